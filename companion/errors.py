@@ -1,0 +1,42 @@
+"""The one tree of exceptions.
+
+    CompanionError
+    ├── InputError          a file, mission, problem or option cannot be believed    -> exit 2
+    ├── LinkError           the link to the autopilot is dead or never answered      -> exit 1
+    │   └── TransferError   a mission, fence, parameter or file transfer failed      -> exit 1
+    └── JobError            the job was understood and could not be done             -> exit 1
+
+Outcomes that are part of normal life (no plan found, an upload refused) are enums in values, not exceptions.
+"""
+
+
+class CompanionError(Exception):
+    """Root of everything this program raises on purpose."""
+
+    exit_code = 1
+
+
+class InputError(CompanionError):
+    """Bad input: names the source, the place in it, what is wrong and what to do.
+
+    The text is one line: ``mission.toml: [goal] lat: 143.66 is not a latitude; write degrees within ±90``.
+    """
+
+    exit_code = 2
+
+    def __init__(self, source: str, place: str, problem: str, remedy: str = "") -> None:
+        self.source, self.place, self.problem, self.remedy = source, place, problem, remedy
+        where = f"{source}: {place}" if place else source
+        super().__init__(f"{where}: {problem}" + (f"; {remedy}" if remedy else ""))
+
+
+class LinkError(CompanionError):
+    """The link is dead, refused, or nobody answers on it."""
+
+
+class TransferError(LinkError):
+    """A transfer with the autopilot ended without success; the text says what it answered."""
+
+
+class JobError(CompanionError):
+    """The job was understood and could not be done."""

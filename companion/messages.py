@@ -1,0 +1,307 @@
+"""The values that several rooms share.
+
+Every value is frozen, made of keywords, carries ``t_s`` where it has a moment, and is checked when it is made:
+a value that exists is finite and in range. What is not known is ``None``.
+
+Units are in the names: metres, seconds, radians, true north clockwise, local east-north frame. Geographic
+positions are the one exception and say ``_deg``. A wind direction is where the wind comes from
+(``twd_from_rad``); angles to the bow are positive to starboard (``awa_rad``, ``twa_rad``).
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def _finite(**values: float | None) -> None:
+    for name, value in values.items():
+        if value is not None and not math.isfinite(value):
+            raise ValueError(f"{name} is {value}, not a finite number")
+
+
+# --------------------------------------------------------------------------------------------- place
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GeoPoint:
+    """A WGS 84 position: latitude [deg, ±90] north, longitude [deg, ±180] east."""
+
+    lat_deg: float
+    lon_deg: float
+
+    def __post_init__(self) -> None:
+        _finite(lat_deg=self.lat_deg, lon_deg=self.lon_deg)
+        if not -90.0 <= self.lat_deg <= 90.0:
+            raise ValueError(f"latitude {self.lat_deg} is outside ±90 degrees")
+        if not -180.0 <= self.lon_deg <= 180.0:
+            raise ValueError(f"longitude {self.lon_deg} is outside ±180 degrees")
+
+
+# ------------------------------------------------------------------------------------------- vehicle
+class Mode(enum.IntEnum):
+    """ArduRover's modes by their custom_mode number."""
+
+    MANUAL = 0
+    ACRO = 1
+    STEERING = 3
+    HOLD = 4
+    LOITER = 5
+    FOLLOW = 6
+    SIMPLE = 7
+    DOCK = 8
+    CIRCLE = 9
+    AUTO = 10
+    RTL = 11
+    SMART_RTL = 12
+    GUIDED = 15
+    INITIALISING = 16
+
+
+class MissionState(enum.IntEnum):
+    """MISSION_STATE of MISSION_CURRENT."""
+
+    UNKNOWN = 0
+    NO_MISSION = 1
+    NOT_STARTED = 2
+    ACTIVE = 3
+    PAUSED = 4
+    COMPLETE = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleState:
+    """Where the boat is and how it moves (GLOBAL_POSITION_INT and ATTITUDE)."""
+
+    t_s: float
+    boot_s: float
+    position: GeoPoint
+    velocity_en_mps: tuple[float, float]
+    heading_rad: float
+    roll_rad: float | None = None
+    yaw_rate_radps: float | None = None
+
+    def __post_init__(self) -> None:
+        _finite(
+            t_s=self.t_s, boot_s=self.boot_s, ve=self.velocity_en_mps[0], vn=self.velocity_en_mps[1],
+            heading_rad=self.heading_rad, roll_rad=self.roll_rad, yaw_rate_radps=self.yaw_rate_radps,
+        )
+
+    @property
+    def speed_mps(self) -> float:
+        """Speed over ground [m/s]."""
+        return math.hypot(*self.velocity_en_mps)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AutopilotStatus:
+    """What the autopilot says of itself (HEARTBEAT, MISSION_CURRENT, NAV_CONTROLLER_OUTPUT, EKF, SYS_STATUS)."""
+
+    t_s: float
+    boot_s: float | None = None
+    mode: Mode | None = None
+    is_armed: bool = False
+    system_status: int = 0
+    ekf_ok: bool = False
+    gps_fix: int | None = None
+    mission_seq: int | None = None
+    mission_total: int | None = None
+    mission_state: MissionState = MissionState.UNKNOWN
+    waypoint_distance_m: float | None = None
+    target_bearing_rad: float | None = None
+    cross_track_m: float | None = None  # positive: the boat is to the RIGHT of its leg (the wire has the reverse)
+    battery_v: float | None = None
+    battery_remaining: float | None = None
+    fence_breached: bool | None = None
+    last_reached_seq: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatusText:
+    """A STATUSTEXT: severity 0 emergency .. 7 debug."""
+
+    t_s: float
+    severity: int
+    text: str
+    source_component: int = 1
+
+
+# ---------------------------------------------------------------------------------------------- wind
+class WindSource(enum.Enum):
+    """Who made the sample."""
+
+    AUTOPILOT_TRUE = "autopilot_true"          # WIND: low-passed by WNDVN_TRUE_FILT
+    APPARENT = "apparent"                      # AppWnd* with heading and ground velocity, ours
+    RECORD = "record"
+    SIMULATED = "simulated"
+
+
+class WindReference(enum.Enum):
+    """What the wind moves against."""
+
+    GROUND = "ground"
+    WATER = "water"
+
+
+class WindQuality(enum.Enum):
+    """How far the sample may be believed."""
+
+    GOOD = "good"
+    TURNING = "turning"          # within a manoeuvre: compass and vane lag
+    LIGHT = "light"              # direction nearly without meaning
+    HELD = "held"                # the autopilot holds an old value
+    SUSPECT = "suspect"          # a fault detector objects
+    INVALID = "invalid"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindSample:
+    """One reading of the true wind: from where [rad, true north], how fast [m/s]."""
+
+    t_s: float
+    twd_from_rad: float
+    tws_mps: float
+    source: WindSource = WindSource.AUTOPILOT_TRUE
+    reference: WindReference = WindReference.GROUND
+    quality: WindQuality = WindQuality.GOOD
+
+    def __post_init__(self) -> None:
+        _finite(t_s=self.t_s, twd_from_rad=self.twd_from_rad, tws_mps=self.tws_mps)
+        if not 0.0 <= self.tws_mps <= 100.0:
+            raise ValueError(f"true wind speed {self.tws_mps} m/s is out of range 0..100")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ApparentWind:
+    """The wind on the moving boat: speed [m/s], angle from the bow [rad, -π..π), starboard positive."""
+
+    t_s: float
+    awa_rad: float
+    aws_mps: float
+
+    def __post_init__(self) -> None:
+        _finite(t_s=self.t_s, awa_rad=self.awa_rad, aws_mps=self.aws_mps)
+        if not 0.0 <= self.aws_mps <= 100.0:
+            raise ValueError(f"apparent wind speed {self.aws_mps} m/s is out of range 0..100")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindForecast:
+    """The wind to come, as a table over horizons that the planner interpolates.
+
+    All arrays are float64 of shape (n,) except ``half_width_rad`` (n, m). ``horizon_s`` is strictly increasing
+    and starts at 0 or later. ``half_width_rad[i, j]`` is the half width of the central interval that holds the
+    direction at ``horizon_s[i]`` with probability ``level[j]``; it carries heavy tails that sigma does not.
+    """
+
+    t_s: float
+    horizon_s: NDArray[np.float64]
+    mean_twd_from_rad: NDArray[np.float64]
+    sigma_twd_rad: NDArray[np.float64]
+    mean_tws_mps: NDArray[np.float64]
+    sigma_tws_mps: NDArray[np.float64]
+    level: NDArray[np.float64]
+    half_width_rad: NDArray[np.float64]
+    correlation_time_s: float
+
+    def __post_init__(self) -> None:
+        n = self.horizon_s.shape[0]
+        if n == 0 or not bool(np.all(np.diff(self.horizon_s) > 0.0)):
+            raise ValueError("horizon_s must be strictly increasing and not empty")
+        for name in ("mean_twd_from_rad", "sigma_twd_rad", "mean_tws_mps", "sigma_tws_mps"):
+            array = getattr(self, name)
+            if array.shape != (n,) or not bool(np.all(np.isfinite(array))):
+                raise ValueError(f"{name} must be {n} finite numbers")
+        if self.half_width_rad.shape != (n, self.level.shape[0]):
+            raise ValueError("half_width_rad must be (horizons, levels)")
+        if not self.correlation_time_s > 0.0:
+            raise ValueError("correlation_time_s must be positive")
+
+
+# ------------------------------------------------------------------------------------------- traffic
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AisReport:
+    """One report of another vessel; what it did not say is None. ``age_s`` is how old it was at ``t_s``."""
+
+    t_s: float
+    mmsi: int
+    position: GeoPoint | None = None
+    course_rad: float | None = None
+    speed_mps: float | None = None
+    heading_rad: float | None = None
+    turn_rate_radps: float | None = None
+    nav_status: int | None = None
+    ship_type: int | None = None
+    name: str | None = None
+    bow_m: float | None = None
+    stern_m: float | None = None
+    port_m: float | None = None
+    starboard_m: float | None = None
+    is_class_b: bool = False
+    age_s: float = 0.0
+
+
+# ------------------------------------------------------------------------------------------- mission
+class MissionType(enum.IntEnum):
+    """Which list of the autopilot (MAV_MISSION_TYPE)."""
+
+    MISSION = 0
+    FENCE = 1
+    RALLY = 2
+
+
+class Command(enum.IntEnum):
+    """The MAV_CMD numbers that this project writes or understands in missions, fences and rally lists."""
+
+    NAV_WAYPOINT = 16
+    NAV_LOITER_UNLIM = 17
+    NAV_LOITER_TURNS = 18
+    NAV_LOITER_TIME = 19
+    NAV_RETURN_TO_LAUNCH = 20
+    NAV_DELAY = 93
+    DO_JUMP = 177
+    DO_CHANGE_SPEED = 178
+    DO_SET_HOME = 179
+    DO_FENCE_ENABLE = 207
+    NAV_FENCE_RETURN_POINT = 5000
+    NAV_FENCE_POLYGON_VERTEX_INCLUSION = 5001
+    NAV_FENCE_POLYGON_VERTEX_EXCLUSION = 5002
+    NAV_FENCE_CIRCLE_INCLUSION = 5003
+    NAV_FENCE_CIRCLE_EXCLUSION = 5004
+    NAV_RALLY_POINT = 5100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionItem:
+    """One item of a mission, fence or rally list, as files and the wire carry it.
+
+    ``lat_e7`` and ``lon_e7`` are the wire's integers (degrees x 1e7), so that equality after a read-back means
+    equality on the autopilot. Items have no sequence number: a list's order is its numbering, and a mission's
+    item 0 (home) belongs to the transfer, not to the list.
+    """
+
+    command: int
+    lat_e7: int = 0
+    lon_e7: int = 0
+    alt_m: float = 0.0
+    frame: int = 3  # MAV_FRAME_GLOBAL_RELATIVE_ALT
+    params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    autocontinue: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.command <= 0xFFFF:
+            raise ValueError(f"command {self.command} is not a MAV_CMD")
+        if abs(self.lat_e7) > 900_000_000 or abs(self.lon_e7) > 1_800_000_000:
+            raise ValueError(f"item at {self.lat_e7 / 1e7}, {self.lon_e7 / 1e7} is not on the globe")
+
+    @property
+    def point(self) -> GeoPoint:
+        """The item's position."""
+        return GeoPoint(lat_deg=self.lat_e7 / 1e7, lon_deg=self.lon_e7 / 1e7)
+
+
+def waypoint(point: GeoPoint, *, command: int = Command.NAV_WAYPOINT) -> MissionItem:
+    """Return an item at ``point``."""
+    return MissionItem(command=command, lat_e7=round(point.lat_deg * 1e7), lon_e7=round(point.lon_deg * 1e7))

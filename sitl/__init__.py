@@ -1,0 +1,1 @@
+"""The proving ground: a simulated autopilot, weather, scenarios and campaigns."""
