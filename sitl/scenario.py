@@ -1,0 +1,145 @@
+"""Scenario files: a situation, the weather, the events in time, and what must hold.
+
+The same file runs on the embedded autopilot under the virtual clock and on the real ArduRover. Numbers carry
+their unit in the key; directions are where the wind comes from, degrees clockwise from true north.
+"""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from companion.errors import InputError
+
+EventKind = Literal[
+    "wind_shift",        # veer_deg, over_s
+    "wind_speed",        # tws_mps, over_s
+    "mode",              # mode: the operator's choice, by name
+    "reboot",            # the autopilot restarts
+    "link_cut",          # for_s (none: for good)
+    "link_quality",      # loss, duplicate, reorder, delay_s, corrupt
+    "gps_jump",          # east_m, north_m, for_s
+    "vane",              # state: frozen | offset | spikes | ok; value_deg
+    "kill_companion",    # restart_after_s: SIGKILL in the middle of whatever it does
+    "kill_planner",
+    "foreign_mission",   # somebody uploads another mission
+    "battery",           # volts
+    "current",           # set_deg, drift_mps
+]
+
+
+class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The weather."""
+
+    model: Literal["constant", "ou", "recorded"] = "ou"
+    from_deg: float = 0.0
+    tws_mps: float = 5.0
+    sd_deg: float = 9.0
+    tau_s: float = 28.0          # 1 / rho: Wolsieffer's 0.036 Hz
+    tws_sd_mps: float = 0.3
+    file: str | None = None
+
+
+class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Something that happens at ``at_s`` after setting sail."""
+
+    at_s: float
+    kind: EventKind
+    veer_deg: float = 0.0
+    over_s: float = 0.0
+    tws_mps: float | None = None
+    mode: str | None = None
+    for_s: float | None = None
+    loss: float = 0.0
+    duplicate: float = 0.0
+    reorder: float = 0.0
+    corrupt: float = 0.0
+    delay_s: float = 0.0
+    east_m: float = 0.0
+    north_m: float = 0.0
+    state: str | None = None
+    value_deg: float = 0.0
+    restart_after_s: float | None = None
+    volts: float | None = None
+    set_deg: float = 0.0
+    drift_mps: float = 0.0
+
+
+class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What must hold when it is over; a check that is not asked for is not made."""
+
+    arrived: bool | None = True
+    contacts: int | None = 0
+    within_m: float | None = None             # last position to the last goal
+    max_time_s: float | None = None
+    min_clearance_m: float | None = None
+    max_silence_s: float | None = 10.0        # without a status from the companion that says why
+    max_replans_per_hour: float | None = None
+    end_phase: str | None = None
+    alerts: tuple[str, ...] = ()              # announced at least once, by code
+    laps_rounded: int | None = None
+
+
+class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One scenario file."""
+
+    name: str
+    title: str = ""
+    mission: str
+    limit_s: float = 3600.0
+    speedup: float = 8.0                      # when it runs in real time, separate processes
+    start_heading_deg: float | None = None
+    wind: WindSpec = msgspec.field(default_factory=WindSpec)
+    parameters: dict[str, float] = {}
+    events: tuple[EventSpec, ...] = ()
+    expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)
+
+    def mission_path(self, source: Path) -> Path:
+        """Return the mission file, which is named relative to the scenario."""
+        return (source.parent / self.mission).resolve()
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read a scenario, or a mission file as the plain scenario of sailing it.
+
+    Raises:
+        InputError: naming the file, the key and the remedy.
+    """
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), "", error.strerror or "cannot be read", "name a scenario TOML file") from error
+    try:
+        raw: dict[str, Any] = msgspec.toml.decode(text)
+    except msgspec.DecodeError as error:
+        raise InputError(str(path), "", f"is not TOML ({error})") from error
+    if "mission" not in raw and "goal" in raw:
+        raw = {"name": str(raw.get("name", path.stem)), "mission": path.name}
+    try:
+        scenario = msgspec.convert(raw, Scenario)
+    except msgspec.ValidationError as error:
+        raise InputError(str(path), _place(error), _sentence(error), _suggestion(error)) from error
+    if not scenario.mission_path(path).is_file():
+        raise InputError(str(path), "mission", f"there is no file {scenario.mission}", "paths start at the scenario")
+    return scenario
+
+
+def _place(error: msgspec.ValidationError) -> str:
+    _, _, place = str(error).partition(" - at `$")
+    return place.rstrip("`").lstrip(".")
+
+
+def _sentence(error: msgspec.ValidationError) -> str:
+    return str(error).partition(" - at ")[0]
+
+
+def _suggestion(error: msgspec.ValidationError) -> str:
+    if "unknown field" not in str(error):
+        return ""
+    word = str(error).partition("`")[2].partition("`")[0]
+    known = {f for s in (Scenario, WindSpec, EventSpec, ExpectSpec) for f in s.__struct_fields__}
+    close = difflib.get_close_matches(word, sorted(known), n=1)
+    return f"did you mean `{close[0]}`?" if close else "remove it"

@@ -1,0 +1,209 @@
+"""The judge: what the boat really did, against what the scenario says must hold.
+
+Works on the truth (where the boat was, not where anybody believed it was) and on what the companion recorded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from sitl.scenario import ExpectSpec
+
+# A tack is counted when the boat has been on the other side of the wind for this long.
+TACK_SETTLED_S = 3.0
+
+
+@dataclass(slots=True)
+class Truth:
+    """The true track, sampled at a fixed rate from setting sail on."""
+
+    t_s: list[float] = field(default_factory=list)
+    en_m: list[tuple[float, float]] = field(default_factory=list)
+    heading_rad: list[float] = field(default_factory=list)
+    speed_mps: list[float] = field(default_factory=list)
+    twd_from_rad: list[float] = field(default_factory=list)
+    tws_mps: list[float] = field(default_factory=list)
+
+    def add(
+        self, t_s: float, en_m: tuple[float, float], heading_rad: float, speed_mps: float, wind: tuple[float, float]
+    ) -> None:
+        """Append one sample."""
+        self.t_s.append(t_s)
+        self.en_m.append(en_m)
+        self.heading_rad.append(heading_rad)
+        self.speed_mps.append(speed_mps)
+        self.twd_from_rad.append(wind[0])
+        self.tws_mps.append(wind[1])
+
+    def positions_m(self) -> NDArray[np.float64]:
+        """Return (n, 2) east, north [m]."""
+        return np.asarray(self.en_m, dtype=np.float64).reshape(-1, 2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One thing that had to hold, with its figure."""
+
+    name: str
+    passed: bool
+    figure: Any
+    required: Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """The outcome of one run."""
+
+    scenario: str
+    seed: int
+    passed: bool
+    checks: tuple[Check, ...]
+    figures: dict[str, Any]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of verdict.json."""
+        return {
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "passed": self.passed,
+            "checks": [
+                {"name": c.name, "passed": c.passed, "figure": c.figure, "required": c.required} for c in self.checks
+            ],
+            "figures": self.figures,
+        }
+
+
+def contacts_and_clearance(positions_m: NDArray[np.float64], solid: BaseGeometry) -> tuple[int, float]:
+    """Return how often the track entered ``solid`` and its smallest distance to it [m] (0 on contact).
+
+    Args:
+        positions_m: (n, 2) east, north [m].
+        solid: obstacles and everything outside the fence, local metres.
+    """
+    if solid.is_empty or len(positions_m) == 0:
+        return 0, math.inf
+    points = shapely.points(positions_m)
+    shapely.prepare(solid)
+    inside = shapely.intersects(solid, points)
+    entries = int(np.count_nonzero(inside[1:] & ~inside[:-1])) + int(inside[0])
+    clearance = float(np.min(shapely.distance(solid, points)))
+    if len(positions_m) > 1 and entries == 0 and shapely.intersects(solid, shapely.LineString(positions_m)):
+        return 1, 0.0
+    return entries, clearance
+
+
+def count_tacks(truth: Truth) -> tuple[int, int]:
+    """Return (tacks, gybes): settled changes of the side that the wind comes from."""
+    tacks = gybes = 0
+    side = 0
+    since_s = -math.inf
+    pending = 0
+    deepest = 0.0
+    for t_s, heading, wind in zip(truth.t_s, truth.heading_rad, truth.twd_from_rad, strict=True):
+        twa = (heading - wind + math.pi) % (2.0 * math.pi) - math.pi
+        now = 1 if twa > 0.0 else -1
+        if side == 0:
+            side = now
+        if now == side:
+            pending, deepest = 0, 0.0
+            last_twa = abs(twa)
+            continue
+        if pending == 0:
+            pending, since_s = now, t_s
+            deepest = min(abs(twa), last_twa)
+        if t_s - since_s >= TACK_SETTLED_S:
+            if deepest < math.pi / 2.0:
+                tacks += 1
+            else:
+                gybes += 1
+            side, pending = now, 0
+    return tacks, gybes
+
+
+def longest_silence_s(status_times_s: Sequence[float], start_s: float, end_s: float) -> float:
+    """Return the longest stretch without a status [s]."""
+    times = [start_s, *[t for t in status_times_s if start_s <= t <= end_s], end_s]
+    return max((b - a for a, b in zip(times, times[1:], strict=False)), default=0.0)
+
+
+def judge(
+    *,
+    scenario: str,
+    seed: int,
+    expect: ExpectSpec,
+    truth: Truth,
+    solid: BaseGeometry,
+    goal_en_m: tuple[float, float],
+    summary: dict[str, Any],
+    status_times_s: Sequence[float] | None,
+    alerts: Iterable[str],
+    errors: Sequence[str] = (),
+) -> Verdict:
+    """Hold a run against what its scenario expects."""
+    positions = truth.positions_m()
+    contacts, clearance = contacts_and_clearance(positions, solid)
+    tacks, gybes = count_tacks(truth)
+    end_distance = float(math.dist(truth.en_m[-1], goal_en_m)) if truth.en_m else math.inf
+    duration_s = truth.t_s[-1] - truth.t_s[0] if truth.t_s else 0.0
+    sailed_m = float(np.sum(np.hypot(*np.diff(positions, axis=0).T))) if len(positions) > 1 else 0.0
+    silence_s = (
+        longest_silence_s(status_times_s, truth.t_s[0], truth.t_s[-1]) if status_times_s is not None and truth.t_s else None
+    )
+    seen = set(alerts)
+    checks: list[Check] = [Check(name="no unhandled error", passed=not errors, figure=list(errors), required=[])]
+
+    def check(name: str, passed: bool, figure: Any, required: Any) -> None:
+        checks.append(Check(name=name, passed=passed, figure=figure, required=required))
+
+    arrived = bool(summary.get("arrived"))
+    if expect.arrived is not None:
+        check("arrived", arrived == expect.arrived, arrived, expect.arrived)
+    if expect.contacts is not None:
+        check("contacts", contacts <= expect.contacts, contacts, f"at most {expect.contacts}")
+    if expect.within_m is not None:
+        check("distance to the goal, m", end_distance <= expect.within_m, end_distance, f"at most {expect.within_m}")
+    if expect.max_time_s is not None:
+        check("time, s", duration_s <= expect.max_time_s, duration_s, f"at most {expect.max_time_s}")
+    if expect.min_clearance_m is not None:
+        check("clearance, m", clearance >= expect.min_clearance_m, clearance, f"at least {expect.min_clearance_m}")
+    if expect.max_silence_s is not None and silence_s is not None:
+        check("silence, s", silence_s <= expect.max_silence_s, silence_s, f"at most {expect.max_silence_s}")
+    if expect.max_replans_per_hour is not None and duration_s > 0.0:
+        rate = float(summary.get("replans", 0)) * 3600.0 / duration_s
+        check("replans per hour", rate <= expect.max_replans_per_hour, rate, f"at most {expect.max_replans_per_hour}")
+    if expect.end_phase is not None:
+        check("end phase", summary.get("end_phase") == expect.end_phase, summary.get("end_phase"), expect.end_phase)
+    if expect.laps_rounded is not None:
+        rounded = summary.get("marks_rounded")
+        check("marks rounded", rounded == expect.laps_rounded, rounded, expect.laps_rounded)
+    for code in expect.alerts:
+        check(f"announced {code}", code in seen, sorted(seen), code)
+    return Verdict(
+        scenario=scenario,
+        seed=seed,
+        passed=all(c.passed for c in checks),
+        checks=tuple(checks),
+        figures={
+            "arrived": arrived,
+            "contacts": contacts,
+            "time_s": duration_s,
+            "distance_m": sailed_m,
+            "tacks": tacks,
+            "gybes": gybes,
+            "min_clearance_m": clearance if math.isfinite(clearance) else None,
+            "end_distance_m": end_distance,
+            "silence_s": silence_s,
+            "replans": summary.get("replans"),
+            "promised_risk": summary.get("promised_risk"),
+            "no_go_entries": summary.get("no_go_entries"),
+            "end_reason": summary.get("end_reason"),
+        },
+    )
