@@ -5,6 +5,7 @@ Works on the truth (where the boat was, not where anybody believed it was) and o
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -104,9 +105,9 @@ def count_tacks(truth: Truth) -> tuple[int, int]:
     """Return (tacks, gybes): settled changes of the side that the wind comes from."""
     tacks = gybes = 0
     side = 0
-    since_s = -math.inf
     pending = 0
-    deepest = 0.0
+    since_s = -math.inf
+    deepest = last_twa = 0.0
     for t_s, heading, wind in zip(truth.t_s, truth.heading_rad, truth.twd_from_rad, strict=True):
         twa = (heading - wind + math.pi) % (2.0 * math.pi) - math.pi
         now = 1 if twa > 0.0 else -1
@@ -131,7 +132,7 @@ def count_tacks(truth: Truth) -> tuple[int, int]:
 def longest_silence_s(status_times_s: Sequence[float], start_s: float, end_s: float) -> float:
     """Return the longest stretch without a status [s]."""
     times = [start_s, *[t for t in status_times_s if start_s <= t <= end_s], end_s]
-    return max((b - a for a, b in zip(times, times[1:], strict=False)), default=0.0)
+    return max((b - a for a, b in itertools.pairwise(times)), default=0.0)
 
 
 def judge(
@@ -154,9 +155,9 @@ def judge(
     end_distance = float(math.dist(truth.en_m[-1], goal_en_m)) if truth.en_m else math.inf
     duration_s = truth.t_s[-1] - truth.t_s[0] if truth.t_s else 0.0
     sailed_m = float(np.sum(np.hypot(*np.diff(positions, axis=0).T))) if len(positions) > 1 else 0.0
-    silence_s = (
-        longest_silence_s(status_times_s, truth.t_s[0], truth.t_s[-1]) if status_times_s is not None and truth.t_s else None
-    )
+    silence_s = None
+    if status_times_s is not None and truth.t_s:
+        silence_s = longest_silence_s(status_times_s, truth.t_s[0], truth.t_s[-1])
     seen = set(alerts)
     checks: list[Check] = [Check(name="no unhandled error", passed=not errors, figure=list(errors), required=[])]
 
