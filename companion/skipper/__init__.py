@@ -1,1 +1,4 @@
-"""skipper."""
+"""The skipper: when to plan again, how a new plan takes the place of the old one, what to do when something is wrong.
+
+Pure rules. ``Skipper(voyage=..., config=...).step(state, snapshot) -> (state, actions)``.
+"""

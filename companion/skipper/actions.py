@@ -1,0 +1,146 @@
+"""What the skipper asks of the application. Each answer comes back in a later snapshot under the same id."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import Any
+
+from companion.messages import MissionItem, Mode
+
+
+class ReplanReason(enum.Enum):
+    """Why a plan was asked for."""
+
+    START = "start"
+    WAYPOINT = "waypoint"              # Wolsieffer: at each waypoint, from the next one
+    FORECAST = "forecast"              # the forecast has changed enough to matter
+    WIND_SHIFT = "wind_shift"          # Büsser: 20 deg
+    PLAN_AGE = "plan_age"              # Büsser: 60 minutes
+    OFF_LEG = "off_leg"                # Büsser: off the leg by more than the grid size
+    NO_GO = "no_go"                    # the present wind makes the leg unsailable
+    NEXT_GOAL = "next_goal"
+    MISSED_BUOY = "missed_buoy"
+    NO_PROGRESS = "no_progress"
+    OPERATOR_BACK = "operator_back"
+    REBOOT = "reboot"
+    OBSTACLE = "obstacle"              # the area or the traffic changed
+    OPERATOR_WISH = "operator_wish"
+    RETRY = "retry"                    # a step of the ladder after nothing was found
+    MISMATCH = "mismatch"              # the mission on the autopilot is not the one that was uploaded
+
+
+class Severity(enum.IntEnum):
+    """MAVLink's."""
+
+    CRITICAL = 2
+    ERROR = 3
+    WARNING = 4
+    NOTICE = 5
+    INFO = 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RequestPlan:
+    """Plan ``problem`` (a companion.planner.Problem) within ``budget_s``; answered by PlanOutcome.
+
+    ``from_seq`` is the mission item that the plan starts at: its result replaces the items after it; None when
+    the plan starts at the boat and replaces the present target too. ``rung`` names the step of the ladder.
+    """
+
+    request_id: int
+    problem: Any
+    reason: ReplanReason
+    budget_s: float
+    seed: int
+    from_seq: int | None
+    rung: str = ""
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CancelPlan:
+    """Forget a request: its answer is no longer wanted."""
+
+    request_id: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UploadMission:
+    """Put ``items`` (without home; items[0] has seq 1) on the autopilot; answered by UploadOutcome.
+
+    The first ``keep_first`` items are those of the mission there now: a partial write may begin after them.
+    Write, read back, compare (up to the first item that ends a mission: an old tail behind it is dead), and only
+    then, if ``set_current`` is given, DO_SET_MISSION_CURRENT(set_current, p2=1). OK means all of that.
+    """
+
+    upload_id: int
+    items: tuple[MissionItem, ...]
+    keep_first: int
+    set_current: int | None
+    plan_id: int
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UploadFence:
+    """Put the fence on the autopilot; answered by UploadOutcome."""
+
+    upload_id: int
+    items: tuple[MissionItem, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadMission:
+    """Read the mission from the autopilot; answered by ReadOutcome, and in Snapshot.mission."""
+
+    read_id: int
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetMode:
+    """Ask for a mode; answered by CommandOutcome."""
+
+    command_id: int
+    mode: Mode
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arm:
+    """Ask for arming; answered by CommandOutcome."""
+
+    command_id: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetCurrent:
+    """DO_SET_MISSION_CURRENT(seq, p2 = 1 if reset); answered by CommandOutcome."""
+
+    command_id: int
+    seq: int
+    reset: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SteerHeading:
+    """A GUIDED heading setpoint [rad, true]; repeated every step, since it times out after 3 s. Not answered."""
+
+    heading_rad: float
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Announce:
+    """Say ``text`` (STATUSTEXT, decision record). ``code`` names the rule or watchdog that speaks."""
+
+    severity: Severity
+    code: str
+    text: str
+
+
+Action = (
+    RequestPlan | CancelPlan | UploadMission | UploadFence | ReadMission | SetMode | Arm | SetCurrent
+    | SteerHeading | Announce
+)

@@ -1,0 +1,80 @@
+"""The voyage as a value: where to go, which side of the buoys, where not to be.
+
+Positions are local (east, north) [m] in ``Voyage.frame``. ``Area`` is what the skipper asks of the geography;
+``companion.geofence`` provides it.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.geo.frame import LocalFrame
+
+PointEn = tuple[float, float]
+
+
+class Side(enum.Enum):
+    """On which side of the boat a buoy is left."""
+
+    NONE = "none"
+    PORT = "port"              # turning left around it, as at the WRSC 2009
+    STARBOARD = "starboard"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goal:
+    """A place to reach within ``radius_m``, or a buoy to round.
+
+    With ``side`` the position is the buoy's, which the boat rounds at ``rounding_m``. ``bandwidth_m`` bounds
+    the way from the goal before (or the start) to this one: half the width of Büsser's band (section 4.2).
+    """
+
+    en_m: PointEn
+    radius_m: float = 5.0
+    name: str = ""
+    side: Side = Side.NONE
+    rounding_m: float = 12.0
+    bandwidth_m: float | None = None
+
+
+class Area(Protocol):
+    """What the skipper asks of the geography (read-only, local metres)."""
+
+    def clearance_m(self, points_en: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the signed distance [m] to the nearest obstacle or fence, negative inside, for (n, 2) points."""
+        ...
+
+    def polygons(self, margin_m: float) -> tuple[str, ...]:
+        """Return the obstacles grown by ``margin_m`` as WKT POLYGONs."""
+        ...
+
+    def fence(self, margin_m: float) -> str | None:
+        """Return the fence shrunk by ``margin_m`` as a WKT POLYGON, None when there is none."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Voyage:
+    """Goals in their order, sailed ``laps`` times, in ``area``; ``refuges`` are safe places to wait in."""
+
+    name: str
+    frame: LocalFrame
+    goals: tuple[Goal, ...]
+    area: Area = field(compare=False)
+    laps: int = 1
+    refuges: tuple[PointEn, ...] = ()
+    home_en_m: PointEn | None = None
+
+    def __post_init__(self) -> None:
+        if not self.goals or self.laps < 1:
+            raise ValueError("a voyage has at least one goal and one lap")
+
+    @property
+    def legs(self) -> tuple[Goal, ...]:
+        """The goals of all laps in order."""
+        return self.goals * self.laps
