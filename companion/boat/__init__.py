@@ -1,1 +1,37 @@
-"""boat."""
+"""What the boat can do: polar, limits, losses, and the margins that its autopilot's habits ask for.
+
+>>> boat = Boat(polar=ardurover_sitl())
+>>> boat.problem_boat(tws_mps=5.0)["no_go_half_deg"]
+45.0
+"""
+
+from companion.boat.boat import Boat, Hull
+from companion.boat.library import ardurover_sitl, avalon, constant
+from companion.boat.margins import (
+    AutopilotLimits,
+    Margin,
+    MarginPart,
+    fence_penetration,
+    required_margin,
+)
+from companion.boat.polar import MPS_PER_KNOT, Polar, SailingAngle
+from companion.boat.polar_files import PolarFile, parse_polar, read_polar
+
+__all__ = [
+    "MPS_PER_KNOT",
+    "AutopilotLimits",
+    "Boat",
+    "Hull",
+    "Margin",
+    "MarginPart",
+    "Polar",
+    "PolarFile",
+    "SailingAngle",
+    "ardurover_sitl",
+    "avalon",
+    "constant",
+    "fence_penetration",
+    "parse_polar",
+    "read_polar",
+    "required_margin",
+]

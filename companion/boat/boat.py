@@ -1,0 +1,85 @@
+"""The boat: everything about it that a plan depends on, as one value."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from companion.boat.polar import Polar
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hull:
+    """Size of the hull [m] and how far the position of its antenna can be wrong [m]."""
+
+    length_m: float = 1.0
+    beam_m: float = 0.3
+    position_error_m: float = 2.5  # a plain GPS receiver's 95 % figure
+
+    def __post_init__(self) -> None:
+        for name in ("length_m", "beam_m", "position_error_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} is {value}; it must be 0 m or more")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Boat:
+    """Polar, limits and losses.
+
+    Attributes:
+        polar: Speed by true wind angle and speed.
+        no_go_half_rad: Half angle of the no-go zone about the true wind [rad, 0..π).
+        max_twa_rad: Deepest angle sailed [rad, above no_go_half_rad, to π].
+        turn_rate_radps: Rate of turn in a manoeuvre [rad/s, above 0].
+        tack_loss_s: Time lost in a tack beyond the turn itself [s].
+        gybe_loss_s: The same for a gybe [s].
+        hull: Its size.
+    """
+
+    polar: Polar
+    no_go_half_rad: float = math.radians(45.0)
+    max_twa_rad: float = math.pi
+    turn_rate_radps: float = math.radians(30.0)
+    tack_loss_s: float = 0.0
+    gybe_loss_s: float = 0.0
+    hull: Hull = field(default_factory=Hull)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.no_go_half_rad < math.pi:
+            raise ValueError(f"no-go half angle {math.degrees(self.no_go_half_rad):.1f}° is outside 0..180°")
+        if not self.no_go_half_rad <= self.max_twa_rad <= math.pi + 1e-9:
+            raise ValueError(f"deepest angle {math.degrees(self.max_twa_rad):.1f}° is outside the no-go angle..180°")
+        if not (math.isfinite(self.turn_rate_radps) and self.turn_rate_radps > 0.0):
+            raise ValueError(f"turn rate {self.turn_rate_radps} rad/s must be positive")
+        for name in ("tack_loss_s", "gybe_loss_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} is {value}; it must be 0 s or more")
+
+    def problem_boat(self, tws_mps: float) -> dict[str, Any]:
+        """Return the ``boat`` part of a planning problem in this wind (degrees, as its JSON has them).
+
+        A polar that is the same at every angle becomes the constant model. Losses are written when there are any.
+        """
+        twa_rad, speed_mps = self.polar.curve(tws_mps)
+        speed: dict[str, Any]
+        if bool(np.all(speed_mps == speed_mps[0])):
+            speed = {"model": "constant", "v_mps": float(speed_mps[0])}
+        else:
+            twa_deg = [round(float(a), 9) for a in np.degrees(twa_rad)]
+            speed = {"model": "polar", "twa_deg": twa_deg, "v_mps": [float(v) for v in speed_mps]}
+        out: dict[str, Any] = {
+            "no_go_half_deg": math.degrees(self.no_go_half_rad),
+            "max_twa_deg": math.degrees(self.max_twa_rad),
+            "turn_rate_rad_s": self.turn_rate_radps,
+            "speed": speed,
+        }
+        if self.tack_loss_s > 0.0:
+            out["tack_loss_s"] = self.tack_loss_s
+        if self.gybe_loss_s > 0.0:
+            out["gybe_loss_s"] = self.gybe_loss_s
+        return out

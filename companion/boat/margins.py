@@ -1,0 +1,159 @@
+"""How far from an obstacle to plan, from what the autopilot does with the plan.
+
+ArduRover does not sail the planned line. It cuts corners by WP_RADIUS, wanders about the line, and where the
+wind shifts a leg inside SAIL_NO_GO_ANGLE it beats in a corridor of SAIL_XTRACK_MAX to either side. Where a fence
+is the last barrier, it is crossed before the autopilot reacts. Each of these becomes a named part of the margin.
+
+The figures are measured on ArduRover 4.7-dev's simulated sailboat at 2 to 3 m/s and scale with speed where the
+cause is a delay.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from companion.boat.boat import Hull
+
+TRACK_S = 0.85              # |cross-track| <= 2.4 m at 2.93 m/s on reaches and close-hauled legs
+CORRIDOR_OVERSHOOT_S = 0.45  # 0.9 m beyond the corridor at 2.0 m/s before the tack has turned the boat
+CORNER_S = 1.4              # |cross-track| <= 4 m at 2.9 m/s just after the corners of a planned beat
+HOLD_COAST_S = 3.6          # 10.4 m inside a fence at 2.93 m/s when the action is Hold (sails eased)
+RTL_TURN_S = 2.6            # 7.4 m when it is RTL (the boat turns round)
+DEFAULT_PAD_RAD = math.radians(2.0)  # legs planned at NO_GO + 2 degrees made no tacks of their own
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AutopilotLimits:
+    """The autopilot's parameters that decide where the boat goes; ArduRover's sailboat defaults."""
+
+    sail_no_go_angle_rad: float = math.radians(45.0)
+    sail_xtrack_max_m: float = 10.0  # 0: no corridor, long boards to the layline
+    wp_radius_m: float = 2.0
+    turn_radius_m: float = 0.9
+    fence_action: int | None = None  # None: no fence guards this obstacle; 0 report .. 4, see FENCE_ACTION
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.sail_no_go_angle_rad < math.pi / 2.0:
+            raise ValueError(f"SAIL_NO_GO_ANGLE {math.degrees(self.sail_no_go_angle_rad):.0f}° is outside 0..90°")
+        for name in ("sail_xtrack_max_m", "wp_radius_m", "turn_radius_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} is {value}; it must be 0 m or more")
+
+    @classmethod
+    def from_params(cls, params: Mapping[str, float]) -> AutopilotLimits:
+        """Return the limits from parameter values by ArduPilot's names; a missing one keeps its default.
+
+        >>> AutopilotLimits.from_params({"WP_RADIUS": 3.0, "SAIL_XTRACK_MAX": 30.0}).sail_xtrack_max_m
+        30.0
+        """
+        default = cls()
+        fenced = params.get("FENCE_ENABLE", 0.0) > 0.0
+        return cls(
+            sail_no_go_angle_rad=math.radians(
+                params.get("SAIL_NO_GO_ANGLE", math.degrees(default.sail_no_go_angle_rad))),
+            sail_xtrack_max_m=float(params.get("SAIL_XTRACK_MAX", default.sail_xtrack_max_m)),
+            wp_radius_m=float(params.get("WP_RADIUS", default.wp_radius_m)),
+            turn_radius_m=float(params.get("TURN_RADIUS", default.turn_radius_m)),
+            fence_action=int(params.get("FENCE_ACTION", 1.0)) if fenced else None,
+        )
+
+    def planned_no_go_rad(self, *, pad_rad: float = DEFAULT_PAD_RAD) -> float:
+        """Return the no-go half angle to plan with: the autopilot's own plus a pad, so it adds no tacks."""
+        return self.sail_no_go_angle_rad + pad_rad
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarginPart:
+    """One cause of distance: its name, its size [m] and why."""
+
+    name: str
+    value_m: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Margin:
+    """The distance to keep between the planned line and an obstacle, and what it is made of.
+
+    ``is_bounded`` is False when the autopilot's deviation has no limit of its own (SAIL_XTRACK_MAX 0 and legs that
+    a shift can push into its no-go zone): then the total covers everything else and ``why`` says so.
+    """
+
+    parts: tuple[MarginPart, ...]
+    is_bounded: bool = True
+
+    @property
+    def total_m(self) -> float:
+        """The sum of the parts [m]: they can all happen at once, on the same side."""
+        return sum(part.value_m for part in self.parts)
+
+    def describe(self) -> str:
+        """Return one line: the total and its parts."""
+        parts = " + ".join(f"{part.name} {part.value_m:.1f}" for part in self.parts)
+        tail = "" if self.is_bounded else " (no bound on the beat: SAIL_XTRACK_MAX is 0)"
+        return f"{self.total_m:.1f} m = {parts}{tail}"
+
+
+def required_margin(
+    limits: AutopilotLimits, *, speed_mps: float, hull: Hull | None = None, largest_turn_rad: float = math.pi / 2.0,
+    legs_can_enter_no_go: bool = True,
+) -> Margin:
+    """Return the margin that the autopilot's behaviour asks for.
+
+    Args:
+        limits: The autopilot's parameters.
+        speed_mps: Highest boat speed expected [m/s, 0 or more].
+        hull: Size and position error; a 1 m boat with plain GPS when None.
+        largest_turn_rad: Largest heading change at a waypoint of the plan [rad, 0..π].
+        legs_can_enter_no_go: Whether a wind shift that is not excluded can put a leg into SAIL_NO_GO_ANGLE.
+
+    Raises:
+        ValueError: when speed or turn is out of range.
+    """
+    if not (math.isfinite(speed_mps) and speed_mps >= 0.0):
+        raise ValueError(f"speed {speed_mps} m/s must be 0 or more")
+    if not 0.0 <= largest_turn_rad <= math.pi + 1e-9:
+        raise ValueError(f"turn {largest_turn_rad} rad is outside 0..π")
+    hull = hull or Hull()
+    radius_m = max(limits.wp_radius_m, limits.turn_radius_m)
+    # The chord from one leg to the next, each a radius from the corner, is at most this far from both legs.
+    cut_m = 0.5 * radius_m * math.sin(max(largest_turn_rad, math.pi / 2.0))
+    overshoot_m = CORNER_S * speed_mps * min(1.0, largest_turn_rad / (math.pi / 2.0))
+    corner_m = max(cut_m, overshoot_m)
+    track_m = TRACK_S * speed_mps
+    corridor = legs_can_enter_no_go and limits.sail_xtrack_max_m > 0.0
+    corridor_m = limits.sail_xtrack_max_m + CORRIDOR_OVERSHOOT_S * speed_mps if corridor else 0.0
+    widest = max((corridor_m, "corridor"), (corner_m, "corner"), (track_m, "track"))
+    why = {
+        "corridor": f"a shift puts the leg into SAIL_NO_GO_ANGLE: it beats within SAIL_XTRACK_MAX "
+                    f"{limits.sail_xtrack_max_m:g} m and overshoots by {CORRIDOR_OVERSHOOT_S * speed_mps:.1f} m",
+        "corner": f"cuts the corner {cut_m:.1f} m inside (WP_RADIUS {limits.wp_radius_m:g} m) or swings "
+                  f"{overshoot_m:.1f} m wide of it",
+        "track": "wanders about the line",
+    }
+    parts = [
+        MarginPart(name="hull", value_m=0.5 * math.hypot(hull.length_m, hull.beam_m), why="the hull about its antenna"),
+        MarginPart(name="position", value_m=hull.position_error_m, why="the position fix"),
+        # The three ways off the line exclude one another in time: the boat corners, follows or beats.
+        MarginPart(name=widest[1], value_m=widest[0], why=why[widest[1]]),
+    ]
+    fence = fence_penetration(limits, speed_mps=speed_mps)
+    if fence is not None:
+        parts.append(fence)
+    return Margin(parts=tuple(parts), is_bounded=not legs_can_enter_no_go or limits.sail_xtrack_max_m > 0.0)
+
+
+def fence_penetration(limits: AutopilotLimits, *, speed_mps: float) -> MarginPart | None:
+    """Return how far past its own fence the autopilot lets the boat go [m]; None without a fence."""
+    if limits.fence_action is None:
+        return None
+    if limits.fence_action == 0:
+        return MarginPart(name="fence", value_m=0.0, why="FENCE_ACTION 0 only reports: the fence stops nothing")
+    coasts = limits.fence_action in {2, 4}
+    seconds = HOLD_COAST_S if coasts else RTL_TURN_S
+    why = "eases its sails and coasts" if coasts else "turns for home"
+    text = f"on a breach the autopilot {why} inside the fence"
+    return MarginPart(name="fence", value_m=seconds * speed_mps, why=text)
