@@ -1,0 +1,62 @@
+"""What a simulated autopilot is told before it boots, and what it tells those who judge it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from companion.messages import GeoPoint, Mode
+
+HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
+EKF_READY_S = 42.0
+"""Boot to "EKF3 IMU0 is using GPS" on the real one [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AutopilotConfig:
+    """One boat.
+
+    Attributes:
+        home: where it lies at power-up; the origin of ``Truth.east_m`` and ``north_m``.
+        heading_rad: of the bow at power-up.
+        is_warm: powered up long ago: boot time starts at 60 s, EKF ready, filters settled, wind there from the
+            first step. Otherwise it boots as the real one does: wind after 5 s, ready after 42 s.
+        is_moored: lies still until it is armed. The real simulator drifts with the wind from the start.
+        sysid: MAVLink system id.
+        parameters: values other than the fresh boat's, by name.
+        battery_v: at the start; ``Autopilot.set_battery`` changes it.
+    """
+
+    home: GeoPoint = HOME
+    heading_rad: float = 0.0
+    is_warm: bool = False
+    is_moored: bool = False
+    sysid: int = 1
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    battery_v: float = 12.6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """What is so, whatever the sensors and the telemetry say. Read by judges and plots, never by a companion.
+
+    ``t_s`` is the simulated time since the ``Autopilot`` was made (a reboot does not set it back); the wind is the
+    true wind that acts on the boat now. Positions are metres east and north of ``AutopilotConfig.home``.
+    """
+
+    t_s: float
+    boot_s: float
+    east_m: float
+    north_m: float
+    position: GeoPoint
+    heading_rad: float
+    speed_mps: float
+    velocity_en_mps: tuple[float, float]
+    twd_from_rad: float
+    tws_mps: float
+    mode: Mode
+    is_armed: bool
+    mission_seq: int
+    tacks: int
+    sail_rad: float
+    rudder: float

@@ -1,0 +1,161 @@
+"""A link without a network: two transports in one process, with a radio's faults between them.
+
+Both ends have the shape of ``companion.mavlink.transport.Transport``. Nothing is lost by default. Faults are drawn
+from a seed, frame by frame, so that under the virtual clock a bad link repeats exactly.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from companion.clock import now_s
+from companion.errors import LinkError
+from companion.mavlink.transport import OnBytes, TransportState, TransportStats
+
+_STX = 0xFD
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Impairment:
+    """What the link does to each frame, in either direction; probabilities are per frame.
+
+    Attributes:
+        loss: share of frames that vanish.
+        duplicate: share that arrive twice.
+        reorder: share held back so that later frames overtake them, by up to ``reorder_s``.
+        corrupt: share with one byte changed.
+        delay_s: for every frame, one way.
+        jitter_s: a further delay, uniform on 0..jitter_s; order is kept.
+    """
+
+    loss: float = 0.0
+    duplicate: float = 0.0
+    reorder: float = 0.0
+    reorder_s: float = 0.2
+    corrupt: float = 0.0
+    delay_s: float = 0.0
+    jitter_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("loss", "duplicate", "reorder", "corrupt"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} is a probability, not {getattr(self, name)}")
+
+
+PERFECT = Impairment()
+
+
+class MemoryLink:
+    """A pair of ends, ``near`` (for a companion) and ``far`` (for the autopilot).
+
+    ``impairment`` may be replaced at any time; ``cut()`` silences both directions until ``mend()``.
+    """
+
+    def __init__(self, name: str = "memory", *, impairment: Impairment = PERFECT, seed: int = 0) -> None:
+        self.impairment = impairment
+        self.is_cut = False
+        self.near = MemoryEnd(f"{name}:near", self, random.Random(f"{seed} near"))
+        self.far = MemoryEnd(f"{name}:far", self, random.Random(f"{seed} far"))
+        self.near.other, self.far.other = self.far, self.near
+
+    def cut(self) -> None:
+        """Let nothing through from now on; what is under way still arrives."""
+        self.is_cut = True
+
+    def mend(self) -> None:
+        """End a cut."""
+        self.is_cut = False
+
+
+class MemoryEnd:
+    """One end; a ``Transport``. Both ends may be closed and opened again."""
+
+    def __init__(self, name: str, link: MemoryLink, rng: random.Random) -> None:
+        self.other: MemoryEnd = self
+        self._name = name
+        self._link = link
+        self._rng = rng
+        self._stats = TransportStats()
+        self._on_bytes: OnBytes | None = None
+        self._last_arrival_s = 0.0
+
+    @property
+    def name(self) -> str:
+        """A name for messages."""
+        return self._name
+
+    @property
+    def stats(self) -> TransportStats:
+        """Live counters."""
+        return self._stats
+
+    @property
+    def state(self) -> TransportState:
+        """Open or closed."""
+        return TransportState.CLOSED if self._on_bytes is None else TransportState.OPEN
+
+    async def open(self, on_bytes: OnBytes) -> None:
+        """Start to receive."""
+        if self._on_bytes is not None:
+            raise LinkError(f"{self._name} is already open")
+        self._on_bytes = on_bytes
+        self._stats.connections += 1
+
+    async def close(self) -> None:
+        """Stop to receive; what is under way is lost."""
+        self._on_bytes = None
+
+    def write(self, data: bytes) -> None:
+        """Send every frame in ``data`` on its own way through the link."""
+        if self._on_bytes is None or self._link.is_cut:
+            self._stats.writes_dropped += 1
+            self._stats.bytes_dropped += len(data)
+            return
+        self._stats.bytes_out += len(data)
+        faults = self._link.impairment
+        if faults == PERFECT:
+            asyncio.get_running_loop().call_soon(self.other.deliver, data)
+            return
+        for frame in frames(data):
+            self._send(frame, faults)
+
+    def _send(self, frame: bytes, faults: Impairment) -> None:
+        rng = self._rng
+        if rng.random() < faults.loss:
+            self._stats.writes_dropped += 1
+            return
+        copies = 2 if rng.random() < faults.duplicate else 1
+        for _ in range(copies):
+            sent = frame
+            if rng.random() < faults.corrupt:
+                place = rng.randrange(len(frame))
+                sent = frame[:place] + bytes([frame[place] ^ rng.randrange(1, 256)]) + frame[place + 1:]
+            arrival_s = now_s() + faults.delay_s + faults.jitter_s * rng.random()
+            if rng.random() < faults.reorder:
+                arrival_s += faults.reorder_s * rng.random()
+            else:
+                arrival_s = self._last_arrival_s = max(arrival_s, self._last_arrival_s)
+            asyncio.get_running_loop().call_at(arrival_s, self.other.deliver, sent)
+
+    def deliver(self, data: bytes) -> None:
+        """Hand over what arrived, if anybody is there."""
+        if self._on_bytes is not None:
+            self._stats.bytes_in += len(data)
+            self._on_bytes(data)
+
+
+def frames(data: bytes) -> Iterator[bytes]:
+    """Split bytes into MAVLink 2 frames; what is none comes out as it is, up to the next frame."""
+    start = 0
+    while start < len(data):
+        if data[start] == _STX and start + 3 <= len(data):
+            signed = 13 if data[start + 2] & 1 else 0
+            end = start + 12 + data[start + 1] + signed
+        else:
+            end = data.find(bytes([_STX]), start + 1)
+            end = len(data) if end < 0 else end
+        yield data[start:end]
+        start = end
