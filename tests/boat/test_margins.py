@@ -1,0 +1,77 @@
+"""Margins follow the autopilot's parameters, part by part."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.boat import AutopilotLimits, Hull, fence_penetration, required_margin
+
+
+def names(margin):
+    return [part.name for part in margin.parts]
+
+
+def test_the_corridor_decides_when_a_leg_can_enter_the_no_go_zone():
+    wide = required_margin(AutopilotLimits(sail_xtrack_max_m=30.0), speed_mps=2.0)
+    assert "corridor" in names(wide)
+    part = next(p for p in wide.parts if p.name == "corridor")
+    assert part.value_m == pytest.approx(30.9, abs=0.01)  # measured: 29.1-29.6 at the tack, never 0.9 m beyond 30
+    tight = required_margin(AutopilotLimits(sail_xtrack_max_m=30.0), speed_mps=2.0, legs_can_enter_no_go=False)
+    assert "corridor" not in names(tight)
+    assert tight.total_m < wide.total_m
+
+
+def test_without_a_corridor_the_beat_has_no_bound():
+    margin = required_margin(AutopilotLimits(sail_xtrack_max_m=0.0), speed_mps=2.0)
+    assert not margin.is_bounded
+    assert "no bound" in margin.describe()
+    assert required_margin(AutopilotLimits(sail_xtrack_max_m=0.0), speed_mps=2.0, legs_can_enter_no_go=False).is_bounded
+
+
+def test_the_fence_lets_the_boat_in_as_far_as_was_measured():
+    hold = fence_penetration(AutopilotLimits(fence_action=2), speed_mps=2.93)
+    rtl = fence_penetration(AutopilotLimits(fence_action=1), speed_mps=2.93)
+    assert hold.value_m >= 10.4
+    assert rtl.value_m >= 7.4
+    assert fence_penetration(AutopilotLimits(), speed_mps=2.93) is None
+    assert "stops nothing" in fence_penetration(AutopilotLimits(fence_action=0), speed_mps=2.93).why
+
+
+def test_parameters_by_their_ardupilot_names():
+    limits = AutopilotLimits.from_params({
+        "SAIL_NO_GO_ANGLE": 35.0, "SAIL_XTRACK_MAX": 12.0, "WP_RADIUS": 7.0, "TURN_RADIUS": 1.0,
+        "FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0,
+    })
+    assert math.degrees(limits.planned_no_go_rad()) == pytest.approx(37.0)
+    assert limits.fence_action == 2
+    assert AutopilotLimits.from_params({"FENCE_ACTION": 2.0}).fence_action is None
+
+
+@given(st.floats(0.0, 10.0), st.floats(0.0, 100.0), st.floats(0.0, 40.0), st.floats(0.0, math.pi))
+@settings(max_examples=100, deadline=None, derandomize=True)
+def test_a_margin_never_shrinks_with_speed_corridor_or_radius(speed, corridor, radius, turn):
+    def total(v, x, r):
+        limits = AutopilotLimits(sail_xtrack_max_m=x, wp_radius_m=r, fence_action=2)
+        return required_margin(limits, speed_mps=v, largest_turn_rad=turn).total_m
+
+    base = total(speed, corridor, radius)
+    assert base >= 2.5
+    assert total(speed + 1.0, corridor, radius) >= base
+    assert total(speed, corridor + 1.0, radius) >= base
+    assert total(speed, corridor, radius + 1.0) >= base
+
+
+@pytest.mark.parametrize("bad", [
+    {"speed_mps": -1.0}, {"speed_mps": math.nan}, {"speed_mps": 1.0, "largest_turn_rad": 9.0},
+])
+def test_nonsense_is_refused(bad):
+    with pytest.raises(ValueError):
+        required_margin(AutopilotLimits(), **bad)
+
+
+def test_a_bigger_hull_needs_more_room():
+    small = required_margin(AutopilotLimits(), speed_mps=2.0, hull=Hull(length_m=1.0, beam_m=0.3))
+    large = required_margin(AutopilotLimits(), speed_mps=2.0, hull=Hull(length_m=12.0, beam_m=4.0))
+    assert large.total_m - small.total_m == pytest.approx(0.5 * (math.hypot(12, 4) - math.hypot(1, 0.3)))
