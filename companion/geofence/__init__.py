@@ -1,1 +1,17 @@
-"""geofence."""
+"""Where the boat may go: obstacles, fences and missions as values, and every file format that carries them.
+
+``load_mission(path)`` reads a mission TOML with the files that it names; ``Area.local(frame)`` is its picture in
+metres for the planner. ``read(path)`` reads any single file into a ``Document``.
+"""
+
+from companion.geofence.area import Area, Fence, LocalArea
+from companion.geofence.document import Document
+from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.formats import read
+from companion.geofence.mission import Goal, Mission, load_mission
+from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
+
+__all__ = [
+    "Area", "Circle", "Code", "Document", "Fence", "Finding", "Goal", "LocalArea", "Mission", "Obstacle", "Severity",
+    "Zone", "ZoneKind", "load_mission", "read",
+]

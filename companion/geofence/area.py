@@ -1,0 +1,201 @@
+"""The area: obstacles and fence on the globe, and their picture in local metres.
+
+``Area`` is what a mission says; ``Area.local(frame)`` is what the planner, the skipper and the plots use. All
+local geometry is shapely in metres (x east, y north), and every approximation errs to the safe side: circles and
+buffered obstacles are drawn around, limits inside.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from companion.geo.frame import LocalFrame
+from companion.geofence.shapes import Obstacle, Zone, ZoneKind, polygon_en
+
+QUADRANT_SEGMENTS = 4  # of a buffer's corner: 22.5 degree chords; buffer_out pays for the sagitta
+MITRE_FACTOR = 1.0 / math.cos(math.pi / (4.0 * QUADRANT_SEGMENTS))
+
+
+def buffer_out(shape: BaseGeometry, distance_m: float) -> BaseGeometry:
+    """Return a polygon that contains every point within ``distance_m`` of ``shape`` (at most 2 % more)."""
+    if distance_m <= 0.0:
+        return shape
+    return shapely.buffer(shape, distance_m * MITRE_FACTOR, quad_segs=QUADRANT_SEGMENTS)
+
+
+def buffer_in(shape: BaseGeometry, distance_m: float) -> BaseGeometry:
+    """Return a part of ``shape`` whose points are all at least ``distance_m`` from its boundary."""
+    if distance_m <= 0.0:
+        return shape
+    return shapely.buffer(shape, -distance_m * MITRE_FACTOR, quad_segs=QUADRANT_SEGMENTS)
+
+
+def parts(shape: BaseGeometry) -> list[Polygon]:
+    """Return the polygons of a polygonal geometry, empty ones left out."""
+    return [p for p in shapely.get_parts(shape) if isinstance(p, Polygon) and not p.is_empty]
+
+
+@dataclass(frozen=True, slots=True)
+class Fence:
+    """Keep-in and keep-out zones. Several keep-in zones mean their intersection, as ArduPilot has it."""
+
+    zones: tuple[Zone, ...] = ()
+
+    @property
+    def inclusions(self) -> tuple[Zone, ...]:
+        """The keep-in zones."""
+        return tuple(z for z in self.zones if z.kind is ZoneKind.INCLUSION)
+
+    @property
+    def exclusions(self) -> tuple[Zone, ...]:
+        """The keep-out zones."""
+        return tuple(z for z in self.zones if z.kind is ZoneKind.EXCLUSION)
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """Obstacles and fence of a mission, in longitude and latitude.
+
+    Keep-out zones of the fence are obstacles like any other.
+    """
+
+    obstacles: tuple[Obstacle, ...] = ()
+    fence: Fence = Fence()
+
+    @property
+    def solids(self) -> tuple[Obstacle, ...]:
+        """The obstacles and the fence's keep-out zones."""
+        return self.obstacles + tuple(
+            Obstacle(shape=z.shape, name=z.name, margin_m=z.margin_m) for z in self.fence.exclusions
+        )
+
+    def local(self, frame: LocalFrame) -> LocalArea:
+        """Return the area in the metres of ``frame``."""
+        limits: BaseGeometry | None = None
+        for zone in self.fence.inclusions:
+            polygon = buffer_in(polygon_en(zone.shape, frame, cover=False), zone.margin_m or 0.0)
+            limits = polygon if limits is None else shapely.intersection(limits, polygon)
+        solids = self.solids
+        return LocalArea(
+            frame=frame,
+            names=tuple(o.name or f"obstacle {i + 1}" for i, o in enumerate(solids)),
+            polygons=tuple(polygon_en(o.shape, frame) for o in solids),
+            own_margins_m=tuple(o.margin_m or 0.0 for o in solids),
+            limits=limits,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LocalArea:
+    """Obstacles and limits in metres, x east, y north.
+
+    ``names``, ``polygons`` and ``own_margins_m`` run in parallel, one per obstacle. ``limits`` is the water that
+    the fence leaves (polygon or multipolygon, possibly empty), None without a fence. Points are (n, 2) arrays.
+    """
+
+    frame: LocalFrame
+    names: tuple[str, ...]
+    polygons: tuple[Polygon, ...]
+    own_margins_m: tuple[float, ...]
+    limits: BaseGeometry | None
+
+    @functools.cached_property
+    def solid(self) -> BaseGeometry:
+        """The union of the obstacles, prepared; empty without any."""
+        union = shapely.union_all(list(self.polygons)) if self.polygons else MultiPolygon()
+        shapely.prepare(union)
+        return union
+
+    @functools.lru_cache(maxsize=8)  # noqa: B019 - an area lives as long as its voyage
+    def buffered(self, margin_m: float) -> BaseGeometry:
+        """Return the union of all points closer than ``margin_m`` (or the obstacle's own, larger) to an obstacle.
+
+        Prepared. Contains the true buffer; at most 2 % wider.
+        """
+        grown = [buffer_out(p, max(margin_m, m)) for p, m in zip(self.polygons, self.own_margins_m, strict=True)]
+        union = shapely.union_all(grown) if grown else MultiPolygon()
+        shapely.prepare(union)
+        return union
+
+    @functools.lru_cache(maxsize=8)  # noqa: B019 - an area lives as long as its voyage
+    def water(self, margin_m: float = 0.0) -> BaseGeometry | None:
+        """Return the limits less ``margin_m``, prepared; None without a fence."""
+        if self.limits is None:
+            return None
+        inner = buffer_in(self.limits, margin_m)
+        shapely.prepare(inner)
+        return inner
+
+    def obstacle_clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
+        """Return the distance of each point to the nearest obstacle [m], negative inside; inf without any."""
+        points = shapely.points(np.asarray(points_en, dtype=np.float64).reshape(-1, 2))
+        if self.solid.is_empty:
+            return np.full(points.shape, np.inf)
+        outside = np.asarray(shapely.distance(self.solid.boundary, points))
+        return np.where(shapely.covers(self.solid, points), -outside, outside)
+
+    def limit_clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
+        """Return the distance of each point to the limits' edge [m], negative outside; inf without a fence."""
+        points = shapely.points(np.asarray(points_en, dtype=np.float64).reshape(-1, 2))
+        if self.limits is None:
+            return np.full(points.shape, np.inf)
+        if self.limits.is_empty:
+            return np.full(points.shape, -np.inf)
+        shapely.prepare(self.limits)
+        inside = np.asarray(shapely.distance(self.limits.boundary, points))
+        return np.where(shapely.covers(self.limits, points), inside, -inside)
+
+    def clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
+        """Return the smaller of the two clearances [m]: positive in free water."""
+        return np.minimum(self.obstacle_clearance_m(points_en), self.limit_clearance_m(points_en))
+
+    def contains(self, points_en: ArrayLike, margin_m: float = 0.0) -> NDArray[np.bool_]:
+        """Return which points are in free water, ``margin_m`` clear of obstacles and limits."""
+        points = np.asarray(points_en, dtype=np.float64).reshape(-1, 2)
+        buffered, water = self.buffered(margin_m), self.water(margin_m)
+        free = ~np.asarray(shapely.contains_xy(buffered, points[:, 0], points[:, 1]))
+        if water is not None:
+            free &= np.asarray(shapely.intersects_xy(water, points[:, 0], points[:, 1]))
+        return np.asarray(free, dtype=np.bool_)
+
+    def path_clearance_m(self, path_en: ArrayLike) -> float:
+        """Return the exact smallest distance of a polyline (n, 2) to obstacles and limits [m], ≤ 0 on contact."""
+        coordinates = np.asarray(path_en, dtype=np.float64).reshape(-1, 2)
+        line = shapely.linestrings(coordinates) if len(coordinates) > 1 else shapely.points(coordinates[0])
+        clearance = math.inf
+        if not self.solid.is_empty:
+            clearance = float(shapely.distance(self.solid, line))
+        if self.limits is not None:
+            inside = bool(shapely.covers(self.limits, line))
+            clearance = min(clearance, float(shapely.distance(self.limits.boundary, line)) if inside else -1.0)
+        return clearance
+
+    def obstacles_wkt(self, margin_m: float = 0.0) -> list[str]:
+        """Return the obstacles, grown by the margin and merged, as the WKT polygons of a planning problem."""
+        merged = self.buffered(margin_m) if self.polygons else MultiPolygon()
+        return [shapely.to_wkt(p, rounding_precision=4) for p in parts(merged)]
+
+    def fence_wkt(self, margin_m: float = 0.0, near_en: tuple[float, float] | None = None) -> str | None:
+        """Return the limits less the margin as a WKT polygon, None without a fence.
+
+        Limits in several pieces give the piece that holds ``near_en``, or the nearest to it. Raises ValueError
+        when the margin leaves no water at all.
+        """
+        water = self.water(margin_m)
+        if water is None:
+            return None
+        pieces = parts(water)
+        if not pieces:
+            raise ValueError(f"no water is left inside the fence at a margin of {margin_m:g} m")
+        if near_en is not None:
+            here = shapely.points(near_en)
+            pieces.sort(key=lambda p: (float(shapely.distance(p, here)), -p.area))
+        return str(shapely.to_wkt(pieces[0], rounding_precision=4))

@@ -1,0 +1,95 @@
+"""What a file holds, whatever its format: zones, mission items, home, rally points, tracks, and what was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from companion.geofence.findings import Finding, require_clean
+from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
+from companion.messages import GeoPoint, MissionItem
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Track:
+    """A line that was sailed or drawn: (lat, lon) points in order, with times [s since 1970] if it has them."""
+
+    points: tuple[GeoPoint, ...]
+    times_s: tuple[float, ...] | None = None
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """A point or line without area (a rock, a cable): it becomes a zone once it is given a radius."""
+
+    geometry: Point | LineString
+    kind: ZoneKind
+    name: str = ""
+    margin_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Document:
+    """The neutral form between formats.
+
+    ``items`` is a mission without its home, as files number it from 1; ``rally`` holds NAV_RALLY_POINT items;
+    ``return_point`` is the fence's (Mission Planner's first line). ``findings`` is what the reader met.
+    """
+
+    source: str = ""
+    format: str = ""
+    zones: tuple[Zone, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    items: tuple[MissionItem, ...] = ()
+    item_names: tuple[str, ...] = ()
+    home: GeoPoint | None = None
+    rally: tuple[MissionItem, ...] = ()
+    return_point: GeoPoint | None = None
+    tracks: tuple[Track, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def is_empty(self) -> bool:
+        """Nothing at all was read."""
+        return not (self.zones or self.marks or self.items or self.rally or self.tracks
+                    or self.home or self.return_point)
+
+    def require_clean(self) -> Document:
+        """Return the document itself; raise its first error as InputError."""
+        require_clean(self.findings, self.source)
+        return self
+
+    def with_zones(self, zones: tuple[Zone, ...]) -> Document:
+        """Return the document with other zones."""
+        return replace(self, zones=zones)
+
+    def as_obstacles(self, radius_m: float) -> tuple[Obstacle, ...]:
+        """Return everything solid as obstacles: keep-out zones, and marks grown by ``radius_m``."""
+        solid = [
+            Obstacle(shape=z.shape, name=z.name, margin_m=z.margin_m)
+            for z in self.zones if z.kind is ZoneKind.EXCLUSION
+        ]
+        for mark in self.marks:
+            if mark.kind is ZoneKind.EXCLUSION:
+                solid.extend(
+                    Obstacle(shape=s, name=mark.name, margin_m=mark.margin_m)
+                    for s in grown(mark.geometry, radius_m)
+                )
+        return tuple(solid)
+
+
+def grown(geometry: BaseGeometry, radius_m: float) -> list[Polygon | Circle]:
+    """Return the shapes that hold all points within ``radius_m`` of a point or line in longitude and latitude."""
+    from companion.geo.frame import LocalFrame
+    from companion.geofence.area import buffer_out, parts
+    from companion.geofence.shapes import polygon_lonlat, wrap_lon_deg
+
+    if isinstance(geometry, Point):
+        return [Circle(GeoPoint(lat_deg=geometry.y, lon_deg=wrap_lon_deg(geometry.x)), radius_m)]
+    x, y = geometry.coords[0][:2]
+    frame = LocalFrame(GeoPoint(lat_deg=y, lon_deg=wrap_lon_deg(x)))
+    local = LineString(frame.array_en_from_lonlat([c[:2] for c in geometry.coords]))
+    return [polygon_lonlat(p, frame) for p in parts(buffer_out(local, radius_m))]

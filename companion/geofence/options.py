@@ -1,0 +1,147 @@
+"""What a mission TOML may say: one struct per table, every field with its unit and default.
+
+An unknown key is an error (with the nearest known spelling), a missing one takes the default given here.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+Latitude = Annotated[float, Meta(ge=-90.0, le=90.0)]
+Longitude = Annotated[float, Meta(ge=-180.0, le=180.0)]
+Positive = Annotated[float, Meta(gt=0.0)]
+NonNegative = Annotated[float, Meta(ge=0.0)]
+Heading = Annotated[float, Meta(ge=0.0, le=360.0)]
+
+
+class GoalOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[[goal]]``: a mark to reach, or to round."""
+
+    lat: Latitude
+    lon: Longitude
+    radius_m: Annotated[float, Meta(gt=0.0, le=5000.0)] = 10.0
+    rounding: Literal["port", "starboard"] | None = None
+    """Leave the mark to this side of the boat; None: just come within the radius."""
+    name: str = ""
+
+
+class StartOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[start]``: for checks, previews and simulations. The boat itself starts where it is."""
+
+    lat: Latitude
+    lon: Longitude
+    heading_deg: Heading = 0.0
+
+
+class AreaOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[area]``: files beside the mission, and the margins to keep from what is in them."""
+
+    obstacles: tuple[str, ...] = ()
+    fence: str | None = None
+    axis: Literal["auto", "lonlat", "latlon"] = "auto"
+    margin_m: Annotated[float, Meta(ge=0.0, le=1000.0)] = 12.0
+    """What the plan keeps clear of obstacles and fence."""
+    margin_floor_m: Annotated[float, Meta(ge=0.0, le=1000.0)] = 6.0
+    """What it may be reduced to, step by step, when there is no way at the full margin."""
+    point_radius_m: Annotated[float, Meta(gt=0.0, le=5000.0)] = 10.0
+    """The radius of an obstacle that is only a point or a line."""
+
+
+class RiskOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[risk]``: the probabilities that a plan must keep."""
+
+    delta_s: Annotated[float, Meta(ge=0.5, lt=1.0)] = 0.9
+    """Probability of being outside the no-go zone at each instant."""
+    max_path_risk: Annotated[float, Meta(gt=0.0, lt=1.0)] | None = None
+    """Bound of the probability of ever being inside it along a plan; None: not bounded."""
+
+
+class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[boat]``: what the boat can do."""
+
+    polar: str | Positive = "ardurover"
+    """``ardurover`` (the simulator's), a polar file beside the mission, or a constant speed [m/s]."""
+    no_go_half_deg: Annotated[float, Meta(ge=0.0, lt=90.0)] = 47.0
+    max_twa_deg: Annotated[float, Meta(gt=90.0, le=180.0)] = 180.0
+    turn_rate_deg_s: Annotated[float, Meta(gt=0.0, le=360.0)] = 30.0
+    tack_loss_s: NonNegative = 4.0
+
+
+class WindOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[wind]``: how the wind is estimated, and what previews assume before there is any."""
+
+    estimator: str = "default"
+    preview_from_deg: Heading = 0.0
+    preview_speed_mps: Annotated[float, Meta(gt=0.0, le=50.0)] = 5.0
+
+
+class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[operator]``: what the companion may do uninvited. Nothing is sent to the boat that is not allowed here."""
+
+    arm: bool = False
+    set_auto: bool = False
+    guided: bool = False
+    upload_fence: bool = False
+
+
+class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[skipper]``: the rules of the voyage, numbers as data."""
+
+    replan: Literal["waypoint", "forecast"] = "waypoint"
+    """At each waypoint, or also when the wind leaves what was forecast."""
+    end: Literal["loiter", "home"] = "loiter"
+    laps: Annotated[int, Meta(ge=1, le=10_000)] = 1
+    bandwidth_m: Positive | None = None
+    """Half width of the lane between two goals; None: no lane."""
+    planning_budget_s: Annotated[float, Meta(gt=0.0, le=600.0)] = 2.0
+    expansions: Annotated[int, Meta(gt=0)] | None = None
+    """Plan by this much effort in place of time, so that a voyage repeats; None: by time."""
+    seed: Annotated[int, Meta(ge=0)] = 0
+    min_replan_s: NonNegative = 10.0
+    max_replan_s: Positive | None = None
+    """Replan at the latest after this long; None: never for time alone."""
+    wind_shift_deg: Annotated[float, Meta(gt=0.0, le=180.0)] = 20.0
+    """Replan when the mean wind has turned this far from the plan's."""
+    off_track_m: Positive = 30.0
+    """Replan when the boat is this far from its leg."""
+    voyage_timeout_s: Positive | None = None
+
+
+class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[traffic]``: where other vessels are heard, and how far to stay away."""
+
+    feeds: tuple[str, ...] = ()
+    """``mavlink``, ``udp:HOST:PORT``, a serial port or an NMEA file."""
+    safe_distance_m: Positive = 50.0
+    safe_time_s: Positive = 90.0
+    drop_after_s: Positive = 600.0
+
+
+class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The whole file."""
+
+    goal: Annotated[tuple[GoalOptions, ...], Meta(min_length=1)]
+    name: str = ""
+    description: str = ""
+    start: StartOptions | None = None
+    area: AreaOptions = AreaOptions()
+    risk: RiskOptions = RiskOptions()
+    boat: BoatOptions = BoatOptions()
+    wind: WindOptions = WindOptions()
+    operator: OperatorOptions = OperatorOptions()
+    skipper: SkipperOptions = SkipperOptions()
+    traffic: TrafficOptions = TrafficOptions()
+
+
+def tables() -> dict[str, tuple[str, ...]]:
+    """Return the keys of each table, for spelling suggestions: "" is the top level."""
+    known = {"": MissionOptions.__struct_fields__}
+    for field in msgspec.structs.fields(MissionOptions):
+        if isinstance(field.default, Struct):
+            known[field.name] = type(field.default).__struct_fields__
+    known["goal"] = GoalOptions.__struct_fields__
+    known["start"] = StartOptions.__struct_fields__
+    return known

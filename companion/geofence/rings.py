@@ -1,0 +1,167 @@
+"""From the rings that files write to polygons that hold: closing, crossing, degenerate, swapped, far away.
+
+A repair never lets the sea grow: a keep-out zone is repaired to every face that its lines enclose, a keep-in zone
+only to the faces that its lines enclose an odd number of times.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.shapes import ZoneKind, unwrapped
+
+Ring = Sequence[Sequence[float]]
+
+
+class Findings(list[Finding]):
+    """The findings of one reading, in order."""
+
+    def add(self, severity: Severity, code: Code, place: str, text: str, remedy: str = "") -> None:
+        """Append one finding."""
+        self.append(Finding(severity=severity, code=code, place=place, text=text, remedy=remedy))
+
+
+def polygons_from_rings(
+    rings: Sequence[Ring], kind: ZoneKind, place: str, findings: Findings, *, closed: bool = True,
+) -> list[Polygon]:
+    """Return the valid polygons that an outer ring and its holes (lon, lat) describe; none when nothing is left.
+
+    ``closed`` says that the format repeats the first vertex, so that a missing repetition is a finding. What is
+    wrong is added to ``findings`` with ``place``; the polygons are what a repair would make of it.
+    """
+    fixed: list[NDArray[np.float64]] = []
+    for index, ring in enumerate(rings):
+        where = place if index == 0 else f"{place} hole {index}"
+        coordinates = np.array([[float(c[0]), float(c[1])] for c in ring], dtype=np.float64).reshape(-1, 2)
+        coordinates = _ring(coordinates, where, findings, closed=closed)
+        if coordinates.shape[0] == 0:
+            if index == 0:
+                return []
+            continue
+        if fixed:
+            coordinates = unwrapped(coordinates, near_lon_deg=float(fixed[0][0, 0]))
+        fixed.append(coordinates)
+    if not fixed:
+        findings.add(Severity.ERROR, Code.EMPTY, place, "the polygon has no vertices", "draw it or remove it")
+        return []
+    polygon = Polygon(fixed[0], fixed[1:])
+    if polygon.is_valid and polygon.area > 0.0:
+        return [polygon]
+    return _repaired(polygon, kind, place, findings)
+
+
+def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, closed: bool) -> NDArray[np.float64]:
+    """Return the ring closed, finite and continuous; an empty array when it is no ring."""
+    if coordinates.shape[0] == 0:
+        findings.add(Severity.ERROR, Code.EMPTY, place, "the ring has no vertices", "draw it or remove it")
+        return coordinates
+    bad = ~np.isfinite(coordinates).all(axis=1)
+    if bad.any():
+        findings.add(
+            Severity.ERROR, Code.NOT_FINITE, f"{place} vertex {int(np.argmax(bad)) + 1}",
+            "a coordinate is not a finite number", "write degrees",
+        )
+        return np.empty((0, 2))
+    is_closed = coordinates.shape[0] > 1 and bool(np.array_equal(coordinates[0], coordinates[-1]))
+    if not is_closed:
+        if closed:
+            findings.add(
+                Severity.ERROR, Code.UNCLOSED, place,
+                f"the ring is not closed: it starts at {_at(coordinates[0])} and ends at {_at(coordinates[-1])}",
+                "repeat the first vertex at the end (a repair would)",
+            )
+        coordinates = np.vstack([coordinates, coordinates[:1]])
+    if np.unique(coordinates, axis=0).shape[0] < 3:
+        findings.add(
+            Severity.ERROR, Code.DEGENERATE, place, "the ring has fewer than three different vertices",
+            "draw an area, or a POINT or LINESTRING with a radius",
+        )
+        return np.empty((0, 2))
+    _check_range(coordinates, place, findings)
+    if float(np.ptp(coordinates[:, 0])) > 180.0:
+        findings.add(
+            Severity.WARNING, Code.ANTIMERIDIAN, place,
+            "the ring spans more than 180 degrees of longitude and is read as crossing the antimeridian",
+        )
+        coordinates = unwrapped(coordinates)
+        if not math.isclose(coordinates[0, 0], coordinates[-1, 0], abs_tol=1e-6):
+            findings.add(Severity.ERROR, Code.ANTIMERIDIAN, place, "the ring goes round a pole", "cut it in two")
+            return np.empty((0, 2))
+    return coordinates
+
+
+def _check_range(coordinates: NDArray[np.float64], place: str, findings: Findings) -> None:
+    lat_bad = np.abs(coordinates[:, 1]) > 90.0
+    if lat_bad.any():
+        vertex = coordinates[int(np.argmax(lat_bad))]
+        findings.add(
+            Severity.ERROR, Code.SWAPPED_AXES if abs(vertex[0]) <= 90.0 else Code.OUT_OF_RANGE, place,
+            f"latitude {vertex[1]:g} is outside ±90 degrees",
+            'latitude and longitude look swapped: try --axis latlon (or axis = "latlon")'
+            if abs(vertex[0]) <= 90.0 else "write WGS 84 degrees",
+        )
+        return
+    lon_bad = np.abs(coordinates[:, 0]) > 360.0
+    if lon_bad.any():
+        findings.add(
+            Severity.ERROR, Code.OUT_OF_RANGE, place,
+            f"longitude {coordinates[int(np.argmax(lon_bad)), 0]:g} is outside ±180 degrees", "write WGS 84 degrees",
+        )
+
+
+def _repaired(polygon: Polygon, kind: ZoneKind, place: str, findings: Findings) -> list[Polygon]:
+    """Return a safe repair of an invalid polygon, and say what it does."""
+    reason = shapely.is_valid_reason(polygon)
+    if kind is ZoneKind.EXCLUSION:
+        fixed = enclosed_faces(polygon)
+    else:
+        fixed = shapely.intersection(
+            shapely.make_valid(polygon, method="linework", keep_collapsed=True), enclosed_faces(polygon)
+        )
+    pieces = [p for p in shapely.get_parts(fixed) if isinstance(p, Polygon) and p.area > 0.0]
+    effect = (
+        f"a repair would make {len(pieces)} polygon{'s' if len(pieces) != 1 else ''} of "
+        f"{_hectares(pieces)} ha in place of {_hectares([polygon])} ha"
+        if pieces else "nothing would be left of it"
+    )
+    code = Code.SELF_CROSSING if "intersect" in reason.lower() else Code.DEGENERATE
+    name = "the ring crosses itself" if code is Code.SELF_CROSSING else "the polygon is not valid"
+    findings.add(
+        Severity.ERROR, code, place, f"{name} ({_plain(reason)}); {effect}",
+        "redraw it, or write the repair with 'companion fence convert --repair'",
+    )
+    return pieces
+
+
+def enclosed_faces(polygon: Polygon) -> BaseGeometry:
+    """Return every face that the outer ring encloses, less the faces that lie wholly within proper holes."""
+    outer = shapely.union_all(shapely.get_parts(shapely.polygonize([shapely.node(polygon.exterior)])))
+    holes = [Polygon(ring) for ring in polygon.interiors]
+    good = [h for h in holes if h.is_valid and shapely.covers(outer, h)]
+    return shapely.difference(outer, shapely.union_all(good)) if good else outer
+
+
+def _plain(reason: str) -> str:
+    head, _, where = reason.partition("[")
+    return f"{head.strip().lower()} at {where.rstrip(']')}" if where else head.strip().lower()
+
+
+def _hectares(polygons: Sequence[Polygon]) -> str:
+    """Return an area in hectares, good to a percent: degrees scaled at the polygon's latitude."""
+    total = sum(
+        abs(p.area) * 111_195.0**2 * math.cos(math.radians(min(89.9, abs(p.exterior.coords[0][1])))) / 1e4
+        for p in polygons
+    )
+    return f"{total:.3g}"
+
+
+def _at(coordinate: NDArray[np.float64]) -> str:
+    return f"lon {coordinate[0]:.7g} lat {coordinate[1]:.7g}"
