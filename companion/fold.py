@@ -1,0 +1,226 @@
+"""The companion without its shell: values in, snapshots, steps and actions out.
+
+A voyage is a fold: every decoded value, every outcome of an action and every tick goes through here in order, and
+nothing else does. The application feeds it live; ``companion replay`` feeds it from a recorded voyage and must get
+the same actions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from companion.geo.angles import wrap_pi
+from companion.messages import (
+    AisReport,
+    ApparentWind,
+    AutopilotStatus,
+    Mode,
+    StatusText,
+    VehicleState,
+    WindSample,
+)
+from companion.skipper import Skipper
+from companion.skipper.actions import Action
+from companion.skipper.config import Permissions
+from companion.skipper.snapshot import (
+    AutopilotLimits,
+    AutopilotRebooted,
+    Event,
+    MissionOnBoard,
+    ModeChanged,
+    Outcome,
+    ReadOutcome,
+    Snapshot,
+    WaypointReached,
+    WindHealth,
+    WindView,
+)
+from companion.skipper.state import Persisted, SkipperState
+from companion.wind import Estimator, Verdict, WindRoom, make
+
+# A boot time that goes back by more than this is a reboot, not a reordered frame [s].
+REBOOT_BACK_S = 5.0
+# Wind is believed after this long a record [s]; until then its spread is a guess.
+SETTLED_S = 20.0
+# At least this many seconds lie between two forecast tables [s]: they cost more than a step.
+FORECAST_EVERY_S = 1.0
+
+_UNTRUSTED = frozenset({
+    Verdict.FROZEN, Verdict.SPIKING, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR,
+})
+
+Value = VehicleState | AutopilotStatus | WindSample | ApparentWind | StatusText | AisReport
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """What one tick saw and decided."""
+
+    snapshot: Snapshot
+    state: SkipperState
+    actions: tuple[Action, ...]
+
+
+class VoyageFold:
+    """The fold. ``skipper`` holds the rules, ``wind`` the forecaster; everything else here is bookkeeping."""
+
+    def __init__(
+        self, skipper: Skipper, wind: WindRoom, permissions: Permissions, persisted: Persisted | None = None
+    ) -> None:
+        self.skipper, self.wind, self.permissions = skipper, wind, permissions
+        self.state: SkipperState = skipper.initial(persisted)
+        self._mean90: Estimator = make("mean90")
+        self._mean5: Estimator = make("mean5")
+        self._vehicle: VehicleState | None = None
+        self._autopilot: AutopilotStatus | None = None
+        self._heartbeat_s: float | None = None
+        self._mission = MissionOnBoard()
+        self._limits = AutopilotLimits()
+        self._boot_s: float | None = None
+        self._mode: Mode | None = None
+        self._reached: int | None = None
+        self._first_wind_s: float | None = None
+        self._sample_s: float | None = None
+        self._planner_alive = True
+        self._events: list[Event] = []
+        self._outcomes: list[Outcome] = []
+
+    # ------------------------------------------------------------------------------------- inputs
+    def take(self, value: Value) -> None:
+        """Take one decoded value, in the order of time."""
+        if isinstance(value, VehicleState):
+            self._notice_boot(value.boot_s)
+            self._vehicle = value
+            self.wind.update(value)
+        elif isinstance(value, WindSample | ApparentWind):
+            self._take_wind(value)
+        elif isinstance(value, AutopilotStatus):
+            self._take_status(value)
+        elif isinstance(value, StatusText):
+            self._events.append(value)
+
+    def heartbeat(self, t_s: float) -> None:
+        """Note that the autopilot's heartbeat was heard."""
+        self._heartbeat_s = t_s
+
+    def outcome(self, outcome: Outcome) -> None:
+        """Take the outcome of an earlier action."""
+        self._outcomes.append(outcome)
+
+    def read_mission(self, outcome: ReadOutcome, t_s: float) -> None:
+        """Take a mission that was read from the autopilot."""
+        if outcome.items is not None:
+            self._mission = MissionOnBoard(items=outcome.items, read_t_s=t_s)
+        self._outcomes.append(outcome)
+
+    def event(self, event: Event) -> None:
+        """Take something that happened outside the link: an operator's wish."""
+        self._events.append(event)
+
+    def parameters(self, values: Mapping[str, float]) -> None:
+        """Take parameters of the autopilot (ArduPilot's names and units)."""
+        self.wind.set_parameters(values)
+        self._limits = limits_from_parameters(values, self._limits)
+
+    def planner_alive(self, alive: bool) -> None:
+        """Note whether the planner's process lives."""
+        self._planner_alive = alive
+
+    def _notice_boot(self, boot_s: float) -> None:
+        if self._boot_s is not None and boot_s < self._boot_s - REBOOT_BACK_S:
+            self._events.append(AutopilotRebooted())
+            self._mission = MissionOnBoard()
+            self._reached = None
+        self._boot_s = boot_s
+
+    def _take_status(self, status: AutopilotStatus) -> None:
+        if status.mode is not None and status.mode != self._mode:
+            self._events.append(ModeChanged(before=self._mode, after=status.mode))
+            self._mode = status.mode
+        if status.last_reached_seq is not None and status.last_reached_seq != self._reached:
+            self._events.append(WaypointReached(seq=status.last_reached_seq))
+        self._reached = status.last_reached_seq
+        self._autopilot = status
+
+    def _take_wind(self, value: WindSample | ApparentWind) -> None:
+        status = self.wind.update(value)
+        if status is None or status.sample is None or status.sample.t_s == self._sample_s:
+            return
+        sample = status.sample
+        self._sample_s = sample.t_s
+        if self._first_wind_s is None:
+            self._first_wind_s = sample.t_s
+        for mean in (self._mean90, self._mean5):
+            mean.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight)
+
+    # -------------------------------------------------------------------------------------- step
+    def tick(self, t_s: float) -> Step:
+        """Step the skipper at ``t_s``."""
+        snapshot = self._snapshot(t_s)
+        self._events, self._outcomes = [], []
+        self.state, actions = self.skipper.step(self.state, snapshot)
+        return Step(snapshot=snapshot, state=self.state, actions=actions)
+
+    def _snapshot(self, t_s: float) -> Snapshot:
+        vehicle, autopilot = self._vehicle, self._autopilot
+        return Snapshot(
+            t_s=t_s,
+            vehicle=vehicle,
+            vehicle_age_s=None if vehicle is None else t_s - vehicle.t_s,
+            position_en_m=None if vehicle is None else self.skipper.voyage.frame.en_from_geo(vehicle.position),
+            autopilot=autopilot,
+            autopilot_age_s=None if autopilot is None else t_s - autopilot.t_s,
+            heartbeat_age_s=None if self._heartbeat_s is None else t_s - self._heartbeat_s,
+            wind=self._wind_view(t_s),
+            mission=self._mission,
+            limits=self._limits,
+            permissions=self.permissions,
+            planner_alive=self._planner_alive,
+            events=tuple(self._events),
+            outcomes=tuple(self._outcomes),
+        )
+
+    def _wind_view(self, t_s: float) -> WindView:
+        status = self.wind.status(t_s)
+        table = self.wind.forecast_table(t_s)
+        if status is None or table is None or self._first_wind_s is None:
+            return WindView()
+        mean_rad, _, mean_mps, _ = self._mean90.forecast(0.0)
+        now_rad, _, now_mps, _ = self._mean5.forecast(0.0)
+        record_s = t_s - self._first_wind_s
+        if any(v in _UNTRUSTED for v in status.verdicts):
+            health = WindHealth.UNTRUSTED
+        elif Verdict.CALM in status.verdicts:
+            health = WindHealth.LIGHT
+        elif record_s < SETTLED_S:
+            health = WindHealth.SETTLING
+        else:
+            health = WindHealth.GOOD
+        return WindView(
+            health=health,
+            forecast=table,
+            mean_twd_from_rad=wrap_pi(mean_rad),
+            mean_tws_mps=max(0.0, mean_mps),
+            sigma_twd_rad=float(table.sigma_twd_rad[0]),
+            present_twd_from_rad=wrap_pi(now_rad),
+            present_tws_mps=max(0.0, now_mps),
+            record_s=record_s,
+            verdict="" if health is WindHealth.GOOD else status.reason,
+        )
+
+
+def limits_from_parameters(values: Mapping[str, float], before: AutopilotLimits) -> AutopilotLimits:
+    """Return the limits that the autopilot's parameters set (degrees become radians)."""
+    changes: dict[str, Any] = {}
+    if "SAIL_NO_GO_ANGLE" in values:
+        changes["no_go_half_rad"] = values["SAIL_NO_GO_ANGLE"] * 3.141592653589793 / 180.0
+    for name, key in (
+        ("WP_RADIUS", "waypoint_radius_m"),
+        ("SAIL_XTRACK_MAX", "tack_corridor_m"),
+        ("SAIL_LOIT_RADIUS", "loiter_radius_m"),
+    ):
+        if name in values:
+            changes[key] = values[name]
+    return replace(before, **changes)
