@@ -18,6 +18,11 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
+def effort_s() -> float:
+    """Return a stopwatch reading [s] for computing budgets; no part of the voyage's time, never for its logic."""
+    return time.perf_counter()
+
+
 def now_s() -> float:
     """Return the running loop's time [s]; its zero is arbitrary and it never steps back."""
     return asyncio.get_running_loop().time()

@@ -1,0 +1,185 @@
+"""The answer of the planner as a value: legs, cost, bound, status and why."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class PlanStatus(enum.Enum):
+    """How planning ended; ``Plan.reason`` says more."""
+
+    OPTIMAL = "optimal"          # found, and within 0.1 % of a proved lower bound
+    FOUND = "found"              # found; the search ended before the bound was met
+    INFEASIBLE = "infeasible"    # proved: no path exists
+    TIMEOUT = "timeout"          # the effort ended without a path and without a proof
+    INVALID = "invalid"          # the problem cannot be planned at all
+
+    @property
+    def has_path(self) -> bool:
+        """Is there something to sail?"""
+        return self in {PlanStatus.OPTIMAL, PlanStatus.FOUND}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leg:
+    """One straight leg.
+
+    ``heading_rad`` is through the water, [0, 2π); ``twa_rad`` is [-π, π], starboard positive; ``turn_rad`` the
+    heading change into the leg. ``start_s``..``end_s`` is the sailing itself, after the turn. ``sigma_rad`` and
+    ``no_go_half_rad`` are the worst over that time and what the leg was checked against; ``margin_rad`` is
+    |TWA| minus it. ``clearance_m`` is the distance to the nearest obstacle or fence (None: there is none).
+    ``risk`` is the probability that the wind forces the leg into the no-go zone at some instant of it (None: not
+    computed).
+    """
+
+    from_en: tuple[float, float]
+    to_en: tuple[float, float]
+    heading_rad: float
+    twa_rad: float
+    turn_rad: float
+    length_m: float
+    speed_mps: float
+    start_s: float
+    end_s: float
+    sigma_rad: float
+    no_go_half_rad: float
+    risk: float | None = None
+    clearance_m: float | None = None
+
+    @property
+    def margin_rad(self) -> float:
+        """|TWA| minus the no-go half angle [rad]; touching the zone is 0."""
+        return abs(self.twa_rad) - self.no_go_half_rad
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Why:
+    """Why the plan looks as it does: a sentence or more, and the same as data (JSON types only)."""
+
+    text: str = ""
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plan:
+    """A plan. ``waypoints_en`` is (n, 2), starts at the start, and is empty (0, 2) without a path.
+
+    ``cost_s`` is the time of the path (inf without one), ``lower_bound_s`` a proved bound from below (inf when
+    INFEASIBLE). ``expansions`` is the effort spent, ``elapsed_s`` the computing time, ``first_s`` the computing
+    time to the first path (None without one).
+    """
+
+    status: PlanStatus
+    reason: str
+    waypoints_en: NDArray[np.float64]
+    legs: tuple[Leg, ...] = ()
+    cost_s: float = math.inf
+    lower_bound_s: float = 0.0
+    algorithm: str = "auto"
+    seed: int = 0
+    expansions: int = 0
+    elapsed_s: float = 0.0
+    first_s: float | None = None
+    risk: float | None = None
+    why: Why = Why()
+    trace: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def has_path(self) -> bool:
+        """Is there something to sail?"""
+        return self.status.has_path
+
+    @property
+    def gap(self) -> float:
+        """(cost - bound) / bound, at least 0; inf when there is no path or no bound."""
+        if not self.has_path or not self.lower_bound_s > 0.0:
+            return 0.0 if self.has_path and self.cost_s <= self.lower_bound_s else math.inf
+        return max(0.0, self.cost_s / self.lower_bound_s - 1.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form: degrees, metres, seconds; None for what is not finite."""
+        return {
+            "status": self.status.value,
+            "reason": self.reason,
+            "waypoints": [[float(x), float(y)] for x, y in self.waypoints_en],
+            "cost_s": _finite(self.cost_s),
+            "lower_bound_s": _finite(self.lower_bound_s),
+            "gap": _finite(self.gap),
+            "algorithm": self.algorithm,
+            "seed": self.seed,
+            "expansions": self.expansions,
+            "elapsed_s": self.elapsed_s,
+            "first_s": self.first_s,
+            "risk": self.risk,
+            "legs": [_leg_dict(leg) for leg in self.legs],
+            "why": {"text": self.why.text, "data": dict(self.why.data)},
+        }
+
+    @classmethod
+    def from_dict(cls, raw: Mapping[str, Any]) -> Plan:
+        """Return the plan of ``to_dict``'s form (the trace is not kept)."""
+        status = PlanStatus(raw["status"])
+        none = math.inf if not status.has_path else 0.0
+        bound = raw["lower_bound_s"]
+        return cls(
+            status=status,
+            reason=raw["reason"],
+            waypoints_en=np.asarray(raw["waypoints"], dtype=np.float64).reshape(-1, 2),
+            legs=tuple(_leg(leg) for leg in raw["legs"]),
+            cost_s=none if raw["cost_s"] is None else float(raw["cost_s"]),
+            lower_bound_s=math.inf if bound is None else float(bound),
+            algorithm=raw["algorithm"],
+            seed=int(raw["seed"]),
+            expansions=int(raw["expansions"]),
+            elapsed_s=float(raw["elapsed_s"]),
+            first_s=raw["first_s"],
+            risk=raw["risk"],
+            why=Why(text=raw["why"]["text"], data=raw["why"]["data"]),
+        )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _leg_dict(leg: Leg) -> dict[str, Any]:
+    return {
+        "from": list(leg.from_en),
+        "to": list(leg.to_en),
+        "heading_deg": math.degrees(leg.heading_rad),
+        "twa_deg": math.degrees(leg.twa_rad),
+        "turn_deg": math.degrees(leg.turn_rad),
+        "length_m": leg.length_m,
+        "speed_mps": leg.speed_mps,
+        "start_s": leg.start_s,
+        "end_s": leg.end_s,
+        "sigma_deg": math.degrees(leg.sigma_rad),
+        "no_go_half_deg": math.degrees(leg.no_go_half_rad),
+        "risk": leg.risk,
+        "clearance_m": leg.clearance_m,
+    }
+
+
+def _leg(raw: Mapping[str, Any]) -> Leg:
+    return Leg(
+        from_en=(raw["from"][0], raw["from"][1]),
+        to_en=(raw["to"][0], raw["to"][1]),
+        heading_rad=math.radians(raw["heading_deg"]),
+        twa_rad=math.radians(raw["twa_deg"]),
+        turn_rad=math.radians(raw["turn_deg"]),
+        length_m=raw["length_m"],
+        speed_mps=raw["speed_mps"],
+        start_s=raw["start_s"],
+        end_s=raw["end_s"],
+        sigma_rad=math.radians(raw["sigma_deg"]),
+        no_go_half_rad=math.radians(raw["no_go_half_deg"]),
+        risk=raw["risk"],
+        clearance_m=raw["clearance_m"],
+    )
