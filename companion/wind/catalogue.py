@@ -7,9 +7,10 @@ from typing import Any
 
 from companion.errors import InputError
 from companion.wind.estimator import Estimator
+from companion.wind.forecaster import Forecaster
 from companion.wind.ou import OrnsteinUhlenbeck
 
-Forecaster = OrnsteinUhlenbeck
+__all__ = ["NAMES", "Forecaster", "make"]
 
 _MAKERS: dict[str, Callable[..., Estimator]] = {
     "default": Forecaster,
@@ -21,6 +22,8 @@ NAMES = tuple(_MAKERS)
 
 def make(name: str, **options: Any) -> Estimator:
     """Return a new estimator; ``options`` are its constructor's keywords. Raises InputError for a name unknown."""
-    if name not in _MAKERS:
+    if name not in __all__ = ["NAMES", "Forecaster", "make"]
+
+_MAKERS:
         raise InputError("estimator", name, "there is none of that name", "choose " + ", ".join(NAMES))
     return _MAKERS[name](**options)
