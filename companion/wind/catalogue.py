@@ -22,8 +22,7 @@ NAMES = tuple(_MAKERS)
 
 def make(name: str, **options: Any) -> Estimator:
     """Return a new estimator; ``options`` are its constructor's keywords. Raises InputError for a name unknown."""
-    if name not in __all__ = ["NAMES", "Forecaster", "make"]
-
-_MAKERS:
+    maker = _MAKERS.get(name)
+    if maker is None:
         raise InputError("estimator", name, "there is none of that name", "choose " + ", ".join(NAMES))
-    return _MAKERS[name](**options)
+    return maker(**options)
