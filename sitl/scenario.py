@@ -44,7 +44,7 @@ class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Something that happens at ``at_s`` after setting sail."""
+    """Something that happens at ``at_s`` [s] after the simulation's start."""
 
     at_s: float
     kind: EventKind
