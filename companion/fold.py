@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from companion.geo.angles import wrap_pi
+from companion.mavlink.assembler import VehicleAssembler
+from companion.mavlink.codec import AUTOPILOT_COMPONENT, is_autopilot_heartbeat
+from companion.mavlink.frames import Message
 from companion.messages import (
     AisReport,
     ApparentWind,
@@ -44,8 +47,6 @@ from companion.wind import Estimator, Verdict, WindRoom, make
 REBOOT_BACK_S = 5.0
 # Wind is believed after this long a record [s]; until then its spread is a guess.
 SETTLED_S = 20.0
-# At least this many seconds lie between two forecast tables [s]: they cost more than a step.
-FORECAST_EVERY_S = 1.0
 
 _UNTRUSTED = frozenset({
     Verdict.FROZEN, Verdict.SPIKING, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR,
@@ -71,6 +72,8 @@ class VoyageFold:
     ) -> None:
         self.skipper, self.wind, self.permissions = skipper, wind, permissions
         self.state: SkipperState = skipper.initial(persisted)
+        self.assembler = VehicleAssembler()
+        self._parameters: dict[str, float] = {}
         self._mean90: Estimator = make("mean90")
         self._mean5: Estimator = make("mean5")
         self._vehicle: VehicleState | None = None
@@ -80,7 +83,6 @@ class VoyageFold:
         self._limits = AutopilotLimits()
         self._boot_s: float | None = None
         self._mode: Mode | None = None
-        self._reached: int | None = None
         self._first_wind_s: float | None = None
         self._sample_s: float | None = None
         self._planner_alive = True
@@ -88,6 +90,18 @@ class VoyageFold:
         self._outcomes: list[Outcome] = []
 
     # ------------------------------------------------------------------------------------- inputs
+    def message(self, t_s: float, message: Message) -> None:
+        """Take one message of the autopilot's system, heard at ``t_s``, in the order of arrival."""
+        kind = message.get_type()
+        if kind == "HEARTBEAT" and is_autopilot_heartbeat(message):
+            self._heartbeat_s = t_s
+        elif kind == "MISSION_ITEM_REACHED" and message.get_srcComponent() == AUTOPILOT_COMPONENT:
+            self._events.append(WaypointReached(seq=int(message.seq)))
+        elif kind == "PARAM_VALUE":
+            self.parameters({message.param_id: float(message.param_value)})
+        for value in self.assembler.take(t_s, message):
+            self.take(value)
+
     def take(self, value: Value) -> None:
         """Take one decoded value, in the order of time."""
         if isinstance(value, VehicleState):
@@ -100,10 +114,6 @@ class VoyageFold:
             self._take_status(value)
         elif isinstance(value, StatusText):
             self._events.append(value)
-
-    def heartbeat(self, t_s: float) -> None:
-        """Note that the autopilot's heartbeat was heard."""
-        self._heartbeat_s = t_s
 
     def outcome(self, outcome: Outcome) -> None:
         """Take the outcome of an earlier action."""
@@ -121,7 +131,9 @@ class VoyageFold:
 
     def parameters(self, values: Mapping[str, float]) -> None:
         """Take parameters of the autopilot (ArduPilot's names and units)."""
-        self.wind.set_parameters(values)
+        self._parameters.update(values)
+        if any(name.startswith("WNDVN_") for name in values):
+            self.wind.set_parameters(self._parameters)
         self._limits = limits_from_parameters(values, self._limits)
 
     def planner_alive(self, alive: bool) -> None:
@@ -132,16 +144,12 @@ class VoyageFold:
         if self._boot_s is not None and boot_s < self._boot_s - REBOOT_BACK_S:
             self._events.append(AutopilotRebooted())
             self._mission = MissionOnBoard()
-            self._reached = None
         self._boot_s = boot_s
 
     def _take_status(self, status: AutopilotStatus) -> None:
         if status.mode is not None and status.mode != self._mode:
             self._events.append(ModeChanged(before=self._mode, after=status.mode))
             self._mode = status.mode
-        if status.last_reached_seq is not None and status.last_reached_seq != self._reached:
-            self._events.append(WaypointReached(seq=status.last_reached_seq))
-        self._reached = status.last_reached_seq
         self._autopilot = status
 
     def _take_wind(self, value: WindSample | ApparentWind) -> None:
