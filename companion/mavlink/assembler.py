@@ -1,0 +1,207 @@
+"""Folds the autopilot's messages into the values that the companion works with. Pure.
+
+``VehicleAssembler.take`` never raises: what cannot be believed is counted in ``dropped`` and left out.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+from companion.mavlink import codec
+from companion.mavlink.frames import Drop, Message
+from companion.messages import (
+    AisReport,
+    ApparentWind,
+    AutopilotStatus,
+    MissionState,
+    StatusText,
+    VehicleState,
+    WindSample,
+)
+
+Value = VehicleState | AutopilotStatus | WindSample | ApparentWind | StatusText | AisReport
+
+# A boot time that steps back by more than this is a reboot; by less, a late or repeated frame [s].
+REBOOT_BACK_S = 5.0
+# ATTITUDE older than this [boot s] is not joined to a position.
+ATTITUDE_MAX_AGE_S = 1.5
+# NAV_CONTROLLER_OUTPUT and FENCE_STATUS stop when they have nothing to say; then they are unknown after [s].
+QUIET_S = 5.0
+_APPARENT = ("AppWndSpd", "AppWndDir")
+
+
+class VehicleAssembler:
+    """One autopilot, from its messages to values; the caller passes messages of that system only."""
+
+    def __init__(self) -> None:
+        self.dropped: Counter[Drop] = Counter()
+        self.dropped_by_type: Counter[str] = Counter()
+        self.reboots = 0
+        self._status: AutopilotStatus | None = None
+        self._texts = codec.TextAssembler()
+        self._boot_s: float | None = None
+        self._forget()
+
+    @property
+    def status(self) -> AutopilotStatus | None:
+        """The newest status, None before the first heartbeat."""
+        return self._status
+
+    @property
+    def boot_s(self) -> float | None:
+        """The newest boot time heard [s]."""
+        return self._boot_s
+
+    def _forget(self) -> None:
+        """Forget what was true before a reboot."""
+        self._attitude: codec.Attitude | None = None
+        self._position_boot_s = -1.0
+        self._apparent: dict[str, tuple[int, float]] = {}
+        self._apparent_ms = -1
+        self._nav_s: float | None = None
+        self._fence_s: float | None = None
+
+    def take(self, t_s: float, message: Message) -> list[Value]:
+        """Return the values that ``message``, heard at ``t_s`` [s], completes: none, one, or several texts."""
+        kind = message.get_type()
+        component = message.get_srcComponent()
+        try:
+            if kind == "STATUSTEXT":
+                return list(self._texts.take(t_s, message))
+            if kind == "AIS_VESSEL":
+                return [codec.ais_report(t_s, message)]
+            if component != codec.AUTOPILOT_COMPONENT:
+                return []
+            self._notice_boot(message)
+            return self._take(t_s, kind, message)
+        except _Stale:
+            reason = Drop.STALE
+        except (ValueError, OverflowError, TypeError):
+            reason = Drop.BAD_VALUE
+        self.dropped[reason] += 1
+        self.dropped_by_type[kind] += 1
+        return []
+
+    def expire(self, t_s: float) -> list[StatusText]:
+        """Return texts that lost a chunk and will not be completed."""
+        return self._texts.expired(t_s)
+
+    def _notice_boot(self, message: Message) -> None:
+        boot_ms = getattr(message, "time_boot_ms", None)
+        if boot_ms is None or message.get_type() == "NAMED_VALUE_FLOAT":
+            return
+        boot_s = boot_ms / 1e3
+        if self._boot_s is not None and boot_s < self._boot_s - REBOOT_BACK_S:
+            self.reboots += 1
+            self._forget()
+            self._status = None
+            self._boot_s = boot_s
+        self._boot_s = boot_s if self._boot_s is None else max(boot_s, self._boot_s)
+
+    def _take(self, t_s: float, kind: str, message: Message) -> list[Value]:
+        if kind == "ATTITUDE":
+            attitude = codec.attitude(message)
+            if self._attitude is not None and attitude.boot_s <= self._attitude.boot_s:
+                raise _Stale
+            self._attitude = attitude
+            return []
+        if kind == "GLOBAL_POSITION_INT":
+            return self._position(t_s, message)
+        if kind == "WIND":
+            return [codec.wind_sample(t_s, message)]
+        if kind == "NAMED_VALUE_FLOAT":
+            return self._named(t_s, message)
+        return self._fold_status(t_s, kind, message)
+
+    def _position(self, t_s: float, message: Message) -> list[Value]:
+        boot_s = message.time_boot_ms / 1e3
+        if boot_s <= self._position_boot_s:
+            raise _Stale
+        attitude = self._attitude
+        if attitude is not None and abs(boot_s - attitude.boot_s) > ATTITUDE_MAX_AGE_S:
+            attitude = None
+        state = codec.vehicle_state(t_s, message, attitude)
+        self._position_boot_s = boot_s
+        return [] if state is None else [state]
+
+    def _named(self, t_s: float, message: Message) -> list[Value]:
+        """Join the two halves of the apparent wind; every link's copies carry the same boot time."""
+        if message.name not in _APPARENT:
+            return []
+        boot_ms = message.time_boot_ms
+        if boot_ms <= self._apparent_ms and self._apparent_ms - boot_ms < REBOOT_BACK_S * 1e3:
+            raise _Stale
+        self._apparent[message.name] = (boot_ms, message.value)
+        halves = [self._apparent.get(name) for name in _APPARENT]
+        speed, angle = halves
+        if speed is None or angle is None or speed[0] != angle[0]:
+            return []
+        self._apparent_ms = boot_ms
+        return [codec.apparent_wind(t_s, speed[1], angle[1])]
+
+    def _fold_status(self, t_s: float, kind: str, message: Message) -> list[Value]:
+        if kind == "HEARTBEAT":
+            if not codec.is_autopilot_heartbeat(message):
+                return []
+            before = self._status or AutopilotStatus(t_s=t_s)
+            self._status = replace(
+                before, mode=codec.mode(message), is_armed=codec.is_armed(message),
+                system_status=message.system_status,
+            )
+        elif self._status is None:
+            return []  # a status begins with a heartbeat
+        elif kind == "MISSION_CURRENT":
+            self._status = replace(
+                self._status, mission_seq=message.seq,
+                mission_total=None if message.total == 0xFFFF else message.total,
+                mission_state=_mission_state(message.mission_state),
+            )
+        elif kind == "MISSION_ITEM_REACHED":
+            self._status = replace(self._status, last_reached_seq=message.seq)
+        elif kind == "NAV_CONTROLLER_OUTPUT":
+            self._status = replace(
+                self._status, waypoint_distance_m=codec.waypoint_distance_m(message),
+                target_bearing_rad=codec.target_bearing_rad(message), cross_track_m=codec.cross_track_m(message),
+            )
+            self._nav_s = t_s
+        elif kind == "EKF_STATUS_REPORT":
+            self._status = replace(self._status, ekf_ok=codec.ekf_ok(message))
+        elif kind == "GPS_RAW_INT":
+            self._status = replace(self._status, gps_fix=int(message.fix_type))
+        elif kind == "SYS_STATUS":
+            self._status = replace(
+                self._status,
+                battery_v=None if message.voltage_battery == 0xFFFF else message.voltage_battery / 1e3,
+                battery_remaining=message.battery_remaining / 100.0 if 0 <= message.battery_remaining <= 100 else None,
+            )
+        elif kind == "FENCE_STATUS":
+            self._status = replace(self._status, fence_breached=bool(message.breach_status))
+            self._fence_s = t_s
+        else:
+            return []
+        self._status = replace(self._status, t_s=t_s, boot_s=self._boot_s)
+        self._quiet(t_s)
+        return [self._status]
+
+    def _quiet(self, t_s: float) -> None:
+        assert self._status is not None
+        if self._nav_s is not None and t_s - self._nav_s > QUIET_S:
+            self._nav_s = None
+            self._status = replace(
+                self._status, waypoint_distance_m=None, target_bearing_rad=None, cross_track_m=None
+            )
+        if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
+            self._fence_s = None
+            self._status = replace(self._status, fence_breached=None)
+
+
+class _Stale(Exception):  # noqa: N818 - a signal inside this module
+    """The message is older than one already used, or repeats it."""
+
+
+def _mission_state(value: int) -> MissionState:
+    try:
+        return MissionState(value)
+    except ValueError:
+        return MissionState.UNKNOWN

@@ -1,0 +1,184 @@
+"""MAVLink 2 frames out of bytes and bytes out of messages. Pure.
+
+The parser trusts nothing: bytes that are no frame are skipped one at a time, so a torn frame or noise that looks
+like a start never swallows the good frame behind it (pymavlink's own parser skips the whole claimed length).
+Everything that is dropped is counted by reason; nothing raises. Payload decoding and the checksum are pymavlink's.
+"""
+
+from __future__ import annotations
+
+import enum
+import hashlib
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
+# pymavlink builds its message classes at run time; to mypy a message is Any with the attributes of its XML.
+Message = Any
+
+STX = 0xFD
+_HEADER_BYTES = 10
+_CRC_BYTES = 2
+_SIGNATURE_BYTES = 13
+_SIGNED = 0x01
+# A frame of MAVLink 1 that every autopilot sends: start, length 9, ..., HEARTBEAT (0).
+_V1_HEARTBEAT_BYTES = 17
+
+
+class Drop(enum.Enum):
+    """Why bytes, a frame or a message was not used."""
+
+    NOISE = "bytes outside any frame"
+    BAD_CRC = "frames with a wrong checksum"
+    BAD_HEADER = "frames with flags or an id that do not exist"
+    BAD_SIGNATURE = "frames unsigned or with a wrong signature"
+    MAVLINK_1 = "frames of MAVLink 1"
+    FOREIGN_SYSTEM = "messages of another system"
+    DUPLICATE = "frames received twice"
+    BAD_VALUE = "messages with a value that is not a number or out of range"
+    STALE = "messages older than one already used"
+
+
+@dataclass(slots=True)
+class SigningState:
+    """MAVLink 2 signing: the 32-byte key, the link id, and the timestamp [10 µs since 2015-01-01 UTC].
+
+    ``timestamp`` only grows, over restarts too; whoever makes this value takes the larger of the clock and the
+    stored one.
+    """
+
+    key: bytes
+    link_id: int = 0
+    timestamp: int = 0
+
+    def __post_init__(self) -> None:
+        if len(self.key) != 32:
+            raise ValueError(f"a signing key has 32 bytes, not {len(self.key)}")
+
+
+class Codec:
+    """The two directions of one link: ``feed`` bytes, get messages; ``pack`` messages, get bytes."""
+
+    def __init__(self, system: int, component: int, signing: SigningState | None = None) -> None:
+        self.dropped: Counter[Drop] = Counter()
+        self.frames_in = 0
+        self.frames_out = 0
+        self._buffer = bytearray()
+        self._mav = wire.MAVLink(None, srcSystem=system, srcComponent=component)
+        self._signing = signing
+        if signing is not None:
+            state = self._mav.signing
+            state.secret_key, state.link_id, state.timestamp = signing.key, signing.link_id, signing.timestamp
+            state.sign_outgoing = True
+            # a radio's own status is never signed
+            state.allow_unsigned_callback = lambda _, msg_id: msg_id == wire.MAVLINK_MSG_ID_RADIO_STATUS
+
+    @property
+    def system(self) -> int:
+        """Our system id."""
+        return int(self._mav.srcSystem)
+
+    @system.setter
+    def system(self, value: int) -> None:
+        self._mav.srcSystem = value
+
+    @property
+    def component(self) -> int:
+        """Our component id."""
+        return int(self._mav.srcComponent)
+
+    def pack(self, message: Message) -> bytes:
+        """Return ``message`` as the next frame of ours, signed if the link is."""
+        frame = message.pack(self._mav)
+        self._mav.seq = (self._mav.seq + 1) % 256
+        self.frames_out += 1
+        if self._signing is not None:
+            self._signing.timestamp = self._mav.signing.timestamp
+        return bytes(frame)
+
+    def set_signing_time(self, timestamp: int) -> None:
+        """Move the signing timestamp forward to ``timestamp`` [10 µs since 2015]; never back."""
+        state = self._mav.signing
+        state.timestamp = max(state.timestamp, timestamp)
+
+    def feed(self, data: bytes) -> list[Message]:
+        """Return the messages completed by ``data``, oldest first; ``get_msgbuf()`` of each is its frame."""
+        buffer = self._buffer
+        buffer += data
+        messages: list[Message] = []
+        at = 0
+        while True:
+            start = buffer.find(STX, at)
+            skipped_to = len(buffer) if start < 0 else start
+            if skipped_to > at:
+                self._noise(bytes(buffer[at:skipped_to]))
+            at = skipped_to
+            size = self._frame_size(at)
+            if size == 0:  # not all here yet
+                break
+            if size < 0:
+                self.dropped[Drop.BAD_HEADER] += 1
+                self.dropped[Drop.NOISE] += 1
+                at += 1
+                continue
+            message = self._decode(buffer[at:at + size])
+            if message is None:
+                self.dropped[Drop.NOISE] += 1
+                at += 1
+                continue
+            at += size
+            if message is not False:
+                self.frames_in += 1
+                messages.append(message)
+        del buffer[:at]
+        return messages
+
+    def _frame_size(self, at: int) -> int:
+        """Return the size [bytes] of the frame at ``at``, 0 while bytes are missing, -1 when it is none."""
+        buffer = self._buffer
+        have = len(buffer) - at
+        if have >= 3 and buffer[at + 2] & ~_SIGNED:
+            return -1
+        if have < _HEADER_BYTES:
+            return 0
+        msg_id = buffer[at + 7] | buffer[at + 8] << 8 | buffer[at + 9] << 16
+        if msg_id not in wire.mavlink_map:
+            return -1
+        signature = _SIGNATURE_BYTES if buffer[at + 2] & _SIGNED else 0
+        size = _HEADER_BYTES + buffer[at + 1] + _CRC_BYTES + signature
+        return size if have >= size else 0
+
+    def _decode(self, frame: bytearray) -> Message:
+        """Return the message, None when the frame is not one, False when it is one that must not be used."""
+        try:
+            if self._signing is not None and frame[2] & _SIGNED and not self._is_signed_by_us(frame):
+                # checked before pymavlink sees it: its check takes the timestamp of a forgery for good
+                self.dropped[Drop.BAD_SIGNATURE] += 1
+                return None
+            return self._mav.decode(frame)
+        except wire.MAVError as error:
+            if "signature" in str(error).lower():
+                self.dropped[Drop.BAD_SIGNATURE] += 1
+                return False
+            self.dropped[Drop.BAD_CRC] += 1
+            return None
+        except Exception:  # a payload that pymavlink cannot digest is a bad frame, whatever it raises
+            self.dropped[Drop.BAD_CRC] += 1
+            return None
+
+    def _is_signed_by_us(self, frame: bytearray) -> bool:
+        assert self._signing is not None
+        digest = hashlib.sha256(self._signing.key + bytes(frame[:-6])).digest()
+        return digest[:6] == bytes(frame[-6:])
+
+    def _noise(self, data: bytes) -> None:
+        self.dropped[Drop.NOISE] += len(data)
+        at = data.find(b"\xfe\x09")
+        while at >= 0:
+            frame = data[at:at + _V1_HEARTBEAT_BYTES]
+            if len(frame) == _V1_HEARTBEAT_BYTES and frame[5] == wire.MAVLINK_MSG_ID_HEARTBEAT:
+                crc = wire.x25crc(frame[1:-2] + bytes([wire.MAVLink_heartbeat_message.crc_extra])).crc
+                self.dropped[Drop.MAVLINK_1] += crc == int.from_bytes(frame[-2:], "little")
+            at = data.find(b"\xfe\x09", at + 1)
