@@ -1,0 +1,292 @@
+"""First passage of a Gaussian Markov wind into the no-go zone: the numbers behind ``risk``.
+
+The deviation of the wind from its forecast is X(t) = sigma(t) Z(t), with Z standard normal at every moment and
+Markov: Z(t + d) = r Z(t) + sqrt(1 - r^2) N(0, 1). The models differ only in sigma and in the correlation r:
+
+    0 none    sigma = 0
+    1 kalman  sigma^2 = s0^2 + g^2 t, a random walk: r = sigma(t) / sigma(t + d)
+    2 ar1     sigma^2 = si^2 + (s0^2 - si^2) exp(-2 rho t), an OU process: r = sigma(t) exp(-rho d) / sigma(t + d)
+    3 table   sigma from a table, r = exp(-d / tau)
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+NONE, KALMAN, AR1, TABLE = 0, 1, 2, 3
+
+Z_MAX = 6.5          # the grid ends here; beyond lies 4e-11 of the wind
+Z_CELLS = 260        # cells of 0.05 standard deviations
+R_STEP = 0.965       # correlation over one step: its standard deviation, 0.26, is five cells
+# Between steps a continuous process peeks over the barrier; a barrier nearer by this many step deviations
+# accounts for it (Chernoff 1965; Broadie, Glasserman and Kou 1997: -zeta(1/2) / sqrt(2 pi)).
+BARRIER_SHIFT = 0.5826
+
+
+@njit(nogil=True, cache=True)
+def sigma_at(  # type: ignore[no-untyped-def]
+    t_s, model, s0, s1, rho, table_t, table_s,
+):
+    """Return sigma [rad] at time t: s1 is the growth [rad/sqrt s] of model 1, the limit [rad] of model 2."""
+    if model == 1:
+        return math.sqrt(s0 * s0 + s1 * s1 * t_s)
+    if model == 2:
+        return math.sqrt(max(0.0, s1 * s1 + (s0 * s0 - s1 * s1) * math.exp(-2.0 * rho * t_s)))
+    if model == 3:
+        return np.interp(t_s, table_t, table_s)
+    return 0.0
+
+
+@njit(nogil=True, cache=True)
+def _step_for(t_s, r, model, s0, s1, rho, tau, table_t, table_s):  # type: ignore[no-untyped-def]
+    """Return the time [s] over which the correlation falls to r; infinite when it never does."""
+    sigma = sigma_at(t_s, model, s0, s1, rho, table_t, table_s)
+    if model == 1:
+        return sigma * sigma * (1.0 / (r * r) - 1.0) / (s1 * s1) if s1 > 0.0 else np.inf
+    if model == 2:
+        if rho <= 0.0 or s1 <= 0.0:
+            return np.inf
+        e = r * r * s1 * s1 / (sigma * sigma - r * r * (sigma * sigma - s1 * s1))
+        return -0.5 * math.log(e) / rho if e > 0.0 else np.inf
+    return -tau * math.log(r)
+
+
+@njit(nogil=True, cache=True)
+def correlation(t_s, d_s, model, s0, s1, rho, tau, table_t, table_s):  # type: ignore[no-untyped-def]
+    """Return the correlation of X(t) and X(t + d)."""
+    if model == 3:
+        return math.exp(-d_s / tau)
+    a = sigma_at(t_s, model, s0, s1, rho, table_t, table_s)
+    b = sigma_at(t_s + d_s, model, s0, s1, rho, table_t, table_s)
+    if b <= 0.0:
+        return 1.0
+    r = a / b
+    if model == 2:
+        r *= math.exp(-rho * d_s)
+    return min(1.0, r)
+
+
+@njit(nogil=True, cache=True)
+def _phi(x):  # type: ignore[no-untyped-def]
+    return 0.5 * math.erfc(-x / math.sqrt(2.0))
+
+
+@njit(nogil=True, cache=True)
+def _kernel(r, dz, out):  # type: ignore[no-untyped-def]
+    """Fill out[i, j]: the probability to go from the centre of cell i into cell j."""
+    n = out.shape[0]
+    s = math.sqrt(max(1e-12, 1.0 - r * r))
+    for i in range(n):
+        mean = r * (-Z_MAX + (i + 0.5) * dz)
+        low = _phi((-Z_MAX - mean) / s)
+        total = 0.0
+        for j in range(n):
+            high = _phi((-Z_MAX + (j + 1.0) * dz - mean) / s)
+            out[i, j] = high - low
+            total += high - low
+            low = high
+        for j in range(n):
+            out[i, j] /= total
+
+
+@njit(nogil=True, cache=True)
+def _spread(p, kernel, reach, r, out):  # type: ignore[no-untyped-def]
+    """Move the mass one step; only cells within ``reach`` of the mean receive any."""
+    n = p.shape[0]
+    out[:] = 0.0
+    half = 0.5 * (n - 1)
+    for i in range(n):
+        if p[i] > 1e-15:
+            middle = int(half + r * (i - half))
+            for j in range(max(0, middle - reach), min(n, middle + reach + 2)):
+                out[j] += p[i] * kernel[i, j]
+
+
+@njit(nogil=True, cache=True)
+def _absorb(p, low, high, dz):  # type: ignore[no-untyped-def]
+    """Take the mass of cells (and parts of cells) within [low, high] out of p and return it."""
+    taken = 0.0
+    n = p.shape[0]
+    first = max(0, int((low + Z_MAX) / dz))
+    last = min(n - 1, int((high + Z_MAX) / dz))
+    for j in range(first, last + 1):
+        a = -Z_MAX + j * dz
+        part = (min(high, a + dz) - max(low, a)) / dz
+        if part > 0.0:
+            part = min(1.0, part)
+            taken += p[j] * part
+            p[j] *= 1.0 - part
+    return taken
+
+
+@njit(nogil=True, cache=True)
+def first_passage(  # type: ignore[no-untyped-def]
+    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, max_steps, out,
+):
+    """Fill out[k]: the probability that the wind first forces the boat into the no-go zone on leg k.
+
+    start_s, end_s, twa_rad: (n,) legs in order of time, |TWA| about the forecast mean signed to starboard [rad].
+    half_rad: the boat's own no-go half angle, not widened [rad]. Returns the steps taken, or -1 when they ran out.
+    """
+    n = Z_CELLS
+    dz = 2.0 * Z_MAX / n
+    p = np.empty(n)
+    for j in range(n):
+        p[j] = _phi(-Z_MAX + (j + 1.0) * dz) - _phi(-Z_MAX + j * dz)
+    fresh = p.copy()
+    q = np.empty(n)
+    full = np.empty((n, n))
+    part = np.empty((n, n))
+    _kernel(R_STEP, dz, full)
+    shift = BARRIER_SHIFT * math.sqrt(1.0 - R_STEP * R_STEP)
+    t = 0.0
+    steps = 0
+    two_pi = 2.0 * math.pi
+    for k in range(start_s.shape[0]):
+        out[k] = 0.0
+        for phase in range(2):  # the turn before the leg, then the leg
+            stop = start_s[k] if phase == 0 else end_s[k]
+            at_start = phase == 1
+            while t < stop or at_start:
+                move = 0.0
+                r = 1.0
+                if not at_start:
+                    sigma = sigma_at(t, model, s0, s1, rho, table_t, table_s)
+                    step = _step_for(t, R_STEP, model, s0, s1, rho, tau, table_t, table_s)
+                    if sigma < 1e-7:
+                        step = max(step, min(0.5, stop - t))
+                    r = R_STEP
+                    move = stop - t
+                    if step < move:
+                        move = step
+                    else:
+                        r = correlation(t, move, model, s0, s1, rho, tau, table_t, table_s)
+                    if sigma < 1e-7:
+                        p[:] = fresh * np.sum(p)
+                        r = 0.0
+                    elif r == R_STEP:
+                        s = math.sqrt(1.0 - r * r)
+                        _spread(p, full, int(6.0 * s / dz) + 2, r, q)
+                        p[:] = q
+                    elif r < 1.0 - 1e-9:
+                        s = math.sqrt(1.0 - r * r)
+                        if s > dz:
+                            _kernel(r, dz, part)
+                            _spread(p, part, int(6.0 * s / dz) + 2, r, q)
+                            p[:] = q
+                    steps += 1
+                    if steps > max_steps:
+                        return -1
+                    t = stop if move >= stop - t else t + move
+                if phase == 1:
+                    sigma = sigma_at(t, model, s0, s1, rho, table_t, table_s)
+                    # At the leg's own start the barrier is where it is; within the leg it is watched continuously.
+                    peek = 0.0 if at_start else BARRIER_SHIFT * math.sqrt(max(0.0, 1.0 - r * r))
+                    peek = min(peek, shift)
+                    for turn in range(-1, 2):
+                        low = twa_rad[k] - half_rad + turn * two_pi
+                        high = twa_rad[k] + half_rad + turn * two_pi
+                        if sigma > 1e-9:
+                            out[k] += _absorb(p, low / sigma - peek, high / sigma + peek, dz)
+                        elif low < 0.0 < high:
+                            out[k] += np.sum(p)
+                            p[:] = 0.0
+                at_start = False
+    return steps
+
+
+@njit(nogil=True, cache=True)
+def _tail(z):  # type: ignore[no-untyped-def]
+    return 0.5 * math.erfc(z / math.sqrt(2.0))
+
+
+@njit(nogil=True, cache=True)
+def leg_risk(  # type: ignore[no-untyped-def]
+    t0, t1, twa, before_twa, before_t, half, model, s0, s1, rho, tau, table_t, table_s,
+):
+    """Return what a leg adds to a bound on the path's risk: Boole over its entry and its up-crossings.
+
+    The entry at the leg's start counts in full when the leg is on the other side of the wind than the one before
+    (or the first: before_t < 0), else only by what the barrier came nearer. Up-crossings of a barrier at z standard
+    deviations come at the rate z phi(z) (1 / tau + |sigma'| / sigma) (Aldous 1989, the clumping heuristic, which
+    overstates for low barriers); below z = 1 the rate at 1 is taken.
+    """
+    margin = abs(twa) - half
+    s_start = sigma_at(t0, model, s0, s1, rho, table_t, table_s)
+    if max(s_start, sigma_at(t1, model, s0, s1, rho, table_t, table_s)) <= 1e-9:
+        return 0.0 if margin >= -1e-9 else 1.0
+    entry = _tail(margin / max(s_start, 1e-9))
+    if before_t >= 0.0 and before_twa * twa > 0.0:
+        s_before = max(sigma_at(before_t, model, s0, s1, rho, table_t, table_s), 1e-9)
+        entry = max(0.0, entry - _tail((abs(before_twa) - half) / s_before))
+    total = entry
+    n = 6
+    dt = (t1 - t0) / n
+    for i in range(n):
+        t = t0 + (i + 0.5) * dt
+        s = max(sigma_at(t, model, s0, s1, rho, table_t, table_s), 1e-9)
+        z = max(1.0, margin / s)
+        inverse_tau, growth = 0.0, 0.0
+        if model == 1:
+            inverse_tau = 0.5 * s1 * s1 / (s * s)
+            growth = inverse_tau
+        elif model == 2:
+            inverse_tau = rho * s1 * s1 / (s * s)
+            growth = max(0.0, inverse_tau - rho)
+        elif model == 3:
+            inverse_tau = 1.0 / tau
+            later = sigma_at(t + 0.5 * dt, model, s0, s1, rho, table_t, table_s)
+            earlier = sigma_at(t - 0.5 * dt, model, s0, s1, rho, table_t, table_s)
+            growth = max(0.0, (later - earlier) / max(dt, 1e-9) / s)
+        total += z * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi) * (inverse_tau + growth) * dt
+    return min(1.0, total)
+
+
+@njit(nogil=True, cache=True)
+def simulate(  # type: ignore[no-untyped-def]
+    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, step_s, generator, count, hits,
+):
+    """Fill hits[i] with the leg on which simulated wind i first forces the boat into the no-go zone, else -1.
+
+    An independent check of ``first_passage``: exact draws of X every ``step_s`` seconds and at each leg's ends.
+    """
+    two_pi = 2.0 * math.pi
+    for i in range(count):
+        hits[i] = -1
+        t = 0.0
+        z = generator.standard_normal()
+        for k in range(start_s.shape[0]):
+            for phase in range(2):
+                stop = start_s[k] if phase == 0 else end_s[k]
+                at_start = phase == 1
+                while t < stop or at_start:
+                    if not at_start:
+                        move = min(step_s, stop - t)
+                        r = correlation(t, move, model, s0, s1, rho, tau, table_t, table_s)
+                        z = r * z + math.sqrt(max(0.0, 1.0 - r * r)) * generator.standard_normal()
+                        t = stop if move >= stop - t else t + move
+                    at_start = False
+                    if phase == 1:
+                        x = z * sigma_at(t, model, s0, s1, rho, table_t, table_s)
+                        off = (twa_rad[k] - x + math.pi) % two_pi - math.pi
+                        if abs(off) < half_rad - 1e-9:
+                            hits[i] = k
+                            break
+                if hits[i] >= 0:
+                    break
+            if hits[i] >= 0:
+                break
+
+
+def as_legs(
+    start_s: NDArray[np.float64], end_s: NDArray[np.float64], twa_rad: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the three arrays as contiguous float64, for the kernels."""
+    return (
+        np.ascontiguousarray(start_s, dtype=np.float64), np.ascontiguousarray(end_s, dtype=np.float64),
+        np.ascontiguousarray(twa_rad, dtype=np.float64),
+    )
