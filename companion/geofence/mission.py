@@ -275,7 +275,7 @@ def load_area(options: AreaOptions, mission_path: Path, origin: GeoPoint) -> tup
         if not path.is_file():
             raise InputError(str(mission_path), f"[area] {key}", f"no such file: {path}",
                              "paths are relative to the mission file")
-        document = read(path, kind=kind, axis=options.axis, near=origin).require_clean()
+        document = read(path, kind=kind, axis=options.axis, near=origin, areas=True).require_clean()
         findings.extend(f for f in document.findings if f.severity is not Severity.NOTE)
         return document
 

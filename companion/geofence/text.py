@@ -80,3 +80,8 @@ def require_shallow(text: str, source: str, *, opening: str = "([{", closing: st
         if depth > MAX_DEPTH:
             line = text.count("\n", 0, match.start()) + 1
             raise InputError(source, f"line {line}", f"brackets nest deeper than {MAX_DEPTH}")
+
+
+def printable(text: str) -> str:
+    """Return the text without the control characters that XML cannot hold."""
+    return "".join(c for c in text if (c.isprintable() or c in "\n\t ") and c not in "\ufffe\uffff")

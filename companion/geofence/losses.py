@@ -1,0 +1,104 @@
+"""What a format cannot carry: every writer says what is lost, before anyone relies on the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from shapely.geometry import Polygon
+
+from companion.geofence.document import Document
+from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.shapes import CIRCLE_SIDES, Circle, Zone, ZoneKind, drawn
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A file to be: its bytes and what they do not carry.
+
+    A finding of severity ERROR means that the file protects less than the document (a zone is missing); WARNING
+    that a mission, track or mark is missing; NOTE that something is written otherwise (circles drawn, names gone).
+    """
+
+    data: bytes
+    losses: tuple[Finding, ...] = ()
+
+
+class Losses(list[Finding]):
+    """The losses of one writing."""
+
+    def add(self, severity: Severity, text: str, remedy: str = "") -> None:
+        """Append one loss."""
+        self.append(Finding(severity=severity, code=Code.NOT_CARRIED, place="", text=text, remedy=remedy))
+
+    def drop(self, what: str, count: int, *, severity: Severity = Severity.WARNING) -> None:
+        """Say that ``count`` things are not carried."""
+        if count:
+            self.add(severity, f"{count} {what} not carried by this format")
+
+
+def leave_out(losses: Losses, document: Document, carried: Iterable[str]) -> None:
+    """Announce everything in the document that a format which carries only ``carried`` leaves out.
+
+    Words: zones, marks, items, rally, return, home, tracks, names, margins.
+    """
+    kept = set(carried)
+    if "zones" not in kept:
+        losses.drop("zones are", len(document.zones), severity=Severity.ERROR)
+    if "marks" not in kept:
+        losses.drop("point and line obstacles are", len(document.marks), severity=Severity.ERROR)
+    if "items" not in kept:
+        losses.drop("mission items are", len(document.items))
+    if "rally" not in kept:
+        losses.drop("rally points are", len(document.rally))
+    if "tracks" not in kept:
+        losses.drop("tracks are", len(document.tracks))
+    if "return" not in kept and document.return_point is not None:
+        losses.add(Severity.WARNING, "the fence's return point is not carried by this format")
+    if "home" not in kept and document.home is not None:
+        losses.add(Severity.NOTE, "the home position is not carried by this format")
+    if "zones" in kept and "names" not in kept and any(z.name for z in document.zones):
+        losses.add(Severity.NOTE, "the names of zones are not carried by this format")
+    if "items" in kept and "item names" not in kept and any(document.item_names):
+        losses.add(Severity.NOTE, "the names of waypoints are not carried by this format")
+    if "margins" not in kept and any(z.margin_m is not None for z in document.zones):
+        losses.add(Severity.WARNING, "the zones' own margins are not carried by this format")
+
+
+def as_polygon(zone: Zone, losses: Losses) -> Polygon:
+    """Return the zone as a polygon; a circle is drawn, and that is announced."""
+    if isinstance(zone.shape, Circle):
+        side = "around" if zone.kind is ZoneKind.EXCLUSION else "inside"
+        losses.add(
+            Severity.NOTE,
+            f"the circle {zone.name or 'of ' + format(zone.shape.radius_m, 'g') + ' m'} is drawn as "
+            f"{CIRCLE_SIDES} sides {side} it",
+        )
+    return drawn(zone)
+
+
+def without_holes(zones: Sequence[Zone], losses: Losses) -> list[Zone]:
+    """Return the zones for a format without holes, so that the sea does not grow.
+
+    A keep-in zone with holes becomes the zone and a keep-out zone for each hole: the same water. A keep-out zone
+    with holes is filled, so water inside it is lost: announced.
+    """
+    out: list[Zone] = []
+    for zone in zones:
+        if isinstance(zone.shape, Circle) or not zone.shape.interiors:
+            out.append(zone)
+            continue
+        filled = Polygon(zone.shape.exterior)
+        out.append(Zone(kind=zone.kind, shape=filled, name=zone.name, margin_m=zone.margin_m))
+        count = len(zone.shape.interiors)
+        name = zone.name or "a zone"
+        if zone.kind is ZoneKind.INCLUSION:
+            out.extend(
+                Zone(kind=ZoneKind.EXCLUSION, shape=Polygon(ring), name=f"{zone.name} hole {i + 1}".strip(),
+                     margin_m=zone.margin_m)
+                for i, ring in enumerate(zone.shape.interiors)
+            )
+            losses.add(Severity.NOTE, f"{count} hole(s) of {name} become keep-out zones of their own")
+        else:
+            losses.add(Severity.WARNING, f"{count} hole(s) of {name} are filled: the water inside is given up")
+    return out
