@@ -8,9 +8,9 @@ the same actions.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
+from companion.boat import AutopilotLimits
 from companion.geo.angles import wrap_pi
 from companion.mavlink.assembler import VehicleAssembler
 from companion.mavlink.codec import AUTOPILOT_COMPONENT, is_autopilot_heartbeat
@@ -28,7 +28,6 @@ from companion.skipper import Skipper
 from companion.skipper.actions import Action
 from companion.skipper.config import Permissions
 from companion.skipper.snapshot import (
-    AutopilotLimits,
     AutopilotRebooted,
     Event,
     MissionOnBoard,
@@ -51,6 +50,9 @@ SETTLED_S = 20.0
 _UNTRUSTED = frozenset({
     Verdict.FROZEN, Verdict.SPIKING, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR,
 })
+
+# Parameters without which the autopilot's limits are not known.
+_LIMITS = frozenset({"SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS"})
 
 Value = VehicleState | AutopilotStatus | WindSample | ApparentWind | StatusText | AisReport
 
@@ -80,7 +82,7 @@ class VoyageFold:
         self._autopilot: AutopilotStatus | None = None
         self._heartbeat_s: float | None = None
         self._mission = MissionOnBoard()
-        self._limits = AutopilotLimits()
+        self._limits: AutopilotLimits | None = None
         self._boot_s: float | None = None
         self._mode: Mode | None = None
         self._first_wind_s: float | None = None
@@ -134,7 +136,8 @@ class VoyageFold:
         self._parameters.update(values)
         if any(name.startswith("WNDVN_") for name in values):
             self.wind.set_parameters(self._parameters)
-        self._limits = limits_from_parameters(values, self._limits)
+        if self._parameters.keys() >= _LIMITS:
+            self._limits = AutopilotLimits.from_params(self._parameters)
 
     def planner_alive(self, alive: bool) -> None:
         """Note whether the planner's process lives."""
@@ -218,17 +221,3 @@ class VoyageFold:
             verdict="" if health is WindHealth.GOOD else status.reason,
         )
 
-
-def limits_from_parameters(values: Mapping[str, float], before: AutopilotLimits) -> AutopilotLimits:
-    """Return the limits that the autopilot's parameters set (degrees become radians)."""
-    changes: dict[str, Any] = {}
-    if "SAIL_NO_GO_ANGLE" in values:
-        changes["no_go_half_rad"] = values["SAIL_NO_GO_ANGLE"] * 3.141592653589793 / 180.0
-    for name, key in (
-        ("WP_RADIUS", "waypoint_radius_m"),
-        ("SAIL_XTRACK_MAX", "tack_corridor_m"),
-        ("SAIL_LOIT_RADIUS", "loiter_radius_m"),
-    ):
-        if name in values:
-            changes[key] = values[name]
-    return replace(before, **changes)

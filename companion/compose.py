@@ -1,0 +1,95 @@
+"""From a mission file to the values that the rooms want: voyage, skipper's configuration, permissions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from companion.boat import Boat, Polar, ardurover_sitl, constant, read_polar
+from companion.errors import InputError
+from companion.geofence import Mission
+from companion.skipper.config import Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.voyage import Goal, Side, Voyage
+from companion.wind import Estimator, make
+
+_SIDES = {None: Side.NONE, "port": Side.PORT, "starboard": Side.STARBOARD}
+
+
+def polar_of(mission: Mission) -> Polar:
+    """Return the mission's polar."""
+    path = mission.polar_path
+    if path is not None:
+        return read_polar(path).polar
+    polar = mission.boat.polar
+    if isinstance(polar, str):
+        if polar != "ardurover":
+            raise InputError(str(mission.path), "[boat] polar", f"there is no polar {polar!r}",
+                             'write "ardurover", a polar file beside the mission, or a speed in m/s')
+        return ardurover_sitl()
+    return constant(float(polar))
+
+
+def boat_of(mission: Mission) -> Boat:
+    """Return the mission's boat."""
+    return Boat(
+        polar=polar_of(mission),
+        no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
+        max_twa_rad=math.radians(mission.boat.max_twa_deg),
+        turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s),
+        tack_loss_s=mission.boat.tack_loss_s,
+    )
+
+
+def voyage_of(mission: Mission) -> Voyage:
+    """Return the voyage in the mission's local frame."""
+    frame = mission.frame()
+    goals = tuple(
+        Goal(
+            en_m=frame.en_from_geo(g.point), radius_m=g.radius_m, name=g.name, side=_SIDES[g.rounding],
+            rounding_m=max(g.radius_m, mission.margin_m) if g.rounding else 12.0,
+            bandwidth_m=mission.skipper.bandwidth_m,
+        )
+        for g in mission.goals
+    )
+    return Voyage(
+        name=mission.name, frame=frame, goals=goals, area=mission.area.local(frame), boat=boat_of(mission),
+        laps=mission.skipper.laps,
+    )
+
+
+def config_of(mission: Mission) -> SkipperConfig:
+    """Return the skipper's thresholds; what the mission does not say keeps its default."""
+    options = mission.skipper
+    changes: dict[str, Any] = {
+        "delta_s": mission.risk.delta_s,
+        "delta_s_ladder": tuple(d for d in SkipperConfig().delta_s_ladder if d < mission.risk.delta_s),
+        "margin_m": mission.margin_m,
+        "margin_floor_m": mission.margin_floor_m,
+        "plan_budget_s": options.planning_budget_s,
+        "first_plan_budget_s": options.planning_budget_s,
+        "replan_policy": ReplanPolicy(options.replan),
+        "min_replan_interval_s": options.min_replan_s,
+        "wind_change_rad": math.radians(options.wind_shift_deg),
+        "grid_size_m": options.off_track_m,
+        "safe_end": SafeEnd.RETURN if options.end == "home" else SafeEnd.LOITER,
+    }
+    if options.max_replan_s is not None:
+        changes["plan_age_s"] = options.max_replan_s
+    return replace(SkipperConfig(), **changes)
+
+
+def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
+    """Return what the operator allows. Uploading a mission goes with setting AUTO; a dry run allows nothing."""
+    if dry_run:
+        return Permissions()
+    operator = mission.operator
+    return Permissions(
+        may_upload=operator.set_auto, may_upload_fence=operator.upload_fence, may_arm=operator.arm,
+        may_set_mode=operator.set_auto, may_steer=operator.guided,
+    )
+
+
+def estimator_of(mission: Mission) -> Estimator:
+    """Return the mission's wind estimator."""
+    return make(mission.wind.estimator)
