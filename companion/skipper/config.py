@@ -56,6 +56,7 @@ class SkipperConfig:
     first_plan_budget_s: float = 2.0
     plan_timeout_s: float = 20.0       # no answer from the planner: the request is counted as failed
     no_go_half_rad: float = 0.785398   # SAIL_NO_GO_ANGLE 45 deg
+    tack_corridor_m: float = 10.0      # SAIL_XTRACK_MAX, its default, until it has been read
     no_go_pad_rad: float = 0.034907    # legs at least 2 deg outside: then the autopilot adds no tacks of its own
     replan_policy: ReplanPolicy = ReplanPolicy.WAYPOINT
     announce_m: float = 5.0            # the autopilot announces a waypoint 3 to 5 m early
@@ -71,13 +72,19 @@ class SkipperConfig:
     manoeuvre_m: float = 3.0           # D_maneuver
     buoy_angle_rad: float = 0.523599   # 30 deg, experimentally his
     # uploads
+    settle_s: float = 5.0              # a mode or sequence number that was asked for shows within this
+    reread_s: float = 300.0            # the mission on board is read again this often
     upload_timeout_s: float = 60.0     # no outcome: counted as failed, the mission on the autopilot unknown
     max_items: int = 600               # below the 655 of the smallest board; then the numbering starts again
     safe_end: SafeEnd = SafeEnd.LOITER
     loiter_radius_m: float = 15.0      # room the last item needs (measured: 12.1 m from the point)
     # patience
     min_replan_interval_s: float = 20.0        # Büsser 5.2: never a new plan more often than every 20 s
+    no_go_patience_s: float = 4.0      # the present wind must close the leg for this long ...
+    no_go_off_leg_m: float = 4.0       # ... and take the boat this far off it, or below the margin's floor
     no_go_replan_interval_s: float = 8.0       # a leg that became unsailable is more urgent
+    look_ahead_s: float = 40.0         # the mission reaches at least this far ahead while goals remain
+    command_timeout_s: float = 10.0
     backoff_first_s: float = 10.0
     backoff_factor: float = 2.0
     backoff_max_s: float = 300.0

@@ -10,6 +10,7 @@ import enum
 from dataclasses import dataclass
 from typing import Any
 
+from companion.boat import AutopilotLimits
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
 from companion.skipper.config import DRY_RUN, Permissions
 from companion.skipper.voyage import PointEn
@@ -46,16 +47,6 @@ class MissionOnBoard:
 
     items: tuple[MissionItem, ...] | None = None
     read_t_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AutopilotLimits:
-    """Parameters of the autopilot that the plan depends on; None when not read."""
-
-    no_go_half_rad: float | None = None        # SAIL_NO_GO_ANGLE
-    waypoint_radius_m: float | None = None     # WP_RADIUS
-    tack_corridor_m: float | None = None       # SAIL_XTRACK_MAX; 0: the autopilot tacks on laylines only
-    loiter_radius_m: float | None = None       # SAIL_LOIT_RADIUS
 
 
 # ------------------------------------------------------------------------------------------- events
@@ -162,7 +153,7 @@ class Snapshot:
     heartbeat_age_s: float | None = None
     wind: WindView = WindView()
     mission: MissionOnBoard = MissionOnBoard()
-    limits: AutopilotLimits = AutopilotLimits()
+    limits: AutopilotLimits | None = None  # None: not read yet
     permissions: Permissions = DRY_RUN
     planner_alive: bool = True
     traffic: object | None = None

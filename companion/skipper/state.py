@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from companion.messages import MissionItem, Mode
 from companion.skipper.actions import ReplanReason
+from companion.skipper.snapshot import OperatorWish
 from companion.skipper.voyage import PointEn
 
 
@@ -29,21 +30,24 @@ class Phase(enum.Enum):
 class Route:
     """The mission that sails: its items and what each is for. Index i has seq i + 1.
 
-    ``points_en_m[i]`` is where item i is (for the safe end: where it ends); ``goal_of[i]`` the index into
-    ``Voyage.legs`` that reaching item i completes, -1 when none. ``origin_en_m`` is where the leg to item 0 began.
+    ``points_en_m[i]`` is where item i is (for the safe end: where it ends), ``leg_from_en_m[i]`` where the planned
+    leg to it begins, ``gate_of[i]`` the gate (see ``companion.skipper.gates``) that reaching it completes, or -1.
     """
 
-    items: tuple[MissionItem, ...]
-    points_en_m: tuple[PointEn, ...]
-    goal_of: tuple[int, ...]
-    origin_en_m: PointEn
+    items: tuple[MissionItem, ...] = ()
+    points_en_m: tuple[PointEn, ...] = ()
+    leg_from_en_m: tuple[PointEn, ...] = ()
+    gate_of: tuple[int, ...] = ()
     plan_id: int
     plan_t_s: float                    # when the plan was asked for
     plan_twd_from_rad: float           # mean wind that the plan used
-    plan_half_width_rad: float         # half width of the forecast interval at config.wind_change_level
+    plan_tws_mps: float
+    plan_half_width_rad: float         # half width of the forecast's interval at config.wind_change_level
     margin_m: float
     delta_s: float
+    rung: str = ""                     # the step of the ladder it was found on; empty: as configured
     risk: float | None = None
+    cost_s: float | None = None
     why: str = ""
 
 
@@ -54,14 +58,18 @@ class PendingPlan:
     request_id: int
     t_s: float
     reason: ReplanReason
-    from_seq: int | None
+    from_index: int | None             # route index that the plan starts at; None: the boat
     rung: int
+    gate: int                          # the gate that the plan's end completes, -1 when none
+    lead_in: tuple[PointEn, ...]       # waypoints before the plan's start (a repaired start)
+    start_en_m: PointEn
+    facts: Route                       # figures of the plan to be, without items
     problem: Any
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PendingUpload:
-    """An upload asked for and not yet answered: the route that it would bring."""
+    """An upload asked for and not yet answered: the route that it brings."""
 
     upload_id: int
     t_s: float
@@ -71,8 +79,8 @@ class PendingUpload:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WatchdogState:
-    """One raised watchdog: since when, and since when its exit condition holds."""
+class Raised:
+    """A raised watchdog: since when, and since when its exit condition has held."""
 
     name: str
     since_s: float
@@ -80,34 +88,141 @@ class WatchdogState:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Retry:
+    """Patience with something that failed: how often in a row, and when it may be tried again."""
+
+    failures: int = 0
+    not_before_s: float = float("-inf")
+
+
+PATIENT = Retry()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SkipperState:
-    """Everything that ``step`` needs from before. ``initial(...)`` makes the first."""
+    """Everything that ``step`` needs from before. ``Skipper.initial`` makes the first."""
 
     phase: Phase = Phase.IDLE
     why: str = "just started"
     next_id: int = 1
-    goal_index: int = 0                # into Voyage.legs: the goal being sailed to
+    gate: int = 0                      # index of the gate being sailed to
     route: Route | None = None         # what is on the autopilot, as far as we know
+    adoptable: Persisted | None = None  # from before a restart, until the autopilot's mission has been compared
+    checked_mission: bool = False      # the mission on board has been compared with ours since link, reboot, operator
+    foreign: str = ""                  # why the mission on board is not ours; empty: it is, or there is none
+    sailing: bool = False              # has been in AUTO and armed with our route
+    index: int = 0                     # target by the autopilot
+    own_index: int = 0                 # target by Büsser's double conditions
     pending_plan: PendingPlan | None = None
     pending_upload: PendingUpload | None = None
-    expected_mode: Mode | None = None  # the mode we asked for last
-    raised: tuple[WatchdogState, ...] = field(default=())
+    pending_read: tuple[int, float] | None = None          # id, since
+    pending_command: tuple[int, float, str] | None = None  # id, since, what
+    unsure_route: Route | None = None  # of an upload that failed: the mission on board may be it or a mixture
+    ready_route: Route | None = None   # planned, not allowed or not yet possible to upload
+    own_mode: Mode | None = None       # a mode other than AUTO that we asked for ourselves
+    rung: int = 0                      # step of the ladder being tried
+    ladder_reason: ReplanReason | None = None
+    plan_retry: Retry = PATIENT
+    upload_retry: Retry = PATIENT
+    read_retry: Retry = PATIENT
+    command_retry: Retry = PATIENT
+    read_since_s: float = float("-inf")   # a mission read before this does not count
+    asked_seq: int | None = None   # the item we made current, until the autopilot shows it
+    current_asked_s: float = float("-inf")  # when an item was last made current by us
+    last_plan_s: float = float("-inf")  # when a plan was last asked for
+    replanned_index: int = -1           # the target for which Wolsieffer's replan was asked
+    replans: int = 0
+    good_wind_since_s: float | None = None
+    no_go_since_s: float | None = None
+    wish: OperatorWish | None = None    # the operator's last wish, until it is answered
+    read_items: tuple[MissionItem, ...] | None = None      # the mission as last read
+    read_t_s: float = float("-inf")
+    missed_gate: int | None = None      # a gate that was missed and is to be sailed again
+    track: tuple[PointEn, ...] = ()     # near a buoy
+    history_plan: int = -1
+    history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
+    last_seen: tuple[float, float, float] | None = None          # t, east, north of the last position
+    boot_s: float | None = None
+    after_operator: bool = False       # AUTO has come back: plan from where the boat is now
+    after_restart: bool = False
+    replace_foreign: bool = False      # permission was given to overwrite what is on board
+    repair: bool = False               # the mission on board is a mixture of ours
+    rebooted: bool = False             # in this very step
+    operator_since_s: float | None = None
+    passed_since_s: float | None = None   # the target was passed by our own geometry, the autopilot still steers for it
+    raised: tuple[Raised, ...] = ()
+    entering: tuple[tuple[str, float], ...] = ()   # watchdogs whose entry condition holds, since when
+    steering_until_s: float | None = None          # bearing away in GUIDED until
+    steering_heading_rad: float | None = None
+    irons_s: tuple[float, ...] = ()                # when the boat was in irons
+    announced: tuple[tuple[str, float], ...] = ()  # code, last said
+    reached: tuple[int, ...] = ()                  # goals reached, in order
+    missed: int = 0                                # buoys passed on the wrong side and sailed again
+    wants: tuple[str, ...] = ()                    # what is missing, in words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Persisted:
-    """What survives a kill: written whenever it changes, before the action that it allows."""
+    """What survives a kill: written whenever it changes, before the actions of the step are carried out."""
 
     voyage: str
-    goal_index: int
+    gate: int
+    sailing: bool
     route: Route | None
-    pending: PendingUpload | None
+    pending: Route | None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""
-        raise NotImplementedError
+        return {
+            "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
+            "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
+        }
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Persisted:
         """Read ``to_dict``'s result; ValueError when it cannot be believed."""
-        raise NotImplementedError
+        try:
+            if data["format"] != FORMAT:
+                raise ValueError(f"state format {data['format']}, not {FORMAT}")
+            return cls(
+                voyage=str(data["voyage"]), gate=int(data["gate"]), sailing=bool(data["sailing"]),
+                route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
+            )
+        except (KeyError, TypeError, IndexError, AttributeError) as error:
+            raise ValueError(f"the saved state is damaged: {error!r}") from error
+
+
+FORMAT = 1
+_FIGURES = (
+    "plan_id", "plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s", "rung",
+    "risk", "cost_s", "why",
+)
+
+
+def _route_to_dict(route: Route | None) -> dict[str, Any] | None:
+    if route is None:
+        return None
+    return {
+        "items": [[m.command, m.lat_e7, m.lon_e7, m.alt_m, m.frame, list(m.params)] for m in route.items],
+        "points": [list(p) for p in route.points_en_m],
+        "from": [list(p) for p in route.leg_from_en_m],
+        "gates": list(route.gate_of),
+        **{name: getattr(route, name) for name in _FIGURES},
+    }
+
+
+def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
+    if data is None:
+        return None
+    items = tuple(
+        MissionItem(command=int(c), lat_e7=int(lat), lon_e7=int(lon), alt_m=float(alt), frame=int(frame),
+                    params=(float(p[0]), float(p[1]), float(p[2]), float(p[3])))
+        for c, lat, lon, alt, frame, p in data["items"]
+    )
+    points = tuple((float(e), float(n)) for e, n in data["points"])
+    starts = tuple((float(e), float(n)) for e, n in data["from"])
+    gates = tuple(int(g) for g in data["gates"])
+    if not len(items) == len(points) == len(starts) == len(gates):
+        raise ValueError("the saved state is damaged: its lists differ in length")
+    return Route(items=items, points_en_m=points, leg_from_en_m=starts, gate_of=gates,
+                 **{name: data[name] for name in _FIGURES})

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from companion.boat import Boat
 from companion.geo.frame import LocalFrame
 
 PointEn = tuple[float, float]
@@ -43,18 +44,22 @@ class Goal:
 
 
 class Area(Protocol):
-    """What the skipper asks of the geography (read-only, local metres)."""
+    """What the skipper asks of the geography (local metres); ``companion.geofence.LocalArea`` is one."""
 
-    def clearance_m(self, points_en: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the signed distance [m] to the nearest obstacle or fence, negative inside, for (n, 2) points."""
+    def clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
+        """Return each point's distance to the nearest obstacle or limit [m], negative where it is not free."""
         ...
 
-    def polygons(self, margin_m: float) -> tuple[str, ...]:
-        """Return the obstacles grown by ``margin_m`` as WKT POLYGONs."""
+    def path_clearance_m(self, path_en: ArrayLike) -> float:
+        """Return the smallest distance of a polyline (n, 2) to obstacles and limits [m], at most 0 on contact."""
         ...
 
-    def fence(self, margin_m: float) -> str | None:
-        """Return the fence shrunk by ``margin_m`` as a WKT POLYGON, None when there is none."""
+    def obstacles_wkt(self, margin_m: float = 0.0) -> list[str]:
+        """Return the obstacles grown by the margin as WKT POLYGONs."""
+        ...
+
+    def fence_wkt(self, margin_m: float = 0.0, near_en: PointEn | None = None) -> str | None:
+        """Return the limits less the margin as a WKT POLYGON, None without any; ValueError when nothing is left."""
         ...
 
 
@@ -66,6 +71,7 @@ class Voyage:
     frame: LocalFrame
     goals: tuple[Goal, ...]
     area: Area = field(compare=False)
+    boat: Boat = field(compare=False)
     laps: int = 1
     refuges: tuple[PointEn, ...] = ()
     home_en_m: PointEn | None = None

@@ -1,0 +1,78 @@
+"""Commands to the autopilot with their patience: modes, arming, the current item, an interrupted mission put right."""
+
+from __future__ import annotations
+
+from companion.messages import MissionState, Mode
+from companion.skipper.actions import Arm, SetCurrent, SetMode
+from companion.skipper.planning import upload
+from companion.skipper.turn import Turn
+
+CHECK_S = 3.0   # MISSION_CURRENT comes once a second: by then it shows what was asked for
+
+
+def is_busy(turn: Turn) -> bool:
+    """Return whether a command is unanswered or the last refusal too fresh."""
+    return turn.state.pending_command is not None or turn.t_s < turn.state.command_retry.not_before_s
+
+
+def set_mode(turn: Turn, mode: Mode, text: str) -> bool:
+    """Ask for a mode; False when not permitted or not now."""
+    if is_busy(turn) or not turn.snapshot.permissions.may_set_mode:
+        return False
+    number = turn.new_id()
+    if not turn.act(SetMode(command_id=number, mode=mode, text=text)):
+        return False
+    turn.update(pending_command=(number, turn.t_s, mode.name), own_mode=None if mode is Mode.AUTO else mode)
+    return True
+
+
+def arm(turn: Turn) -> bool:
+    """Ask for arming; False when not permitted or not now."""
+    if is_busy(turn):
+        return False
+    number = turn.new_id()
+    if not turn.act(Arm(command_id=number)):
+        return False
+    turn.update(pending_command=(number, turn.t_s, "arming"))
+    return True
+
+
+def make_current(turn: Turn, seq: int) -> bool:
+    """Make an item current and the mission run (p2 = 1); False when not permitted or not now."""
+    if is_busy(turn):
+        return False
+    number = turn.new_id()
+    if not turn.act(SetCurrent(command_id=number, seq=seq, reset=True)):
+        return False
+    turn.update(
+        pending_command=(number, turn.t_s, "set current"), current_asked_s=turn.t_s, asked_seq=seq, index=seq - 1)
+    return True
+
+
+def check_current(turn: Turn) -> None:
+    """See that the item made current is sailed for; ask again when it is not."""
+    status, asked = turn.autopilot, turn.state.asked_seq
+    if asked is None or status is None or turn.t_s - turn.state.current_asked_s < CHECK_S:
+        return
+    stopped = status.mission_state in {MissionState.NOT_STARTED, MissionState.COMPLETE}
+    if status.mission_seq is not None and status.mission_seq >= asked and not stopped:
+        turn.update(asked_seq=None)
+        return
+    make_current(turn, asked)
+
+
+def repair(turn: Turn) -> bool:
+    """Put right a mission that an interrupted upload left as a mixture; True while that is going on."""
+    state = turn.state
+    if not state.repair:
+        return False
+    route = state.unsure_route or state.route
+    if route is None:
+        turn.update(repair=False)
+        return False
+    turn.phase(state.phase, "the mission on board is a mixture of two of ours: uploading it whole")
+    if state.pending_upload is None and turn.t_s >= state.upload_retry.not_before_s:
+        index = min(state.index, len(route.items) - 1)
+        turn.update(repair=False)
+        upload(turn, route, index + 1, "an upload was cut short: the whole mission again", whole=True)
+    return True

@@ -1,0 +1,209 @@
+"""Taking in a snapshot: outcomes, events, what stays unanswered, and where the boat is on its route."""
+
+from __future__ import annotations
+
+from companion.messages import Mode, StatusText
+from companion.skipper.actions import CancelPlan, Severity
+from companion.skipper.gates import passed_on
+from companion.skipper.geometry import distance_m, waypoint_done
+from companion.skipper.planning import take_plan, take_upload
+from companion.skipper.snapshot import (
+    AutopilotRebooted,
+    CommandOutcome,
+    CommandResult,
+    OperatorWish,
+    PlanOutcome,
+    ReadOutcome,
+    UploadOutcome,
+    UploadResult,
+)
+from companion.skipper.state import PATIENT, Phase
+from companion.skipper.turn import Turn
+from companion.skipper.voyage import Side
+
+HISTORY_STEP_S = 10.0
+HISTORY_KEPT = 19            # 180 s and the present
+BOOT_SLACK_S = 1.0
+FOREIGN_TEXTS = ("Flight plan received",)   # somebody finished an upload
+
+
+def take_outcomes(turn: Turn) -> None:
+    """Take every outcome once, and count what stays unanswered too long as failed."""
+    for outcome in turn.snapshot.outcomes:
+        if isinstance(outcome, PlanOutcome):
+            take_plan(turn, outcome)
+        elif isinstance(outcome, UploadOutcome):
+            take_upload(turn, outcome)
+        elif isinstance(outcome, ReadOutcome):
+            _take_read(turn, outcome)
+        elif isinstance(outcome, CommandOutcome):
+            _take_command(turn, outcome)
+    state, config = turn.state, turn.config
+    if state.pending_plan is not None and turn.t_s - state.pending_plan.t_s > config.plan_timeout_s:
+        number = state.pending_plan.request_id
+        turn.act(CancelPlan(request_id=number))
+        take_plan(turn, PlanOutcome(request_id=number, text=f"no answer within {config.plan_timeout_s:.0f} s"))
+    if state.pending_upload is not None and turn.t_s - state.pending_upload.t_s > config.upload_timeout_s:
+        take_upload(turn, UploadOutcome(
+            upload_id=state.pending_upload.upload_id, result=UploadResult.TIMEOUT,
+            text=f"no outcome within {config.upload_timeout_s:.0f} s"))
+    if state.pending_read is not None and turn.t_s - state.pending_read[1] > config.upload_timeout_s:
+        turn.update(pending_read=None, read_retry=turn.failed(state.read_retry))
+    if state.pending_command is not None and turn.t_s - state.pending_command[1] > config.command_timeout_s:
+        turn.update(pending_command=None, command_retry=turn.failed(state.command_retry))
+
+
+def _take_read(turn: Turn, outcome: ReadOutcome) -> None:
+    if turn.state.pending_read is None or turn.state.pending_read[0] != outcome.read_id:
+        return
+    if outcome.items is None:
+        turn.update(pending_read=None, read_retry=turn.failed(turn.state.read_retry))
+        turn.say(Severity.WARNING, "read failed", f"the mission could not be read: {outcome.text}")
+        return
+    turn.update(pending_read=None, read_retry=PATIENT, read_items=outcome.items, read_t_s=turn.t_s)
+
+
+def _take_command(turn: Turn, outcome: CommandOutcome) -> None:
+    pending = turn.state.pending_command
+    if pending is None or pending[0] != outcome.command_id:
+        return
+    if outcome.result is CommandResult.ACCEPTED:
+        turn.update(pending_command=None, command_retry=PATIENT)
+        return
+    turn.update(pending_command=None, command_retry=turn.failed(turn.state.command_retry))
+    turn.say(Severity.WARNING, f"refused {pending[2]}",
+             f"{pending[2]} {outcome.result.value}: {outcome.text or 'no reason given'}", every_s=0.0)
+
+
+def take_events(turn: Turn) -> None:
+    """Take events: reboots, somebody else's uploads, the operator's wishes."""
+    status = turn.snapshot.autopilot
+    rebooted = any(isinstance(e, AutopilotRebooted) for e in turn.snapshot.events)
+    if status is not None and status.boot_s is not None:
+        if turn.state.boot_s is not None and status.boot_s < turn.state.boot_s - BOOT_SLACK_S:
+            rebooted = True
+        turn.update(boot_s=status.boot_s)
+    turn.update(rebooted=rebooted)
+    for event in turn.snapshot.events:
+        if isinstance(event, StatusText):
+            ours = turn.state.pending_upload is not None or turn.t_s - turn.state.current_asked_s < turn.config.settle_s
+            if event.text.startswith(FOREIGN_TEXTS) and not ours and event.source_component == 1:
+                turn.update(checked_mission=False, read_since_s=turn.t_s)
+        elif isinstance(event, OperatorWish):
+            turn.update(wish=event)
+
+
+def locate(turn: Turn) -> None:
+    """Say where the boat is on its route: the autopilot's count, our own count, gates passed, way made good."""
+    state, status = turn.state, turn.autopilot
+    route, here = state.route, turn.snapshot.position_en_m
+    if route is not None and status is not None and status.mission_seq is not None and _counts(turn):
+        index = min(max(status.mission_seq - 1, 0), len(route.items) - 1)
+        # Right after we made an item current the stream may still carry the old number.
+        if turn.t_s - state.current_asked_s > turn.config.settle_s or index >= state.index:
+            turn.update(index=index)
+    boat = turn.boat_en
+    if route is not None and boat is not None and state.sailing:
+        _own_count(turn)
+        _pass_gates(turn)
+        _remember(turn)
+    if here is not None and turn.snapshot.vehicle_age_s is not None and turn.snapshot.vehicle_age_s < 1.0 + 1e-9:
+        turn.update(last_seen=(turn.t_s, here[0], here[1]))
+
+
+def _counts(turn: Turn) -> bool:
+    """Return whether the autopilot's number is about our route."""
+    return turn.state.checked_mission and not turn.state.foreign and turn.state.phase is not Phase.OPERATOR
+
+
+def _own_count(turn: Turn) -> None:
+    """Advance our own target by Büsser's double conditions; note when the autopilot lags behind it."""
+    boat, route = turn.boat_en, turn.state.route
+    if boat is None or route is None:
+        return
+    own = max(turn.state.own_index, turn.state.index)
+    while own < len(route.items) - 1 and waypoint_done(
+        boat, route.leg_from_en_m[own], route.points_en_m[own], route.points_en_m[own + 1],
+        grid_m=turn.config.grid_size_m, manoeuvre_m=turn.config.manoeuvre_m,
+    ):
+        own += 1
+        if own > turn.state.index + 1:
+            break
+    lags = own > turn.state.index
+    since = turn.state.passed_since_s if turn.state.passed_since_s is not None else turn.t_s
+    turn.update(own_index=own, passed_since_s=since if lags else None)
+
+
+def _pass_gates(turn: Turn) -> None:
+    """Count the gates passed: by being there, or by the autopilot's count."""
+    boat, route = turn.boat_en, turn.state.route
+    while boat is not None and route is not None and turn.gate is not None:
+        gate, number = turn.gate, turn.state.gate
+        left = distance_m(boat, gate.en_m)
+        counted = any(g == number for g in route.gate_of[: turn.state.index])
+        near = max(gate.radius_m, turn.config.grid_size_m)
+        if not (left <= gate.radius_m or (counted and left <= near and not _is_last(turn))):
+            if not (counted and left > near) or turn.state.missed_gate == number:
+                return
+            # The autopilot has left it behind and we were never near: it was missed.
+            turn.update(missed=turn.state.missed + 1, missed_gate=number)
+            return
+        if gate.side is not Side.NONE and gate.buoy_en_m is not None and gate.ends_goal and not _rounded(turn, number):
+            turn.update(missed=turn.state.missed + 1, missed_gate=_first_gate(turn, gate.goal),
+                        gate=_first_gate(turn, gate.goal), track=())
+            turn.say(Severity.WARNING, "buoy missed", f"{gate.name} was left on the wrong side: again", every_s=0.0)
+            return
+        reached = (*turn.state.reached, gate.goal) if gate.ends_goal else turn.state.reached
+        turn.update(gate=number + 1, reached=reached, missed_gate=None)
+        if gate.ends_goal:
+            turn.update(track=())
+            turn.say(Severity.NOTICE, "goal", f"{gate.name} reached, {left:.1f} m from it", every_s=0.0)
+
+
+def _is_last(turn: Turn) -> bool:
+    return turn.state.gate == len(turn.gates) - 1
+
+
+def _first_gate(turn: Turn, goal: int) -> int:
+    return next(n for n, gate in enumerate(turn.gates) if gate.goal == goal)
+
+
+def _rounded(turn: Turn, number: int) -> bool:
+    """Return whether the track since the buoy's first gate goes round it on the right hand."""
+    gate = turn.gates[number]
+    if gate.buoy_en_m is None or len(turn.state.track) < 2:
+        return True
+    return passed_on(gate.side, list(turn.state.track), gate.buoy_en_m)
+
+
+def _remember(turn: Turn) -> None:
+    """Keep the way made good (for the progress watchdog) and the track near a buoy."""
+    boat, ahead = turn.boat_en, turn.ahead()
+    if boat is None:
+        return
+    gate = turn.gate
+    if gate is not None and gate.buoy_en_m is not None:
+        near = distance_m(boat, gate.buoy_en_m) < 4.0 * distance_m(gate.en_m, gate.buoy_en_m)
+        if near and (not turn.state.track or distance_m(turn.state.track[-1], boat) > 0.5):
+            turn.update(track=(*turn.state.track[-399:], boat))
+    elif turn.state.track:
+        turn.update(track=())
+    history = turn.state.history
+    if history and turn.t_s - history[-1][0] < HISTORY_STEP_S:
+        return
+    left = 0.0
+    point = boat
+    for following in ahead:
+        left += distance_m(point, following)
+        point = following
+    # A new plan may be longer or shorter: progress is measured within one plan.
+    if turn.state.history_plan != (turn.state.route.plan_id if turn.state.route is not None else -1):
+        history = ()
+    plan_id = turn.state.route.plan_id if turn.state.route is not None else -1
+    turn.update(history=(*history, (turn.t_s, boat[0], boat[1], left))[-HISTORY_KEPT:], history_plan=plan_id)
+
+
+def mode_is_ours(turn: Turn) -> bool:
+    """Return whether the mode is AUTO or one that we asked for."""
+    status = turn.autopilot
+    return status is None or status.mode in {None, Mode.AUTO, Mode.INITIALISING, turn.state.own_mode}

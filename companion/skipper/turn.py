@@ -1,0 +1,187 @@
+"""One step in the making: the state so far, the snapshot, and the actions asked for.
+
+A ``Turn`` lives for one call of ``step``. Rules read it and change it through its methods; nothing leaves it but
+the frozen state and the tuple of actions. Permissions are checked here too, so no rule can go round them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from companion.messages import AutopilotStatus, Mode
+from companion.skipper.actions import (
+    Action,
+    Announce,
+    Arm,
+    SetCurrent,
+    SetMode,
+    Severity,
+    SteerHeading,
+    UploadFence,
+    UploadMission,
+)
+from companion.skipper.config import Permissions, SkipperConfig
+from companion.skipper.gates import Gate
+from companion.skipper.problem import wind_mean, wind_now
+from companion.skipper.route import ends_safely
+from companion.skipper.snapshot import Snapshot
+from companion.skipper.state import Phase, Retry, Route, SkipperState
+from companion.skipper.voyage import PointEn, Voyage
+
+FRESH_S = 3.0   # a part older than this is not acted upon
+
+
+def permitted(action: Action, permissions: Permissions) -> bool:
+    """Return whether the operator allows an action of this kind."""
+    if isinstance(action, UploadMission):
+        return permissions.may_upload and ends_safely(action.items)
+    if isinstance(action, UploadFence):
+        return permissions.may_upload_fence
+    if isinstance(action, SetMode):
+        return permissions.may_set_mode and (action.mode is not Mode.GUIDED or permissions.may_steer)
+    if isinstance(action, Arm):
+        return permissions.may_arm
+    if isinstance(action, SetCurrent):
+        return permissions.may_upload
+    if isinstance(action, SteerHeading):
+        return permissions.may_steer
+    return True
+
+
+class Turn:
+    """The work of one step."""
+
+    def __init__(
+        self, voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], state: SkipperState, snapshot: Snapshot,
+    ) -> None:
+        self.voyage, self.config, self.gates = voyage, config, gates
+        self.state, self.snapshot = state, snapshot
+        self.actions: list[Action] = []
+
+    # ------------------------------------------------------------------------------------- changing
+    def update(self, **changes: Any) -> None:
+        """Change the state."""
+        self.state = replace(self.state, **changes)
+
+    def new_id(self) -> int:
+        """Return a number not used before in this voyage."""
+        number = self.state.next_id
+        self.update(next_id=number + 1)
+        return number
+
+    def act(self, action: Action) -> bool:
+        """Ask for an action; False (and nothing asked) when it is not permitted."""
+        if not permitted(action, self.snapshot.permissions):
+            return False
+        self.actions.append(action)
+        return True
+
+    def say(self, severity: Severity, code: str, text: str, *, every_s: float | None = None) -> None:
+        """Announce something; the same code not more often than every ``every_s`` (default: the configured)."""
+        interval = self.config.announce_interval_s if every_s is None else every_s
+        said = dict(self.state.announced)
+        if self.t_s - said.get(code, -math.inf) < interval:
+            return
+        said[code] = self.t_s
+        recent = sorted(said.items(), key=lambda item: item[1])[-64:]
+        self.update(announced=tuple(recent))
+        self.actions.append(Announce(severity=severity, code=code, text=text))
+
+    def phase(self, phase: Phase, why: str) -> None:
+        """Set the phase and the sentence that says why."""
+        self.update(phase=phase, why=why)
+
+    def failed(self, retry: Retry) -> Retry:
+        """Return the patience after another failure: the wait doubles up to the longest."""
+        wait = min(
+            self.config.backoff_first_s * self.config.backoff_factor**retry.failures, self.config.backoff_max_s)
+        return Retry(failures=retry.failures + 1, not_before_s=self.t_s + wait)
+
+    # -------------------------------------------------------------------------------------- reading
+    @property
+    def t_s(self) -> float:
+        """Now [s]."""
+        return self.snapshot.t_s
+
+    @property
+    def autopilot(self) -> AutopilotStatus | None:
+        """The autopilot's status while it is heard."""
+        age = self.snapshot.heartbeat_age_s
+        return self.snapshot.autopilot if age is not None and age <= FRESH_S else None
+
+    @property
+    def boat_en(self) -> PointEn | None:
+        """The boat's position while it is fresh and plausible."""
+        age = self.snapshot.vehicle_age_s
+        if self.snapshot.vehicle is None or age is None or age > FRESH_S or self.is_raised("position jump"):
+            return None
+        return self.snapshot.position_en_m
+
+    @property
+    def speed_mps(self) -> float:
+        """Speed over ground [m/s], 0 when unknown."""
+        return self.snapshot.vehicle.speed_mps if self.snapshot.vehicle is not None else 0.0
+
+    @property
+    def wind_now(self) -> tuple[float, float] | None:
+        """The 5 s wind (from [rad], speed [m/s])."""
+        return wind_now(self.snapshot)
+
+    @property
+    def wind_mean(self) -> tuple[float, float] | None:
+        """The 90 s wind (from [rad], speed [m/s])."""
+        return wind_mean(self.snapshot)
+
+    @property
+    def no_go_half_rad(self) -> float:
+        """Where the autopilot stops following the line: SAIL_NO_GO_ANGLE."""
+        limits = self.snapshot.limits
+        return self.config.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
+
+    @property
+    def planned_no_go_rad(self) -> float:
+        """The half angle that plans keep out of."""
+        return max(self.no_go_half_rad + self.config.no_go_pad_rad, self.voyage.boat.no_go_half_rad)
+
+    @property
+    def tack_corridor_m(self) -> float:
+        """SAIL_XTRACK_MAX."""
+        limits = self.snapshot.limits
+        return self.config.tack_corridor_m if limits is None else limits.sail_xtrack_max_m
+
+    @property
+    def gate(self) -> Gate | None:
+        """The gate being sailed to, None when all are passed."""
+        return self.gates[self.state.gate] if self.state.gate < len(self.gates) else None
+
+    def is_raised(self, name: str) -> bool:
+        """Return whether a watchdog is raised."""
+        return any(r.name == name for r in self.state.raised)
+
+    def leg(self) -> tuple[PointEn, PointEn] | None:
+        """Return the planned leg being sailed (from, to), None without a route."""
+        route, i = self.state.route, self.state.index
+        if route is None or not 0 <= i < len(route.items):
+            return None
+        return route.leg_from_en_m[i], route.points_en_m[i]
+
+    def ahead(self) -> tuple[PointEn, ...]:
+        """Return the waypoints still to be sailed, without the safe end; empty when loitering at it."""
+        route = self.state.route
+        return route.points_en_m[self.state.index:-1] if route is not None else ()
+
+    def last_waypoint(self) -> int:
+        """Return the index of the last waypoint before the safe end, -1 without one."""
+        route = self.state.route
+        return len(route.items) - 2 if route is not None else -1
+
+    def blank_facts(self, plan_id: int, margin_m: float, delta_s: float, rung: str) -> Route:
+        """Return the figures of a plan that is being asked for now."""
+        wind = self.wind_mean or (0.0, 0.0)
+        return Route(
+            plan_id=plan_id, plan_t_s=self.t_s, plan_twd_from_rad=wind[0], plan_tws_mps=wind[1],
+            plan_half_width_rad=0.0, margin_m=margin_m, delta_s=delta_s, rung=rung,
+        )
