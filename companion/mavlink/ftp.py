@@ -252,7 +252,7 @@ class FtpRead(_Ftp):
     def _next(self, t_s: float) -> list[Message]:
         """Ask for the first byte that is missing, or close."""
         at = 0
-        while at in self._chunks and self._chunks[at]:
+        while self._chunks.get(at):
             at += len(self._chunks[at])
         if self._end_at is not None and at >= self._end_at:
             return self._ask(t_s, TERMINATE)
