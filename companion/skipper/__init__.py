@@ -2,3 +2,14 @@
 
 Pure rules. ``Skipper(voyage=..., config=...).step(state, snapshot) -> (state, actions)``.
 """
+
+from companion.skipper.config import ALL_PERMITTED, DRY_RUN, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.rules import Skipper
+from companion.skipper.snapshot import Snapshot
+from companion.skipper.state import Persisted, Phase, SkipperState
+from companion.skipper.voyage import Goal, Side, Voyage
+
+__all__ = [
+    "ALL_PERMITTED", "DRY_RUN", "Goal", "Permissions", "Persisted", "Phase", "ReplanPolicy", "SafeEnd", "Side",
+    "Skipper", "SkipperConfig", "SkipperState", "Snapshot", "Voyage",
+]
