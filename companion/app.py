@@ -1,1 +1,332 @@
-"""The composition root."""
+"""The composition root: the one module that knows every room, and the one task group that a voyage lives in.
+
+``sail`` joins a transport, a planner and a mission into a voyage and returns its summary. It does not know whether
+the boat is simulated, how fast time runs, or where the planner computes: all of that is in what it is given.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import platform
+import sys
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from companion import __version__
+from companion.clock import now_s
+from companion.compose import config_of, estimator_of, permissions_of, voyage_of
+from companion.executor import Executor, Planner
+from companion.fold import Step, VoyageFold
+from companion.geofence import Mission
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.link import Link
+from companion.mavlink.signing import SigningStore
+from companion.mavlink.tlog import stamp
+from companion.mavlink.transport import Transport
+from companion.messages import CompanionStatus
+from companion.plots.voyage import AREA
+from companion.skipper import Skipper
+from companion.skipper.actions import Announce, RequestPlan
+from companion.skipper.state import Persisted, Phase
+from companion.telemetry.recorder import STATE, Recorder, write_atomically
+from companion.telemetry.records import action_record, outcome_record, track_row
+from companion.telemetry.status import companion_status
+from companion.telemetry.summary import VoyageFigures
+from companion.wind import WindRoom
+
+STEP_S = 1.0
+# Status to the radio: a frame of it every so often [s]; see companion.mavlink.status_wire for its bytes.
+STATUS_EVERY_S = 2.0
+SYNC_EVERY_S = 5.0
+# After arrival the boat loiters; the companion watches it for a moment before it ends [s].
+LINGER_S = 5.0
+# Parameters that the plan and the wind depend on; asked at the start and after a reboot.
+PARAMETERS = (
+    "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "SAIL_LOIT_RADIUS", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE",
+    "FENCE_ACTION", "WNDVN_TYPE", "WNDVN_SPEED_TYPE", "WNDVN_SPEED_MIN", "WNDVN_TRUE_FILT", "WNDVN_DIR_FILT",
+    "WNDVN_SPEED_FILT", "WNDVN_DIR_OFS",
+)
+
+Offload = Callable[[Callable[[], None]], Awaitable[None]]
+
+
+async def in_thread(work: Callable[[], None]) -> None:
+    """Do disk work in a thread: a slow card must not hold the loop."""
+    await asyncio.to_thread(work)
+
+
+async def at_once(work: Callable[[], None]) -> None:
+    """Do disk work here: for the virtual clock, which has no threads."""
+    work()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SailOptions:
+    """How to sail, beside the mission.
+
+    Attributes:
+        seed: of the planner.
+        dry_run: look, plan, speak, touch nothing.
+        epoch_s: Unix time [s] of the loop's time 0, for stamps only.
+        expansions: plan with this effort instead of the mission's time budget (repeatable).
+        state_path: where the state for a restart is kept; None: in the voyage folder.
+        limit_s: end after this long [s].
+        wait_s: how long to wait for the autopilot's first heartbeat [s].
+        offload: where disk work is done.
+        signing: key and timestamp for a signed link.
+        command: what was typed, for the record.
+    """
+
+    seed: int = 0
+    dry_run: bool = False
+    epoch_s: float = 0.0
+    expansions: int | None = None
+    state_path: Path | None = None
+    limit_s: float | None = None
+    wait_s: float = 30.0
+    offload: Offload = in_thread
+    signing: SigningStore | None = None
+    command: str = ""
+
+
+OnStatus = Callable[[CompanionStatus, Step], None]
+
+
+async def sail(
+    mission: Mission, transport: Transport, planner: Planner, folder: Path, options: SailOptions,
+    *, on_status: OnStatus | None = None, stop: asyncio.Event | None = None,
+) -> dict[str, Any]:
+    """Sail ``mission`` until it is done, stopped or out of time; return the summary.
+
+    Raises:
+        LinkError: no autopilot was heard within ``options.wait_s``.
+        JobError: the folder cannot be written.
+    """
+    with Recorder(folder) as recorder:
+        shell = _Shell(mission, planner, recorder, options, on_status, stop or asyncio.Event())
+        return await shell.run(transport)
+
+
+class _Shell:
+    """One voyage: the fold and everything around it that has a life."""
+
+    def __init__(
+        self, mission: Mission, planner: Planner, recorder: Recorder, options: SailOptions,
+        on_status: OnStatus | None, stop: asyncio.Event,
+    ) -> None:
+        self.mission, self.recorder, self.options = mission, recorder, options
+        self.planner, self.on_status, self.stop = planner, on_status, stop
+        self.voyage = voyage_of(mission)
+        self.config = config_of(mission)
+        self.state_path = options.state_path or recorder.folder / STATE
+        self.figures = VoyageFigures()
+        self.status: CompanionStatus | None = None
+        self.end_reason = "stopped"
+        self._persisted: Persisted | None = None
+        self._frames = 0
+        self._announced: tuple[str, str] = ("", "")
+
+    async def run(self, transport: Transport) -> dict[str, Any]:
+        """Sail and leave the folder complete, whatever happens."""
+        persisted = self._load_state()
+        self.fold = VoyageFold(
+            Skipper(voyage=self.voyage, config=self.config),
+            WindRoom(estimator=estimator_of(self.mission)),
+            permissions_of(self.mission, dry_run=self.options.dry_run),
+            persisted,
+        )
+        self._write_description(transport.name)
+        try:
+            async with Link(transport, sink=self._on_frame, signing=self.options.signing) as link:
+                link.subscribe(self._on_message)
+                await link.wait_autopilot(self.options.wait_s)
+                autopilot = Autopilot(link)
+                executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
+                                    expansions=self.options.expansions)
+                async with asyncio.TaskGroup() as group:
+                    tasks = [
+                        group.create_task(executor.run(), name="executor"),
+                        group.create_task(self._keep_parameters(autopilot, link), name="parameters"),
+                        group.create_task(self._send_status(autopilot), name="radio status"),
+                        group.create_task(self._sync(), name="disk sync"),
+                    ]
+                    await self._steps(executor, link)
+                    for task in tasks:
+                        task.cancel()
+        except asyncio.CancelledError:
+            self.end_reason = "interrupted"
+            raise
+        finally:
+            summary = self._summary()
+            self.recorder.summary(summary)
+        return summary
+
+    # -------------------------------------------------------------------------------------- inputs
+    def _quantised(self, t_s: float) -> tuple[int, float]:
+        """Return a stamp [µs since 1970] as a tlog keeps it, and the loop time [s] that it stands for."""
+        stamp_us = int((self.options.epoch_s + t_s) * 1e6) & ~3
+        return stamp_us, stamp_us / 1e6 - self.options.epoch_s
+
+    def _on_frame(self, t_s: float, frame: bytes) -> None:
+        self.recorder.frame(stamp(self._quantised(t_s)[0], frame))
+
+    def _on_message(self, t_s: float, message: Any) -> None:
+        self._frames += 1
+        self.fold.message(self._quantised(t_s)[1], message)
+
+    def _on_outcome(self, outcome: Any) -> None:
+        t_s = self._quantised(now_s())[1]
+        self.recorder.decision(self._stamped(t_s, outcome_record(outcome)))
+        self.fold.take_outcome(t_s, outcome)
+
+    # --------------------------------------------------------------------------------------- steps
+    async def _steps(self, executor: Executor, link: Link) -> None:
+        started_s = next_s = now_s()
+        done_s: float | None = None
+        while True:
+            t_s = self._quantised(now_s())[1]
+            self.fold.planner_alive(self.planner.is_alive)
+            step = self.fold.tick(t_s)
+            await self._after_step(step, link)
+            executor.submit(step.actions)
+            if step.state.phase is Phase.DONE:
+                done_s = t_s if done_s is None else done_s
+                if t_s - done_s >= LINGER_S:
+                    self.end_reason = "arrived"
+                    return
+            else:
+                done_s = None
+            if self.options.limit_s is not None and t_s - started_s >= self.options.limit_s:
+                self.end_reason = "out of time"
+                return
+            next_s = max(next_s + STEP_S, now_s())
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout_at(next_s):
+                    await self.stop.wait()
+                self.end_reason = "stopped"
+                return
+
+    async def _after_step(self, step: Step, link: Link) -> None:
+        """Record the step; nothing of it is carried out before what a restart needs is on the disk."""
+        snapshot = step.snapshot
+        clearance_m = None
+        if snapshot.position_en_m is not None:
+            value = float(self.voyage.area.clearance_m(np.array([snapshot.position_en_m]))[0])
+            clearance_m = value if np.isfinite(value) else None
+        self.figures.take(step, clearance_m)
+        self.recorder.track(track_row(step, self._frames, clearance_m))
+        self._frames = 0
+        for action in step.actions:
+            self.recorder.decision(self._stamped(snapshot.t_s, action_record(action, snapshot, self.config)))
+        changed = (step.state.phase.value, step.state.why)
+        if changed[0] != self._announced[0]:
+            self.recorder.decision(self._stamped(
+                snapshot.t_s, {"kind": "phase", "phase": changed[0], "why": changed[1]}))
+        self._announced = changed
+        self.status = companion_status(step, self.voyage, self.figures, clearance_m, link.bytes_per_s()[1])
+        persisted = self.fold.skipper.persisted(step.state)
+        if persisted != self._persisted:
+            self._persisted = persisted
+            data = json.dumps(persisted.to_dict()).encode()
+            await self.options.offload(lambda: write_atomically(self.state_path, data))
+        if self.on_status is not None:
+            self.on_status(self.status, step)
+
+    def _stamped(self, t_s: float, record: dict[str, Any]) -> dict[str, Any]:
+        utc = datetime.fromtimestamp(self.options.epoch_s + t_s, UTC).isoformat(timespec="milliseconds")
+        return {"t_s": t_s, "utc": utc.replace("+00:00", "Z"), **record}
+
+    # ----------------------------------------------------------------------------------- companions
+    async def _keep_parameters(self, autopilot: Autopilot, link: Link) -> None:
+        """Read the parameters that matter, again after each reboot; the fold hears them as messages."""
+        reboots = -1
+        while True:
+            if reboots != link.stats.reboots and link.is_alive:
+                reboots = link.stats.reboots
+                for name in PARAMETERS:
+                    await autopilot.get_param(name)
+            await asyncio.sleep(STEP_S)
+
+    async def _send_status(self, autopilot: Autopilot) -> None:
+        while True:
+            if self.status is not None:
+                autopilot.send_status(self.status)
+            await asyncio.sleep(STATUS_EVERY_S)
+
+    async def _sync(self) -> None:
+        while True:
+            await asyncio.sleep(SYNC_EVERY_S)
+            await self.options.offload(self.recorder.sync)
+
+    # ---------------------------------------------------------------------------------------- files
+    def _load_state(self) -> Persisted | None:
+        try:
+            return Persisted.from_dict(json.loads(self.state_path.read_bytes()))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError) as error:
+            self.recorder.decision(self._stamped(now_s(), {
+                "kind": "refusal", "what": "saved state", "text": f"{self.state_path.name} is not used: {error}"}))
+            return None
+
+    def _write_description(self, link: str) -> None:
+        area, options = self.voyage.area, self.options
+        chart = {
+            "name": self.mission.name,
+            "origin": {"lat_deg": self.voyage.frame.origin.lat_deg, "lon_deg": self.voyage.frame.origin.lon_deg},
+            "goals": [
+                {"x": g.en_m[0], "y": g.en_m[1], "radius_m": g.radius_m, "name": g.name, "side": g.side.value}
+                for g in self.voyage.goals
+            ],
+            "obstacles": area.obstacles_wkt(0.0),
+            "grown": area.obstacles_wkt(self.config.margin_m),
+            "fence": area.fence_wkt(0.0),
+            "margin_m": self.config.margin_m,
+            "no_go_half_deg": self.mission.boat.no_go_half_deg,
+        }
+        write_atomically(self.recorder.folder / AREA, json.dumps(chart).encode())
+        self.recorder.voyage({
+            "mission": {"name": self.mission.name, "path": str(self.mission.path)},
+            "run": {
+                "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
+                "expansions": options.expansions, "epoch_s": options.epoch_s,
+                "started_utc": datetime.fromtimestamp(options.epoch_s + now_s(), UTC).isoformat(),
+            },
+            "permissions": {
+                name: getattr(self.fold.permissions, name) for name in type(self.fold.permissions).__slots__
+            },
+            "versions": {
+                "companion": __version__, "python": platform.python_version(), "machine": platform.machine(),
+                **{name: metadata.version(name) for name in ("numpy", "numba", "shapely", "pymavlink", "filterpy")},
+            },
+            "argv": sys.argv[1:],
+        })
+
+    def _summary(self) -> dict[str, Any]:
+        state = self.fold.state
+        goals = len(self.voyage.legs)
+        return {
+            "mission": self.mission.name,
+            "arrived": state.phase is Phase.DONE,
+            **self.figures.to_dict(),
+            "goals_reached": min(goals, len(state.reached)),
+            "goals": goals,
+            "end_phase": state.phase.value,
+            "end_reason": self.end_reason,
+            "end_why": state.why,
+            "records_dropped": self.recorder.dropped,
+            "planner_restarts": self.planner.restarts,
+        }
+
+
+def is_announcement(action: object) -> bool:
+    """Tell an announcement from the actions that touch the boat."""
+    return isinstance(action, Announce | RequestPlan)

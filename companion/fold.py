@@ -117,13 +117,9 @@ class VoyageFold:
         elif isinstance(value, StatusText):
             self._events.append(value)
 
-    def outcome(self, outcome: Outcome) -> None:
-        """Take the outcome of an earlier action."""
-        self._outcomes.append(outcome)
-
-    def read_mission(self, outcome: ReadOutcome, t_s: float) -> None:
-        """Take a mission that was read from the autopilot."""
-        if outcome.items is not None:
+    def take_outcome(self, t_s: float, outcome: Outcome) -> None:
+        """Take the outcome of an earlier action, known at ``t_s``."""
+        if isinstance(outcome, ReadOutcome) and outcome.items is not None:
             self._mission = MissionOnBoard(items=outcome.items, read_t_s=t_s)
         self._outcomes.append(outcome)
 

@@ -57,10 +57,21 @@ def read_voyage(folder: Path) -> VoyageRecord:
         folder=folder,
         columns=columns,
         texts=texts,
-        decisions=read_jsonl(folder / DECISIONS),
+        decisions=_joined(read_jsonl(folder / DECISIONS)),
         area=json.loads((folder / AREA).read_text(encoding="utf-8")),
         summary=json.loads(summary_path.read_text(encoding="utf-8")) if summary_path.is_file() else {},
     )
+
+
+def _joined(decisions: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Give each plan the facts of its request: reason, wind, widening of the no-go zone."""
+    requests = {d["request_id"]: d for d in decisions if d.get("action") == "RequestPlan"}
+    for decision in decisions:
+        if decision.get("kind") == "plan":
+            request = requests.get(decision.get("request_id"), {})
+            for key in ("reason", "rung", "twd_deg", "widening"):
+                decision.setdefault(key, request.get(key))
+    return decisions
 
 
 def _number(text: str) -> float:
@@ -269,7 +280,7 @@ def _no_go(axes: Any, record: VoyageRecord, plans: list[dict[str, Any]]) -> None
         start_s = times[k]
         xs: list[float] = []
         ys: list[float] = []
-        for horizon_s, half_deg in plan.get("widening", []):
+        for horizon_s, half_deg in plan.get("widening") or []:
             at_s = start_s + float(horizon_s)
             if at_s > times[k + 1] + 1e-9 and xs:
                 break

@@ -1,0 +1,178 @@
+"""Carries out what the skipper asked for, and hands back how each ended.
+
+Transfers and commands go to the autopilot one after another, in the order asked; planning runs beside them, one
+request at a time, the newest winning. The skipper hears every outcome under the id of its action.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.commands import CommandAnswer
+from companion.mavlink.machines import Outcome as WireOutcome
+from companion.planner import Plan, Problem
+from companion.skipper.actions import (
+    Action,
+    Announce,
+    Arm,
+    CancelPlan,
+    ReadMission,
+    RequestPlan,
+    SetCurrent,
+    SetMode,
+    SteerHeading,
+    UploadFence,
+    UploadMission,
+)
+from companion.skipper.snapshot import (
+    CommandOutcome,
+    CommandResult,
+    Outcome,
+    PlanOutcome,
+    ReadOutcome,
+    UploadOutcome,
+    UploadResult,
+)
+
+# More orders than this waiting means that the autopilot has long stopped answering.
+MAX_WAITING = 16
+
+_UPLOADS = {
+    WireOutcome.OK: UploadResult.OK,
+    WireOutcome.REFUSED: UploadResult.REFUSED,
+    WireOutcome.UNSUPPORTED: UploadResult.REFUSED,
+    WireOutcome.MISMATCH: UploadResult.MISMATCH,
+    WireOutcome.LINK: UploadResult.LINK,
+}
+_COMMANDS = {WireOutcome.OK: CommandResult.ACCEPTED, WireOutcome.TIMEOUT: CommandResult.TIMEOUT,
+             WireOutcome.LINK: CommandResult.TIMEOUT}
+
+
+class Planner(Protocol):
+    """Whoever computes plans: a worker process on the boat, the same process under the virtual clock."""
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it can take a request."""
+        ...
+
+    @property
+    def restarts(self) -> int:
+        """How often it had to be replaced."""
+        ...
+
+    async def plan(
+        self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
+        algorithm: str = "auto",
+    ) -> Plan:
+        """Plan; never raises for a problem, however bad."""
+        ...
+
+
+class Executor:
+    """The orders under way. ``run`` lives in the voyage's task group."""
+
+    def __init__(
+        self, autopilot: Autopilot, planner: Planner, on_outcome: Callable[[Outcome], None], *,
+        seed: int = 0, expansions: int | None = None,
+    ) -> None:
+        self._autopilot, self._planner, self._on_outcome = autopilot, planner, on_outcome
+        self._seed, self._expansions = seed, expansions
+        self._orders: asyncio.Queue[Action] = asyncio.Queue(MAX_WAITING)
+        self._plan: RequestPlan | None = None
+        self._plan_wanted = asyncio.Event()
+        self.refused = 0
+
+    def submit(self, actions: Sequence[Action]) -> None:
+        """Take the actions of one step; never waits."""
+        for action in actions:
+            if isinstance(action, RequestPlan):
+                self._plan = action
+                self._plan_wanted.set()
+            elif isinstance(action, CancelPlan):
+                if self._plan is not None and self._plan.request_id == action.request_id:
+                    self._plan = None
+            elif isinstance(action, SteerHeading):
+                self._autopilot.steer_heading(action.heading_rad)
+            elif isinstance(action, Announce):
+                self._autopilot.say(int(action.severity), action.text)
+            else:
+                self._enqueue(action)
+
+    def _enqueue(self, action: Action) -> None:
+        try:
+            self._orders.put_nowait(action)
+        except asyncio.QueueFull:
+            self.refused += 1
+            self._on_outcome(_gave_up(action, f"{MAX_WAITING} orders are waiting"))
+
+    async def run(self) -> None:
+        """Carry out orders until cancelled."""
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._run_orders(), name="orders")
+            group.create_task(self._run_plans(), name="plans")
+
+    async def _run_plans(self) -> None:
+        while True:
+            await self._plan_wanted.wait()
+            self._plan_wanted.clear()
+            request = self._plan
+            if request is None:
+                continue
+            plan = await self._planner.plan(
+                request.problem, budget_s=request.budget_s, expansions=self._expansions,
+                seed=self._seed + request.seed,
+            )
+            # A request that was cancelled or overtaken while it was computed is answered by the newer one.
+            if self._plan is not None and self._plan.request_id == request.request_id:
+                self._plan = None
+                self._on_outcome(PlanOutcome(request_id=request.request_id, plan=plan, text=plan.reason))
+
+    async def _run_orders(self) -> None:
+        while True:
+            action = await self._orders.get()
+            self._on_outcome(await self._carry_out(action))
+
+    async def _carry_out(self, action: Action) -> Outcome:
+        autopilot = self._autopilot
+        if isinstance(action, UploadMission):
+            done = await autopilot.upload_mission(
+                action.items, keep_first=action.keep_first, set_current=action.set_current)
+            return UploadOutcome(upload_id=action.upload_id, result=_UPLOADS.get(done.outcome, UploadResult.TIMEOUT),
+                                 text=_join(done.text, f"{done.method} {done.duration_s:.2f} s"))
+        if isinstance(action, UploadFence):
+            done = await autopilot.upload_fence(action.items)
+            return UploadOutcome(upload_id=action.upload_id, result=_UPLOADS.get(done.outcome, UploadResult.TIMEOUT),
+                                 text=done.text)
+        if isinstance(action, ReadMission):
+            read = await autopilot.read_mission()
+            return ReadOutcome(read_id=action.read_id, items=read.items, text=read.text)
+        if isinstance(action, SetMode):
+            return _command(action.command_id, await autopilot.set_mode(action.mode))
+        if isinstance(action, Arm):
+            return _command(action.command_id, await autopilot.arm())
+        if isinstance(action, SetCurrent):
+            return _command(action.command_id, await autopilot.set_current(action.seq, reset=action.reset))
+        raise TypeError(f"nobody carries out {type(action).__name__}")
+
+
+def _command(command_id: int, answer: CommandAnswer) -> CommandOutcome:
+    result = _COMMANDS.get(answer.outcome, CommandResult.REFUSED)
+    return CommandOutcome(command_id=command_id, result=result, text=answer.text)
+
+
+def _gave_up(action: Action, why: str) -> Outcome:
+    if isinstance(action, UploadMission | UploadFence):
+        return UploadOutcome(upload_id=action.upload_id, result=UploadResult.LINK, text=why)
+    if isinstance(action, ReadMission):
+        return ReadOutcome(read_id=action.read_id, text=why)
+    if isinstance(action, SetMode | Arm | SetCurrent):
+        return CommandOutcome(command_id=action.command_id, result=CommandResult.TIMEOUT, text=why)
+    raise TypeError(f"{type(action).__name__} is no order")
+
+
+def _join(*texts: str) -> str:
+    return "; ".join(t for t in texts if t)
