@@ -1,0 +1,157 @@
+"""Pictures of plans: the problem, the search, the path with its no-go fans widening along it, the bound."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import shapely
+from matplotlib.collections import LineCollection
+from matplotlib.patches import Circle, PathPatch, Wedge
+from matplotlib.path import Path as DrawnPath
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from companion.planner import Plan, Problem
+
+LAND, LAND_EDGE = "#d9cfb4", "#8d7f5a"
+SEA, TREE = "#f2f7fa", "#9db4c4"
+PATH, FAN, START, GOAL = "#c1272d", "#e08a1e", "#00a3b4", "#2e8b3d"
+FANS_MOST = 14
+
+
+def save_plan(problem: Problem, plan: Plan, path: str | Path) -> None:
+    """Draw a plan and save it.
+
+    Raises:
+        InputError: the file cannot be written or its kind is unknown.
+    """
+    from companion.errors import InputError
+
+    figure, axes = plt.subplots(figsize=(8.0, 8.0), layout="constrained")
+    try:
+        draw_plan(axes, problem, plan)
+        figure.savefig(path, dpi=110)
+    except (OSError, ValueError) as error:
+        raise InputError("--plot", str(path), f"cannot be written ({error})", "name a .png in a folder") from error
+    finally:
+        plt.close(figure)
+
+
+def draw_plan(axes: Axes, problem: Problem, plan: Plan, *, title: str | None = None, fans: bool = True) -> None:
+    """Draw problem, search, path, fans and a wind arrow into axes in local metres."""
+    x0, y0, x1, y1 = _frame(problem, plan)
+    axes.set_facecolor(SEA)
+    draw_solids(axes, problem)
+    tree = plan.trace.get("tree") if plan.trace else None
+    if tree is not None and len(tree):
+        segments = np.asarray(tree, dtype=np.float64).reshape(-1, 2, 2)
+        axes.add_collection(LineCollection(list(segments), colors=TREE, linewidths=0.35, alpha=0.8, zorder=1))
+    axes.plot([problem.start_en[0], problem.goal_en[0]], [problem.start_en[1], problem.goal_en[1]], ls=":", lw=0.8,
+              color="#777777", zorder=2)
+    if plan.has_path:
+        way = np.asarray(plan.waypoints_en)
+        if fans:
+            _fans(axes, problem, plan, 0.055 * max(x1 - x0, y1 - y0))
+        axes.plot(way[:, 0], way[:, 1], "-", color=PATH, lw=1.9, zorder=5, solid_joinstyle="round")
+        axes.plot(way[1:-1, 0], way[1:-1, 1], "o", color=PATH, ms=3.2, zorder=6)
+    axes.plot(*problem.start_en, "o", color=START, ms=8, mec="black", mew=0.6, zorder=7)
+    axes.add_patch(Circle(problem.goal_en, max(problem.goal_radius_m, 1e-6), fc="none", ec=GOAL, lw=1.2, zorder=7))
+    axes.plot(*problem.goal_en, "o", color=GOAL, ms=8, mec="black", mew=0.6, zorder=7)
+    draw_wind(axes, problem)
+    for target in problem.targets:
+        axes.add_patch(Circle((target.x_m, target.y_m), target.radius_m, fc="none", ec="#7a3fa0", ls="--", zorder=4))
+        axes.annotate("", (target.x_m + 60.0 * target.vx_mps, target.y_m + 60.0 * target.vy_mps),
+                      (target.x_m, target.y_m), arrowprops={"arrowstyle": "->", "color": "#7a3fa0"}, zorder=4)
+    axes.set(xlim=(x0, x1), ylim=(y0, y1), aspect="equal")
+    axes.tick_params(labelsize=7)
+    axes.set_xlabel("east [m]", fontsize=8)
+    axes.set_ylabel("north [m]", fontsize=8)
+    axes.set_title(_title(problem, plan) if title is None else title, fontsize=9, loc="left")
+
+
+def draw_solids(axes: Axes, problem: Problem) -> None:
+    """Draw obstacles and, with a fence, the forbidden water outside it."""
+    for shape in shapely.get_parts(problem.obstacle_union):
+        axes.add_patch(PathPatch(_outline(shape), fc=LAND, ec=LAND_EDGE, lw=0.8, zorder=3))
+    if problem.fence_polygon is not None:
+        for shape in shapely.get_parts(problem.fence_polygon):
+            axes.add_patch(PathPatch(_outline(shape), fc="none", ec="#555555", ls=(0, (6, 3)), lw=1.1, zorder=3))
+
+
+def draw_wind(axes: Axes, problem: Problem) -> None:
+    """Draw an arrow with the wind, blowing from where it comes, and its fan of one sigma at the start."""
+    east, north = math.sin(problem.wind.twd_from_rad), math.cos(problem.wind.twd_from_rad)
+    cx, cy, size = 0.09, 0.91, 0.055
+    axes.annotate(
+        "", (cx - size * east, cy - size * north), (cx + size * east, cy + size * north), xycoords="axes fraction",
+        textcoords="axes fraction", arrowprops={"arrowstyle": "-|>", "lw": 1.8, "color": "#1f4e79"}, zorder=9)
+    axes.text(cx, cy - 0.075, "wind", transform=axes.transAxes, ha="center", va="top", fontsize=7, color="#1f4e79",
+              zorder=9)
+
+
+def _outline(shape: shapely.Geometry) -> DrawnPath:
+    points: list[Any] = []
+    codes: list[Any] = []
+    for ring in shapely.get_rings(shape):
+        xy = shapely.get_coordinates(ring)
+        points += list(xy)
+        codes += [DrawnPath.MOVETO, *([DrawnPath.LINETO] * (len(xy) - 2)), DrawnPath.CLOSEPOLY]
+    return DrawnPath(np.array(points).reshape(-1, 2), codes if points else None)
+
+
+def _fans(axes: Axes, problem: Problem, plan: Plan, radius_m: float) -> None:
+    """Draw the no-go zone about the wind as it stands when the boat gets there: the boat's own, and widened."""
+    total = plan.legs[-1].end_s if plan.legs else 0.0
+    if total <= 0.0:
+        return
+    windward_deg = 90.0 - math.degrees(problem.wind.twd_from_rad)
+    own = math.degrees(problem.boat.no_go_half_rad)
+    for t in np.linspace(0.0, total, FANS_MOST):
+        leg = next((item for item in plan.legs if t <= item.end_s), plan.legs[-1])
+        span = leg.end_s - leg.start_s
+        share = 0.0 if span <= 0.0 else min(1.0, max(0.0, (t - leg.start_s) / span))
+        at = (leg.from_en[0] + share * (leg.to_en[0] - leg.from_en[0]),
+              leg.from_en[1] + share * (leg.to_en[1] - leg.from_en[1]))
+        wide = min(180.0, math.degrees(problem.no_go_half_rad(float(t))))
+        for half, alpha in ((wide, 0.22), (own, 0.38)):
+            axes.add_patch(Wedge(at, radius_m, windward_deg - half, windward_deg + half, fc=FAN, alpha=alpha, lw=0,
+                                 zorder=4))
+
+
+def _frame(problem: Problem, plan: Plan) -> tuple[float, float, float, float]:
+    x, y = [problem.start_en[0], problem.goal_en[0]], [problem.start_en[1], problem.goal_en[1]]
+    for shape in (problem.obstacle_union, problem.fence_polygon):
+        if shape is not None and not shape.is_empty:
+            bounds = shape.bounds
+            x += [bounds[0], bounds[2]]
+            y += [bounds[1], bounds[3]]
+    if plan.has_path:
+        x += [float(v) for v in plan.waypoints_en[:, 0]]
+        y += [float(v) for v in plan.waypoints_en[:, 1]]
+    pad = 0.08 * max(max(x) - min(x), max(y) - min(y), 1.0)
+    half = max(max(x) - min(x), max(y) - min(y)) / 2.0 + pad
+    cx, cy = (min(x) + max(x)) / 2.0, (min(y) + max(y)) / 2.0
+    wide = max((max(x) - min(x)) / 2.0 + pad, 0.55 * half)
+    high = max((max(y) - min(y)) / 2.0 + pad, 0.55 * half)
+    return cx - wide, cy - high, cx + wide, cy + high
+
+
+def _title(problem: Problem, plan: Plan) -> str:
+    name = problem.title or problem.id or "plan"
+    if not plan.has_path:
+        return f"{name}\nno path ({plan.status.value}): {plan.reason[:90]}"
+    text = f"{name}\n{plan.algorithm}: {plan.cost_s:.0f} s in {len(plan.legs)} legs"
+    if math.isfinite(plan.gap) and plan.lower_bound_s > 0.0:
+        text += f", {100.0 * plan.gap:.1f} % above the bound of {plan.lower_bound_s:.0f} s"
+    if plan.risk is not None and problem.wind.sigma.model != "none":
+        text += f"; risk at most {100.0 * plan.risk:.1f} %"
+    return text
