@@ -305,3 +305,48 @@ class MissionItem:
 def waypoint(point: GeoPoint, *, command: int = Command.NAV_WAYPOINT) -> MissionItem:
     """Return an item at ``point``."""
     return MissionItem(command=command, lat_e7=round(point.lat_deg * 1e7), lon_e7=round(point.lon_deg * 1e7))
+
+
+# -------------------------------------------------------------------------------------------- status
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompanionStatus:
+    """What the companion says of itself over the radio; the shore reads it with ``companion status``.
+
+    Seen from the companion ``t_s`` is its own time; ages and distances are those at ``t_s``. ``promised_risk`` is the
+    plan's probability of not staying clear [0..1]; ``next_tack_s`` is the time until the next planned tack.
+    """
+
+    t_s: float
+    state: str                                # the skipper's phase in words
+    goal_index: int | None = None             # the goal sailed for now, from 0
+    goal_count: int | None = None
+    waypoint_seq: int | None = None           # as MISSION_CURRENT counts: 1 is the first after home
+    waypoint_count: int | None = None
+    waypoint_distance_m: float | None = None
+    goal_distance_m: float | None = None
+    cross_track_m: float | None = None        # positive: right of the leg
+    clearance_m: float | None = None          # to the nearest obstacle or fence now
+    twd_from_rad: float | None = None
+    twd_sigma_rad: float | None = None
+    tws_mps: float | None = None
+    tws_sigma_mps: float | None = None
+    next_tack_s: float | None = None
+    promised_risk: float | None = None
+    plan_id: int | None = None
+    plan_age_s: float | None = None
+    replans: int | None = None
+    tacks: int | None = None
+    battery_v: float | None = None
+    position: GeoPoint | None = None
+    bytes_out_per_s: float | None = None      # own traffic
+    alert_code: str = ""                      # the rule or watchdog that speaks; empty: all is well
+    alert_text: str = ""
+
+    def __post_init__(self) -> None:
+        _finite(
+            t_s=self.t_s, waypoint_distance_m=self.waypoint_distance_m, goal_distance_m=self.goal_distance_m,
+            cross_track_m=self.cross_track_m, clearance_m=self.clearance_m, twd_from_rad=self.twd_from_rad,
+            twd_sigma_rad=self.twd_sigma_rad, tws_mps=self.tws_mps, tws_sigma_mps=self.tws_sigma_mps,
+            next_tack_s=self.next_tack_s, promised_risk=self.promised_risk, plan_age_s=self.plan_age_s,
+            battery_v=self.battery_v, bytes_out_per_s=self.bytes_out_per_s,
+        )

@@ -76,9 +76,10 @@ class ReadResult:
 
 
 class Autopilot:
-    """One ArduRover behind a ``Link`` that is open. Use ``async with Autopilot(link) as autopilot``.
+    """One ArduRover behind a ``Link`` that is open; it lives as long as the link.
 
-    Entering waits for the heartbeat and asks for the version; LinkError when there is no autopilot.
+    ``async with Autopilot(link) as autopilot`` also waits for the heartbeat (LinkError when none comes within
+    ``timeout_s``) and asks for the version; without that, the first upload asks.
     """
 
     def __init__(self, link: Link, *, timeout_s: float = 10.0) -> None:
@@ -88,26 +89,23 @@ class Autopilot:
         self.home: GeoPoint | None = None
         self._timeout_s = timeout_s
         self._listeners: list[OnValue] = []
-        self._unsubscribe: Callable[[], None] | None = None
+        self._version_asked = False
         self._ftp_works: bool | None = None
-        self._ftp_seq = 0
+        self._ftp_seq: int | None = None
         self._text_id = 0
+        self._status_turn = 0
         self._changed = asyncio.Event()
+        self._unsubscribe = link.subscribe(self._take)
 
     async def __aenter__(self) -> Self:
-        self._unsubscribe = self.link.subscribe(self._take)
         await self.link.wait_autopilot(self._timeout_s)
-        # numbers that an earlier life of this program has not just used: the autopilot repeats its last answer
-        # to a request that carries the last number
-        self._ftp_seq = int(now_s() * 997.0) & 0xFFFF
         await self.read_version()
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._unsubscribe is not None:
-            self._unsubscribe()
+        self._unsubscribe()
 
     # -------------------------------------------------------------------------------------- values in
     @property
@@ -143,10 +141,11 @@ class Autopilot:
                 callback(value)
         self._changed.set()
 
-    async def _wait_status(self, holds: Callable[[AutopilotStatus], bool], timeout_s: float) -> bool:
-        """Wait until the status, heard after now, fulfils ``holds``."""
-        since_s = now_s()
-        try:
+    async def _wait_status(
+        self, holds: Callable[[AutopilotStatus], bool], since_s: float, timeout_s: float = CONFIRM_S
+    ) -> bool:
+        """Wait until a status heard at ``since_s`` or later fulfils ``holds``."""
+        with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(timeout_s):
                 while True:
                     status = self.status
@@ -154,12 +153,12 @@ class Autopilot:
                         return True
                     self._changed.clear()
                     await self._changed.wait()
-        except TimeoutError:
-            return False
+        return False
 
     # ---------------------------------------------------------------------------------------- commands
     async def read_version(self) -> codec.AutopilotVersion | None:
         """Ask for AUTOPILOT_VERSION; None when it is not told."""
+        self._version_asked = True
         answer = await self.link.command(
             wire.MAV_CMD_REQUEST_MESSAGE, wire.MAVLINK_MSG_ID_AUTOPILOT_VERSION, give_up_s=3.0
         )
@@ -173,8 +172,9 @@ class Autopilot:
 
     async def set_mode(self, mode: Mode) -> CommandAnswer:
         """Change the mode and wait until the heartbeat shows it."""
+        since_s = now_s()
         answer = await self.link.command(wire.MAV_CMD_DO_SET_MODE, 1.0, float(mode))
-        if answer.is_ok and not await self._wait_status(lambda s: s.mode is mode, CONFIRM_S):
+        if answer.is_ok and not await self._wait_status(lambda s: s.mode is mode, since_s):
             shown = self.status.mode if self.status else None
             text = f"accepted, but the heartbeat shows {shown.name if shown is not None else 'no known mode'}"
             return CommandAnswer(outcome=Outcome.MISMATCH, text=text, result=answer.result)
@@ -189,8 +189,9 @@ class Autopilot:
         return await self._arm(is_armed=False)
 
     async def _arm(self, *, is_armed: bool) -> CommandAnswer:
+        since_s = now_s()
         answer = await self.link.command(wire.MAV_CMD_COMPONENT_ARM_DISARM, 1.0 if is_armed else 0.0)
-        if answer.is_ok and not await self._wait_status(lambda s: s.is_armed is is_armed, CONFIRM_S):
+        if answer.is_ok and not await self._wait_status(lambda s: s.is_armed is is_armed, since_s):
             return CommandAnswer(
                 outcome=Outcome.MISMATCH, text="accepted, but the heartbeat does not show it", result=answer.result
             )
@@ -203,19 +204,10 @@ class Autopilot:
         """
         answer = CommandAnswer(outcome=Outcome.TIMEOUT, text="not sent")
         for _ in range(SET_CURRENT_TRIES):
-            shown = asyncio.ensure_future(self._wait_status(lambda s: s.mission_seq == seq, CONFIRM_S + 6.0))
-            try:
-                answer = await self.link.command(wire.MAV_CMD_DO_SET_MISSION_CURRENT, float(seq), float(reset))
-                if not answer.is_ok:
-                    return answer
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(CONFIRM_S):
-                        if await asyncio.shield(shown):
-                            return answer
-            finally:
-                shown.cancel()
-                with contextlib.suppress(asyncio.CancelledError):
-                    await shown
+            since_s = now_s()
+            answer = await self.link.command(wire.MAV_CMD_DO_SET_MISSION_CURRENT, float(seq), float(reset))
+            if not answer.is_ok or await self._wait_status(lambda s: s.mission_seq == seq, since_s):
+                return answer
         now = self.status.mission_seq if self.status else None
         return CommandAnswer(
             outcome=Outcome.MISMATCH, text=f"item {seq} was accepted, MISSION_CURRENT shows {now}", result=answer.result
@@ -247,19 +239,19 @@ class Autopilot:
         self.link.send(*codec.status_texts(severity, text, self._text_id))
 
     # -------------------------------------------------------------------------------------- parameters
-    async def get_param(self, name: str) -> ParamAnswer:
+    async def get_parameter(self, name: str) -> ParamAnswer:
         """Read a parameter under any of its names."""
         return await self.link.perform(ParamRead(self.link.party, names_of(name)), "param")
 
-    async def set_param(self, name: str, value: float) -> ParamAnswer:
+    async def set_parameter(self, name: str, value: float) -> ParamAnswer:
         """Write a parameter under the name that this autopilot has for it, and wait for the echo."""
-        present = await self.get_param(name)
+        present = await self.get_parameter(name)
         if not present.is_ok:
             return present
         machine = ParamSet(self.link.party, present.name, value, present.param_type or wire.MAV_PARAM_TYPE_REAL32)
         return await self.link.perform(machine, "param")
 
-    async def read_params(self) -> ParamTable:
+    async def read_parameters(self) -> ParamTable:
         """Read all parameters."""
         return await self.link.perform(ParamList(self.link.party), "param")
 
@@ -298,6 +290,8 @@ class Autopilot:
         if not items:
             raise ValueError("an empty mission is not uploaded; use clear_mission")
         began_s = now_s()
+        if method == "auto" and not self._version_asked:
+            await self.read_version()
         async with self.link.lock("lists"):
             result = TransferResult(outcome=Outcome.LINK, text="the link is silent")
             for attempt in range(UPLOAD_TRIES):
@@ -381,7 +375,7 @@ class Autopilot:
         if method == "ftp":
             sent = padded(items, self._running_total())
             data = pack_mission_dat((home, *sent), kind)
-            written = await self.link.perform(FtpWrite(party, MISSION_FILE, data, seq=self._ftp_seq))
+            written = await self.link.perform(FtpWrite(party, MISSION_FILE, data, seq=self._next_ftp_seq()))
             self._ftp_seq = written.next_seq
             outcome, text = written.outcome, written.text
             if outcome is Outcome.OK:
@@ -456,7 +450,7 @@ class Autopilot:
         return _without_home(kind, read.items)
 
     async def _read_ftp(self, kind: MissionType) -> ReadResult:
-        read = await self.link.perform(FtpRead(self.link.party, _FILES[kind], seq=self._ftp_seq))
+        read = await self.link.perform(FtpRead(self.link.party, _FILES[kind], seq=self._next_ftp_seq()))
         self._ftp_seq = read.next_seq
         if read.outcome is not Outcome.OK:
             return ReadResult(outcome=read.outcome, text=read.text)
@@ -467,6 +461,15 @@ class Autopilot:
         if found is not kind or start != 0:
             return ReadResult(outcome=Outcome.MISMATCH, text=f"the file holds {found.name} from item {start}")
         return _without_home(kind, items)
+
+    def _next_ftp_seq(self) -> int:
+        """Return a request number that an earlier life of this program has not just used.
+
+        The autopilot answers a number that it has just answered by repeating that answer.
+        """
+        if self._ftp_seq is None:
+            self._ftp_seq = int(now_s() * 997.0) & 0xFFFF
+        return self._ftp_seq
 
     @staticmethod
     def _timed(result: TransferResult, began_s: float) -> TransferResult:

@@ -1,0 +1,107 @@
+"""Telemetry logs: 8 bytes of big-endian microseconds since 1970, then one raw frame, and so on.
+
+Every ground station reads them. The caller brings the wall clock; the two lowest bits of a stamp are 0, as in MAVProxy's
+files (they once held flags). Written so that a power cut costs the last frame; the reader stops at a torn tail, and
+finds its way again after damage in the middle.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Self
+
+from companion.errors import InputError
+from companion.mavlink.frames import STX, Codec, Message
+
+_STAMP = struct.Struct(">Q")
+# Stamps outside 2000..2100 are damage, not time [µs].
+_EARLIEST_US, _LATEST_US = 946_684_800_000_000, 4_102_444_800_000_000
+
+
+def stamp(unix_us: int, frame: bytes) -> bytes:
+    """Return one record: ``frame`` with its time [µs since 1970]."""
+    return _STAMP.pack(unix_us & ~3) + frame
+
+
+class TlogWriter:
+    """Appends records to a file; each is handed to the operating system at once."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: BinaryIO | None = None
+
+    def __enter__(self) -> Self:
+        self._file = self._path.open("ab", buffering=0)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def write(self, unix_us: int, frame: bytes) -> None:
+        """Append ``frame`` with its time [µs since 1970]."""
+        if self._file is None:
+            raise ValueError("the log is not open")
+        self._file.write(stamp(unix_us, frame))
+
+
+@dataclass(frozen=True, slots=True)
+class TlogRecord:
+    """One record: time [µs since 1970] and frame."""
+
+    unix_us: int
+    frame: bytes
+
+
+def _frame_size(data: bytes, at: int) -> int:
+    """Return the size of the frame at ``at``; 0 when there is none."""
+    if len(data) - at < 12 or data[at] not in {STX, 0xFE}:
+        return 0
+    if data[at] == 0xFE:
+        size = 8 + data[at + 1]
+    else:
+        size = 12 + data[at + 1] + (13 if data[at + 2] & 1 else 0)
+    return size if at + size <= len(data) else 0
+
+
+def parse_tlog(data: bytes) -> Iterator[TlogRecord]:
+    """Yield the records in ``data``; what is torn or damaged is stepped over."""
+    at = 0
+    while at + 20 <= len(data):
+        (unix_us,) = _STAMP.unpack_from(data, at)
+        size = _frame_size(data, at + 8) if _EARLIEST_US < unix_us < _LATEST_US else 0
+        if size == 0:
+            at += 1
+            continue
+        yield TlogRecord(unix_us, data[at + 8:at + 8 + size])
+        at += 8 + size
+
+
+def read_tlog(path: Path) -> list[TlogRecord]:
+    """Return the records of a file, a torn tail left out.
+
+    Raises:
+        InputError: it cannot be read, or holds bytes and not one record.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), "", f"cannot be read ({error.strerror})") from error
+    records = list(parse_tlog(data))
+    if data and not records:
+        raise InputError(str(path), "", "no MAVLink frame in it", "give a .tlog file")
+    return records
+
+
+def messages_of(records: Iterator[TlogRecord] | list[TlogRecord]) -> Iterator[tuple[float, Message]]:
+    """Yield (seconds since 1970, message) of records; frames that do not decode are left out."""
+    for record in records:
+        for message in Codec(1, 191).feed(record.frame):
+            yield record.unix_us / 1e6, message
