@@ -20,6 +20,8 @@ from companion.geofence.shapes import ZoneKind, unwrapped
 
 Ring = Sequence[Sequence[float]]
 
+MAX_FACES = 2000  # of a self-crossing keep-in ring; a worse tangle is not repaired
+
 
 class Findings(list[Finding]):
     """The findings of one reading, in order."""
@@ -123,9 +125,7 @@ def _repaired(polygon: Polygon, kind: ZoneKind, place: str, findings: Findings) 
     if kind is ZoneKind.EXCLUSION:
         fixed = enclosed_faces(polygon)
     else:
-        fixed = shapely.intersection(
-            shapely.make_valid(polygon, method="linework", keep_collapsed=True), enclosed_faces(polygon)
-        )
+        fixed = odd_faces(polygon)
     pieces = [p for p in shapely.get_parts(fixed) if isinstance(p, Polygon) and p.area > 0.0]
     effect = (
         f"a repair would make {len(pieces)} polygon{'s' if len(pieces) != 1 else ''} of "
@@ -147,6 +147,24 @@ def enclosed_faces(polygon: Polygon) -> BaseGeometry:
     holes = [Polygon(ring) for ring in polygon.interiors]
     good = [h for h in holes if h.is_valid and shapely.covers(outer, h)]
     return shapely.difference(outer, shapely.union_all(good)) if good else outer
+
+
+def odd_faces(polygon: Polygon) -> BaseGeometry:
+    """Return the faces that the rings enclose an odd number of times (the even-odd rule); none of a tangle."""
+    rings = [np.asarray(r.coords)[:, :2] for r in (polygon.exterior, *polygon.interiors)]
+    lines = shapely.union_all([shapely.linestrings(r) for r in rings])
+    faces = [f for f in shapely.get_parts(shapely.polygonize(shapely.get_parts(lines))) if f.area > 0.0]
+    if len(faces) > MAX_FACES:
+        return Polygon()
+    start, end = np.vstack([r[:-1] for r in rings]), np.vstack([r[1:] for r in rings])
+    odd = []
+    for face in faces:
+        inside = face.representative_point()
+        spans = (start[:, 1] > inside.y) != (end[:, 1] > inside.y)
+        (x0, y0), (x1, y1) = start[spans].T, end[spans].T
+        if np.count_nonzero(inside.x < x0 + (inside.y - y0) * (x1 - x0) / (y1 - y0)) % 2 == 1:
+            odd.append(face)
+    return shapely.union_all(odd) if odd else Polygon()
 
 
 def _plain(reason: str) -> str:

@@ -23,7 +23,7 @@ from companion.geofence.document import Document, Mark
 from companion.geofence.findings import Code, Severity
 from companion.geofence.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import Zone, ZoneKind, drawn, wrap_lon_deg
-from companion.geofence.text import MAX_DEPTH, MAX_POSITIONS
+from companion.geofence.text import MAX_POSITIONS, require_shallow
 
 Coordinates = list[tuple[float, float]]
 
@@ -105,6 +105,7 @@ def _collect(
 
 def _statements(text: str, source: str) -> Iterator[_Statement]:
     """Yield the statements: a geometry may run over several lines; it ends where its brackets close."""
+    require_shallow("\n".join(line.split("#", 1)[0] for line in text.split("\n")), source)
     pending, start, depth = "", 0, 0
     for number, raw in enumerate(text.split("\n"), start=1):
         line = raw.split("#", 1)[0].rstrip()
@@ -114,8 +115,6 @@ def _statements(text: str, source: str) -> Iterator[_Statement]:
             start = number
         pending = f"{pending}\n{line}" if pending else line
         depth += line.count("(") - line.count(")")
-        if depth > MAX_DEPTH:
-            raise InputError(source, f"line {number}", f"brackets nest deeper than {MAX_DEPTH}")
         if depth <= 0 and ("(" in pending or "EMPTY" in pending.upper()):
             yield _statement(pending, start, source)
             pending, depth = "", 0
@@ -313,7 +312,7 @@ def write_wkt(document: Document, *, with_kinds: bool = True, srid: bool = False
 
     ``with_kinds`` writes ``name|kind|`` before each (plain WKT has nowhere to put it).
     """
-    lines = []
+    lines = ["# name|kind|WKT, longitude before latitude (WGS 84)"] if with_kinds else []
     for name, kind, geometry in _geometries(document):
         prefix = f"{_clean(name)}|{kind.value}|" if with_kinds else ""
         lines.append(f"{prefix}{'SRID=4326;' if srid else ''}{shapely.to_wkt(geometry, rounding_precision=-1)}")

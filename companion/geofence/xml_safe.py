@@ -20,8 +20,10 @@ def parse_xml(data: bytes, source: str) -> Any:
         raise InputError(source, "", "declares a DTD or entities, which are refused", "remove the DOCTYPE") from None
     except ParseError as error:
         line, column = error.position
-        raise InputError(source, f"line {line} column {column + 1}", f"is not XML ({error.msg.split(':')[0]})",
-                         "is the file cut off?" if "no element" in error.msg else "") from None
+        what = str(error).split(":", maxsplit=1)[0]
+        cut = "no element" in what or "unclosed" in what
+        raise InputError(source, f"line {line} column {column + 1}", f"is not XML ({what})",
+                         "is the file cut off?" if cut else "") from None
     except (ValueError, LookupError) as error:
         raise InputError(source, "line 1", f"is not XML ({str(error)[:60]})", "save it as UTF-8") from None
     level = [root]

@@ -1,0 +1,119 @@
+"""Mission TOML: what is wrong is said in one line with the file, the place and the remedy."""
+
+import pathlib
+
+import numpy as np
+import pytest
+
+from companion.errors import InputError
+from companion.geofence import load_mission
+from companion.geofence.mission import dump_options, parse_options
+
+MISSIONS = sorted((pathlib.Path(__file__).parents[2] / "missions").glob("*.toml"))
+ROCK = "POLYGON ((-1.301 50.801, -1.300 50.801, -1.300 50.802, -1.301 50.802, -1.301 50.801))"
+GOOD = """
+[start]
+lat = 50.8
+lon = -1.3
+[[goal]]
+lat = 50.805
+lon = -1.3005
+[area]
+obstacles = ["rock.wkt"]
+"""
+
+
+def load(tmp_path, text=GOOD, **files):
+    for name, content in ({"rock": ROCK} | files).items():
+        data = content if isinstance(content, bytes) else content.encode()
+        (tmp_path / f"{name}.wkt").write_bytes(data)
+    (tmp_path / "m.toml").write_text(text, encoding="utf-8")
+    return load_mission(tmp_path / "m.toml")
+
+
+@pytest.mark.parametrize("path", MISSIONS, ids=lambda p: p.stem)
+def test_every_example_loads_and_starts_in_free_water(path):
+    mission = load_mission(path)
+    local = mission.area.local(mission.frame())
+    places = [mission.frame().en_from_geo(p) for p in (mission.start, *(g.point for g in mission.goals))]
+    assert (local.clearance_m(places) > mission.margin_m).all()
+
+
+@pytest.mark.parametrize("path", MISSIONS, ids=lambda p: p.stem)
+def test_options_there_and_back(path):
+    options = parse_options(path.read_text(encoding="utf-8"), str(path))
+    assert parse_options(dump_options(options), "again") == options
+
+
+def test_defaults(tmp_path):
+    mission = load(tmp_path)
+    assert (mission.operator.arm, mission.operator.set_auto, mission.operator.guided) == (False, False, False)
+    assert mission.name == "m"
+    assert mission.origin == mission.start
+    assert mission.area.local(mission.frame()).names == ("obstacle 1",)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    (("[area]", "[area]\nmargn_m = 3"), ("[area] margn_m", "unknown key", "'margin_m'")),
+    (("[area]", "[aera]"), ("aera", "unknown key", "'area'")),
+    (("[area]", "[area]\ndelta_s = 0.9"), ("[area] delta_s", "belongs in [risk]")),
+    (("lat = 50.805", "lat = 143.66"), ("[[goal]] 1 lat", "143.66", "swapped")),
+    (("lat = 50.805\n", ""), ("[[goal]] 1 lat", "missing")),
+    (("lat = 50.805", 'lat = "50"'), ("[[goal]] 1 lat", "'50'")),
+    (("lat = 50.805", "lat = nan"), ("[[goal]] 1 lat", "finite")),
+    (("lat = 50.805", "lat = 50.805\nrounding = 'left'"), ("[[goal]] 1 rounding", "'left'")),
+    (("lat = 50.805", "lat = 5O.805"), ("line 6", "not TOML")),
+    (("[[goal]]", "[[gaol]]"), ("gaol", "unknown key")),
+    (("rock.wkt", "rack.wkt"), ("[area] obstacles", "no such file", "relative")),
+    (("lat = 50.805\nlon = -1.3005", "lat = 50.8015\nlon = -1.3005"), ("[[goal]] 1", "inside the obstacle")),
+    (("lat = 50.8\nlon = -1.3\n", "lat = 50.8015\nlon = -1.3005\n"), ("[start]", "inside the obstacle")),
+    (("lat = 50.805\nlon = -1.3005", "lat = -1.3005\nlon = 50.805"), ("[[goal]] 1", "swapped")),
+    (("[area]", "[boat]\npolar = 'none.pol'\n[area]"), ("[boat] polar", "no such file")),
+    (("[area]", "[risk]\ndelta_s = 1.0\n[area]"), ("[risk] delta_s", "1.0")),
+])
+def test_faults_of_the_mission(tmp_path, change, words):
+    assert change[0] in GOOD
+    with pytest.raises(InputError) as error:
+        load(tmp_path, GOOD.replace(*change, 1))
+    message = str(error.value)
+    assert "\n" not in message
+    assert message.startswith(str(tmp_path / "m.toml"))
+    for word in words:
+        assert word in message, message
+
+
+@pytest.mark.parametrize(("wkt", "words"), [
+    ("POLYGON EMPTY", ("rock.wkt: line 1", "EMPTY")),
+    ("", ("rock.wkt", "is empty")),
+    ("POLYGON ((-1.301 50.801, -1.300 50.801, -1.300 50.802))", ("line 1", "not closed", "repeat the first vertex")),
+    ("POLYGON ((-1.301 50.801, -1.300 50.802, -1.300 50.801, -1.301 50.802, -1.301 50.801))",
+     ("line 1", "crosses itself", "--repair")),
+    ("POLYGON ((50.801 -1.301, 50.801 -1.300, 50.802 -1.300, 50.801 -1.301))", ("swapped", 'axis = "latlon"')),
+    ("POINT (50.801 -1.301)", ("mark 1", "swapped")),
+    ("SRID=27700;" + ROCK, ("line 1", "27700", "4326")),
+    (ROCK[:60], ("rock.wkt: line 1", "do not close", "cut off")),
+    (b"\x00\x01\x02" * 30, ("rock.wkt", "binary")),
+])
+def test_faults_of_the_obstacles(tmp_path, wkt, words):
+    with pytest.raises(InputError) as error:
+        load(tmp_path, rock=wkt)
+    for word in words:
+        assert word in str(error.value), str(error.value)
+
+
+def test_the_fence_must_hold_start_and_goal(tmp_path):
+    text = GOOD.replace('["rock.wkt"]', '["rock.wkt"]\nfence = "lake.wkt"')
+    lake = "POLYGON ((-1.31 50.79, -1.29 50.79, -1.29 50.804, -1.31 50.804, -1.31 50.79))"
+    with pytest.raises(InputError, match="outside the fence"):
+        load(tmp_path, text, lake=lake)
+    local = (mission := load(tmp_path, text, lake=lake.replace("50.804", "50.814"))).area.local(mission.frame())
+    assert local.fence_wkt(12.0, (0.0, 0.0)).startswith("POLYGON")
+    with pytest.raises(InputError, match="stay inside"):
+        load(tmp_path, text, lake="POINT (-1.3 50.8)")
+
+
+def test_points_become_circles_of_the_configured_radius(tmp_path):
+    mission = load(tmp_path, GOOD + "point_radius_m = 25.0\n", rock="POINT (-1.302 50.801)")
+    local = mission.area.local(mission.frame())
+    center = np.array(local.polygons[0].centroid.coords[0])
+    assert local.obstacle_clearance_m(center + np.array([100.0, 0.0]))[0] == pytest.approx(75.0, abs=0.1)
