@@ -1,1 +1,68 @@
-"""traffic."""
+"""Other boats: what AIS says of them, where they will be, how near, and who gives way.
+
+A pure fold and pure questions about its value; sockets are in ``companion.traffic.feeds`` alone::
+
+    targets = Targets.empty(frame)                       # frame: companion.geo.frame.LocalFrame
+    targets = targets.heard(report)                      # AisReport from MAVLink, NMEA or the JSON feed
+    picture = targets.picture(t_s)                       # TrafficPicture: vessels with age, counts, events
+    own = OwnShip(t_s=t_s, en_m=(e, n), velocity_en_mps=(ve, vn), heading_rad=h)
+    approach = cpa(own, vessel, t_s)                     # Approach: distance between hulls, TCPA, bearing
+    alarms = assess(own, picture, LAKE, twd_from_rad)    # per vessel: Approach, Alarm, Encounter (COLREGs)
+    predict(vessel, t_s)                                 # Prediction: mean, covariance, radius_m(risk)
+    discs = planning_discs(picture, t_s, own, ...)       # tuple[Disc, ...]: fields of companion.planner.Target
+    conflicts = check_legs(legs, discs)                  # the active plan against the targets
+
+Times are absolute [s] on the companion's clock, except in a ``Disc`` and a ``TimedLeg``, where they count from
+the moment that the discs were made for (a plan's t = 0).
+"""
+
+from companion.traffic.approach import LAKE, SEA, Alarm, AlarmLimits, Approach, OwnShip, cpa
+from companion.traffic.assess import Assessment, assess
+from companion.traffic.colregs import Encounter, Policy, Role, Rule, classify
+from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json, decode_nmea
+from companion.traffic.occupancy import Disc, planning_discs, time_matched_discs
+from companion.traffic.plans import Conflict, Decision, TimedLeg, check_legs, decide, path_distance_m
+from companion.traffic.predict import Motion, Prediction, motion_of, predict
+from companion.traffic.targets import Change, TargetLimits, Targets, TrafficCounts, TrafficPicture
+from companion.traffic.vessel import Hull, Vessel
+
+__all__ = [
+    "LAKE",
+    "SEA",
+    "Alarm",
+    "AlarmLimits",
+    "Approach",
+    "Assessment",
+    "Change",
+    "Conflict",
+    "Decision",
+    "DecodeCounts",
+    "Disc",
+    "Encounter",
+    "Hull",
+    "Motion",
+    "NmeaDecoder",
+    "OwnShip",
+    "Policy",
+    "Prediction",
+    "Role",
+    "Rule",
+    "TargetLimits",
+    "Targets",
+    "TimedLeg",
+    "TrafficCounts",
+    "TrafficPicture",
+    "Vessel",
+    "assess",
+    "check_legs",
+    "classify",
+    "cpa",
+    "decide",
+    "decode_json",
+    "decode_nmea",
+    "motion_of",
+    "path_distance_m",
+    "planning_discs",
+    "predict",
+    "time_matched_discs",
+]

@@ -1,0 +1,225 @@
+"""The active plan against the traffic: where it meets a target, and whether another plan should replace it."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from companion.traffic.occupancy import Disc
+
+# A plan may be this deep in a disc [m]: numerical slack.
+SLACK_M = 1e-3
+# A safe plan is replaced only by one that is better by this share of its time and by this much.
+BETTER_SHARE, BETTER_S = 0.15, 20.0
+# Plans are made again for traffic at most this often (Büsser 2009, section 5.2).
+MIN_INTERVAL_S = 20.0
+
+
+class TimedLeg(Protocol):
+    """A leg in time; ``companion.planner.Leg`` is one. Times count from the plan's t = 0."""
+
+    @property
+    def from_en(self) -> tuple[float, float]:
+        """Begin [m]."""
+
+    @property
+    def to_en(self) -> tuple[float, float]:
+        """End [m]."""
+
+    @property
+    def start_s(self) -> float:
+        """When it begins [s]."""
+
+    @property
+    def end_s(self) -> float:
+        """When it ends [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlainLeg:
+    """A leg of one's own making."""
+
+    from_en: tuple[float, float]
+    to_en: tuple[float, float]
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conflict:
+    """The plan enters a target's disc: on which leg, when first, and how deep at worst [m]."""
+
+    mmsi: int
+    name: str
+    leg: int
+    time_s: float
+    depth_m: float
+
+
+def check_legs(
+    legs: Sequence[TimedLeg], discs: Sequence[Disc], *, now_s: float = 0.0, plan_t0_s: float = 0.0
+) -> tuple[Conflict, ...]:
+    """Return where the plan meets the discs, the earliest meeting of each vessel, in order of time.
+
+    Args:
+        legs: of the plan; times count from ``plan_t0_s`` on the discs' time scale (negative: sailed for a while).
+        discs: made for now.
+        now_s: only the plan after this moment on the discs' scale is looked at.
+        plan_t0_s: the plan's start on the discs' time scale.
+
+    """
+    found: dict[int, Conflict] = {}
+    for i, leg in enumerate(legs):
+        begin, end = leg.start_s + plan_t0_s, leg.end_s + plan_t0_s
+        for disc in discs:
+            lo, hi = max(begin, disc.from_s, now_s), min(end, disc.until_s)
+            if hi < lo or not math.isfinite(begin):
+                continue
+            hit = _enters(leg, begin, end, lo, hi, disc)
+            if hit is None:
+                continue
+            before = found.get(disc.mmsi)
+            if before is None or hit[0] < before.time_s:
+                depth = hit[1] if before is None else max(hit[1], before.depth_m)
+                found[disc.mmsi] = Conflict(mmsi=disc.mmsi, name=disc.name, leg=i, time_s=hit[0], depth_m=depth)
+    return tuple(sorted(found.values(), key=lambda c: (c.time_s, c.mmsi)))
+
+
+def _enters(
+    leg: TimedLeg, begin: float, end: float, lo: float, hi: float, disc: Disc
+) -> tuple[float, float] | None:
+    """Return (first time inside, greatest depth) or None: |r + w s|² < (R + g s)², a quadratic in s."""
+    span = end - begin
+    ux, uy = (0.0, 0.0)
+    if span > 0.0 and math.isfinite(span):
+        ux, uy = (leg.to_en[0] - leg.from_en[0]) / span, (leg.to_en[1] - leg.from_en[1]) / span
+    cx, cy = disc.centre_en_m(lo)
+    rx, ry = leg.from_en[0] + ux * (lo - begin) - cx, leg.from_en[1] + uy * (lo - begin) - cy
+    wx, wy = ux - disc.vx_mps, uy - disc.vy_mps
+    radius, g = max(0.0, disc.radius_at_m(lo) - SLACK_M), disc.growth_mps
+    a, b, c = wx * wx + wy * wy - g * g, rx * wx + ry * wy - radius * g, rx * rx + ry * ry - radius * radius
+    last = hi - lo
+    if not math.isfinite(last):
+        last = 1e9
+    first = _first_negative(a, b, c, last)
+    if first is None:
+        return None
+    # Depth = R + g s - |r + w s| is concave in s: its maximum by golden section on [first, last].
+    depth = _max_depth(rx, ry, wx, wy, radius, g, first, last)
+    return lo + first, depth
+
+
+def _first_negative(a: float, b: float, c: float, last: float) -> float | None:
+    """Return the first s in [0, last] with a s² + 2 b s + c < 0, or None."""
+    if c < 0.0:
+        return 0.0
+    disc = b * b - a * c
+    if abs(a) < 1e-12:
+        if b >= 0.0:
+            return None
+        s = -0.5 * c / b
+        return s if s < last else None
+    if a > 0.0:
+        if disc <= 0.0 or b >= 0.0:
+            return None
+        # Stable form of the smaller root for b < 0.
+        s = c / (-b + math.sqrt(disc))
+        return s if s < last else None
+    # a < 0: the parabola opens downwards, the root above 0 is where it becomes negative.
+    s = (-b - math.sqrt(max(0.0, disc))) / a
+    return s if 0.0 <= s < last else None
+
+
+def _max_depth(
+    rx: float, ry: float, wx: float, wy: float, radius: float, g: float, lo: float, hi: float
+) -> float:
+    def depth(s: float) -> float:
+        return radius + g * s - math.hypot(rx + wx * s, ry + wy * s)
+
+    ratio = 0.5 * (math.sqrt(5.0) - 1.0)
+    for _ in range(60):
+        p, q = hi - ratio * (hi - lo), lo + ratio * (hi - lo)
+        if depth(p) < depth(q):
+            lo = p
+        else:
+            hi = q
+    return max(0.0, depth(0.5 * (lo + hi)))
+
+
+class Decision(enum.Enum):
+    """What to do with the active plan, seen from the traffic."""
+
+    KEEP = "keep"
+    REPLAN = "replan"                # it has become unsafe: look for another
+    WAIT = "wait"                    # unsafe, but the last plan for traffic is too young and the meeting not near
+    REPLACE_UNSAFE = "replace: the active plan meets a target"
+    REPLACE_BETTER = "replace: clearly better"
+
+
+def decide(
+    conflicts: Sequence[Conflict], *, since_replan_s: float, urgent_s: float = 60.0,
+    active_cost_s: float | None = None, new_cost_s: float | None = None, new_conflicts: Sequence[Conflict] = (),
+) -> Decision:
+    """Return whether to replan (no new plan yet) or to replace (``new_cost_s`` given).
+
+    A plan that stays safe is kept unless the new one is better by 15 % and 20 s. Replanning for traffic keeps
+    20 s apart unless the meeting is nearer than ``urgent_s``.
+    """
+    if new_cost_s is not None:
+        if new_conflicts:
+            return Decision.KEEP
+        if conflicts:
+            return Decision.REPLACE_UNSAFE
+        if active_cost_s is not None and active_cost_s - new_cost_s > max(BETTER_S, BETTER_SHARE * active_cost_s):
+            return Decision.REPLACE_BETTER
+        return Decision.KEEP
+    if not conflicts:
+        return Decision.KEEP
+    if since_replan_s < MIN_INTERVAL_S and conflicts[0].time_s > urgent_s:
+        return Decision.WAIT
+    return Decision.REPLAN
+
+
+def path_distance_m(a_en: ArrayLike, b_en: ArrayLike, *, step_m: float = 5.0) -> float:
+    """Return how different two paths look: the discrete Fréchet distance of their common future [m].
+
+    Both are resampled every ``step_m`` (error at most half of it). The older path may begin further back: it is
+    cut at the point nearest to the newer one's start first, so that what was sailed since does not count.
+
+    Args:
+        a_en: (n, 2) the older path.
+        b_en: (m, 2) the newer path.
+        step_m: resampling step.
+
+    """
+    a, b = _resample(np.asarray(a_en, dtype=np.float64), step_m), _resample(np.asarray(b_en, dtype=np.float64), step_m)
+    if len(a) == 0 or len(b) == 0:
+        return math.inf
+    a = a[int(np.argmin(np.hypot(*(a - b[0]).T))):]
+    distance = np.hypot(a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1])
+    reach = np.empty_like(distance)
+    reach[0] = np.maximum.accumulate(distance[0])
+    for i in range(1, len(a)):
+        best = np.minimum(reach[i - 1], np.concatenate([[math.inf], reach[i - 1, :-1]]))
+        row = reach[i]
+        last = math.inf
+        for j in range(len(b)):
+            last = max(distance[i, j], min(best[j], last))
+            row[j] = last
+    return float(reach[-1, -1])
+
+
+def _resample(path: NDArray[np.float64], step_m: float) -> NDArray[np.float64]:
+    points = path.reshape(-1, 2)
+    if len(points) < 2:
+        return points
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    count = max(2, math.ceil(float(run[-1]) / step_m) + 1)
+    at = np.linspace(0.0, float(run[-1]), count)
+    return np.column_stack([np.interp(at, run, points[:, 0]), np.interp(at, run, points[:, 1])])
