@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +34,16 @@ from companion.planner import risk_kernels as kernels
 from companion.planner.plan import Leg, Plan
 from companion.planner.problem import Problem
 
+if TYPE_CHECKING:
+    from companion.planner.solve import Effort, Outcome, Search
+
 PROMISE_FACTOR = 1.15
 """What is promised over what is computed: a simulation of 2,000 winds scatters by a tenth at a share of 5 %."""
 DEFAULT_CORRELATION_S = 60.0
 MAX_STEPS = 400_000
+RISK_ROUNDS = 8             # searches that the bisection under a limit divides its effort among
+MOST_EXTRA_SIGMAS = 8.0
+EXTRA_RESOLUTION = 0.02     # of the bisection [standard deviations]
 ASSUMPTION = {
     kernels.NONE: "the wind is as forecast",
     kernels.KALMAN: "the wind's direction walks at random (Kalman filter run open loop)",
@@ -185,3 +191,79 @@ def simulate_entries(
             np.random.default_rng(seed), winds, hits,
         )
     return hits
+
+
+# ------------------------------------------------------------------------------ planning within a limit
+def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -> Outcome:
+    """Return the fastest path found whose promised risk is within ``problem.risk``.
+
+    Any search that keeps the chance constraint at each instant can be held to a limit on the whole path: the
+    no-go zone is widened by e more standard deviations, the least e whose plan keeps the limit is bisected, and the
+    cheapest plan that keeps it is handed back. The bound of the first search, without the limit, stays a bound.
+    """
+    from companion.planner.solve import Effort, Outcome
+
+    limit = problem.risk.max_path_risk if problem.risk is not None else 1.0
+    share = 1.0 / RISK_ROUNDS
+    best: Outcome | None = None
+    best_s, least = math.inf, 1.0
+    low, high, extra = 0.0, math.inf, 0.0
+    bound_s = 0.0
+    first = True
+    while first or not effort.is_over:
+        inner = Effort(
+            None if math.isinf(effort.budget_s) else max(1e-3, share * effort.budget_s),
+            None if effort.limit is None else max(1, int(share * effort.limit)),
+        )
+        outcome = search(widened(problem, extra), inner, seed)
+        effort.spend(inner.used)
+        if first:
+            bound_s = outcome.lower_bound_s
+            if outcome.waypoints_en is None:
+                return outcome  # nothing to widen: what fails without the limit fails with it
+        promised = math.inf
+        if outcome.waypoints_en is not None:
+            judged = problem.evaluate(outcome.waypoints_en)
+            if judged.is_feasible:
+                promised = path_risk(problem, judged.legs).total
+                least = min(least, promised)
+        if promised <= limit:
+            effort.found()
+            if judged.time_s < best_s:
+                best, best_s = outcome, judged.time_s
+            if first:
+                break
+            high = extra
+        elif promised < math.inf or math.isinf(high):
+            low = extra if promised < math.inf else low
+            if promised == math.inf:  # widened so far that nothing is left
+                high = extra
+        else:
+            high = extra
+        first = False
+        if math.isinf(high):
+            extra = 0.5 if extra == 0.0 else 2.0 * extra
+            if extra > MOST_EXTRA_SIGMAS:
+                break
+        else:
+            extra = 0.5 * (low + high)
+        if high - low < EXTRA_RESOLUTION:
+            break
+    if best is None:
+        reason = (f"no path within the limit of {100.0 * limit:.3g} % on its risk; the least risky found has "
+                  f"{100.0 * least:.3g} %")
+        return Outcome(waypoints_en=None, reason=reason)
+    return replace(best, lower_bound_s=bound_s, trace={**best.trace, "extra_sigmas": extra})
+
+
+def widened(problem: Problem, extra: float) -> Problem:
+    """Return the problem, its risk limit taken off, with its no-go zone ``extra`` standard deviations wider."""
+    sigma = problem.wind.sigma
+    if extra <= 0.0:
+        return replace(problem, risk=None)
+    if sigma.model == "forecast" and sigma.half_width_rad is not None:
+        half = tuple(h + extra * s for h, s in zip(sigma.half_width_rad, sigma.sigma_rad, strict=True))
+        return replace(problem, risk=None, wind=replace(problem.wind, sigma=replace(sigma, half_width_rad=half)))
+    k = problem.k_delta + extra
+    delta_s = 1.0 - 0.5 * math.erfc(k / math.sqrt(2.0))
+    return replace(problem, risk=None, delta_s=min(delta_s, 1.0 - 1e-12))

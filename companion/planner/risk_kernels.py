@@ -151,6 +151,7 @@ def first_passage(  # type: ignore[no-untyped-def]
         for phase in range(2):  # the turn before the leg, then the leg
             stop = start_s[k] if phase == 0 else end_s[k]
             at_start = phase == 1
+            steady, last_share = 0, -1.0
             while t < stop or at_start:
                 move = 0.0
                 r = 1.0
@@ -187,14 +188,31 @@ def first_passage(  # type: ignore[no-untyped-def]
                     # At the leg's own start the barrier is where it is; within the leg it is watched continuously.
                     peek = 0.0 if at_start else BARRIER_SHIFT * math.sqrt(max(0.0, 1.0 - r * r))
                     peek = min(peek, shift)
+                    taken, mass = 0.0, np.sum(p)
                     for turn in range(-1, 2):
                         low = twa_rad[k] - half_rad + turn * two_pi
                         high = twa_rad[k] + half_rad + turn * two_pi
                         if sigma > 1e-9:
-                            out[k] += _absorb(p, low / sigma - peek, high / sigma + peek, dz)
+                            taken += _absorb(p, low / sigma - peek, high / sigma + peek, dz)
                         elif low < 0.0 < high:
-                            out[k] += np.sum(p)
+                            taken += np.sum(p)
                             p[:] = 0.0
+                    out[k] += taken
+                    # On a long leg in a settled wind the share taken per step settles too: the rest is a power.
+                    share = taken / mass if mass > 1e-12 else 0.0
+                    settled = (model == 2 and abs(sigma - s1) < 1e-4 * s1) or (model == 3 and t >= table_t[-1])
+                    if settled and r == R_STEP and abs(share - last_share) <= 1e-4 * share:
+                        steady += 1
+                        whole = math.floor((stop - t) / move)
+                        if steady >= 8 and whole >= 2:
+                            left = (1.0 - share) ** whole
+                            mass = np.sum(p)
+                            out[k] += mass * (1.0 - left)
+                            p *= left
+                            t += whole * move
+                    else:
+                        steady = 0
+                    last_share = share
                 at_start = False
     return steps
 

@@ -1,0 +1,343 @@
+"""Annealed waypoints: the continuous local search that turns a good path into a nearly optimal one.
+
+The state is the list of waypoints itself; the cost is the exact one (turns, losses, time-varying no-go zone,
+moving targets) and a candidate that collides or points too high is refused, so every state is feasible. What
+makes it work are moves that keep courses: slide a corner along its leg, shift a whole leg or a block of legs
+parallel, re-solve a corner from two close-hauled courses at the times they are sailed, besides the plain ones.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.planner.kernels import Boat, Floats, Grid, is_free, jit, track, walk, worst_half
+from companion.planner.moves import corner, fit_corners, kind_of
+
+MOST_POINTS = 400
+
+
+@jit
+def uniform(state: NDArray[np.uint64]) -> float:
+    """Return the next number on [0, 1) of a xorshift generator whose state is ``state[0]``."""
+    x = state[0]
+    x ^= x >> np.uint64(12)
+    x ^= x << np.uint64(25)
+    x ^= x >> np.uint64(27)
+    state[0] = x
+    return float((x * np.uint64(2685821657736338717)) >> np.uint64(11)) / 9007199254740992.0
+
+
+@jit
+def reach(b: Boat, xs: Floats, ys: Floats, m: int, h0: float) -> tuple[float, float]:
+    """Return (time, TWA) on arrival at point m of the path."""
+    t, h = 0.0, h0
+    for i in range(m):
+        dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
+        length = math.hypot(dx, dy)
+        if length < 1e-9:
+            continue
+        a, v = track(b, dx, dy, t)
+        d = a - h
+        d = d - 2.0 * math.pi if d >= math.pi else (d + 2.0 * math.pi if d < -math.pi else d)
+        t += abs(d) / b.omega
+        if h * a < 0.0:
+            t += b.tack_s if abs(h + d - a) < 1e-6 else b.gybe_s
+        t += length / max(v, 1e-9)
+        h = a
+    return t, h
+
+
+@jit
+def _course(xs: Floats, ys: Floats, i: int) -> tuple[float, float]:
+    dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
+    d = math.hypot(dx, dy)
+    return (dx / d, dy / d) if d > 1e-12 else (0.0, 0.0)
+
+
+@jit
+def _delete(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
+    for k in range(i, n - count):
+        xs[k], ys[k] = xs[k + count], ys[k + count]
+    return n - count
+
+
+@jit
+def _insert(xs: Floats, ys: Floats, n: int, i: int, x: float, y: float) -> int:
+    for k in range(n, i, -1):
+        xs[k], ys[k] = xs[k - 1], ys[k - 1]
+    xs[i], ys[i] = x, y
+    return n + 1
+
+
+@jit
+def _pair(r: float, low: bool) -> tuple[int, int]:
+    """Return two edge courses: mostly a tack or a gybe, sometimes a mixture."""
+    if r < 0.4:
+        return (0, 1) if not low else (2, 3)
+    if r < 0.8:
+        return (1, 0) if not low else (3, 2)
+    if r < 0.85:
+        return 0, 2
+    if r < 0.9:
+        return 2, 0
+    if r < 0.95:
+        return 1, 3
+    return 3, 1
+
+
+@jit
+def collides(g: Grid, xs: Floats, ys: Floats, n: int, ox: Floats, oy: Floats, on: int) -> bool:
+    """Does the path collide, given that the old path (ox, oy, on) does not? Tests only the legs that differ."""
+    head = 0
+    while head < n and head < on and xs[head] == ox[head] and ys[head] == oy[head]:
+        head += 1
+    tail = 0
+    while tail < n - head and tail < on - head and xs[n - 1 - tail] == ox[on - 1 - tail] and (
+        ys[n - 1 - tail] == oy[on - 1 - tail]
+    ):
+        tail += 1
+    for i in range(max(0, head - 1), min(n - 1, n - tail)):
+        if not is_free(g, xs[i], ys[i], xs[i + 1], ys[i + 1]):
+            return True
+    return False
+
+
+@jit
+def propose(
+    b: Boat, xs: Floats, ys: Floats, n: int, h0: float, goal: Floats, size: float, spots: Floats,
+    rng: NDArray[np.uint64],
+) -> int:
+    """Change the path in place by one random move and return its new number of points (0: no such move)."""
+    u = uniform(rng)
+    step = size * math.exp(-14.0 * uniform(rng))
+    inner = n - 2
+    if u < 0.18 and inner > 0:                                            # push a corner anywhere
+        i = 1 + int(uniform(rng) * inner)
+        xs[i] += step * (2.0 * uniform(rng) - 1.0)
+        ys[i] += step * (2.0 * uniform(rng) - 1.0)
+        return n
+    if u < 0.36 and inner > 0:                                            # slide a corner along one of its legs
+        i = 1 + int(uniform(rng) * inner)
+        if uniform(rng) < 0.5:
+            ux, uy = _course(xs, ys, i - 1)
+        else:
+            ux, uy = _course(xs, ys, i)
+        s = step if uniform(rng) < 0.5 else -step
+        ax, ay = xs[i], ys[i]
+        xs[i] += s * ux
+        ys[i] += s * uy
+        if uniform(rng) < 0.6:                                            # ... and keep the courses next to it
+            back = uniform(rng) < 0.5
+            m = i - 1 if back else i + 1
+            if 0 < m < n - 1:
+                t, h = reach(b, xs, ys, m - 1, h0)
+                if back:
+                    k1 = kind_of(math.atan2(xs[m] - xs[m - 1], ys[m] - ys[m - 1]))
+                    k2 = kind_of(math.atan2(ax - xs[m], ay - ys[m]))
+                else:
+                    k1 = kind_of(math.atan2(xs[m] - ax, ys[m] - ay))
+                    k2 = kind_of(math.atan2(xs[m + 1] - xs[m], ys[m + 1] - ys[m]))
+                if k1 == k2:
+                    return 0
+                x, y, _, ok = corner(b, xs[m - 1], ys[m - 1], h, t, xs[m + 1], ys[m + 1], k1, k2)
+                if not ok:
+                    return 0
+                xs[m], ys[m] = x, y
+        return n
+    if u < 0.46 and inner > 1:                                            # shift a block of legs, courses kept
+        i = 1 + int(uniform(rng) * inner)
+        j = min(n - 2, i + int(4.0 * uniform(rng) * uniform(rng) + uniform(rng)))
+        ux, uy = _course(xs, ys, i - 1)
+        s = step if uniform(rng) < 0.5 else -step
+        if uniform(rng) < 0.3:
+            ux, uy = 2.0 * uniform(rng) - 1.0, 2.0 * uniform(rng) - 1.0
+        for k in range(i, j + 1):
+            xs[k] += s * ux
+            ys[k] += s * uy
+        return n
+    if u < 0.56:                                                          # replace a stretch by one corner
+        i = int(uniform(rng) * (n - 1))
+        j = min(n - 1, i + 1 + int(4.0 * uniform(rng) * uniform(rng) + 0.7))
+        t, h = reach(b, xs, ys, i, h0)
+        k1, k2 = _pair(uniform(rng), ys[j] < ys[i])
+        x, y, _, ok = corner(b, xs[i], ys[i], h, t, xs[j], ys[j], k1, k2)
+        if not ok or n + 1 >= MOST_POINTS:
+            return 0
+        if j > i + 1:
+            n = _delete(xs, ys, n, i + 1, j - i - 1)
+        return _insert(xs, ys, n, i + 1, x, y)
+    if u < 0.64 and inner > 0:                                            # leave corners out
+        i = 1 + int(uniform(rng) * inner)
+        count = min(n - 1 - i, 1 + int(3.0 * uniform(rng) * uniform(rng)))
+        return _delete(xs, ys, n, i, count)
+    if u < 0.70 and n + 1 < MOST_POINTS:                                  # a new corner beside a leg
+        i = int(uniform(rng) * (n - 1))
+        f = uniform(rng)
+        x = xs[i] + f * (xs[i + 1] - xs[i]) + step * (2.0 * uniform(rng) - 1.0)
+        y = ys[i] + f * (ys[i + 1] - ys[i]) + step * (2.0 * uniform(rng) - 1.0)
+        return _insert(xs, ys, n, i + 1, x, y)
+    if u < 0.80 and spots.shape[0] > 0:                                   # touch an obstacle's corner
+        q = int(uniform(rng) * spots.shape[0])
+        x, y = spots[q, 0], spots[q, 1]
+        best, m = math.inf, -1
+        for i in range(n - 1):
+            dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
+            d2 = dx * dx + dy * dy
+            f = ((x - xs[i]) * dx + (y - ys[i]) * dy) / d2 if d2 > 0.0 else 0.0
+            f = min(1.0, max(0.0, f))
+            d = (xs[i] + f * dx - x) ** 2 + (ys[i] + f * dy - y) ** 2
+            if d < best:
+                best, m = d, i
+        if m < 0:
+            return 0
+        r = uniform(rng)
+        if r < 0.4 and n + 1 < MOST_POINTS:
+            return _insert(xs, ys, n, m + 1, x, y)
+        i = m if r < 0.7 else m + 1
+        if i == 0 or i == n - 1:
+            return 0
+        xs[i], ys[i] = x, y
+        return n
+    if u < 0.88 and n > 1:                                                # move the end in the goal's disc
+        radius = goal[2]
+        if radius <= 0.0:
+            return 0
+        m = n - 1
+        if uniform(rng) < 0.5 and n > 2:                                  # ... carrying the last corner with it
+            s = min(step, radius) * (2.0 * uniform(rng) - 1.0)
+            ux, uy = _course(xs, ys, m - 2)
+            xs[m - 1] += s * ux
+            ys[m - 1] += s * uy
+            xs[m] += s * ux
+            ys[m] += s * uy
+        elif uniform(rng) < 0.3:
+            ux, uy = _course(xs, ys, m - 1)
+            s = min(step, radius) * (2.0 * uniform(rng) - 1.0)
+            xs[m] += s * ux
+            ys[m] += s * uy
+        else:
+            xs[m] += min(step, radius) * (2.0 * uniform(rng) - 1.0)
+            ys[m] += min(step, radius) * (2.0 * uniform(rng) - 1.0)
+        dx, dy = xs[m] - goal[0], ys[m] - goal[1]
+        d = math.hypot(dx, dy)
+        if d > radius:
+            f = radius / d
+            xs[m], ys[m] = goal[0] + f * dx, goal[1] + f * dy
+        return n
+    if u < 0.94:                                                          # two courses in the other order
+        i = int(uniform(rng) * (n - 1))
+        if i + 2 >= n:
+            return 0
+        xs[i + 1] = xs[i] + xs[i + 2] - xs[i + 1]
+        ys[i + 1] = ys[i] + ys[i + 2] - ys[i + 1]
+        return n
+    if n > 2:                                                             # all corners to their times
+        fit_corners(b, xs, ys, n, h0, 1 + int(uniform(rng) * inner), True)
+        return n
+    return 0
+
+
+@jit
+def anneal(
+    g: Grid, b: Boat, points: Floats, h0: float, goal: Floats, size: float, spots: Floats, rounds: int,
+    hot: float, cold: float, rng: NDArray[np.uint64],
+) -> tuple[float, Floats, float, Floats]:
+    """Anneal for ``rounds`` moves from temperature ``hot`` to ``cold`` [s]; the path must be feasible.
+
+    Returns (best cost, best points, last cost, last points).
+    """
+    n = points.shape[0]
+    xs, ys = np.empty(MOST_POINTS + 4), np.empty(MOST_POINTS + 4)
+    cx, cy = np.empty(MOST_POINTS + 4), np.empty(MOST_POINTS + 4)
+    bx, by = np.empty(MOST_POINTS + 4), np.empty(MOST_POINTS + 4)
+    for i in range(n):
+        xs[i], ys[i] = points[i, 0], points[i, 1]
+        bx[i], by[i] = xs[i], ys[i]
+    cost = walk(b, xs, ys, n, h0)
+    best, bn = cost, n
+    ratio = (cold / hot) ** (1.0 / max(1, rounds))
+    heat = hot
+    for _ in range(rounds):
+        heat *= ratio
+        for i in range(n):
+            cx[i], cy[i] = xs[i], ys[i]
+        cn = propose(b, cx, cy, n, h0, goal, size, spots, rng)
+        if cn < 2:
+            continue
+        limit = cost - heat * math.log(1.0 - uniform(rng))
+        new = walk(b, cx, cy, cn, h0)
+        if new == math.inf and b.kind != 0:
+            fit_corners(b, cx, cy, cn, h0, 1, False)
+            new = walk(b, cx, cy, cn, h0)
+        if new > limit or collides(g, cx, cy, cn, xs, ys, n):
+            continue
+        cost, n = new, cn
+        for i in range(n):
+            xs[i], ys[i] = cx[i], cy[i]
+        if cost < best:
+            best, bn = cost, n
+            for i in range(n):
+                bx[i], by[i] = xs[i], ys[i]
+    out, last = np.empty((bn, 2)), np.empty((n, 2))
+    for i in range(bn):
+        out[i, 0], out[i, 1] = bx[i], by[i]
+    for i in range(n):
+        last[i, 0], last[i, 1] = xs[i], ys[i]
+    return best, out, cost, last
+
+
+@jit
+def check_path(g: Grid, b: Boat, points: Floats, h0: float) -> float:
+    """Return the time of a path, inf where it collides or breaks an angle limit."""
+    n = points.shape[0]
+    for i in range(n - 1):
+        if not is_free(g, points[i, 0], points[i, 1], points[i + 1, 0], points[i + 1, 1]):
+            return math.inf
+    return walk(b, points[:, 0].copy(), points[:, 1].copy(), n, h0)
+
+
+@jit
+def zigzag(
+    g: Grid, b: Boat, ax: float, ay: float, h: float, t: float, ex: float, ey: float, most: int
+) -> tuple[Floats, float, float, bool]:
+    """Return (points after a, arrival time, TWA on arrival, ok): the fewest equal tacks or gybes from a to e.
+
+    Tries the direct leg, then 1, 2, 3, 4, 6, ... up to ``most`` equal parts in either order.
+    """
+    dx, dy = ex - ax, ey - ay
+    d = math.hypot(dx, dy)
+    empty = np.empty((0, 2))
+    if d < 1e-9:
+        return empty, t, h, True
+    a, v = track(b, dx, dy, t)
+    if v > 1e-9 and abs(a) <= b.max_twa:
+        dh = abs(a - h)
+        t1 = t + min(dh, 2.0 * math.pi - dh) / b.omega
+        if abs(a) >= worst_half(b, t1, t1 + d / v) and is_free(g, ax, ay, ex, ey):
+            return np.array([[ex, ey]]), t1 + d / v, a, True
+    first = 0 if dy > 0.0 else 2
+    parts = 1
+    while parts <= most:
+        for way in range(2):
+            out = np.empty((2 * parts, 2))
+            px, py, now, course = ax, ay, t, h
+            fine = True
+            for m in range(parts):
+                qx, qy = ax + dx * (m + 1) / parts, ay + dy * (m + 1) / parts
+                w = (way + m) % 2
+                k1, k2 = first + w, first + 1 - w
+                x, y, t2, ok = corner(b, px, py, course, now, qx, qy, k1, k2)
+                if not ok or not is_free(g, px, py, x, y) or not is_free(g, x, y, qx, qy):
+                    fine = False
+                    break
+                out[2 * m, 0], out[2 * m, 1] = x, y
+                out[2 * m + 1, 0], out[2 * m + 1, 1] = qx, qy
+                course, now = math.atan2(qx - x, qy - y), t2
+                px, py = qx, qy
+            if fine:
+                return out, now, course, True
+        parts = parts + 1 if parts < 4 else parts + parts // 2
+    return empty, t, h, False

@@ -1,0 +1,103 @@
+"""Compiled pieces of path surgery: the exact corner between two points, and a path whose corners fit its times."""
+
+from __future__ import annotations
+
+import math
+
+from companion.planner.kernels import SLACK_RAD, Boat, Floats, jit, speed_at, track, turn_time, worst_half, wrap
+
+UP_STARBOARD, UP_PORT, DOWN_STARBOARD, DOWN_PORT = 0, 1, 2, 3
+"""Kinds of an edge course: close hauled or at the best gybing angle, TWA positive or negative."""
+
+
+@jit
+def edge_angle(b: Boat, kind: int, t0: float, t1: float) -> float:
+    """Return the TWA [rad] of an edge course sailed from t0 to t1; NaN where there is none."""
+    half = worst_half(b, t0, t1)
+    a = max(half, b.up) if kind < 2 else b.down
+    if a > b.max_twa or a < half:
+        return math.nan
+    return a if kind % 2 == 0 else -a
+
+
+@jit
+def corner(
+    b: Boat, px: float, py: float, h: float, t: float, qx: float, qy: float, k1: int, k2: int
+) -> tuple[float, float, float, bool]:
+    """Return (x, y, arrival time, ok): the corner of the two edge courses k1, k2 that lead from p to q.
+
+    The boat is at p at time t heading h. The angles fit the times at which the two legs are sailed.
+    """
+    a1, a2 = edge_angle(b, k1, t, t), edge_angle(b, k2, t, t)
+    l1 = l2 = t2 = vx = vy = 0.0
+    rounds = 1 if b.kind == 0 else 12
+    for r in range(rounds):
+        if not (abs(a1) >= 0.0 and abs(a2) >= 0.0):
+            return 0.0, 0.0, math.inf, False
+        v1, v2 = speed_at(b, a1), speed_at(b, a2)
+        vx, vy = v1 * math.sin(a1) + b.cx, v1 * math.cos(a1) + b.cy
+        wx, wy = v2 * math.sin(a2) + b.cx, v2 * math.cos(a2) + b.cy
+        det = vx * wy - vy * wx
+        if abs(det) < 1e-12:
+            return 0.0, 0.0, math.inf, False
+        l1 = ((qx - px) * wy - (qy - py) * wx) / det
+        l2 = (vx * (qy - py) - vy * (qx - px)) / det
+        if l1 <= 1e-9 or l2 <= 1e-9:
+            return 0.0, 0.0, math.inf, False
+        ta = t + turn_time(b, h, a1)
+        tb = ta + l1
+        tc = tb + turn_time(b, a1, a2)
+        t2 = tc + l2
+        if r + 1 < rounds:
+            n1, n2 = edge_angle(b, k1, ta, tb), edge_angle(b, k2, tc, t2)
+            settled = abs(n1 - a1) + abs(n2 - a2) < 1e-10
+            a1, a2 = n1, n2
+            if settled:
+                break
+    return px + l1 * vx, py + l1 * vy, t2, True
+
+
+@jit
+def kind_of(a: float) -> int:
+    """Return the edge course nearest to a leg's TWA."""
+    if abs(a) <= 0.5 * math.pi:
+        return 0 if a >= 0.0 else 1
+    return 2 if a >= 0.0 else 3
+
+
+@jit
+def fit_corners(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, first: int, force: bool) -> None:
+    """Re-solve corners from point ``first`` on so that their courses fit the times they are sailed at.
+
+    With ``force`` every corner of two close-hauled legs, otherwise only where a leg is inside the no-go zone.
+    """
+    t, h = 0.0, h0
+    for i in range(n - 1):
+        for attempt in range(2):
+            dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
+            length = math.hypot(dx, dy)
+            if length < 1e-9:
+                break
+            a, v = track(b, dx, dy, t)
+            if v <= 1e-9:
+                return
+            t1 = t + turn_time(b, h, a)
+            t2 = t1 + length / v
+            if attempt == 0 and i + 2 < n and i + 1 >= first and abs(a) < 0.5 * math.pi:
+                ex, ey = xs[i + 2] - xs[i + 1], ys[i + 2] - ys[i + 1]
+                if math.hypot(ex, ey) > 1e-9:
+                    a2 = math.atan2(ex, ey)
+                    half = worst_half(b, t1, t2)
+                    near = 0.5 * math.pi
+                    wants = abs(a) < half - SLACK_RAD or (
+                        force and abs(a) < half + 0.1 and abs(a2) < half + 0.1 and a * a2 < 0.0
+                    )
+                    if wants and abs(a2) < near and abs(wrap(a - a2)) > 0.02:
+                        x, y, _, ok = corner(
+                            b, xs[i], ys[i], h, t, xs[i + 2], ys[i + 2], kind_of(a), kind_of(a2)
+                        )
+                        if ok:
+                            xs[i + 1], ys[i + 1] = x, y
+                            continue
+            t, h = t2, a
+            break

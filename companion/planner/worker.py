@@ -1,0 +1,230 @@
+"""The planner's worker: a child process that plans, is watched, and is replaced when it hangs or dies.
+
+Both planners here have one method, ``await plan(problem, ...)``. ``PlannerWorker`` runs ``plan`` in a child, so
+the event loop never waits for it; ``InlinePlanner`` runs it at once and lets the loop's clock pass a stated time,
+for the virtual clock where there may be no process. Planner trouble is an outcome (``PlanStatus.TIMEOUT`` with
+the reason), never an exception.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import pickle
+import struct
+import sys
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from companion.clock import effort_s
+from companion.planner.plan import Plan, PlanStatus, Why
+from companion.planner.problem import Problem
+from companion.planner.solve import DEFAULT_BUDGET_S, plan
+
+_LOG = logging.getLogger(__name__)
+_LENGTH = struct.Struct("<Q")
+_READY = b"ready"
+DEFAULT_GRACE_S = 3.0
+"""How much longer than its budget an answer may take [s] before the child is taken for hung."""
+_START_LIMIT_S = 180.0
+"""Kernels compile once per machine; a Raspberry Pi takes a minute or two."""
+_PULSE_S = 0.5
+
+
+def failed(reason: str, *, seed: int, algorithm: str, elapsed_s: float = 0.0) -> Plan:
+    """Return the plan that says the worker did not answer."""
+    return Plan(status=PlanStatus.TIMEOUT, reason=reason, waypoints_en=np.empty((0, 2)), algorithm=algorithm,
+                seed=seed, elapsed_s=elapsed_s, why=Why(text=reason))
+
+
+class InlinePlanner:
+    """Plans in place and then lets ``virtual_s`` of the loop's time pass: deterministic under the virtual clock.
+
+    The budget in seconds is left out where there is an expansion budget: it would tie the plan to the machine.
+    """
+
+    def __init__(self, *, virtual_s: float = 1.0, expansions: int = 60_000) -> None:
+        self.virtual_s, self.expansions = virtual_s, expansions
+        self.is_alive = True
+
+    async def __aenter__(self) -> Self:
+        """Nothing to start."""
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Nothing to end."""
+
+    async def plan(
+        self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
+        algorithm: str = "auto",
+    ) -> Plan:
+        """Return the plan of ``expansions`` (or the default number) after ``virtual_s``."""
+        del budget_s
+        answer = plan(problem, expansions=expansions or self.expansions, seed=seed, algorithm=algorithm)
+        await asyncio.sleep(self.virtual_s)
+        return answer
+
+
+class PlannerWorker:
+    """A child process with warm kernels, one request at a time; a second caller waits for the first.
+
+    ``async with PlannerWorker() as planner`` starts the child and returns at once: it warms up while the loop runs
+    and the first request waits for it. ``restarts`` counts replacements.
+    """
+
+    def __init__(self, *, grace_s: float = DEFAULT_GRACE_S, command: list[str] | None = None) -> None:
+        self._grace_s = grace_s
+        self._command = command or [sys.executable, "-m", "companion.planner.worker"]
+        self._child: asyncio.subprocess.Process | None = None
+        self._is_warm = False
+        self._lock = asyncio.Lock()
+        self.restarts = 0
+
+    @property
+    def is_alive(self) -> bool:
+        """Is there a child that runs?"""
+        return self._child is not None and self._child.returncode is None
+
+    @property
+    def pid(self) -> int | None:
+        """Process id of the child, or None."""
+        return self._child.pid if self.is_alive and self._child is not None else None
+
+    async def __aenter__(self) -> Self:
+        """Start the child; it warms up by itself."""
+        await self._start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the child."""
+        await self._stop()
+
+    async def plan(
+        self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
+        algorithm: str = "auto",
+    ) -> Plan:
+        """Return the child's plan; ``PlanStatus.TIMEOUT`` when it hangs or dies, and it is then replaced.
+
+        With only an expansion budget there is no limit in seconds to judge a hang by: a minute is allowed.
+        """
+        if budget_s is None and expansions is None:
+            budget_s = DEFAULT_BUDGET_S
+        request = pickle.dumps(
+            {"problem": problem, "budget_s": budget_s, "expansions": expansions, "seed": seed, "algorithm": algorithm}
+        )
+        async with self._lock:
+            began_s = effort_s()
+            try:
+                if not self.is_alive:
+                    await self._replace()
+                if not self._is_warm:
+                    await self._answer(_START_LIMIT_S)
+                    self._is_warm = True
+                began_s = effort_s()
+                await self._send(request)
+                answer = await self._answer((60.0 if budget_s is None else budget_s) + self._grace_s)
+            except (OSError, EOFError, asyncio.IncompleteReadError, TimeoutError) as error:
+                hung = isinstance(error, TimeoutError)
+                reason = "the planner's worker did not answer in time" if hung else "the planner's worker died"
+                _LOG.warning("%s; it is replaced", reason)
+                await self._replace()
+                return failed(reason, seed=seed, algorithm=algorithm, elapsed_s=effort_s() - began_s)
+            except asyncio.CancelledError:
+                await self._replace()  # its answer would be taken for that of the next request
+                raise
+        value = pickle.loads(answer)  # noqa: S301 - our own child wrote it
+        if isinstance(value, Plan):
+            return value
+        return failed(f"the planner's worker failed: {value}", seed=seed, algorithm=algorithm)
+
+    # ------------------------------------------------------------------------------------ the child
+    async def _start(self) -> None:
+        self._is_warm = False
+        self._child = await asyncio.create_subprocess_exec(
+            *self._command, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE
+        )
+
+    async def _stop(self) -> None:
+        child, self._child = self._child, None
+        if child is None:
+            return
+        with contextlib.suppress(ProcessLookupError):
+            child.kill()
+        await child.wait()
+
+    async def _replace(self) -> None:
+        await self._stop()
+        self.restarts += 1
+        await self._start()
+
+    async def _send(self, payload: bytes) -> None:
+        assert self._child is not None
+        assert self._child.stdin is not None
+        self._child.stdin.write(_LENGTH.pack(len(payload)))
+        self._child.stdin.write(payload)
+        await self._child.stdin.drain()
+
+    async def _receive(self) -> bytes:
+        assert self._child is not None
+        assert self._child.stdout is not None
+        head = await self._child.stdout.readexactly(_LENGTH.size)
+        return await self._child.stdout.readexactly(_LENGTH.unpack(head)[0])
+
+    async def _answer(self, limit_s: float) -> bytes:
+        """Return the next message; ``TimeoutError`` after ``limit_s`` of computing time (the loop may be scaled)."""
+        task = asyncio.ensure_future(self._receive())
+        deadline_s = effort_s() + limit_s
+        try:
+            while not task.done():
+                if effort_s() >= deadline_s:
+                    raise TimeoutError
+                await asyncio.wait({task}, timeout=_PULSE_S)
+            return task.result()
+        finally:
+            if not task.done():
+                task.cancel()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await task
+
+
+# ------------------------------------------------------------------------------------- in the child
+def serve() -> None:
+    """Answer requests on standard input until it closes: the child's main."""
+    source = sys.stdin.buffer
+    sink = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever prints must not break the frames
+    with contextlib.suppress(OSError):
+        os.nice(5)
+
+    from companion.planner.warm import warm
+
+    warm()
+    _write(sink, _READY)
+    while True:
+        head = source.read(_LENGTH.size)
+        if len(head) < _LENGTH.size:
+            return
+        request: dict[str, Any] = pickle.loads(source.read(_LENGTH.unpack(head)[0]))  # noqa: S301 - our parent's
+        try:
+            answer: Plan | str = plan(request.pop("problem"), **request)
+        except Exception as error:
+            answer = f"{type(error).__name__}: {error}"
+        _write(sink, pickle.dumps(answer))
+
+
+def _write(sink: Any, payload: bytes) -> None:
+    sink.write(_LENGTH.pack(len(payload)))
+    sink.write(payload)
+    sink.flush()
+
+
+if __name__ == "__main__":
+    serve()
