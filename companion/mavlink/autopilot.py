@@ -27,7 +27,17 @@ from companion.mavlink.link import Link
 from companion.mavlink.lists import ListClear, ListDownload, ListUpload
 from companion.mavlink.machines import Outcome
 from companion.mavlink.params import ParamAnswer, ParamList, ParamRead, ParamSet, ParamTable, names_of
-from companion.messages import AutopilotStatus, GeoPoint, MissionItem, MissionState, MissionType, Mode, StatusText
+from companion.mavlink.status_wire import status_messages
+from companion.messages import (
+    AutopilotStatus,
+    CompanionStatus,
+    GeoPoint,
+    MissionItem,
+    MissionState,
+    MissionType,
+    Mode,
+    StatusText,
+)
 
 Method = Literal["auto", "ftp", "items", "partial"]
 OnValue = Callable[[Value], None]
@@ -237,6 +247,11 @@ class Autopilot:
         """Send a STATUSTEXT (0 emergency .. 7 debug); it reaches the shore and the autopilot's log."""
         self._text_id += 1
         self.link.send(*codec.status_texts(severity, text, self._text_id))
+
+    def send_status(self, status: CompanionStatus) -> None:
+        """Put the companion's status on the air; to be called every 2 s or more slowly."""
+        self.link.send(*status_messages(status, self.link.boot_s, self._status_turn))
+        self._status_turn += 1
 
     # -------------------------------------------------------------------------------------- parameters
     async def get_parameter(self, name: str) -> ParamAnswer:

@@ -1,8 +1,8 @@
 """Telemetry logs: 8 bytes of big-endian microseconds since 1970, then one raw frame, and so on.
 
-Every ground station reads them. The caller brings the wall clock; the two lowest bits of a stamp are 0, as in MAVProxy's
-files (they once held flags). Written so that a power cut costs the last frame; the reader stops at a torn tail, and
-finds its way again after damage in the middle.
+Every ground station reads them. The caller brings the wall clock; the two lowest bits of a stamp are 0, as in
+MAVProxy's files (they once held flags). Written so that a power cut costs the last frame; the reader stops at a torn
+tail, and finds its way again after damage in the middle.
 """
 
 from __future__ import annotations
@@ -102,6 +102,7 @@ def read_tlog(path: Path) -> list[TlogRecord]:
 
 def messages_of(records: Iterator[TlogRecord] | list[TlogRecord]) -> Iterator[tuple[float, Message]]:
     """Yield (seconds since 1970, message) of records; frames that do not decode are left out."""
+    codec = Codec(1, 191)
     for record in records:
-        for message in Codec(1, 191).feed(record.frame):
+        for message in codec.feed(record.frame):
             yield record.unix_us / 1e6, message
