@@ -25,6 +25,7 @@ class ReplanReason(enum.Enum):
     OPERATOR_BACK = "operator_back"
     REBOOT = "reboot"
     OBSTACLE = "obstacle"              # the area or the traffic changed
+    REFUGE = "refuge"                  # the battery is critical
     OPERATOR_WISH = "operator_wish"
     RETRY = "retry"                    # a step of the ladder after nothing was found
     MISMATCH = "mismatch"              # the mission on the autopilot is not the one that was uploaded

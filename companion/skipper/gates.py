@@ -8,7 +8,7 @@ section 3.2.4: undesired areas are mapped as static obstacles).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from companion.geo.angles import difference_rad, wrap_pi
@@ -42,8 +42,9 @@ class Gate:
 
 
 def gates_of(voyage: Voyage) -> tuple[Gate, ...]:
-    """Return the gates of all laps in order."""
+    """Return the gates of all laps in order. Every buoy is something to keep clear of on every leg."""
     legs = voyage.legs
+    discs = tuple(disc_wkt(g.en_m, KEEP_SHARE * g.rounding_m) for g in voyage.goals if g.side is not Side.NONE)
     out: list[Gate] = []
     for i, goal in enumerate(legs):
         before = legs[i - 1].en_m if i > 0 else voyage.home_en_m
@@ -51,10 +52,12 @@ def gates_of(voyage: Voyage) -> tuple[Gate, ...]:
         if goal.side is Side.NONE:
             out.append(Gate(
                 en_m=goal.en_m, radius_m=goal.radius_m, goal=i, ends_goal=True, name=name, from_en_m=before,
-                bandwidth_m=goal.bandwidth_m,
+                bandwidth_m=goal.bandwidth_m, keep_out=discs,
             ))
         else:
-            out.extend(_round(goal, i, name, before, legs[i + 1].en_m if i + 1 < len(legs) else None))
+            after = legs[i + 1].en_m if i + 1 < len(legs) else None
+            out.extend(
+                replace(gate, keep_out=(*discs, *gate.keep_out)) for gate in _round(goal, i, name, before, after))
     return tuple(out)
 
 
@@ -95,7 +98,7 @@ def _round(goal: Goal, index: int, name: str, before: PointEn | None, after: Poi
             en_m=moved(buoy, place, goal.rounding_m), radius_m=max(goal.radius_m, 0.4 * goal.rounding_m), goal=index,
             ends_goal=n == len(places) - 1, name=name, from_en_m=before if n == 0 else None,
             bandwidth_m=goal.bandwidth_m if n == 0 else None, buoy_en_m=buoy, side=goal.side,
-            keep_out=(disc_wkt(buoy, KEEP_SHARE * goal.rounding_m), barrier_wkt(buoy, wrong, length)),
+            keep_out=(barrier_wkt(buoy, wrong, length),),
         ))
         previous = place
     return gates

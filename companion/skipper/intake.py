@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from companion.messages import Mode, StatusText
 from companion.skipper.actions import CancelPlan, Severity
-from companion.skipper.gates import passed_on
-from companion.skipper.geometry import distance_m, waypoint_done
+from companion.skipper.gates import Gate, passed_on
+from companion.skipper.geometry import distance_m, leg_distance_m, waypoint_done
 from companion.skipper.planning import take_plan, take_upload
 from companion.skipper.snapshot import (
     AutopilotRebooted,
@@ -100,7 +102,8 @@ def locate(turn: Turn) -> None:
     if route is not None and status is not None and status.mission_seq is not None and _counts(turn):
         index = min(max(status.mission_seq - 1, 0), len(route.items) - 1)
         # Right after we made an item current the stream may still carry the old number.
-        if turn.t_s - state.current_asked_s > turn.config.settle_s or index >= state.index:
+        settled = turn.t_s - state.current_asked_s > turn.config.settle_s
+        if settled or state.index <= index <= state.index + 1:
             turn.update(index=index)
     boat = turn.boat_en
     if route is not None and boat is not None and state.sailing:
@@ -109,6 +112,18 @@ def locate(turn: Turn) -> None:
         _remember(turn)
     if here is not None and turn.snapshot.vehicle_age_s is not None and turn.snapshot.vehicle_age_s < 1.0 + 1e-9:
         turn.update(last_seen=(turn.t_s, here[0], here[1]))
+
+
+def notice_truncation(turn: Turn) -> None:
+    """Look at the mission again when the autopilot counts fewer items than we put there."""
+    status, state = turn.autopilot, turn.state
+    if (
+        status is not None and status.mission_total is not None and state.route is not None and state.checked_mission
+        and state.pending_upload is None and status.mission_total < len(state.route.items)
+        and turn.t_s - state.read_since_s > turn.config.settle_s
+        and turn.t_s - state.uploaded_s > turn.config.settle_s
+    ):
+        turn.update(checked_mission=False, read_since_s=turn.t_s)
 
 
 def _counts(turn: Turn) -> bool:
@@ -137,27 +152,54 @@ def _own_count(turn: Turn) -> None:
 def _pass_gates(turn: Turn) -> None:
     """Count the gates passed: by being there, or by the autopilot's count."""
     boat, route = turn.boat_en, turn.state.route
-    while boat is not None and route is not None and turn.gate is not None:
+    if boat is None or route is None:
+        return
+    _approach(turn)
+    while turn.gate is not None:
         gate, number = turn.gate, turn.state.gate
         left = distance_m(boat, gate.en_m)
         counted = any(g == number for g in route.gate_of[: turn.state.index])
         near = max(gate.radius_m, turn.config.grid_size_m)
-        if not (left <= gate.radius_m or (counted and left <= near and not _is_last(turn))):
-            if not (counted and left > near) or turn.state.missed_gate == number:
-                return
-            # The autopilot has left it behind and we were never near: it was missed.
-            turn.update(missed=turn.state.missed + 1, missed_gate=number)
+        if not (turn.state.closest_m <= gate.radius_m or (counted and left <= near and not _is_last(turn))
+                or _is_near_enough(turn, gate, counted)):
+            if counted and left > near and turn.state.missed_gate != number and not _is_last(turn):
+                # The autopilot has left it behind and we were never near.
+                turn.update(missed=turn.state.missed + 1, missed_gate=number)
             return
         if gate.side is not Side.NONE and gate.buoy_en_m is not None and gate.ends_goal and not _rounded(turn, number):
-            turn.update(missed=turn.state.missed + 1, missed_gate=_first_gate(turn, gate.goal),
-                        gate=_first_gate(turn, gate.goal), track=())
+            first = _first_gate(turn, gate.goal)
+            turn.update(missed=turn.state.missed + 1, missed_gate=first, gate=first, track=(), closest_m=math.inf)
             turn.say(Severity.WARNING, "buoy missed", f"{gate.name} was left on the wrong side: again", every_s=0.0)
             return
+        closest = turn.state.closest_m
         reached = (*turn.state.reached, gate.goal) if gate.ends_goal else turn.state.reached
-        turn.update(gate=number + 1, reached=reached, missed_gate=None)
+        turn.update(gate=number + 1, reached=reached, missed_gate=None, closest_m=math.inf)
         if gate.ends_goal:
             turn.update(track=())
-            turn.say(Severity.NOTICE, "goal", f"{gate.name} reached, {left:.1f} m from it", every_s=0.0)
+            turn.say(Severity.NOTICE, "goal", f"{gate.name} reached, {min(left, closest):.1f} m from it", every_s=0.0)
+
+
+def _approach(turn: Turn) -> None:
+    """Keep the smallest distance to the gate, between the last fix and this one too."""
+    boat, gate, last = turn.boat_en, turn.gate, turn.state.last_seen
+    if boat is None or gate is None:
+        return
+    way = distance_m(boat, gate.en_m)
+    if last is not None and turn.t_s - last[0] <= 2.0 and not turn.is_raised("position jump"):
+        way = min(way, leg_distance_m(gate.en_m, (last[1], last[2]), boat))
+    turn.update(closest_m=min(turn.state.closest_m, way))
+
+
+def _is_near_enough(turn: Turn, gate: Gate, counted: bool) -> bool:
+    """Return whether the last goal counts as reached although its radius was not: Büsser's grid size, and no better.
+
+    The boat has been at the waypoint by the autopilot's count and loiters in the mission's safe end.
+    """
+    route = turn.state.route
+    if route is None or not counted or not _is_last(turn) or turn.state.closest_m > turn.config.grid_size_m:
+        return False
+    at_end = turn.state.index >= len(route.items) - 1
+    return at_end and (distance_m(route.points_en_m[-1], gate.en_m) > gate.radius_m or turn.is_raised("mission ended"))
 
 
 def _is_last(turn: Turn) -> bool:

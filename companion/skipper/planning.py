@@ -45,8 +45,7 @@ def request(
         return False
     wind = turn.wind_mean
     start = repaired(turn.voyage, start, step.margin_m, wind[0] if wind else None)
-    aim = _nearer(turn, gate, start, step) if step.nearer_goal else aim_at(
-        turn.voyage, turn.config, turn.gates, gate, start.en_m)
+    aim = _aim(turn, gate, start, step)
     number = turn.new_id()
     name = ", ".join(part for part in (step.name, "start repaired" if start.lead_in else "") if part)
     try:
@@ -109,6 +108,20 @@ def _gate_after(turn: Turn, from_index: int | None) -> int | None:
     return gate if gate < len(turn.gates) else None
 
 
+def seeks_refuge(turn: Turn) -> bool:
+    """Return whether the boat makes for a refuge instead of its goal."""
+    return turn.is_raised("battery critical") and bool(turn.voyage.refuges)
+
+
+def _aim(turn: Turn, gate: int, start: Start, step: Rung) -> Aim:
+    if seeks_refuge(turn):
+        place = min(turn.voyage.refuges, key=lambda p: distance_m(start.en_m, p))
+        return Aim(en_m=place, radius_m=turn.config.loiter_radius_m, gate=-1)
+    if step.nearer_goal:
+        return _nearer(turn, gate, start, step)
+    return aim_at(turn.voyage, turn.config, turn.gates, gate, start.en_m)
+
+
 def _nearer(turn: Turn, gate: int, start: Start, step: Rung) -> Aim:
     """Return a safe place that is nearer than the goal: a refuge, or a roomy place on the way."""
     target = turn.gates[gate].en_m
@@ -133,6 +146,8 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
     if pending is None or pending.request_id != outcome.request_id:
         return
     turn.update(pending_plan=None)
+    if turn.state.phase in {Phase.OPERATOR, Phase.DONE}:
+        return
     plan = outcome.plan
     if plan is None or not plan.has_path:
         reason = outcome.text or (plan.reason if plan is not None else "the planner died")
@@ -257,7 +272,7 @@ def take_upload(turn: Turn, outcome: UploadOutcome) -> None:
         turn.update(
             pending_upload=None, route=pending.route, index=index, own_index=max(index, 0), upload_retry=Retry(),
             checked_mission=True, foreign="", unsure_route=None, replace_foreign=False, missed_gate=None,
-            no_go_since_s=None,
+            no_go_since_s=None, uploaded_s=turn.t_s,
             current_asked_s=turn.t_s if pending.set_current is not None else turn.state.current_asked_s,
             asked_seq=pending.set_current if turn.state.sailing else None,
             replanned_index=turn.state.replanned_index if pending.set_current != 1 else -1,

@@ -15,7 +15,7 @@ from companion.skipper.config import SkipperConfig
 from companion.skipper.gates import Gate, gates_of
 from companion.skipper.geometry import distance_m, leg_distance_m
 from companion.skipper.helm import arm, make_current, repair, set_mode
-from companion.skipper.intake import locate, mode_is_ours, take_events, take_outcomes
+from companion.skipper.intake import locate, mode_is_ours, notice_truncation, take_events, take_outcomes
 from companion.skipper.planning import request, upload
 from companion.skipper.route import is_mixture, is_same_mission
 from companion.skipper.sailing import sail
@@ -78,11 +78,15 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         return
     if _operator_has_it(turn):
         return
-    if turn.state.phase is Phase.DONE:
-        return
+    notice_truncation(turn)
     if not _mission_is_known(turn):
         return
-    if turn.state.route is None:
+    if turn.state.phase is Phase.DONE:
+        repair(turn)
+        return
+    if turn.state.wish is OperatorWish.HOLD and not turn.state.sailing:
+        turn.phase(Phase.WAITING, "the operator asked to hold")
+    elif turn.state.route is None:
         _start(turn)
     elif not turn.state.sailing:
         _launch(turn)
@@ -172,6 +176,8 @@ def _mission_is_known(turn: Turn) -> bool:
             _read(turn, "whose mission is on board?")
         if not state.sailing:
             turn.phase(Phase.WAITING, "reading the mission on the autopilot")
+        elif state.unsure_route is not None:
+            turn.phase(state.phase, "an upload failed: reading what is on board")
         return state.sailing and state.route is not None and state.unsure_route is None
     return _compare(turn, items)
 

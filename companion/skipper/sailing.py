@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
-from companion.skipper.actions import ReplanReason, Severity, SteerHeading
+from companion.skipper.actions import CancelPlan, ReplanReason, Severity, SteerHeading
 from companion.skipper.config import ReplanPolicy
 from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m
 from companion.skipper.helm import check_current, make_current, repair, set_mode
 from companion.skipper.judge import predicted_beat
 from companion.skipper.manoeuvre import bear_away_rad
-from companion.skipper.planning import request
+from companion.skipper.planning import hold, request, seeks_refuge
 from companion.skipper.route import path_length_m
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase
@@ -59,6 +59,11 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     check_current(turn)
     if turn.is_raised("stuck waypoint") and turn.state.own_index > turn.state.index:
         make_current(turn, turn.state.own_index + 1)
+    if turn.state.wish is OperatorWish.HOLD:
+        if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
+            hold(turn, "the operator asked to hold")
+        turn.phase(Phase.HOLDING, "holding: the operator asked for it")
+        return
     if turn.state.pending_upload is None:
         _consider(turn, fresh)
     _name(turn)
@@ -66,6 +71,9 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
 
 def _finish(turn: Turn) -> None:
     route = turn.state.route
+    if turn.state.pending_plan is not None:
+        turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
+        turn.update(pending_plan=None)
     end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
     turn.phase(Phase.DONE, f"all {len(turn.state.reached)} goals reached{end}")
     turn.say(Severity.NOTICE, "done", turn.state.why, every_s=0.0)
@@ -85,7 +93,7 @@ def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
         return
     if request(turn, trigger.reason, from_index=trigger.from_index, text=trigger.text):
         changes: dict[str, object] = {"after_operator": False}
-        if trigger.reason is ReplanReason.OPERATOR_WISH:
+        if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:
             changes["wish"] = None
         if trigger.from_index is not None:
             changes["replanned_index"] = trigger.from_index
@@ -99,7 +107,9 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return None
     if state.after_operator:
         return Trigger(reason=ReplanReason.OPERATOR_BACK, text="the operator gave the boat back")
-    if state.wish is OperatorWish.REPLAN:
+    if "battery critical" in fresh and turn.voyage.refuges:
+        return Trigger(reason=ReplanReason.REFUGE, text="the battery is critical", urgent=True)
+    if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:
         return Trigger(reason=ReplanReason.OPERATOR_WISH, text="the operator asked for it")
     if state.missed_gate is not None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
@@ -108,7 +118,10 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
     trigger = None
     if not turn.is_raised("wind untrusted"):
         trigger = _no_go(turn)
-    return trigger or _position(turn) or _extension(turn) or _wind(turn) or _waypoint(turn)
+    trigger = trigger or _position(turn)
+    if seeks_refuge(turn):
+        return trigger
+    return trigger or _extension(turn) or _wind(turn) or _waypoint(turn)
 
 
 def _no_go(turn: Turn) -> Trigger | None:
@@ -146,7 +159,7 @@ def _position(turn: Turn) -> Trigger | None:
         return Trigger(reason=ReplanReason.OFF_LEG, text="off the leg", interval_s=config.min_replan_interval_s)
     if turn.is_raised("no progress"):
         return Trigger(reason=ReplanReason.NO_PROGRESS, text="no progress", interval_s=120.0)
-    if turn.is_raised("mission ended") or not turn.ahead():
+    if (turn.is_raised("mission ended") or not turn.ahead()) and not seeks_refuge(turn):
         reason = ReplanReason.RETRY if turn.state.phase is Phase.HOLDING else ReplanReason.NEXT_GOAL
         return Trigger(reason=reason, text="at the end of the mission with goals left", interval_s=config.settle_s)
     return None

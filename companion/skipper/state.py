@@ -132,6 +132,8 @@ class SkipperState:
     last_plan_s: float = float("-inf")  # when a plan was last asked for
     replanned_index: int = -1           # the target for which Wolsieffer's replan was asked
     replans: int = 0
+    closest_m: float = float("inf")     # smallest distance to the present gate so far
+    uploaded_s: float = float("-inf")   # when the last upload ended well
     good_wind_since_s: float | None = None
     no_go_since_s: float | None = None
     wish: OperatorWish | None = None    # the operator's last wish, until it is answered
