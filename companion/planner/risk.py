@@ -28,10 +28,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import erfcinv
 
 from companion.geo.angles import wrap_pi
 from companion.planner import risk_kernels as kernels
-from companion.planner.plan import Leg, Plan
+from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem import Problem
 
 if TYPE_CHECKING:
@@ -41,7 +42,8 @@ PROMISE_FACTOR = 1.15
 """What is promised over what is computed: a simulation of 2,000 winds scatters by a tenth at a share of 5 %."""
 DEFAULT_CORRELATION_S = 60.0
 MAX_STEPS = 400_000
-RISK_ROUNDS = 8             # searches that the bisection under a limit divides its effort among
+RISK_ROUNDS = 8             # parts that the bisection under a limit divides its effort into
+RISK_TURNS = 16
 MOST_EXTRA_SIGMAS = 8.0
 EXTRA_RESOLUTION = 0.02     # of the bisection [standard deviations]
 ASSUMPTION = {
@@ -194,6 +196,17 @@ def simulate_entries(
 
 
 # ------------------------------------------------------------------------------ planning within a limit
+def keep_limit(problem: Problem, plan: Plan) -> Plan:
+    """Return the plan with its risk filled in, or without its path when that is above ``problem.risk``."""
+    plan = with_risk(problem, plan)
+    if problem.risk is None or plan.risk is None or plan.risk <= problem.risk.max_path_risk:
+        return plan
+    reason = (f"the path found has a risk of {100.0 * plan.risk:.3g} %, above the limit of "
+              f"{100.0 * problem.risk.max_path_risk:.3g} %")
+    return replace(plan, status=PlanStatus.TIMEOUT, reason=reason, waypoints_en=np.empty((0, 2)), legs=(),
+                   cost_s=math.inf, first_s=None, why=Why(text=reason))
+
+
 def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -> Outcome:
     """Return the fastest path found whose promised risk is within ``problem.risk``.
 
@@ -204,56 +217,59 @@ def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -
     from companion.planner.solve import Effort, Outcome
 
     limit = problem.risk.max_path_risk if problem.risk is not None else 1.0
-    share = 1.0 / RISK_ROUNDS
     best: Outcome | None = None
-    best_s, least = math.inf, 1.0
+    best_s, least, bound_s = math.inf, 1.0, 0.0
+    # ``low`` keeps too little away from the zone; ``high`` keeps the limit, or leaves no path at all.
     low, high, extra = 0.0, math.inf, 0.0
-    bound_s = 0.0
-    first = True
-    while first or not effort.is_over:
+    over, under = 0.0, -math.inf  # log of hazard / limit's hazard at them
+    for turn in range(RISK_TURNS):
         inner = Effort(
-            None if math.isinf(effort.budget_s) else max(1e-3, share * effort.budget_s),
-            None if effort.limit is None else max(1, int(share * effort.limit)),
+            None if math.isinf(effort.budget_s) else max(1e-3, effort.budget_s / RISK_ROUNDS),
+            None if effort.limit is None else max(1, effort.limit // RISK_ROUNDS),
         )
         outcome = search(widened(problem, extra), inner, seed)
         effort.spend(inner.used)
-        if first:
-            bound_s = outcome.lower_bound_s
+        if turn == 0:
             if outcome.waypoints_en is None:
-                return outcome  # nothing to widen: what fails without the limit fails with it
-        promised = math.inf
-        if outcome.waypoints_en is not None:
-            judged = problem.evaluate(outcome.waypoints_en)
-            if judged.is_feasible:
-                promised = path_risk(problem, judged.legs).total
-                least = min(least, promised)
-        if promised <= limit:
+                return outcome  # what fails without the limit fails with it
+            bound_s = outcome.lower_bound_s
+        judged = None if outcome.waypoints_en is None else problem.evaluate(outcome.waypoints_en)
+        promised = path_risk(problem, judged.legs).total if judged is not None and judged.is_feasible else math.inf
+        least = min(least, promised)
+        if promised <= limit and judged is not None:
             effort.found()
             if judged.time_s < best_s:
                 best, best_s = outcome, judged.time_s
-            if first:
-                break
-            high = extra
-        elif promised < math.inf or math.isinf(high):
-            low = extra if promised < math.inf else low
-            if promised == math.inf:  # widened so far that nothing is left
-                high = extra
+        if limit < promised < math.inf:
+            low, over = extra, math.log(_hazard(promised) / _hazard(limit))
+        elif turn == 0:
+            break
         else:
             high = extra
-        first = False
+            under = math.log(_hazard(promised) / _hazard(limit)) if promised < math.inf else -math.inf
         if math.isinf(high):
-            extra = 0.5 if extra == 0.0 else 2.0 * extra
-            if extra > MOST_EXTRA_SIGMAS:
-                break
-        else:
-            extra = 0.5 * (low + high)
-        if high - low < EXTRA_RESOLUTION:
+            extra = low + _step_for(problem.k_delta + low, over)
+        else:  # regula falsi, kept off the ends; bisection where there was no path
+            part = over / (over - under) if math.isfinite(under) else 0.5
+            extra = low + (high - low) * min(0.85, max(0.15, part))
+        if effort.is_over or extra > MOST_EXTRA_SIGMAS or high - low < EXTRA_RESOLUTION:
             break
     if best is None:
         reason = (f"no path within the limit of {100.0 * limit:.3g} % on its risk; the least risky found has "
                   f"{100.0 * least:.3g} %")
         return Outcome(waypoints_en=None, reason=reason)
-    return replace(best, lower_bound_s=bound_s, trace={**best.trace, "extra_sigmas": extra})
+    return replace(best, lower_bound_s=bound_s, trace={**best.trace, "extra_sigmas": high if turn else 0.0})
+
+
+def _hazard(promised: float) -> float:
+    """Return the accumulated hazard behind a promise: unlike the probability it does not saturate."""
+    return max(1e-9, -math.log1p(-min(promised / PROMISE_FACTOR, 1.0 - 1e-9)))
+
+
+def _step_for(k: float, over: float) -> float:
+    """Return by how many sigmas to go from k so that the normal tail falls by the factor e^over, and a little more."""
+    tail = 0.5 * math.erfc(k / math.sqrt(2.0)) * math.exp(-over)
+    return max(0.1, 1.1 * (math.sqrt(2.0) * float(erfcinv(max(2.0 * tail, 1e-30))) - k))
 
 
 def widened(problem: Problem, extra: float) -> Problem:

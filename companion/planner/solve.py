@@ -130,7 +130,15 @@ def plan(
         return replace(empty, why=Why(text=f"Cannot be planned: {problem.defect}."))
     module, name = ALGORITHMS[algorithm]
     search: Search = getattr(importlib.import_module(module), name)
-    return _judged(problem, search(problem, effort, seed), effort, empty)
+    if problem.risk is None:
+        return _judged(problem, search(problem, effort, seed), effort, empty)
+    from companion.planner.risk import keep_limit, search_within
+
+    if algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)
+        outcome = search(problem, effort, seed)
+    else:
+        outcome = search_within(search, problem, effort, seed)
+    return keep_limit(problem, _judged(problem, outcome, effort, empty))
 
 
 def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> Plan:
