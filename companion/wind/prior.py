@@ -18,11 +18,12 @@ def _array(*values: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
 
 
 CONSTANTS = Constants(
-    survival=_array(3.55, 0.857),
-    speed_survival=_array(3.55, 0.857),
-    sigma=_array(0.4, 0.06, -0.03, 0.42, 0.36, -0.28),
-    error=_array(0.18, 0.27),
-    speed_error=_array(0.15, 0.25),
-    quantile=np.log(_array(1e-3, 0.30, 0.64, 0.90, 1.30, 1.78, 2.30, 3.0, 3.6, 5.5)),
-    memory=_array(2400.0, 3600.0, 3600.0, 3600.0, 60.0, 7200.0, 0.3, 60.0),
+    survival=_array(10.4, 0.638),
+    speed_survival=_array(2.0, 0.857),
+    sigma=_array(0.167, 0.073, 0.415, -0.56, 1500.0),
+    error=_array(0.167, 0.30),
+    speed_error=_array(0.12, 0.25),
+    quantile=_array(0.0, 0.31, 0.65, 0.92, 1.34, 1.85, 2.42, 3.3, 4.1, 8.0),
+    tail=_array(0.05),
+    memory=_array(3600.0, 7200.0, 3600.0, 60.0, 10800.0, 0.3, 0.3),
 )
