@@ -20,3 +20,14 @@ The shell joins it to transports and to the event loop's clock, whatever that is
 ``set_mode(Mode)`` (the operator's switch), ``hear_vessel(Vessel)`` (AIS); on the link: ``MemoryLink.impairment``,
 ``cut`` and ``mend``.
 """
+
+from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.config import HOME, AutopilotConfig, GpsFault, Truth, VaneFault, VaneState
+from sitl.autopilot.memory import PERFECT, Impairment, MemoryLink
+from sitl.autopilot.server import Server, serve
+from sitl.autopilot.traffic import Vessel
+
+__all__ = [
+    "HOME", "PERFECT", "Autopilot", "AutopilotConfig", "GpsFault", "Impairment", "MemoryLink", "Server", "Truth",
+    "VaneFault", "VaneState", "Vessel", "serve",
+]

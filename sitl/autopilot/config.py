@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -25,6 +26,7 @@ class AutopilotConfig:
         sysid: MAVLink system id.
         parameters: values other than the fresh boat's, by name.
         battery_v: at the start; ``Autopilot.set_battery`` changes it.
+        new_parameter_names: answer to ArduPilot 4.7's names (MAV_SYSID) instead of the older ones.
     """
 
     home: GeoPoint = HOME
@@ -34,6 +36,7 @@ class AutopilotConfig:
     sysid: int = 1
     parameters: Mapping[str, float] = field(default_factory=dict)
     battery_v: float = 12.6
+    new_parameter_names: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,3 +63,34 @@ class Truth:
     tacks: int
     sail_rad: float
     rudder: float
+
+
+class VaneState(enum.Enum):
+    """How the wind vane is broken."""
+
+    OK = "ok"
+    FROZEN = "frozen"      # its angle to the bow stays as it is
+    OFFSET = "offset"      # mounted wrong by ``value_rad``
+    SPIKES = "spikes"      # one reading in fifty is anywhere within ``value_rad``
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VaneFault:
+    """A fault of the wind vane."""
+
+    state: VaneState = VaneState.OK
+    value_rad: float = 0.0
+
+    @property
+    def code(self) -> int:
+        """The kernel's number for it."""
+        return list(VaneState).index(self.state)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GpsFault:
+    """A fault of the position: an offset that the autopilot believes at once, or no fix."""
+
+    east_m: float = 0.0
+    north_m: float = 0.0
+    is_lost: bool = False

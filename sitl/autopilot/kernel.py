@@ -44,6 +44,7 @@ S_CURRENT_E, S_CURRENT_N = 58, 59                              # of the water [m
 S_VANE_FAULT, S_VANE_VALUE, S_AVOID = 60, 61, 62               # FAULT_, its angle [rad]; near a fence
 S_MOORED, S_MOTOR, S_THROTTLE = 63, 64, 65
 S_INDIRECT = 66
+S_GPS_E, S_GPS_N = 67, 68                                       # error of the position that the autopilot believes
 S_SIZE = 72
 
 # --- settings --------------------------------------------------------------------------------------------------
@@ -191,7 +192,7 @@ def _indirect(s: Vector, p: Vector, yaw_rad: float) -> bool:
     if s[S_TACKING]:
         return True
     twd = math.atan2(s[S_TWD_SIN], s[S_TWD_COS])
-    return abs(_wrap(twd - yaw_rad)) <= p[P_NOGO] + NOGO_PAD_RAD
+    return bool(abs(_wrap(twd - yaw_rad)) <= p[P_NOGO] + NOGO_PAD_RAD)
 
 
 @njit(nogil=True, cache=True)
@@ -272,7 +273,7 @@ def _target(s: Vector, p: Vector) -> tuple[float, float, float, float, bool]:
         pace = _clip(pace, 0.5, p[P_WP_SPEED])
         he, hn = pace * ue, pace * un
     # the target waits for the boat, and keeps a little ahead of it
-    error = (s[S_TE] - s[S_E]) * de + (s[S_TN] - s[S_N]) * dn
+    error = (s[S_TE] - (s[S_E] + s[S_GPS_E])) * de + (s[S_TN] - (s[S_N] + s[S_GPS_N])) * dn
     along = s[S_VE] * de + s[S_VN] * dn
     want = _clip(TRACK_LEAD + (along - p[P_POS_P] * error) / pace, 0.0, OVERSPEED)
     s[S_SCALE] += (want - s[S_SCALE]) * LOOP_S
@@ -316,12 +317,12 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     he, hn, a_e, a_n, arrived = _target(s, p)
     le, ln = s[S_DE] - s[S_OE], s[S_DN] - s[S_ON]
     length = math.hypot(le, ln)
-    de, dn = s[S_DE] - s[S_E], s[S_DN] - s[S_N]
+    de, dn = s[S_DE] - (s[S_E] + s[S_GPS_E]), s[S_DN] - (s[S_N] + s[S_GPS_N])
     s[S_DIST] = math.hypot(de, dn)
     s[S_BEARING] = math.atan2(de, dn)
     if length > 1e-6:
-        s[S_XTRACK] = ((s[S_N] - s[S_ON]) * le - (s[S_E] - s[S_OE]) * ln) / length
-        past = (s[S_E] - s[S_OE]) * le + (s[S_N] - s[S_ON]) * ln >= length * length
+        s[S_XTRACK] = (((s[S_N] + s[S_GPS_N]) - s[S_ON]) * le - ((s[S_E] + s[S_GPS_E]) - s[S_OE]) * ln) / length
+        past = ((s[S_E] + s[S_GPS_E]) - s[S_OE]) * le + ((s[S_N] + s[S_GPS_N]) - s[S_ON]) * ln >= length * length
     else:
         s[S_XTRACK], past = 0.0, True
     if arrived and (s[S_FAST] or s[S_DIST] <= p[P_WP_RADIUS] or past):
@@ -334,7 +335,7 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
         return heading, 0.0, True, events | more
     s[S_INDIRECT] = 0.0
     # AR_PosControl: velocity wanted, the acceleration across the bow that it takes, the turn rate for that
-    ve, vn = p[P_POS_P] * (s[S_TE] - s[S_E]) + he, p[P_POS_P] * (s[S_TN] - s[S_N]) + hn
+    ve, vn = p[P_POS_P] * (s[S_TE] - (s[S_E] + s[S_GPS_E])) + he, p[P_POS_P] * (s[S_TN] - (s[S_N] + s[S_GPS_N])) + hn
     v = math.hypot(ve, vn)
     if v > p[P_WP_SPEED]:
         ve, vn, v = ve * p[P_WP_SPEED] / v, vn * p[P_WP_SPEED] / v, p[P_WP_SPEED]
@@ -350,7 +351,7 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
 @njit(nogil=True, cache=True)
 def _loiter(s: Vector, p: Vector) -> tuple[float, int]:
     """Mode loiter of a sailboat: keep the heading within the radius, sail to its centre from outside."""
-    de, dn = s[S_LE] - s[S_E], s[S_LN] - s[S_N]
+    de, dn = s[S_LE] - (s[S_E] + s[S_GPS_E]), s[S_LN] - (s[S_N] + s[S_GPS_N])
     s[S_DIST] = math.hypot(de, dn)
     s[S_BEARING] = math.atan2(de, dn)
     s[S_LOITER_SPEED] = 0.1
@@ -426,7 +427,7 @@ def _control(s: Vector, p: Vector) -> int:
 
 
 @njit(nogil=True, cache=True)
-def advance(  # noqa: PLR0917 - a kernel
+def advance(
     s: Vector, p: Vector, wind: NDArray[np.float64], first_tick: int, noise: Vector, loops: int
 ) -> tuple[int, int]:
     """Run up to ``loops`` loops; return (loops done, events). Stops after the loop in which an event happens.

@@ -85,6 +85,11 @@ class Mission:
         return self.nav_index or 0
 
     @property
+    def has_do(self) -> bool:
+        """Whether a DO command behind the current navigation command waits for its turn."""
+        return self._do_next > 0
+
+    @property
     def mav_state(self) -> int:
         """MISSION_STATE for MISSION_CURRENT."""
         return mav.MISSION_STATE_NO_MISSION if len(self.items) <= 1 else self.state.value
@@ -109,9 +114,7 @@ class Mission:
             return
         self.state = RunState.RUNNING
         self.is_loaded = False
-        if self.nav_index >= len(self.items):
-            self._complete()
-        elif not self._advance(self.nav_index):
+        if self.nav_index >= len(self.items) or not self._advance(self.nav_index):
             self._complete()
 
     def reset(self) -> None:
@@ -176,14 +179,12 @@ class Mission:
 
     def _run_do(self) -> None:
         # the DO commands after the current navigation command run while it does, one each loop
-        if 0 < self._do_next < len(self.items):
-            item = self.items[self._do_next]
-            if item.command in NAV_COMMANDS or item.command == mav.MAV_CMD_DO_JUMP:
-                self._do_next = 0
-                return
-            index = self._do_next
-            self._do_next += 1
-            self._crew.do(index, item)
+        index, self._do_next = self._do_next, 0
+        if 0 < index < len(self.items):
+            item = self.items[index]
+            if item.command not in NAV_COMMANDS and item.command != mav.MAV_CMD_DO_JUMP:
+                self._do_next = index + 1
+                self._crew.do(index, item)
 
     def _advance(self, index: int) -> bool:
         jumps = 0

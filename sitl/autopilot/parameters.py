@@ -33,11 +33,11 @@ class Parameters:
                 self._types[name] = _TYPES[kind[0] if kind else "REAL32"]
         self._outside = {old: new for old, new in NEW_NAMES.items() if new_names and old in self._values}
         self._inside = {new: old for old, new in self._outside.items()}
-        for name, value in overrides.items():
-            inside = self._inside.get(name, name)
+        for given, number in overrides.items():
+            inside = self._inside.get(given, given)
             if inside not in self._values:
                 self._types[inside] = _TYPES["REAL32"]
-            self._values[inside] = float(value)
+            self._values[inside] = float(number)
         self._order = list(self._values)
 
     def get(self, name: str) -> float:

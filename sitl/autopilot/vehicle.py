@@ -175,6 +175,18 @@ class Vehicle:
             )
         self._measure(destination)
 
+    def leave_from_here(self) -> None:
+        """The boat drifted while it waited: start its leg at the present position."""
+        s = self.state
+        s[k.S_OE], s[k.S_ON] = s[k.S_TE], s[k.S_TN] = self.position
+        s[k.S_IN], s[k.S_PHASE], s[k.S_U], s[k.S_SCALE] = 0.0, 1.0, 0.0, 0.0
+        self._measure(self.destination)
+
+    @property
+    def heading(self) -> float:
+        """Heading [rad, -π..π)."""
+        return float(self.state[k.S_YAW])
+
     def loiter(self, centre: tuple[float, float] | None = None) -> None:
         """Stay near ``centre``, or near where the boat could stop."""
         s = self.state
@@ -224,18 +236,25 @@ class Vehicle:
 
     def _measure(self, goal: tuple[float, float]) -> None:
         s = self.state
-        de, dn = goal[0] - s[k.S_E], goal[1] - s[k.S_N]
+        east, north = self.position
+        de, dn = goal[0] - east, goal[1] - north
         s[k.S_DIST], s[k.S_BEARING] = math.hypot(de, dn), math.atan2(de, dn)
         if s[k.S_STEER] == k.STEER_LEG:
             le, ln = s[k.S_DE] - s[k.S_OE], s[k.S_DN] - s[k.S_ON]
             length = math.hypot(le, ln)
             s[k.S_XTRACK] = (
-                ((s[k.S_N] - s[k.S_ON]) * le - (s[k.S_E] - s[k.S_OE]) * ln) / length if length > 1e-6 else 0.0
+                ((north - s[k.S_ON]) * le - (east - s[k.S_OE]) * ln) / length if length > 1e-6 else 0.0
             )
 
     # --------------------------------------------------------------------------------------- readings
     @property
     def position(self) -> tuple[float, float]:
+        """East, north [m], as the autopilot believes."""
+        s = self.state
+        return float(s[k.S_E] + s[k.S_GPS_E]), float(s[k.S_N] + s[k.S_GPS_N])
+
+    @property
+    def true_position(self) -> tuple[float, float]:
         """East, north [m]."""
         return float(self.state[k.S_E]), float(self.state[k.S_N])
 
@@ -249,7 +268,8 @@ class Vehicle:
         s = self.state
         speed = math.hypot(s[k.S_VE], s[k.S_VN])
         reach_s = speed / (2.0 * self._settings[k.P_ACCEL])
-        return float(s[k.S_E] + s[k.S_VE] * reach_s), float(s[k.S_N] + s[k.S_VN] * reach_s)
+        east, north = self.position
+        return float(east + s[k.S_VE] * reach_s), float(north + s[k.S_VN] * reach_s)
 
     @property
     def apparent(self) -> tuple[float, float]:

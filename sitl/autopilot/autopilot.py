@@ -1,0 +1,641 @@
+"""The simulated autopilot's core: bytes and time in, bytes out.
+
+Everything happens on the loops of 20 ms that the real one runs at 50 Hz: what arrives is read at the next loop,
+streams are sent on the loop in which they are due. Between two loops in which there is something to do, the
+compiled kernel runs alone.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from companion.errors import InputError
+from companion.geo.angles import wrap_pi, wrap_two_pi
+from companion.geo.frame import LocalFrame
+from companion.messages import GeoPoint, Mode
+from sitl.autopilot import commands, items
+from sitl.autopilot import kernel as k
+from sitl.autopilot.config import EKF_READY_S, AutopilotConfig, GpsFault, Truth, VaneFault
+from sitl.autopilot.failsafe import Failsafe
+from sitl.autopilot.fence import CHECK_S, Fence
+from sitl.autopilot.ftp import FtpServer
+from sitl.autopilot.helm import Helm
+from sitl.autopilot.items import FENCE, MISSION, Item
+from sitl.autopilot.links import FIRST_STREAMS_S, LOOP_S, Link, Router
+from sitl.autopilot.parameters import Parameters
+from sitl.autopilot.telemetry import BUILDERS, POSITION_MODES, apparent_wind
+from sitl.autopilot.traffic import Traffic, Vessel
+from sitl.autopilot.transfer import TransferServer
+from sitl.autopilot.vehicle import Vehicle
+from sitl.wind import Constant, Wind
+
+WARM_BOOT_S = 60.0
+ORIGIN_S = 19.8
+_PARAMETERS_PER_LOOP = 43
+_CHUNK = 50
+_BOOT_TEXTS: tuple[tuple[float, int, str], ...] = (
+    (0.04, 6, "Calibrating barometer"), (1.64, 6, "Barometer 1 calibration complete"),
+    (1.66, 6, "Beginning INS calibration. Do not move vehicle"), (2.28, 6, "ArduPilot Ready"),
+    (2.28, 6, "AHRS: DCM active"), (4.29, 6, "EKF3 IMU0 initialised"),
+    (5.89, 6, "EKF3 IMU0 tilt alignment complete"), (5.97, 6, "EKF3 IMU0 MAG0 initial yaw alignment complete"),
+    (9.57, 6, "GPS 1: probing for u-blox at 230400 baud"), (9.59, 6, "GPS 1: detected u-blox"),
+    (19.77, 6, "EKF3 IMU0 origin set"), (EKF_READY_S, 6, "EKF3 IMU0 is using GPS"),
+    (EKF_READY_S, 6, "AHRS: EKF3 active"),
+)
+
+
+@dataclass(slots=True)
+class _ParameterList:
+    link: Link
+    index: int = 0
+
+
+class Autopilot:
+    """One boat with its autopilot. See the package for how it is used."""
+
+    def __init__(self, config: AutopilotConfig, wind: Wind, seed: int) -> None:
+        self.config = config
+        self.seed = seed
+        self.links: dict[int, Link] = {}
+        self._frame = LocalFrame(config.home)
+        self._e7_cache: dict[tuple[int, int], tuple[float, float]] = {}
+        self.parameters = Parameters(config.parameters, new_names=config.new_parameter_names)
+        twd, tws = wind.at(0.0)
+        self.parameters.put("SIM_WIND_DIR", math.degrees(twd))
+        self.parameters.put("SIM_WIND_SPD", tws)
+        self.parameters.put("SYSID_THISMAV", float(config.sysid))
+        self.vehicle: Vehicle = Vehicle(
+            wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed
+        )
+        self._router = Router(config.sysid)
+        self.battery_v = config.battery_v
+        self._gps_fault = GpsFault()
+        self._gps_lost_s = math.inf
+        self._reboots = 0
+        self._boot_at_s = -WARM_BOOT_S if config.is_warm else 0.0
+        self._debt_s = 0.0
+        self._reboot_at_s = math.inf
+        self.has_origin: bool = False
+        self.home_en: tuple[float, float] | None = None
+        self._texts: Iterator[tuple[float, int, str]] = iter(())
+        self._next_text: tuple[float, int, str] | None = None
+        self._power_up()
+        if config.is_warm:
+            self.vehicle.settle()
+            self.origin_en = self.vehicle.position
+            self.has_origin = True
+            self.home_en = self.vehicle.position
+            self._next_text = None
+        else:
+            self.vehicle.still_air_until(k.WIND_DELAY_S)
+
+    def _power_up(self) -> None:
+        self.is_armed = False
+        self.has_origin = False
+        self.origin_en = (0.0, 0.0)
+        self.home_en = None
+        self._home_due_s = self.t_s
+        self.fence = Fence()
+        self._fence_due_s = self.t_s
+        self.rally: list[Item] = []
+        self._staged: list[Item] = []
+        self.helm: Helm = Helm(self)
+        self.transfers = TransferServer(self)
+        self.ftp = FtpServer(self)
+        self.traffic = Traffic(self)
+        self.failsafe = Failsafe(self)
+        self._parameter_lists: list[_ParameterList] = []
+        self._text_id = 0
+        self._late_texts: list[tuple[int, str]] = []
+        self._texts = iter(_BOOT_TEXTS)
+        self._next_text = next(self._texts, None)
+        if self.parameters.flag("FENCE_ENABLE"):
+            self.fence.switch(enabled=True)
+
+    # ---------------------------------------------------------------------------------------------- time
+    @property
+    def t_s(self) -> float:
+        """Simulated time since the start [s]."""
+        return self.vehicle.t_s
+
+    @property
+    def boot_s(self) -> float:
+        """Time since power-up or reboot [s]."""
+        return self.vehicle.t_s - self._boot_at_s
+
+    @property
+    def boot_ms(self) -> int:
+        """Time since boot [ms]."""
+        return round(self.boot_s * 1e3)
+
+    @property
+    def boot_us(self) -> int:
+        """Time since boot [us]."""
+        return round(self.boot_s * 1e6)
+
+    def step(self, dt_s: float = LOOP_S) -> None:
+        """Let simulated time pass: as many whole loops as fit, the rest is kept for the next call."""
+        self._debt_s += dt_s
+        loops = math.floor(self._debt_s / LOOP_S + 1e-6)
+        self._debt_s -= loops * LOOP_S
+        end = self.vehicle.tick + loops
+        while self.vehicle.tick < end:
+            chunk = max(1, min(end - self.vehicle.tick, self._due_tick() - self.vehicle.tick, _CHUNK))
+            _, events = self.vehicle.advance(chunk)
+            self._loop(events)
+
+    @property
+    def next_wake_s(self) -> float:
+        """Simulated time of the next loop in which something will be sent or done, at the latest known now."""
+        return self._due_tick() * LOOP_S
+
+    def _due_tick(self) -> int:
+        tick = self.vehicle.tick
+        if self._late_texts or self._parameter_lists or any(link.inbox for link in self.links.values()):
+            return tick + 1
+        due = min(self.helm.due_s, self.failsafe.due_s, self._reboot_at_s)
+        for link in self.links.values():
+            due = min(due, link.due_s)
+        waiting = self.transfers.due_s
+        if waiting is not None:
+            due = min(due, waiting)
+        if self._next_text is not None:
+            due = min(due, self._boot_at_s + self._next_text[0])
+        if not self.is_armed:
+            due = min(due, self._home_due_s)
+        if self.fence.is_enabled:
+            due = min(due, self._fence_due_s)
+        return max(tick + 1, math.ceil(due / LOOP_S - 1e-6)) if due < math.inf else tick + _CHUNK
+
+    def _loop(self, events: int) -> None:
+        """One loop of the autopilot in which something is due."""
+        t_s = self.t_s
+        if t_s >= self._reboot_at_s:
+            self.reboot()
+            return
+        while self._next_text is not None and self.boot_s >= self._next_text[0] - 1e-9:
+            self.announce(self._next_text[1], self._next_text[2])
+            self._next_text = next(self._texts, None)
+        if not self.has_origin and self.boot_s >= ORIGIN_S and not self.gps_lost:
+            self.has_origin, self.origin_en = True, self.vehicle.position
+        if not self.is_armed and t_s >= self._home_due_s - 1e-9:
+            self._home_due_s = t_s + 1.0
+            if self.has_origin:
+                self.home_en = self.vehicle.position
+                self.announce(mav.MAV_SEVERITY_INFO, "Field Elevation Set: 0m")
+        if events:
+            self.helm.happened(events)
+        for link in list(self.links.values()):
+            if link.inbox:
+                data = bytes(link.inbox)
+                link.inbox.clear()
+                for m in link.parse(data):
+                    self._message(m, link)
+        self.transfers.update(t_s)
+        self.failsafe.update()
+        self.helm.update()
+        if self.fence.is_enabled and t_s >= self._fence_due_s - 1e-9:
+            self._fence_due_s = t_s + CHECK_S
+            self._check_fence()
+        self._send_parameters()
+        for link in self.links.values():
+            self._send_streams(link, t_s)
+        late, self._late_texts = self._late_texts, []
+        for severity, text in late:
+            self.announce(severity, text)
+
+    # --------------------------------------------------------------------------------------------- bytes
+    def receive(self, link_id: int, data: bytes) -> None:
+        """Take bytes that arrived on a port; they are read at the next loop."""
+        link = self.open_link(link_id)
+        if len(link.inbox) < 1 << 20:
+            link.inbox += data
+
+    def take_outgoing(self, link_id: int) -> bytes:
+        """Return the bytes to send on a port, and forget them."""
+        return self.open_link(link_id).take()
+
+    def open_link(self, link_id: int) -> Link:
+        """Return a port; a new one sends the default streams from now on."""
+        link = self.links.get(link_id)
+        if link is None:
+            link = self.links[link_id] = Link(link_id, self.config.sysid)
+            link.restart(self.t_s)
+        return link
+
+    def close_link(self, link_id: int) -> None:
+        """Take a port away."""
+        self.links.pop(link_id, None)
+
+    def _message(self, m: Any, link: Link) -> None:
+        sender = (m.get_srcSystem(), m.get_srcComponent())
+        link.is_heard = True
+        link.last_heard_s = self.t_s
+        self._router.learn(m, link.number)
+        is_ours, forward = self._router.route(m, link.number, self.links)
+        frame = bytes(m.get_msgbuf())
+        for number in forward:
+            self.links[number].forward(frame)
+        if not is_ours:
+            return
+        name = m.get_type()
+        if name in {"COMMAND_LONG", "COMMAND_INT"}:
+            commands.execute(self, m, link)
+        elif name.startswith("MISSION_"):
+            self._mission_message(m, name, link)
+        elif name.startswith("PARAM_"):
+            if name in {"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"}:
+                commands.parameter(self, m, link)
+        elif name in {"SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_GLOBAL_INT", "SET_POSITION_TARGET_LOCAL_NED"}:
+            commands.setpoint(self, m)
+        elif name == "HEARTBEAT":
+            self.failsafe.heard(sender)
+        elif name == "FILE_TRANSFER_PROTOCOL":
+            self.ftp.handle(m, link.number)
+        elif name == "SET_MODE":
+            self.helm.set_mode(m.custom_mode)
+        elif name == "REQUEST_DATA_STREAM":
+            commands.send_group(self, m, link)
+        elif name == "TIMESYNC" and m.tc1 == 0:
+            link.send(mav.MAVLink_timesync_message(self.boot_us * 1000, m.ts1))
+
+    def _mission_message(self, m: Any, name: str, link: Link) -> None:
+        if name == "MISSION_SET_CURRENT":
+            if m.seq < len(self.helm.mission.items) and self.helm.mission.set_current(m.seq):
+                self.send_once(link, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
+        else:
+            self.transfers.handle(m, link.number, self.t_s)
+
+    def _send_streams(self, link: Link, t_s: float) -> None:
+        if link.due_s > t_s + 1e-9:
+            return
+        due = link.take_due(t_s)
+        if self.boot_s < FIRST_STREAMS_S:
+            due = [i for i in due if i == mav.MAVLINK_MSG_ID_HEARTBEAT]
+        for msgid in due:
+            if msgid == mav.MAVLINK_MSG_ID_AIS_VESSEL:
+                message = self.traffic.next_message(link.number)
+            else:
+                message = BUILDERS[msgid](self)
+            if message is None:
+                continue
+            link.send(message)
+            if msgid == mav.MAVLINK_MSG_ID_WIND:
+                # named floats go out on every port on which somebody was heard, whoever asked for WIND
+                for named in apparent_wind(self):
+                    for other in self.links.values():
+                        if other is link or other.is_heard:
+                            other.send(named)
+
+    # --------------------------------------------------------------------------------------------- voice
+    def announce(self, severity: int, text: str) -> None:
+        """STATUSTEXT on every port, in chunks of 50 characters."""
+        pieces = [text[i:i + 50] for i in range(0, len(text), 50)] or [""]
+        ident = 0
+        if len(pieces) > 1:
+            self._text_id = self._text_id % 65535 + 1
+            ident = self._text_id
+        for n, piece in enumerate(pieces):
+            self.broadcast(mav.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), ident, n))
+
+    def announce_after_ack(self, severity: int, text: str) -> None:
+        """As ``announce``, behind the acknowledgement of the command being carried out."""
+        self._late_texts.append((severity, text))
+
+    def after_ack(self) -> None:
+        """A command was acknowledged: say what belongs behind it."""
+        late, self._late_texts = self._late_texts, []
+        for severity, text in late:
+            self.announce(severity, text)
+
+    def broadcast(self, message: Any) -> None:
+        """Send on every port."""
+        for link in self.links.values():
+            link.send(message)
+
+    def reply(self, message: Any, link: int) -> None:
+        """Send on one port."""
+        if link in self.links:
+            self.links[link].send(message)
+
+    def send_once(self, link: Link, msgid: int) -> bool:
+        """Send a message now; False if there is none of that kind, or none at this moment."""
+        builder = BUILDERS.get(msgid)
+        message = builder(self) if builder is not None else None
+        if message is None:
+            return False
+        link.send(message)
+        return True
+
+    def start_parameter_list(self, link: Link) -> None:
+        """Begin to send all parameters."""
+        self._parameter_lists = [p for p in self._parameter_lists if p.link is not link]
+        self._parameter_lists.append(_ParameterList(link))
+
+    def _send_parameters(self) -> None:
+        for sending in self._parameter_lists:
+            for _ in range(_PARAMETERS_PER_LOOP):
+                entry = self.parameters.entry(sending.index)
+                if entry is None:
+                    break
+                sending.link.send(commands.parameter_message(self, entry, sending.index))
+                sending.index += 1
+        self._parameter_lists = [p for p in self._parameter_lists if p.index < len(self.parameters)]
+
+    def parameter_changed(self, name: str) -> None:
+        """Act on a parameter that somebody set."""
+        if name in {"SIM_WIND_SPD", "SIM_WIND_DIR"}:
+            get = self.parameters.get
+            self.vehicle.wind = Constant(math.radians(get("SIM_WIND_DIR")), max(0.0, get("SIM_WIND_SPD")))
+        elif name == "FENCE_ENABLE":
+            self.switch_fence(enabled=self.parameters.flag("FENCE_ENABLE") == 1)
+        self.vehicle.load_parameters()
+
+    # --------------------------------------------------------------------------------------------- place
+    @property
+    def latlon_e7(self) -> tuple[int, int]:
+        """Where the autopilot believes to be [deg x 1e7]."""
+        return self.to_e7(self.vehicle.position)
+
+    def to_e7(self, en: tuple[float, float]) -> tuple[int, int]:
+        """Return (lat, lon) x 1e7 of a position in metres from the boat's home."""
+        point = self._frame.geo_from_en(*en)
+        return round(point.lat_deg * 1e7), round(point.lon_deg * 1e7)
+
+    def to_en(self, lat_e7: int, lon_e7: int) -> tuple[float, float]:
+        """Return (east, north) [m] from the boat's home."""
+        key = (lat_e7, lon_e7)
+        found = self._e7_cache.get(key)
+        if found is None:
+            if len(self._e7_cache) > 4096:
+                self._e7_cache.clear()
+            point = GeoPoint(lat_deg=lat_e7 / 1e7, lon_deg=lon_e7 / 1e7)
+            found = self._e7_cache[key] = self._frame.en_from_geo(point)
+        return found
+
+    def refuge(self) -> tuple[float, float] | None:
+        """Return home or the nearest rally point within RALLY_LIMIT_KM."""
+        here = self.vehicle.position
+        limit_m = self.parameters.get("RALLY_LIMIT_KM") * 1000.0
+        points = [self.to_en(i.x, i.y) for i in self.rally]
+        points = [p for p in points if limit_m <= 0.0 or math.dist(p, here) <= limit_m]
+        if not points:
+            return self.home_en
+        best = min(points, key=lambda p: math.dist(p, here))
+        if self.home_en is not None and self.parameters.flag("RALLY_INCL_HOME"):
+            return min((best, self.home_en), key=lambda p: math.dist(p, here))
+        return best
+
+    def set_home(self, en: tuple[float, float] | None) -> bool:
+        """Set home, here or there."""
+        if not self.has_origin:
+            return False
+        self.home_en = en if en is not None else self.vehicle.position
+        return True
+
+    # ------------------------------------------------------------------------------------------- arming
+    @property
+    def ekf_ready(self) -> bool:
+        """Whether the position can be used."""
+        return self.boot_s >= EKF_READY_S and not self.t_s - self._gps_lost_s > 10.0
+
+    @property
+    def ekf_flags(self) -> int:
+        """EKF_STATUS_REPORT.flags."""
+        if self.boot_s < 4.3:
+            return 0x400
+        if self.boot_s < 6.5:
+            return 0
+        return 0x33F if self.ekf_ready else 0xA7
+
+    @property
+    def system_status(self) -> int:
+        """HEARTBEAT.system_status."""
+        if self.failsafe.is_active:
+            return int(mav.MAV_STATE_CRITICAL)
+        return int(mav.MAV_STATE_ACTIVE if self.is_armed else mav.MAV_STATE_STANDBY)
+
+    def arm(self, *, force: bool) -> bool:
+        """Arm; False, with the reasons announced behind the acknowledgement, when refused."""
+        if self.is_armed:
+            return True
+        reasons = []
+        if self.parameters.flag("SAIL_ENABLE") and not self.parameters.flag("WNDVN_TYPE"):
+            reasons.append("Sailing enabled with no WindVane")
+        if not self.ekf_ready and self.helm.mode is not Mode.MANUAL:
+            reasons.append("Accels inconsistent")
+            if self.helm.mode in POSITION_MODES:
+                reasons.append("AHRS: waiting for home")
+        if self.fence.is_enabled and self.fence.is_breached:
+            reasons.append("Vehicle breaching Polygon fence")
+        if reasons and not force:
+            for reason in reasons:
+                self.announce_after_ack(mav.MAV_SEVERITY_CRITICAL, f"Arm: {reason}")
+            return False
+        self.is_armed = True
+        self.vehicle.set_armed(armed=True)
+        self.helm.armed()
+        self.announce_after_ack(mav.MAV_SEVERITY_INFO, "Throttle armed")
+        return True
+
+    def disarm(self) -> bool:
+        """Disarm; outside AUTO this forgets the mission's index."""
+        if self.is_armed:
+            self.is_armed = False
+            self.vehicle.set_armed(armed=False)
+            self._home_due_s = self.t_s + 1.0
+            if self.helm.mode is not Mode.AUTO:
+                self.helm.mission.reset()
+            self.announce_after_ack(mav.MAV_SEVERITY_INFO, "Throttle disarmed")
+        return True
+
+    # -------------------------------------------------------------------------------------------- lists
+    def read_list(self, kind: int) -> list[Item]:
+        """Return a stored list; item 0 of a mission is home as it is now."""
+        if kind == FENCE:
+            return self.fence.items
+        if kind != MISSION:
+            return self.rally
+        mission = self.helm.mission.items
+        if not mission:
+            return []
+        lat, lon = self.to_e7(self.home_en) if self.home_en is not None else (0, 0)
+        return [Item(mav.MAV_CMD_NAV_WAYPOINT, 0, x=lat, y=lon), *mission[1:]]
+
+    def begin_list(self, kind: int, count: int) -> None:
+        """An upload begins: a mission is cut to the new length at once, other lists are kept until the end."""
+        self._staged = []
+        if kind == MISSION:
+            self.helm.mission.truncate(count)
+
+    def write_item(self, kind: int, index: int, item: Item) -> None:
+        """Store an item of an upload."""
+        if kind == MISSION:
+            self.helm.mission.put(index, item)
+        else:
+            self._staged.append(item)
+
+    def end_list(self, kind: int) -> int:
+        """An upload is over."""
+        staged, self._staged = self._staged, []
+        if kind == FENCE:
+            if not self.fence.load(staged, self.to_en):
+                self.announce(mav.MAV_SEVERITY_INFO, "Incorrect item count")
+                self.announce(mav.MAV_SEVERITY_WARNING, "Fence validation failed")
+                return int(mav.MAV_MISSION_ERROR)
+            self.parameters.put("FENCE_TOTAL", float(len(staged) + 2 if staged else 0))
+            self.announce_after_ack(mav.MAV_SEVERITY_DEBUG, "Fence Indexed OK")
+        elif kind == MISSION:
+            self.parameters.put("MIS_TOTAL", float(len(self.helm.mission.items)))
+        else:
+            self.rally = staged
+            self.parameters.put("RALLY_TOTAL", float(len(staged)))
+        return int(mav.MAV_MISSION_ACCEPTED)
+
+    def clear_list(self, kind: int) -> bool:
+        """Empty a list; a running mission is not cleared while armed."""
+        if kind == MISSION:
+            if self.is_armed and not self.helm.mission.clear():
+                return False
+            if not self.is_armed:
+                self.helm.mission.stop()
+                self.helm.mission.clear()
+            self.parameters.put("MIS_TOTAL", 0.0)
+            return True
+        self._staged = []
+        self.end_list(kind)
+        return True
+
+    def replace_list(self, kind: int, new: list[Item]) -> bool:
+        """Put a whole fence or rally list in place of the old."""
+        self._staged = new
+        return self.end_list(kind) == int(mav.MAV_MISSION_ACCEPTED)
+
+    def do_item(self, item: Item) -> None:
+        """Carry out a DO command of the mission."""
+        if item.command == mav.MAV_CMD_DO_FENCE_ENABLE:
+            self.switch_fence(enabled=item.p1 == 1.0)
+        elif item.command == mav.MAV_CMD_DO_SET_HOME:
+            self.set_home(None if item.p1 == 1.0 else self.to_en(item.x, item.y))
+        elif item.command == mav.MAV_CMD_DO_AUX_FUNCTION and int(item.p1) == 63:
+            self.vehicle.ask_tack()
+
+    # -------------------------------------------------------------------------------------------- fence
+    def switch_fence(self, *, enabled: bool) -> bool:
+        """Enable or disable the fence."""
+        self.fence.switch(enabled=enabled)
+        self.vehicle.avoid(near=False, ease=False)
+        self._fence_due_s = self.t_s
+        return True
+
+    def _check_fence(self) -> None:
+        if not self.has_origin:
+            return
+        get, fence = self.parameters.get, self.fence
+        clearance = fence.clearance_m(
+            self.vehicle.position, self.home_en, self.parameters.flag("FENCE_TYPE"), get("FENCE_RADIUS")
+        )
+        begins = fence.judge(clearance, self.boot_ms)
+        margin = get("FENCE_MARGIN")
+        reach = margin + get("WP_SPEED") / max(get("PSC_POS_P"), 0.01)
+        avoiding = self.parameters.flag("AVOID_ENABLE") & 1 and not fence.is_breached and self.is_armed
+        fence.is_limiting = bool(avoiding) and clearance <= reach
+        self.vehicle.avoid(near=fence.is_limiting, ease=fence.is_limiting and clearance <= margin)
+        if begins and self.is_armed:
+            self.failsafe.fence_breached()
+
+    # ------------------------------------------------------------------------------------ for scenarios
+    @property
+    def truth(self) -> Truth:
+        """What is so."""
+        s = self.vehicle.state
+        east, north = self.vehicle.true_position
+        return Truth(
+            t_s=self.t_s, boot_s=self.boot_s, east_m=east, north_m=north,
+            position=self._frame.geo_from_en(east, north), heading_rad=wrap_two_pi(float(s[k.S_YAW])),
+            speed_mps=math.hypot(float(s[k.S_VE]), float(s[k.S_VN])),
+            velocity_en_mps=(float(s[k.S_VE]), float(s[k.S_VN])), twd_from_rad=wrap_two_pi(float(s[k.S_WDIR])),
+            tws_mps=float(s[k.S_WSPD]), mode=self.helm.mode, is_armed=self.is_armed,
+            mission_seq=self.helm.mission.current_seq, tacks=int(s[k.S_TACKS]), sail_rad=float(s[k.S_SAIL]),
+            rudder=float(s[k.S_RUDDER]),
+        )
+
+    def reboot_soon(self) -> None:
+        """Reboot a moment after the acknowledgement has left."""
+        self._reboot_at_s = self.t_s + 0.5
+
+    def reboot(self) -> None:
+        """Start again: boot time 0, disarmed; mission, fence, rally points and parameters are in its memory."""
+        self._reboots += 1
+        self._reboot_at_s = math.inf
+        mission, fence, rally = list(self.helm.mission.items), self.fence.items, self.rally
+        self._boot_at_s = self.t_s
+        self._router.forget()
+        for link in self.links.values():
+            link.restart(self.t_s)
+            link.take()
+        self.vehicle.set_armed(armed=False)
+        self.vehicle.clear_tack()
+        self.vehicle.avoid(near=False, ease=False)
+        self._power_up()
+        self.helm.mission.items = mission
+        self.rally = rally
+        self.fence.load(fence, self.to_en)
+
+    def set_mode(self, mode: Mode) -> bool:
+        """The operator's switch."""
+        return self.helm.set_mode(int(mode))
+
+    def set_battery(self, volts: float) -> None:
+        """Change the battery's voltage."""
+        self.battery_v = volts
+
+    @property
+    def battery_percent(self) -> int:
+        """Charge, reckoned from a three-cell battery's 9.6 to 12.6 V."""
+        return max(0, min(100, round((self.battery_v - 9.6) / 3.0 * 100.0)))
+
+    def set_current(self, set_to_rad: float, drift_mps: float) -> None:
+        """Let the water run towards ``set_to_rad``; acts on an armed boat, as SIM_TIDE does."""
+        self.parameters.put("SIM_TIDE_DIR", math.degrees(wrap_two_pi(set_to_rad + math.pi)))
+        self.parameters.put("SIM_TIDE_SPEED", drift_mps)
+        self.vehicle.load_parameters()
+
+    def set_vane(self, fault: VaneFault) -> None:
+        """Break or mend the wind vane."""
+        self.vehicle.set_vane_fault(fault.code, wrap_pi(fault.value_rad) if fault.value_rad else 0.0)
+
+    def set_gps(self, fault: GpsFault) -> None:
+        """Break or mend the position: what the autopilot believes jumps by the fault's offset."""
+        self._gps_fault = fault
+        self.vehicle.state[k.S_GPS_E], self.vehicle.state[k.S_GPS_N] = fault.east_m, fault.north_m
+        self._gps_lost_s = self.t_s if fault.is_lost else math.inf
+
+    @property
+    def gps_lost(self) -> bool:
+        """Whether there is no fix."""
+        return self._gps_fault.is_lost
+
+    def hear_vessel(self, vessel: Vessel) -> None:
+        """An AIS receiver at the autopilot heard a vessel."""
+        self.traffic.hear(vessel)
+
+
+def check_parameters(overrides: dict[str, float]) -> None:
+    """Refuse parameter values that a float of the wire cannot carry.
+
+    Raises:
+        InputError: naming the parameter.
+    """
+    for name, value in overrides.items():
+        if not math.isfinite(value) or len(name) > 16 or struct.unpack("f", struct.pack("f", value))[0] != value:
+            raise InputError("--param", name, f"{value} cannot be a parameter", "write NAME=NUMBER")
+
+
+__all__ = ["Autopilot", "check_parameters", "items"]

@@ -1,0 +1,125 @@
+"""Failsafes: loss of the ground station, low battery, no position, and what a breached fence does."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from companion.messages import Mode
+from sitl.autopilot.telemetry import POSITION_MODES
+
+if TYPE_CHECKING:
+    from sitl.autopilot.autopilot import Autopilot
+
+_CHECK_S = 0.1
+_GPS_PATIENCE_S = 10.0
+
+
+class Failsafe:
+    """Watches; acts once when something begins, says when it has ended, never restores a mode."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._a = autopilot
+        self._gcs_heard_s: float | None = None
+        self._gcs_acted = False
+        self._battery_since_s: float | None = None
+        self._battery_acted = False
+        self._gps_acted = False
+        self._due_s = 0.0
+        self._recovery_until_s = -math.inf
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the ground station's failsafe has acted and not cleared."""
+        return self._gcs_acted
+
+    @property
+    def due_s(self) -> float:
+        """When to look again."""
+        a = self._a
+        watching = (
+            (self._gcs_heard_s is not None and a.parameters.flag("FS_GCS_ENABLE"))
+            or 0.0 < a.battery_v < a.parameters.get("BATT_LOW_VOLT") or a.gps_lost or self._gps_acted
+        )
+        return self._due_s if watching else math.inf
+
+    def heard(self, sender: tuple[int, int]) -> None:
+        """A heartbeat; that of SYSID_MYGCS counts, from any component."""
+        if sender[0] != self._a.parameters.flag("SYSID_MYGCS"):
+            return
+        self._gcs_heard_s = self._a.t_s
+        if self._gcs_acted:
+            self._gcs_acted = False
+            self._a.announce(mav.MAV_SEVERITY_INFO, "GCS Failsafe Cleared")
+
+    def update(self) -> None:
+        """Look at what may be lost."""
+        a = self._a
+        if a.t_s < self._due_s - 1e-9:
+            return
+        self._due_s = a.t_s + _CHECK_S
+        self._watch_gcs()
+        self._watch_battery()
+        if a.gps_lost and not self._gps_acted and not a.ekf_ready:
+            self._gps_acted = True
+            a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF failsafe")
+            if a.is_armed and a.parameters.flag("FS_EKF_ACTION") and a.helm.mode in POSITION_MODES:
+                a.helm.set_mode(Mode.HOLD)
+        elif self._gps_acted and not a.gps_lost:
+            self._gps_acted = False
+            a.announce(mav.MAV_SEVERITY_WARNING, "EKF failsafe cleared")
+
+    def _watch_gcs(self) -> None:
+        a = self._a
+        get = a.parameters.flag
+        if self._gcs_heard_s is None or not get("FS_GCS_ENABLE") or self._gcs_acted:
+            return
+        wait_s = a.parameters.get("FS_GCS_TIMEOUT") + a.parameters.get("FS_TIMEOUT")
+        if a.t_s - self._gcs_heard_s < wait_s - 1e-9:
+            return
+        self._gcs_acted = True
+        # measured: with FS_THR_ENABLE the radio check acts, under its own name and by its own rule
+        by_radio = get("FS_THR_ENABLE")
+        a.announce(mav.MAV_SEVERITY_WARNING, "Radio Failsafe" if by_radio else "GCS Failsafe")
+        goes_on = get("FS_THR_ENABLE") == 2 if by_radio else get("FS_GCS_ENABLE") == 2
+        if a.helm.mode is Mode.AUTO and goes_on:
+            a.announce(mav.MAV_SEVERITY_WARNING, "Failsafe - Continuing Auto Mode")
+        elif a.is_armed:
+            self._act(get("FS_ACTION"))
+
+    def _watch_battery(self) -> None:
+        a = self._a
+        if not 0.0 < a.battery_v < a.parameters.get("BATT_LOW_VOLT"):
+            self._battery_since_s = None
+            return
+        if self._battery_since_s is None:
+            self._battery_since_s = a.t_s
+        if not self._battery_acted and a.t_s - self._battery_since_s >= a.parameters.get("BATT_LOW_TIMER"):
+            self._battery_acted = True
+            a.announce(mav.MAV_SEVERITY_WARNING, f"Battery 1 is low {a.battery_v:.2f}V used 0 mAh")
+            if a.is_armed:
+                self._act(a.parameters.flag("BATT_FS_LOW_ACT"))
+
+    def _act(self, action: int) -> None:
+        helm = self._a.helm
+        if action in {1, 3, 4} and helm.set_mode(Mode.RTL):
+            return
+        if action in {1, 2, 3, 4}:
+            helm.set_mode(Mode.HOLD)
+        elif action == 5:
+            self._a.disarm()
+            self._a.after_ack()
+
+    def fence_breached(self) -> None:
+        """A breach began: change mode by FENCE_ACTION, and leave ten seconds to whoever steers then."""
+        a = self._a
+        if a.t_s < self._recovery_until_s:
+            return
+        action = a.parameters.flag("FENCE_ACTION")
+        if action == 0:
+            return
+        self._recovery_until_s = a.t_s + 10.0
+        self._act({1: 1, 2: 2, 3: 3, 4: 4}.get(action, 2))
+        a.announce(mav.MAV_SEVERITY_INFO, "Manual recovery started")

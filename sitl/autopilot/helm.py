@@ -1,0 +1,278 @@
+"""The modes of the boat, and the mission carried out in AUTO."""
+
+from __future__ import annotations
+
+import enum
+import math
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from companion.messages import Mode
+from sitl.autopilot import kernel as k
+from sitl.autopilot.items import NAMES, Item
+from sitl.autopilot.mission import Mission, RunState, is_reported
+
+if TYPE_CHECKING:
+    from sitl.autopilot.autopilot import Autopilot
+
+GUIDED_TIMEOUT_S = 3.0
+KNOWN = frozenset({
+    Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.HOLD, Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED,
+})
+
+
+class Task(enum.Enum):
+    """What the boat is doing within its mode."""
+
+    NONE = "none"
+    LEG = "leg"                # to a waypoint of the mission
+    RTL = "rtl"
+    GUIDED = "guided"          # to a position that was sent
+    SETPOINT = "setpoint"      # a heading or turn rate that was sent
+    LOITER = "loiter"
+    HOLD = "hold"
+
+
+class Helm:
+    """Owner of the mode. Talks to the vehicle in orders, to the world through the autopilot's voice."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._a = autopilot
+        self.mission = Mission(self)
+        self.mode = Mode.MANUAL
+        self.task = Task.HOLD
+        self._is_waiting = False       # AUTO was entered before there was an origin
+        self._is_reached = False
+        self._corner_passed = False
+        self._hold_until_s = -1.0
+        self._is_arrival_told = False
+        self._told_home = False
+        self._setpoint_s = 0.0
+        autopilot.vehicle.hold()
+
+    # ------------------------------------------------------------------------------------------- modes
+    def set_mode(self, number: int) -> bool:
+        """Change mode; False, with the reason announced, when it is refused."""
+        a = self._a
+        if number not in KNOWN:
+            a.announce(mav.MAV_SEVERITY_WARNING, f"No such mode {number}")
+            return False
+        mode = Mode(number)
+        if mode is self.mode:
+            return True
+        if mode is Mode.AUTO and self.mission.total == 0:
+            a.announce(mav.MAV_SEVERITY_NOTICE, "No Mission. Can't set AUTO.")
+            a.announce(mav.MAV_SEVERITY_WARNING, "Flight mode change failed")
+            return False
+        if mode in {Mode.RTL, Mode.SMART_RTL} and a.home_en is None:
+            a.announce(mav.MAV_SEVERITY_WARNING, "Flight mode change failed")
+            return False
+        if self.mode is Mode.AUTO:
+            self.mission.stop()
+        a.vehicle.clear_tack()
+        self.mode = mode
+        self._is_waiting = False
+        self._corner_passed = False
+        if mode is Mode.AUTO:
+            self._is_waiting = True
+            self.update()
+        elif mode in {Mode.RTL, Mode.SMART_RTL}:
+            self.sail_home()
+        elif mode in {Mode.LOITER, Mode.GUIDED}:
+            self.loiter()
+        else:
+            self._hold()
+        return True
+
+    def armed(self) -> None:
+        """The boat was armed: a leg that waited starts here."""
+        if self.mode is Mode.AUTO and self.task is Task.LEG and self.mission.state is RunState.RUNNING:
+            self._corner_passed = False
+            self._a.vehicle.leave_from_here()
+
+    def _hold(self) -> None:
+        self.task = Task.HOLD
+        self._a.vehicle.hold()
+
+    def loiter(self) -> None:
+        """Loiter where the boat could stop."""
+        self.task = Task.LOITER
+        self._a.vehicle.loiter()
+
+    def sail_home(self) -> None:
+        """Sail to home or the nearest rally point."""
+        goal = self._a.refuge()
+        if goal is None:
+            self._hold()
+            return
+        self.task = Task.RTL
+        self._is_reached = self._told_home = False
+        self._a.vehicle.sail_leg(self._a.vehicle.position, goal, None, is_corner=False, goes_on=False)
+
+    # ------------------------------------------------------------------------------------------ guided
+    def go_to(self, goal: tuple[float, float]) -> None:
+        """GUIDED: sail to a position; no time-out."""
+        self.task = Task.GUIDED
+        self._is_reached = False
+        self._a.vehicle.sail_leg(self._a.vehicle.position, goal, None, is_corner=False, goes_on=False)
+
+    def steer(self, heading_rad: float, thrust: float) -> None:
+        """GUIDED: hold a heading; to be sent again within three seconds."""
+        self.task = Task.SETPOINT
+        self._setpoint_s = self._a.t_s
+        self._a.vehicle.steer_heading(heading_rad, thrust)
+
+    def turn(self, rate_radps: float, thrust: float) -> None:
+        """GUIDED: turn at a rate; to be sent again within three seconds."""
+        self.task = Task.SETPOINT
+        self._setpoint_s = self._a.t_s
+        self._a.vehicle.steer_rate(rate_radps, thrust)
+
+    # ------------------------------------------------------------------------------------------- loops
+    @property
+    def due_s(self) -> float:
+        """When ``update`` has something to do though nothing happened."""
+        if self.mode is Mode.GUIDED and self.task is Task.SETPOINT:
+            return self._setpoint_s + GUIDED_TIMEOUT_S
+        if self.mode is Mode.AUTO:
+            if self._is_waiting:
+                return self._a.t_s + 0.5
+            if self._hold_until_s > self._a.t_s:
+                return self._hold_until_s
+            if self.mission.state is RunState.RUNNING and (
+                self.mission.has_do or (self.task is Task.LEG and self._is_reached) or self.mission.is_changed
+            ):
+                return self._a.t_s
+        return math.inf
+
+    def happened(self, events: int) -> None:
+        """Take the events of the compiled loop."""
+        a = self._a
+        if events & k.TACKED:
+            a.announce(mav.MAV_SEVERITY_INFO, "Sailboat: Tacking")
+        if events & k.TACK_TIMED_OUT:
+            a.announce(mav.MAV_SEVERITY_INFO, "Sailboat: Tacking timed out")
+        if events & k.REACHED:
+            self._is_reached = True
+
+    def update(self) -> None:
+        """One loop of the mode."""
+        a = self._a
+        if self.mode is Mode.AUTO:
+            if self._is_waiting and a.has_origin:
+                self._is_waiting = False
+                self.mission.is_changed = False
+                self.mission.start_or_resume(restart=a.parameters.flag("MIS_RESTART") == 1)
+            if self.mission.is_changed and not self._is_waiting:
+                self.mission.is_changed = False
+                if self.mission.state is RunState.RUNNING and self.task is Task.LEG:
+                    self._corner_passed = False
+                    done = self.mission.restart_current()
+                    what = "restarted command" if done else "but failed to restart command"
+                    comma = "," if done else ""
+                    a.announce(mav.MAV_SEVERITY_CRITICAL, f"Auto mission changed{comma} {what}")
+            self.mission.update()
+        elif self.mode is Mode.GUIDED:
+            if self.task is Task.SETPOINT and a.t_s - self._setpoint_s >= GUIDED_TIMEOUT_S - 1e-9:
+                a.announce(mav.MAV_SEVERITY_WARNING, "target not received last 3secs, stopping")
+                self.loiter()
+            elif self.task is Task.GUIDED and self._is_reached:
+                a.broadcast(mav.MAVLink_mission_item_reached_message(0))
+                self.loiter()
+        if self.task is Task.RTL and self._is_reached and not self._told_home:
+            self._told_home = True
+            a.announce(mav.MAV_SEVERITY_INFO, "Reached destination")
+            a.vehicle.loiter()
+
+    # ----------------------------------------------------------------------------------- mission's crew
+    def start_nav(self, index: int, item: Item) -> bool:
+        """Begin a navigation command."""
+        a = self._a
+        a.announce(mav.MAV_SEVERITY_INFO, f"Mission: {index} {NAMES.get(item.command, 'Cmd')}")
+        passed, self._corner_passed = self._corner_passed, False
+        self._hold_until_s = -1.0
+        self._is_arrival_told = False
+        self._is_reached = False
+        if item.command == mav.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+            self.sail_home()
+            return True
+        if item.command == mav.MAV_CMD_NAV_DELAY:
+            self._hold_until_s = a.t_s + max(0.0, item.p1)
+            self.loiter()
+            return True
+        if item.command in {mav.MAV_CMD_NAV_GUIDED_ENABLE, mav.MAV_CMD_NAV_SET_YAW_SPEED}:
+            return True
+        goal = self._place(item)
+        following = self.mission.following(index)
+        is_corner = (
+            item.command == mav.MAV_CMD_NAV_WAYPOINT and item.p1 <= 0.0
+            and following is not None and NAMES.get(following.command) in {"WP", "LoitUnlim", "LoitTime", "LoitTurns"}
+        )
+        origin = a.vehicle.destination if passed else a.vehicle.position
+        a.vehicle.sail_leg(
+            origin, goal, self._place(following) if is_corner and following is not None else None,
+            is_corner=is_corner, goes_on=passed,
+        )
+        self.task = Task.LEG
+        return True
+
+    def _place(self, item: Item) -> tuple[float, float]:
+        return self._a.to_en(item.x, item.y) if item.x or item.y else self._a.vehicle.position
+
+    def verify_nav(self, index: int, item: Item) -> bool:
+        """Return whether a navigation command is done."""
+        a = self._a
+        if item.command in {mav.MAV_CMD_NAV_GUIDED_ENABLE, mav.MAV_CMD_NAV_SET_YAW_SPEED}:
+            self._report(index)
+            return True
+        if item.command == mav.MAV_CMD_NAV_DELAY:
+            if a.t_s < self._hold_until_s - 1e-9:
+                return False
+            self._report(index)
+            return True
+        if item.command == mav.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+            if not self._is_reached:
+                return False
+            self._report(index)
+            return True
+        if not self._is_reached:
+            return False
+        if not self._is_arrival_told:
+            self._is_arrival_told = True
+            stay_s = item.p1 if item.command in {mav.MAV_CMD_NAV_WAYPOINT, mav.MAV_CMD_NAV_LOITER_TIME} else 0.0
+            # the message of completion comes first on the wire, the text after it
+            more = f". Loiter for {int(stay_s)} seconds" if stay_s > 0.0 else ""
+            self._hold_until_s = a.t_s + max(0.0, stay_s)
+            if stay_s <= 0.0 and item.command != mav.MAV_CMD_NAV_LOITER_UNLIM:
+                self._report(index)
+            a.announce(mav.MAV_SEVERITY_INFO, f"Reached waypoint #{index}{more}")
+            if stay_s > 0.0 or item.command == mav.MAV_CMD_NAV_LOITER_UNLIM:
+                a.vehicle.loiter()
+        if item.command == mav.MAV_CMD_NAV_LOITER_UNLIM or a.t_s < self._hold_until_s - 1e-9:
+            return False
+        if self._hold_until_s > 0.0 and item.p1 > 0.0 and item.command != mav.MAV_CMD_NAV_LOITER_TURNS:
+            self._report(index)
+        self._corner_passed = a.vehicle.state[k.S_STEER] == k.STEER_LEG
+        return True
+
+    def _report(self, index: int) -> None:
+        self._a.broadcast(mav.MAVLink_mission_item_reached_message(index))
+
+    def do(self, index: int, item: Item) -> None:
+        """Carry out a DO command."""
+        self._a.do_item(item)
+        if is_reported(item):
+            self._report(index)
+
+    def mission_complete(self) -> None:
+        """The last item is done."""
+        a = self._a
+        a.announce(mav.MAV_SEVERITY_NOTICE, "Mission Complete")
+        behaviour = a.parameters.flag("MIS_DONE_BEHAVE")
+        if behaviour == 1:
+            self.loiter()
+        elif behaviour == 3:
+            self.set_mode(Mode.MANUAL)
+        else:
+            self._hold()
