@@ -34,7 +34,6 @@ from companion.mavlink.transport import Transport
 from companion.messages import CompanionStatus
 from companion.plots.voyage import AREA
 from companion.skipper import Skipper
-from companion.skipper.actions import Announce, RequestPlan
 from companion.skipper.state import Persisted, Phase
 from companion.telemetry.recorder import STATE, Recorder, write_atomically
 from companion.telemetry.records import action_record, outcome_record, track_row
@@ -82,6 +81,7 @@ class SailOptions:
         wait_s: how long to wait for the autopilot's first heartbeat [s].
         offload: where disk work is done.
         signing: key and timestamp for a signed link.
+        budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
         command: what was typed, for the record.
     """
 
@@ -94,6 +94,7 @@ class SailOptions:
     wait_s: float = 30.0
     offload: Offload = in_thread
     signing: SigningStore | None = None
+    budget_scale: float = 1.0
     command: str = ""
 
 
@@ -145,12 +146,16 @@ class _Shell:
         )
         self._write_description(transport.name)
         try:
-            async with Link(transport, sink=self._on_frame, signing=self.options.signing) as link:
+            async with (
+                Link(transport, sink=self._on_frame, signing=self.options.signing) as link,
+                contextlib.AsyncExitStack() as stack,
+            ):
                 link.subscribe(self._on_message)
                 await link.wait_autopilot(self.options.wait_s)
-                autopilot = Autopilot(link)
+                autopilot = await stack.enter_async_context(Autopilot(link))
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
-                                    expansions=self.options.expansions)
+                                    expansions=self.options.expansions,
+                                    budget_scale=self.options.budget_scale)
                 async with asyncio.TaskGroup() as group:
                     tasks = [
                         group.create_task(executor.run(), name="executor"),
@@ -252,7 +257,7 @@ class _Shell:
             if reboots != link.stats.reboots and link.is_alive:
                 reboots = link.stats.reboots
                 for name in PARAMETERS:
-                    await autopilot.get_param(name)
+                    await autopilot.get_parameter(name)
             await asyncio.sleep(STEP_S)
 
     async def _send_status(self, autopilot: Autopilot) -> None:
@@ -325,8 +330,3 @@ class _Shell:
             "records_dropped": self.recorder.dropped,
             "planner_restarts": self.planner.restarts,
         }
-
-
-def is_announcement(action: object) -> bool:
-    """Tell an announcement from the actions that touch the boat."""
-    return isinstance(action, Announce | RequestPlan)

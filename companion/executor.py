@@ -77,10 +77,10 @@ class Executor:
 
     def __init__(
         self, autopilot: Autopilot, planner: Planner, on_outcome: Callable[[Outcome], None], *,
-        seed: int = 0, expansions: int | None = None,
+        seed: int = 0, expansions: int | None = None, budget_scale: float = 1.0,
     ) -> None:
         self._autopilot, self._planner, self._on_outcome = autopilot, planner, on_outcome
-        self._seed, self._expansions = seed, expansions
+        self._seed, self._expansions, self._budget_scale = seed, expansions, budget_scale
         self._orders: asyncio.Queue[Action] = asyncio.Queue(MAX_WAITING)
         self._plan: RequestPlan | None = None
         self._plan_wanted = asyncio.Event()
@@ -123,7 +123,7 @@ class Executor:
             if request is None:
                 continue
             plan = await self._planner.plan(
-                request.problem, budget_s=request.budget_s, expansions=self._expansions,
+                request.problem, budget_s=request.budget_s * self._budget_scale, expansions=self._expansions,
                 seed=self._seed + request.seed,
             )
             # A request that was cancelled or overtaken while it was computed is answered by the newer one.

@@ -40,7 +40,7 @@ from companion.skipper.snapshot import (
     WindView,
 )
 from companion.skipper.state import Persisted, SkipperState
-from companion.wind import Estimator, Verdict, WindRoom, make
+from companion.wind import NAMES, Estimator, Verdict, WindRoom, make
 
 # A boot time that goes back by more than this is a reboot, not a reordered frame [s].
 REBOOT_BACK_S = 5.0
@@ -76,8 +76,8 @@ class VoyageFold:
         self.state: SkipperState = skipper.initial(persisted)
         self.assembler = VehicleAssembler()
         self._parameters: dict[str, float] = {}
-        self._mean90: Estimator = make("mean90")
-        self._mean5: Estimator = make("mean5")
+        self._mean90: Estimator = make("mean90" if "mean90" in NAMES else "ou")
+        self._mean5: Estimator = make("mean5" if "mean5" in NAMES else "ou")
         self._vehicle: VehicleState | None = None
         self._autopilot: AutopilotStatus | None = None
         self._heartbeat_s: float | None = None

@@ -1,0 +1,95 @@
+"""The companion's status as one value, from a step: what goes over the radio and to whoever watches."""
+
+from __future__ import annotations
+
+import math
+
+from companion.fold import Step
+from companion.geo.angles import wrap_two_pi
+from companion.messages import CompanionStatus
+from companion.skipper.actions import Announce, Severity
+from companion.skipper.state import Phase, Route
+from companion.skipper.voyage import Voyage
+from companion.telemetry.records import sigma_ahead_rad
+from companion.telemetry.summary import VoyageFigures
+
+# Below this speed the time to a waypoint says nothing [m/s].
+MIN_SPEED_MPS = 0.2
+
+
+def companion_status(
+    step: Step, voyage: Voyage, figures: VoyageFigures, clearance_m: float | None, bytes_out_per_s: float | None,
+) -> CompanionStatus:
+    """Return the status at ``step``. The wind's spread is that of a minute ahead, which the plan lives on."""
+    snapshot, state = step.snapshot, step.state
+    autopilot, wind, route, vehicle = snapshot.autopilot, snapshot.wind, state.route, snapshot.vehicle
+    legs = voyage.legs
+    goal = min(len(state.reached), len(legs) - 1)
+    here = snapshot.position_en_m
+    code, text = _alert(step)
+    tws_sigma = None if wind.forecast is None else float(wind.forecast.sigma_tws_mps[0])
+    return CompanionStatus(
+        t_s=snapshot.t_s,
+        state=state.phase.value,
+        goal_index=goal,
+        goal_count=len(legs),
+        waypoint_seq=state.index + 1 if route is not None else None,
+        waypoint_count=None if route is None else len(route.items),
+        waypoint_distance_m=None if autopilot is None else autopilot.waypoint_distance_m,
+        goal_distance_m=None if here is None else math.dist(here, legs[goal].en_m),
+        cross_track_m=None if autopilot is None else autopilot.cross_track_m,
+        clearance_m=clearance_m,
+        twd_from_rad=None if wind.mean_twd_from_rad is None else wrap_two_pi(wind.mean_twd_from_rad),
+        twd_sigma_rad=sigma_ahead_rad(snapshot),
+        tws_mps=wind.mean_tws_mps,
+        tws_sigma_mps=tws_sigma,
+        next_tack_s=next_tack_s(step),
+        promised_risk=None if route is None else risk_of(route),
+        plan_id=None if route is None else route.plan_id,
+        plan_age_s=None if route is None else max(0.0, snapshot.t_s - route.plan_t_s),
+        replans=state.replans,
+        tacks=figures.tacks,
+        battery_v=None if autopilot is None else autopilot.battery_v,
+        position=None if vehicle is None else vehicle.position,
+        bytes_out_per_s=bytes_out_per_s,
+        alert_code=code,
+        alert_text=text,
+    )
+
+
+def risk_of(route: Route) -> float:
+    """Return what the plan promised: its own risk where that was computed, else that of each instant."""
+    return route.risk if route.risk is not None else 1.0 - route.delta_s
+
+
+def next_tack_s(step: Step) -> float | None:
+    """Return the time until the next planned change of tack [s]; None when there is none or no way on."""
+    route, snapshot = step.state.route, step.snapshot
+    wind_rad, vehicle, autopilot = snapshot.wind.mean_twd_from_rad, snapshot.vehicle, snapshot.autopilot
+    if route is None or wind_rad is None or vehicle is None or vehicle.speed_mps < MIN_SPEED_MPS:
+        return None
+    distance_m = 0.0 if autopilot is None or autopilot.waypoint_distance_m is None else autopilot.waypoint_distance_m
+    sides: list[float] = []
+    for start, end in zip(route.leg_from_en_m[step.state.index:], route.points_en_m[step.state.index:], strict=True):
+        course_rad = math.atan2(end[0] - start[0], end[1] - start[1])
+        off_rad = (course_rad - wind_rad + math.pi) % (2.0 * math.pi) - math.pi
+        side = math.copysign(1.0, off_rad)
+        if sides and side != sides[-1] and abs(off_rad) < math.pi / 2.0:
+            return distance_m / vehicle.speed_mps
+        if sides:
+            distance_m += math.dist(start, end)
+        sides.append(side)
+    return None
+
+
+def _alert(step: Step) -> tuple[str, str]:
+    """Return the loudest thing said in this step, else the raised watchdog, else the sentence of the state."""
+    said = [a for a in step.actions if isinstance(a, Announce) and a.severity <= Severity.WARNING]
+    if said:
+        worst = min(said, key=lambda a: a.severity)
+        return worst.code, worst.text
+    if step.state.raised:
+        return step.state.raised[0].name, step.state.why
+    if step.state.phase in {Phase.HOLDING, Phase.OPERATOR}:
+        return step.state.phase.value, step.state.why
+    return "", step.state.why

@@ -1,0 +1,1 @@
+"""The commands of ``sitl``, one module each."""

@@ -1,0 +1,35 @@
+"""``sitl campaign``: a scenario over many seeds."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "campaign", help=summary,
+        description="Sail a scenario over many seeds on the embedded autopilot: one JSON line per run, then a table "
+        "of success, time, tacks, replans, clearance and risk. A failing seed is named and repeats exactly.",
+        epilog="Example: sitl campaign sitl/scenarios/demo.toml --runs 50",
+    )
+    parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.toml")
+    parser.add_argument("--runs", type=int, default=50, metavar="N", help="seeds 0..N-1 (default: 50)")
+    parser.add_argument("--first-seed", type=int, default=0, metavar="S")
+    parser.add_argument("--workers", type=int, default=None, metavar="W", help="processes (default: one per core)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the table's figures")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="keep the voyage folders (default: failed ones only, "
+                        "in campaign-failures/)")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from sitl.campaign import run_campaign
+
+    return run_campaign(
+        args.scenarios, runs=args.runs, first_seed=args.first_seed, workers=args.workers, json_path=args.json,
+        keep=args.keep,
+    )

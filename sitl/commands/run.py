@@ -1,0 +1,76 @@
+"""``sitl run``: one scenario, with a verdict."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "run", help=summary,
+        description="Run a scenario: autopilot, weather, companion, and a verdict on what the boat really did. The "
+        "embedded autopilot runs under the virtual clock in this process; with --live it is a process of its own "
+        "over UDP, as is the companion; with --autopilot ardurover it is the real program.",
+        epilog="Example: sitl run sitl/scenarios/demo.toml --seed 3",
+    )
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO.toml", help="a scenario or a mission file")
+    parser.add_argument("--autopilot", choices=("embedded", "ardurover"), default="embedded")
+    parser.add_argument("--ardurover", type=Path, metavar="PATH", help="the ArduRover program (default: $ARDUROVER, "
+                        "the PATH, what `sitl fetch` brought)")
+    parser.add_argument("--live", action="store_true", help="separate processes over UDP, in (sped-up) real time")
+    parser.add_argument("--speedup", type=float, metavar="N", help="with --live or ardurover (default: the scenario's)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="the voyage folder")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from companion.clock import run_virtual
+    from companion.telemetry.progress import ProgressLine
+    from sitl.runner import run_embedded
+    from sitl.scenario import load_scenario
+
+    scenario = load_scenario(args.scenario)
+    folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{scenario.name}"
+    if args.autopilot == "ardurover" or args.live:
+        from sitl.live import run_live
+
+        verdict = run_live(
+            scenario, args.scenario, args.seed, folder, autopilot=args.autopilot, program=args.ardurover,
+            speedup=args.speedup,
+        )
+    else:
+        with ProgressLine(sys.stdout) as progress:
+            verdict = run_virtual(run_embedded(
+                scenario, args.scenario, args.seed, folder, on_step=lambda step: progress.show(None, step)))
+        draw(folder)
+    print_verdict(verdict)
+    print(folder)
+    return 0 if verdict.passed else 1
+
+
+def draw(folder: Path) -> None:
+    """Draw the voyage; a picture that fails must not hide the verdict."""
+    try:
+        from companion.plots.voyage import PICTURE, plot_voyage, read_voyage
+
+        plot_voyage(read_voyage(folder), folder / PICTURE)
+    except Exception as error:
+        sys.stderr.write(f"sitl run: the picture could not be drawn: {error!r}\n")
+
+
+def print_verdict(verdict: Any) -> None:
+    """Print the checks, each with its figure."""
+    for check in verdict.checks:
+        figure = f"{check.figure:.1f}" if isinstance(check.figure, float) else check.figure
+        print(f"{'pass' if check.passed else 'FAIL'}  {check.name}: {figure} ({check.required})")
+    f = verdict.figures
+    print(f"{'PASSED' if verdict.passed else 'FAILED'}  {verdict.scenario} seed {verdict.seed}: "
+          f"{f['time_s']:.0f} s, {f['distance_m']:.0f} m, {f['tacks']} tacks, {f['replans']} replans, "
+          f"clearance {f['min_clearance_m'] if f['min_clearance_m'] is None else round(f['min_clearance_m'], 1)} m")

@@ -1,0 +1,250 @@
+"""Runs a scenario in one process under the running loop's clock: simulated autopilot, weather, companion, verdict.
+
+Under the virtual clock a seed repeats a voyage bit for bit, and a voyage takes as long as its arithmetic.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from companion.app import SailOptions, at_once, sail
+from companion.clock import now_s
+from companion.fold import Step
+from companion.geofence import LocalArea, Mission, load_mission
+from companion.mavlink.autopilot import Autopilot as Pilot
+from companion.mavlink.link import Link, LinkIdentity
+from companion.messages import MissionItem, Mode, waypoint
+from companion.planner.worker import InlinePlanner
+from companion.telemetry.recorder import write_atomically
+from sitl.autopilot import (
+    Autopilot,
+    AutopilotConfig,
+    GpsFault,
+    Impairment,
+    MemoryLink,
+    VaneFault,
+    VaneState,
+    serve,
+)
+from sitl.autopilot.memory import MemoryEnd
+from sitl.scenario import EventSpec, Scenario
+from sitl.verdict import Truth, Verdict, judge
+from sitl.weather import scenario_wind
+
+TRUTH_EVERY_S = 0.25
+# Unix time of every simulated voyage's start: stamps must not depend on when it was run.
+EPOCH_S = 1_781_000_000.0
+# The simulated boat lies still until it sails, so that every voyage starts where its mission says.
+VERDICT = "verdict.json"
+# Effort of one plan under the virtual clock, where time cannot stop it.
+EXPANSIONS = 60_000
+
+OnStep = Callable[[Step], None]
+
+
+@dataclass(slots=True)
+class _World:
+    """What a running scenario shares between its tasks."""
+
+    autopilot: Autopilot
+    link: MemoryLink
+    shore: MemoryLink
+    truth: Truth = field(default_factory=Truth)
+    status_s: list[float] = field(default_factory=list)
+    alerts: dict[str, int] = field(default_factory=dict)
+    errors: list[str] = field(default_factory=list)
+    summary: dict[str, Any] = field(default_factory=dict)
+    set_sail_s: float | None = None
+
+
+def solid_of(area: LocalArea) -> BaseGeometry:
+    """Return what the boat must not touch: the obstacles and everything outside the fence, local metres."""
+    solid: BaseGeometry = shapely.union_all(list(area.polygons)) if area.polygons else shapely.Polygon()
+    if area.limits is not None and not area.limits.is_empty:
+        x0, y0, x1, y1 = area.limits.bounds
+        around = shapely.box(x0 - 1e4, y0 - 1e4, x1 + 1e4, y1 + 1e4)
+        solid = shapely.union(solid, shapely.difference(around, area.limits))
+    return solid
+
+
+def permitted(mission: Mission) -> Mission:
+    """Return the mission with what a harness allows: the simulated boat may be armed, set to AUTO and steered."""
+    operator = replace_struct(mission.options.operator, arm=True, set_auto=True)
+    return replace(mission, options=replace_struct(mission.options, operator=operator))
+
+
+def replace_struct(struct: Any, **changes: Any) -> Any:
+    """Return a copy of a msgspec struct with ``changes``."""
+    import msgspec
+
+    return msgspec.structs.replace(struct, **changes)
+
+
+async def run_embedded(
+    scenario: Scenario, source: Path, seed: int, folder: Path, *, on_step: OnStep | None = None,
+    expansions: int | None = EXPANSIONS,
+) -> Verdict:
+    """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json."""
+    mission = permitted(load_mission(scenario.mission_path(source)))
+    wind = scenario_wind(scenario, source, seed)
+    start = mission.start or mission.origin
+    heading_deg = scenario.start_heading_deg
+    if heading_deg is None:
+        heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
+    autopilot = Autopilot(
+        AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
+                        parameters=scenario.parameters),
+        wind, seed=seed,
+    )
+    link = MemoryLink("companion", seed=seed)
+    world = _World(autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1))
+    frame = mission.frame()
+    folder.mkdir(parents=True, exist_ok=True)
+    async with serve(autopilot, [link.far, world.shore.far]):
+        side_tasks = [
+            asyncio.create_task(_watch_truth(world, frame), name="truth"),
+            *(asyncio.create_task(_event(world, e, mission), name=f"event {e.kind}") for e in scenario.events),
+        ]
+        await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions)
+        for task in side_tasks:
+            task.cancel()
+        for task in side_tasks:
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+    area = mission.area.local(frame)
+    verdict = judge(
+        scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
+        goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
+        status_times_s=world.status_s, alerts=world.alerts, errors=world.errors,
+    )
+    write_atomically(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
+    return verdict
+
+
+async def _sail_and_restart(
+    world: _World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_step: OnStep | None,
+    expansions: int | None,
+) -> None:
+    """Run the companion; kill it where the scenario says, and start it again."""
+    kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
+    deadline_s = now_s() + scenario.limit_s
+    options = SailOptions(
+        seed=seed, epoch_s=EPOCH_S, expansions=expansions, offload=at_once, state_path=folder / "state.json",
+        command=f"sitl run {scenario.name}",
+    )
+
+    def on_status(status: Any, step: Step) -> None:  # noqa: ARG001 - the interface has both
+        world.status_s.append(step.snapshot.t_s)
+        if on_step is not None:
+            on_step(step)
+
+    while True:
+        left_s = deadline_s - now_s()
+        if left_s <= 0.0:
+            return
+        task = asyncio.create_task(
+            sail(mission, world.link.near, InlinePlanner(), folder, replace(options, limit_s=left_s),
+                 on_status=on_status),
+            name="companion",
+        )
+        kill = kills.pop(0) if kills else None
+        done, _ = await asyncio.wait([task], timeout=None if kill is None else max(0.0, kill.at_s - now_s()))
+        if task not in done:
+            task.cancel()
+        try:
+            world.summary = await task
+        except asyncio.CancelledError:
+            pass
+        except Exception as error:
+            world.errors.append("".join(traceback.format_exception(error)))
+            return
+        _collect_alerts(world, folder)
+        if task in done and not task.cancelled():
+            return
+        if kill is None or kill.restart_after_s is None:
+            await asyncio.sleep(max(0.0, deadline_s - now_s()))
+            return
+        await asyncio.sleep(kill.restart_after_s)
+
+
+def _collect_alerts(world: _World, folder: Path) -> None:
+    try:
+        summary = json.loads((folder / "summary.json").read_bytes())
+    except (OSError, ValueError):
+        return
+    for code, count in summary.get("alerts", {}).items():
+        world.alerts[code] = world.alerts.get(code, 0) + count
+
+
+async def _watch_truth(world: _World, frame: Any) -> None:
+    while True:
+        t = world.autopilot.truth
+        if world.set_sail_s is None and t.is_armed and t.mode in {Mode.AUTO, Mode.GUIDED}:
+            world.set_sail_s = now_s()
+        if world.set_sail_s is not None:
+            world.truth.add(now_s(), frame.en_from_geo(t.position), t.heading_rad, t.speed_mps,
+                            (t.twd_from_rad, t.tws_mps))
+        await asyncio.sleep(TRUTH_EVERY_S)
+
+
+async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
+    """Make one event happen; wind events are in the wind already, kills in the companion's loop."""
+    await asyncio.sleep(max(0.0, event.at_s - now_s()))
+    autopilot, link = world.autopilot, world.link
+    if event.kind == "mode":
+        autopilot.set_mode(Mode[event.mode or "HOLD"])
+    elif event.kind == "reboot":
+        autopilot.reboot()
+    elif event.kind == "link_cut":
+        link.cut()
+        if event.for_s is not None:
+            await asyncio.sleep(event.for_s)
+            link.mend()
+    elif event.kind == "link_quality":
+        link.impairment = Impairment(loss=event.loss, duplicate=event.duplicate, reorder=event.reorder,
+                                     corrupt=event.corrupt, delay_s=event.delay_s)
+        if event.for_s is not None:
+            await asyncio.sleep(event.for_s)
+            link.impairment = Impairment()
+    elif event.kind == "gps_jump":
+        autopilot.set_gps(GpsFault(east_m=event.east_m, north_m=event.north_m))
+        if event.for_s is not None:
+            await asyncio.sleep(event.for_s)
+            autopilot.set_gps(GpsFault())
+    elif event.kind == "vane":
+        autopilot.set_vane(vane_fault(event))
+        if event.for_s is not None:
+            await asyncio.sleep(event.for_s)
+            autopilot.set_vane(VaneFault())
+    elif event.kind == "battery":
+        autopilot.set_battery(event.volts or 0.0)
+    elif event.kind == "current":
+        autopilot.set_current(math.radians(event.set_deg), event.drift_mps)
+    elif event.kind == "foreign_mission":
+        away = mission.frame().geo_from_en(event.east_m, event.north_m)
+        await _upload_foreign(world.shore.near, [waypoint(away)])
+
+
+def vane_fault(event: EventSpec) -> VaneFault:
+    """Return the vane's fault of an event."""
+    return VaneFault(state=VaneState(event.state or "ok"), value_rad=math.radians(event.value_deg))
+
+
+async def _upload_foreign(end: MemoryEnd, items: list[MissionItem]) -> None:
+    """Upload ``items`` as a ground station does: over a link of its own, as 255/190."""
+    async with (
+        Link(end, identity=LinkIdentity(system=255, component=190), streams=()) as link,
+        Pilot(link) as pilot,
+    ):
+        await pilot.upload_mission(items, method="items")
