@@ -267,11 +267,11 @@ def heartbeat(system_status: int = wire.MAV_STATE_ACTIVE) -> Message:
 
 
 def mission_item_int(
-    target: tuple[int, int], seq: int, item: MissionItem, mission_type: MissionType, *, is_current: bool = False
+    target: tuple[int, int], seq: int, item: MissionItem, mission_type: MissionType
 ) -> Message:
     """Return ``item`` as MISSION_ITEM_INT number ``seq``."""
     return wire.MAVLink_mission_item_int_message(
-        target[0], target[1], seq, item.frame, item.command, int(is_current), int(item.autocontinue),
+        target[0], target[1], seq, item.frame, item.command, 0, int(item.autocontinue),
         *item.params, item.lat_e7, item.lon_e7, item.alt_m, int(mission_type),
     )
 

@@ -99,7 +99,7 @@ class ListUpload:
         self._heard_s = t_s
         self._sent.add(message.seq)
         self._wake_s = t_s + (LAST_ACK_WAIT_S if len(self._sent) == len(self._items) else UPLOAD_DEAD_S)
-        return [mission_item_int(self._party.target, message.seq, item, self._type, is_current=message.seq == 0)]
+        return [mission_item_int(self._party.target, message.seq, item, self._type)]
 
     def tick(self, t_s: float) -> list[Message]:
         """Offer again, or give up."""

@@ -111,7 +111,10 @@ class Texts:
     """Collects what the autopilot says in words while a conversation runs: its reasons come only this way."""
 
     # Chatter that has nothing to do with a refusal.
-    _NOISE = ("Field Elevation", "Sailboat: Tacking", "Reached waypoint", "Mission: ", "Auto mission changed")
+    _NOISE = (
+        "Field Elevation", "Sailboat: Tacking", "Reached waypoint", "Mission: ", "Auto mission changed", "EKF3 ",
+        "GPS ", "Flight plan received",
+    )
 
     def __init__(self, party: Party) -> None:
         self._party = party

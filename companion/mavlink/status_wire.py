@@ -6,8 +6,8 @@ ArduPilot forwards what the companion sends to its other links. Two forms go out
 - WIND_COV and NAMED_VALUE_FLOATs ``co_twd co_tws co_sig co_psafe co_tack co_xt``: the wind with its uncertainty and the
   most wanted figures, for any ground station's plots and the autopilot's log. They take turns.
 
-Sent every 2 s this is under 110 bytes/s, heartbeat not counted. ``StatusReader`` joins both forms again, so a router that
-forwards only well-known messages still lets the main figures through.
+Sent every 2 s this is under 110 bytes/s, heartbeat not counted. ``StatusReader`` joins both forms again, so a router
+that forwards only well-known messages still lets the main figures through.
 """
 
 from __future__ import annotations
@@ -110,7 +110,8 @@ def unpack_status(payload: bytes, t_s: float | None = None) -> CompanionStatus:
     return CompanionStatus(
         t_s=tenths / 10.0 if t_s is None else t_s,
         state=words[:state_end].decode("ascii", "replace"),
-        goal_index=_count(goal, _NONE8), goal_count=_count(goals, _NONE8), waypoint_seq=_count(seq), waypoint_count=_count(count),
+        goal_index=_count(goal, _NONE8), goal_count=_count(goals, _NONE8),
+        waypoint_seq=_count(seq), waypoint_count=_count(count),
         waypoint_distance_m=_float(waypoint_m), goal_distance_m=_float(goal_m), cross_track_m=_float(cross_m),
         clearance_m=_float(clearance_m), promised_risk=_float(risk), position=geo_point(lat_e7, lon_e7),
         twd_from_rad=None if twd == _NONE16 else math.radians(twd / 100.0),
