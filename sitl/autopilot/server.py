@@ -35,6 +35,7 @@ class Server:
         self._numbers = 0
         self._wake: asyncio.Future[None] | None = None
         self._zero_s = 0.0
+        self._task: asyncio.Task[None] | None = None
 
     # ----------------------------------------------------------------------------------------------- ports
     def add_port(self, write: Any) -> int:
@@ -79,6 +80,15 @@ class Server:
             link = self.autopilot.links.get(number)
             if link is not None and link.has_output:
                 write(link.take())
+
+    async def wait(self, for_s: float | None = None) -> None:
+        """Return when the simulation ended with an error, or after ``for_s`` simulated seconds."""
+        if self._task is not None:
+            await asyncio.wait([self._task], timeout=for_s)
+
+    def follow(self, task: asyncio.Task[None]) -> None:
+        """Remember who lets time pass."""
+        self._task = task
 
     async def run(self) -> None:
         """Follow the clock for ever."""
@@ -212,6 +222,7 @@ async def serve(autopilot: Autopilot, endpoints: Sequence[Transport | str]) -> A
         for endpoint in endpoints:
             await _open(server, endpoint, stack)
         task = asyncio.create_task(server.run(), name="simulated autopilot")
+        server.follow(task)
         try:
             yield server
         finally:

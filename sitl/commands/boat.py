@@ -1,0 +1,111 @@
+"""``sitl boat``: the simulated autopilot alone, for any MAVLink client."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+
+from companion.errors import InputError
+
+_EXAMPLE = """examples:
+  sitl boat                                  TCP on 5760 (as SITL's SERIAL0), UDP on 14555; real time
+  sitl boat --warm --wind ar1:5@200 --seed 7 --speedup 8
+  sitl boat --udp-out 127.0.0.1:14550        a ground station or companion listens there
+  companion status --link tcp:127.0.0.1:5760
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "boat", help=summary, description=summary, epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--port", type=_port, default=5760, help="TCP port on 127.0.0.1, 0 for none (default 5760)")
+    parser.add_argument("--udp", type=_port, default=14555, help="UDP port to listen on, 0 for none (default 14555)")
+    parser.add_argument("--udp-out", metavar="HOST:PORT", action="append", default=[], help="also send there first")
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
+    parser.add_argument("--speedup", type=float, default=1.0, metavar="N", help="simulated seconds per second")
+    parser.add_argument(
+        "--wind", default="5@0", metavar="WIND",
+        help="SPEED@FROM in m/s and degrees, ar1:SPEED@FROM[,sd=DEG][,rho=HZ][,gust=MPS], or FILE.csv (default 5@0)",
+    )
+    parser.add_argument("--home", default="51.1,-1.3", metavar="LAT,LON", help="place of the boat (default 51.1,-1.3)")
+    parser.add_argument("--heading", type=float, default=0.0, metavar="DEG", help="of the bow at power-up")
+    parser.add_argument("--seed", type=int, default=0, help="of the wind and of faults (default 0)")
+    parser.add_argument("--warm", action="store_true", help="powered up long ago: no EKF wait of 42 s")
+    parser.add_argument("--moored", action="store_true", help="lies still until it is armed")
+    parser.add_argument("--sysid", type=int, default=1, help="MAVLink system id (default 1)")
+    parser.add_argument("--param", metavar="NAME=VALUE", action="append", default=[], help="set a parameter")
+    parser.add_argument("--for", dest="for_s", type=float, metavar="S", help="end after S simulated seconds")
+    parser.set_defaults(run=run)
+
+
+def _port(text: str) -> int:
+    if not text.isdigit() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port")
+    return int(text)
+
+
+def _home(text: str) -> tuple[float, float]:
+    try:
+        lat, lon = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError("--home", text, "is not a position", "write LAT,LON in degrees") from None
+    if not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
+        raise InputError("--home", text, "is not on the globe", "write LAT,LON in degrees")
+    return lat, lon
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run until interrupted."""
+    import asyncio
+
+    from companion import clock
+    from companion.errors import LinkError
+    from companion.messages import GeoPoint
+    from sitl.autopilot import Autopilot, AutopilotConfig, serve
+    from sitl.autopilot.autopilot import check_parameters
+    from sitl.wind import parse_wind
+
+    if not (math.isfinite(args.speedup) and args.speedup > 0.0):
+        raise InputError("--speedup", str(args.speedup), "is not a speed-up", "write a number above 0")
+    if not 1 <= args.sysid <= 255:
+        raise InputError("--sysid", str(args.sysid), "is not a system id", "write 1 to 255")
+    lat, lon = _home(args.home)
+    parameters: dict[str, float] = {}
+    for text in args.param:
+        name, sign, value = text.partition("=")
+        try:
+            parameters[name] = float(value)
+        except ValueError:
+            sign = ""
+        if not sign or not name:
+            raise InputError("--param", text, "is not a parameter", "write NAME=VALUE")
+    check_parameters(parameters)
+    config = AutopilotConfig(
+        home=GeoPoint(lat_deg=lat, lon_deg=lon), heading_rad=math.radians(args.heading), is_warm=args.warm,
+        is_moored=args.moored, sysid=args.sysid, parameters=parameters,
+    )
+    autopilot = Autopilot(config, parse_wind(args.wind, seed=args.seed), args.seed)
+    endpoints = [f"tcpin:{args.host}:{args.port}"] if args.port else []
+    endpoints += [f"udpin:{args.host}:{args.udp}"] if args.udp else []
+    endpoints += [f"udpout:{target}" for target in args.udp_out]
+    if not endpoints:
+        raise InputError("--port", "0", "nobody could reach the boat", "leave a port open or give --udp-out")
+
+    async def sail() -> None:
+        try:
+            async with serve(autopilot, endpoints) as server:
+                sys.stdout.write(f"sitl boat: {', '.join(endpoints)}, {args.speedup:g}x; Ctrl-C ends\n")
+                sys.stdout.flush()
+                await server.wait(args.for_s)
+        except LinkError as error:
+            raise LinkError(f"{error}; another boat may be running, give --port and --udp") from error
+
+    try:
+        clock.run(sail(), speedup=args.speedup)
+    except asyncio.CancelledError:
+        return 130
+    return 0
