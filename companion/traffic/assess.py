@@ -28,7 +28,8 @@ class Assessment:
         when = f"in {a.time_s:.0f} s" if a.is_closing else "opening"
         return (
             f"{self.vessel.label}: {kind}, {a.now_m:.0f} m at {math.degrees(a.bearing_rad):03.0f}°, "
-            f"CPA {a.distance_m:.0f} m {when}, {self.encounter.role.value} (rule {self.encounter.rule.value}: {self.encounter.reason}), "
+            f"CPA {a.distance_m:.0f} m {when}, "
+            f"{self.encounter.role.value} (rule {self.encounter.rule.value}: {self.encounter.reason}), "
             f"report {self.age_s:.0f} s old"
         )
 

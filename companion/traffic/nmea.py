@@ -192,7 +192,7 @@ def _heading(heading_deg: Any) -> float | None:
 
 
 def _turn(turn: Any) -> float | None:
-    """Return rad/s: pyais gives degrees a minute, or an enum for 'not available' and 'more than 5 degrees in 30 s' (unsized)."""
+    """Return rad/s; None for pyais' enum values 'not available' and 'more than 5 degrees in 30 s' (no size)."""
     if turn is None or not isinstance(turn, (int, float)) or hasattr(turn, "name"):
         return None
     return math.radians(float(turn)) / 60.0 if abs(float(turn)) <= 720.0 else None
