@@ -130,8 +130,10 @@ class Link:
     ) -> None:
         for task in self._tasks:
             task.cancel()
+        # What the body raises leaves as it is; only a failure of the link's own tasks comes as a group.
+        is_ours = kind is not None and issubclass(kind, asyncio.CancelledError)
         try:
-            await self._group.__aexit__(kind, error, trace)
+            await self._group.__aexit__(*((kind, error, trace) if is_ours else (None, None, None)))
         finally:
             await self.transport.close()
             if self._signing is not None:
