@@ -18,12 +18,12 @@ def _array(*values: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
 
 
 CONSTANTS = Constants(
-    survival=_array(10.4, 0.638),
-    speed_survival=_array(2.0, 0.857),
-    sigma=_array(0.167, 0.073, 0.415, -0.56, 1500.0),
-    error=_array(0.167, 0.30),
-    speed_error=_array(0.12, 0.25),
-    quantile=_array(0.0, 0.31, 0.65, 0.92, 1.34, 1.85, 2.42, 3.3, 4.1, 8.0),
+    survival=_array(9.4, 0.70),
+    speed_survival=_array(2.3, 0.60),
+    sigma=_array(0.16, 0.056, 0.41, -0.57, 1500.0),
+    error=_array(0.164, 0.31),
+    speed_error=_array(0.128, 0.21),
+    quantile=_array(0.0, 0.305, 0.645, 0.91, 1.32, 1.87, 2.48, 3.4, 4.2, 8.0),
     tail=_array(0.05),
     memory=_array(3600.0, 7200.0, 3600.0, 60.0, 10800.0, 0.3, 0.3),
 )

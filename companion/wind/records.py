@@ -1,0 +1,167 @@
+"""A record of wind: readings of direction and speed over time, with what else was logged.
+
+Reading text is here; opening files is the command's business. The simulated winds serve the tests, the fit and the
+documentation: a process whose best forecast is known is the only real check of a forecaster.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.errors import InputError
+
+Array = NDArray[np.float64]
+
+RHO_HZ = 0.036           # Wolsieffer 2020, equation 17
+NOISE_RADPS = 0.087      # likewise; its spread is for a step of 1 s
+
+_DIRECTION = ("wind_from_deg", "twd_deg", "twd_from_deg")
+_SPEED = ("wind_speed_ms", "wind_speed_mps", "tws_ms", "tws_mps")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Record:
+    """Arrays of one length: time [s], direction the true wind comes from [rad], its speed [m/s].
+
+    ``turning`` marks readings in manoeuvres; ``heading_rad`` and ``awa_rad`` (positive to starboard) are None when
+    they were not logged.
+    """
+
+    name: str
+    t_s: Array
+    twd_from_rad: Array
+    tws_mps: Array
+    turning: NDArray[np.bool_]
+    heading_rad: Array | None = None
+    awa_rad: Array | None = None
+
+    def __post_init__(self) -> None:
+        n = self.t_s.shape
+        if any(a.shape != n for a in (self.twd_from_rad, self.tws_mps, self.turning)) or len(n) != 1:
+            raise ValueError("the columns of a record must have one length")
+
+    def __len__(self) -> int:
+        return int(self.t_s.size)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last reading [s]."""
+        return float(self.t_s[-1] - self.t_s[0]) if len(self) else 0.0
+
+    def rotated(self, angle_rad: float) -> Record:
+        """Return the record as it would have been with north elsewhere."""
+        return Record(
+            name=self.name, t_s=self.t_s, twd_from_rad=self.twd_from_rad + angle_rad, tws_mps=self.tws_mps,
+            turning=self.turning,
+        )
+
+
+def parse_csv(lines: Iterable[str], source: str) -> Record:
+    """Return the record in CSV text with a header: ``t_s``, a direction in degrees, a speed in m/s, other columns.
+
+    Raises InputError naming the line when a column is missing, a number is not one, or time does not advance.
+    """
+    reader = csv.reader(lines)
+    header = [name.strip() for name in next(reader, [])]
+
+    def column(names: tuple[str, ...], *, needed: bool) -> int | None:
+        for name in names:
+            if name in header:
+                return header.index(name)
+        if needed:
+            raise InputError(source, "line 1", f"no column {names[0]}", "a record has t_s,wind_from_deg,wind_speed_ms")
+        return None
+
+    i_t, i_d, i_s = (column(n, needed=True) for n in (("t_s",), _DIRECTION, _SPEED))
+    i_turn, i_head, i_awa = (column((n,), needed=False) for n in ("turning", "heading_deg", "awa_deg"))
+    rows: list[tuple[float, float, float, float, float, float]] = []
+    for number, row in enumerate(reader, start=2):
+        if not row:
+            continue
+
+        def value(index: int | None, row: list[str] = row, number: int = number) -> float:
+            if index is None:
+                return 0.0
+            try:
+                found = float(row[index])
+            except (ValueError, IndexError):
+                text = row[index] if index < len(row) else ""
+                raise InputError(source, f"line {number}", f"{header[index]} is {text!r}", "write a number") from None
+            if not math.isfinite(found):
+                raise InputError(source, f"line {number}", f"{header[index]} is {found}", "write a finite number")
+            return found
+
+        new = (value(i_t), value(i_d), value(i_s), value(i_turn), value(i_head), value(i_awa))
+        if rows and new[0] <= rows[-1][0]:
+            raise InputError(source, f"line {number}", f"time {new[0]:g} is not after {rows[-1][0]:g}", "sort by t_s")
+        if new[2] < 0.0:
+            raise InputError(source, f"line {number}", f"wind speed {new[2]:g} is negative", "write m/s")
+        rows.append(new)
+    if len(rows) < 2:
+        raise InputError(source, "", f"{len(rows)} readings", "a record needs at least two")
+    table = np.array(rows, dtype=np.float64)
+    return Record(
+        name=source, t_s=table[:, 0], twd_from_rad=np.radians(table[:, 1]), tws_mps=table[:, 2],
+        turning=table[:, 3] != 0.0,
+        heading_rad=np.radians(table[:, 4]) if i_head is not None else None,
+        awa_rad=np.radians((table[:, 5] + 180.0) % 360.0 - 180.0) if i_awa is not None else None,
+    )
+
+
+def _record(name: str, t_s: Array, direction_rad: Array, speed_mps: Array) -> Record:
+    return Record(
+        name=name, t_s=t_s, twd_from_rad=np.mod(direction_rad, 2.0 * math.pi), tws_mps=np.maximum(0.0, speed_mps),
+        turning=np.zeros(t_s.size, dtype=np.bool_),
+    )
+
+
+def ornstein_uhlenbeck(
+    rng: np.random.Generator, t_s: Array, *, rate_hz: float, sigma: float,
+) -> Array:
+    """Return the stationary process with sd ``sigma`` at any times: exact steps, so its spread is free of the step."""
+    keep = np.exp(-rate_hz * np.diff(t_s))
+    noise = rng.normal(size=t_s.size)
+    x = np.empty(t_s.size)
+    x[0] = sigma * noise[0]
+    for i in range(1, t_s.size):
+        x[i] = keep[i - 1] * x[i - 1] + sigma * math.sqrt(1.0 - keep[i - 1] ** 2) * noise[i]
+    return x
+
+
+def equation_17(seed: int, *, seconds: float = 7200.0, dt_s: float = 1.0, mean_rad: float = 0.0) -> Record:
+    """Return the AR(1) wind of Wolsieffer's equation 17, its parameters those of the paper at a step of 1 s.
+
+    The equation's spread depends on the step: sd 18.7 deg at 1 s, 5.9 deg at 0.1 s. Here the process of the 1 s step
+    is sampled every ``dt_s``, so that a rate is a choice of the observer and not of the weather.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, dt_s)
+    rate_hz = -math.log(1.0 - RHO_HZ)
+    x = ornstein_uhlenbeck(rng, t, rate_hz=rate_hz, sigma=NOISE_RADPS / math.sqrt(1.0 - (1.0 - RHO_HZ) ** 2))
+    v = ornstein_uhlenbeck(rng, t, rate_hz=0.02, sigma=0.75)
+    return _record(f"eq17_{seed}", t, mean_rad + x, 6.0 + v)
+
+
+def weather(
+    seed: int, *, seconds: float = 7200.0, dt_s: float = 1.0, mean_rad: float = 0.0, speed_mps: float = 5.0,
+    noise_rad: float = 0.05,
+) -> Record:
+    """Return wind as boats meet it: gusts of 8 s and 60 s, shifts of 10 min, a drift of hours, an instrument's noise.
+
+    Departures grow in light air as the square root of 5 m/s over the speed.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, dt_s)
+    parts = ((8.0, 0.06), (60.0, 0.07), (600.0, 0.11), (5400.0, 0.20))
+    x = sum((ornstein_uhlenbeck(rng, t, rate_hz=1.0 / tau, sigma=sd) for tau, sd in parts), np.zeros(t.size))
+    gust = 0.12 * ornstein_uhlenbeck(rng, t, rate_hz=1.0 / 20.0, sigma=1.0)
+    slow = 0.25 * ornstein_uhlenbeck(rng, t, rate_hz=1.0 / 1200.0, sigma=1.0)
+    speed = speed_mps * np.exp(gust + slow)
+    x = x * np.sqrt(5.0 / np.maximum(1.0, speed)) + noise_rad * rng.normal(size=t.size)
+    return _record(f"weather_{seed}", t, mean_rad + x, speed)
