@@ -19,13 +19,14 @@ from companion.skipper.snapshot import (
     UploadOutcome,
     UploadResult,
 )
-from companion.skipper.state import PATIENT, Phase
-from companion.skipper.turn import Turn
+from companion.skipper.state import PATIENT, Phase, Retry
+from companion.skipper.turn import FRESH_S, Turn
 from companion.skipper.voyage import Side
 
 HISTORY_STEP_S = 10.0
 HISTORY_KEPT = 19            # 180 s and the present
 BOOT_SLACK_S = 1.0
+SHOWS_S = 2.5                # a command that was accepted shows in the next heartbeats
 FOREIGN_TEXTS = ("Flight plan received",)   # somebody finished an upload
 
 
@@ -70,7 +71,8 @@ def _take_command(turn: Turn, outcome: CommandOutcome) -> None:
     if pending is None or pending[0] != outcome.command_id:
         return
     if outcome.result is CommandResult.ACCEPTED:
-        turn.update(pending_command=None, command_retry=PATIENT)
+        # The heartbeat that shows it comes once a second: until then nothing is concluded from the old one.
+        turn.update(pending_command=None, command_retry=Retry(not_before_s=turn.t_s + SHOWS_S))
         return
     turn.update(pending_command=None, command_retry=turn.failed(turn.state.command_retry))
     turn.say(Severity.WARNING, f"refused {pending[2]}",
@@ -98,7 +100,7 @@ def take_events(turn: Turn) -> None:
 def locate(turn: Turn) -> None:
     """Say where the boat is on its route: the autopilot's count, our own count, gates passed, way made good."""
     state, status = turn.state, turn.autopilot
-    route, here = state.route, turn.snapshot.position_en_m
+    route = state.route
     if route is not None and status is not None and status.mission_seq is not None and _counts(turn):
         index = min(max(status.mission_seq - 1, 0), len(route.items) - 1)
         # Right after we made an item current the stream may still carry the old number.
@@ -110,8 +112,13 @@ def locate(turn: Turn) -> None:
         _own_count(turn)
         _pass_gates(turn)
         _remember(turn)
-    if here is not None and turn.snapshot.vehicle_age_s is not None and turn.snapshot.vehicle_age_s < 1.0 + 1e-9:
-        turn.update(last_seen=(turn.t_s, here[0], here[1]))
+
+
+def remember_fix(turn: Turn) -> None:
+    """Keep the position for the next step's look at jumps."""
+    here, age = turn.snapshot.position_en_m, turn.snapshot.vehicle_age_s
+    if here is not None and age is not None and age <= FRESH_S:
+        turn.update(last_seen=(turn.t_s - age, here[0], here[1]))
 
 
 def notice_truncation(turn: Turn) -> None:
@@ -185,7 +192,7 @@ def _approach(turn: Turn) -> None:
     if boat is None or gate is None:
         return
     way = distance_m(boat, gate.en_m)
-    if last is not None and turn.t_s - last[0] <= 2.0 and not turn.is_raised("position jump"):
+    if last is not None and turn.t_s - last[0] <= 2.0 + FRESH_S and not turn.is_raised("position jump"):
         way = min(way, leg_distance_m(gate.en_m, (last[1], last[2]), boat))
     turn.update(closest_m=min(turn.state.closest_m, way))
 

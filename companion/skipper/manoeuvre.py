@@ -17,7 +17,11 @@ def bear_away_rad(boat_en: PointEn, heading_rad: float, twd_from_rad: float, are
     """Return the heading [rad] to gather way on: 100° off the wind, on the side that is clear or nearer."""
     tack = 1.0 if difference_rad(twd_from_rad, heading_rad) >= 0.0 else -1.0
     options = [wrap_pi(twd_from_rad - side * BEAR_AWAY_RAD) for side in (tack, -tack)]
-    rooms = [min(area.path_clearance_m([boat_en, moved(boat_en, h, LOOK_M)]), LOOK_M) for h in options]
+    # The boat's own distance to an obstacle is the same both ways: what counts begins ahead of it.
+    rooms = [
+        min(area.path_clearance_m([moved(boat_en, h, LOOK_M / 4.0), moved(boat_en, h, LOOK_M)]), LOOK_M)
+        for h in options
+    ]
     return options[1] if rooms[1] > rooms[0] + 5.0 and rooms[0] < LOOK_M / 2.0 else options[0]
 
 

@@ -135,8 +135,10 @@ def aim_at(voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], gate: i
     """Return what to plan for: the gate, or a place on the way to it where the local plan ends (Büsser 4.1)."""
     target = gates[gate]
     left_m = distance_m(start_en, target.en_m)
+    # The autopilot leaves a waypoint behind before it is there: the plan ends that much inside the radius.
+    inner_m = max(target.radius_m - config.announce_m, 0.2 * target.radius_m)
     if left_m <= config.horizon_m:
-        return Aim(en_m=target.en_m, radius_m=target.radius_m, gate=gate)
+        return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
     course = bearing_rad(start_en, target.en_m)
     radius = max(50.0, 0.02 * config.horizon_m)
     for share in np.arange(1.0, 0.3, -0.05):
@@ -145,7 +147,7 @@ def aim_at(voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], gate: i
             place = moved(on_line, course + math.pi / 2.0, side * 2.0 * radius)
             if float(voyage.area.clearance_m([place])[0]) >= config.margin_m + radius:
                 return Aim(en_m=place, radius_m=radius, gate=-1)
-    return Aim(en_m=target.en_m, radius_m=target.radius_m, gate=gate)
+    return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
 
 
 def band(gate: Gate, start_en: PointEn, aim_en: PointEn) -> Polygon | None:

@@ -15,7 +15,14 @@ from companion.skipper.config import SkipperConfig
 from companion.skipper.gates import Gate, gates_of
 from companion.skipper.geometry import distance_m, leg_distance_m
 from companion.skipper.helm import arm, make_current, repair, set_mode
-from companion.skipper.intake import locate, mode_is_ours, notice_truncation, take_events, take_outcomes
+from companion.skipper.intake import (
+    locate,
+    mode_is_ours,
+    notice_truncation,
+    remember_fix,
+    take_events,
+    take_outcomes,
+)
 from companion.skipper.planning import request, upload
 from companion.skipper.route import is_mixture, is_same_mission
 from companion.skipper.sailing import sail
@@ -53,6 +60,7 @@ class Skipper:
         locate(turn)
         fresh = watch(turn)
         _decide(turn, fresh)
+        remember_fix(turn)
         return turn.state, tuple(turn.actions)
 
     def persisted(self, state: SkipperState) -> Persisted:
@@ -176,9 +184,10 @@ def _mission_is_known(turn: Turn) -> bool:
             _read(turn, "whose mission is on board?")
         if not state.sailing:
             turn.phase(Phase.WAITING, "reading the mission on the autopilot")
-        elif state.unsure_route is not None:
-            turn.phase(state.phase, "an upload failed: reading what is on board")
-        return state.sailing and state.route is not None and state.unsure_route is None
+        else:
+            # Under way nothing is changed on a mission that may not be ours; what is there sails on.
+            turn.phase(state.phase, "reading the mission on board before anything is changed on it")
+        return False
     return _compare(turn, items)
 
 

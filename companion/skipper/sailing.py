@@ -11,7 +11,7 @@ from companion.skipper.actions import CancelPlan, ReplanReason, Severity, SteerH
 from companion.skipper.config import ReplanPolicy
 from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m
-from companion.skipper.helm import check_current, make_current, repair, set_mode
+from companion.skipper.helm import check_current, is_busy, make_current, repair, set_mode
 from companion.skipper.judge import predicted_beat
 from companion.skipper.manoeuvre import bear_away_rad
 from companion.skipper.planning import hold, request, seeks_refuge
@@ -252,7 +252,7 @@ def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
     until = turn.state.steering_until_s
     out = vehicle is not None and wind is not None and vehicle.speed_mps > SAILS_MPS and (
         abs(difference_rad(wind[0], vehicle.heading_rad)) > SAILS_TWA_RAD)
-    refused = status is not None and status.mode is Mode.AUTO and turn.state.pending_command is None
+    refused = status is not None and status.mode is Mode.AUTO and not is_busy(turn)
     over = out or refused or (until is not None and turn.t_s > until)
     if over and (refused or set_mode(turn, Mode.AUTO, "sailing again" if out else "bearing away took too long")):
         # The mode we asked for ourselves stays ours until AUTO shows.

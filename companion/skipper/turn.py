@@ -31,7 +31,10 @@ from companion.skipper.snapshot import Snapshot
 from companion.skipper.state import Phase, Retry, Route, SkipperState
 from companion.skipper.voyage import PointEn, Voyage
 
-FRESH_S = 3.0   # a part older than this is not acted upon
+FRESH_S = 3.0          # a part older than this is not acted upon
+JUMP_M = 20.0          # a fix this much farther than the boat can sail is a jump
+JUMP_MPS = 8.0         # no boat of ours sails faster
+JUMP_MEMORY_S = 10.0   # after a longer silence any place is possible
 
 
 def permitted(action: Action, permissions: Permissions) -> bool:
@@ -116,9 +119,22 @@ class Turn:
     def boat_en(self) -> PointEn | None:
         """The boat's position while it is fresh and plausible."""
         age = self.snapshot.vehicle_age_s
-        if self.snapshot.vehicle is None or age is None or age > FRESH_S or self.is_raised("position jump"):
+        if self.snapshot.vehicle is None or age is None or age > FRESH_S:
+            return None
+        if self.is_raised("position jump") or self.jump_m >= JUMP_M:
             return None
         return self.snapshot.position_en_m
+
+    @property
+    def jump_m(self) -> float:
+        """How much farther than it can sail the boat has moved since the last fix [m]."""
+        here, last, age = self.snapshot.position_en_m, self.state.last_seen, self.snapshot.vehicle_age_s
+        if here is None or last is None or age is None:
+            return 0.0
+        elapsed_s = self.t_s - age - last[0]
+        if elapsed_s > JUMP_MEMORY_S:
+            return 0.0
+        return max(0.0, math.hypot(here[0] - last[1], here[1] - last[2]) - JUMP_MPS * max(elapsed_s, 0.0))
 
     @property
     def speed_mps(self) -> float:

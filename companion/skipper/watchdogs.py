@@ -18,7 +18,7 @@ from companion.skipper.actions import Severity
 from companion.skipper.geometry import along_m, cross_track_m, distance_m
 from companion.skipper.snapshot import WindHealth
 from companion.skipper.state import Raised
-from companion.skipper.turn import Turn
+from companion.skipper.turn import JUMP_M, Turn
 
 
 class Response(enum.Enum):
@@ -63,7 +63,7 @@ TABLE: tuple[Watchdog, ...] = (
       why="nothing can be asked of an autopilot that is not heard; it sails its mission to the safe end alone"),
     W(name="position lost", watches="time since the last position", enter=5.0, exit=2.0, unit="s", enter_s=0.0,
       exit_s=2.0, severity=S.ERROR, response=Response.NO_BOAT_PLANS, at_rest=True, why="a plan needs a start"),
-    W(name="position jump", watches="distance between fixes beyond what the boat can sail", enter=20.0, exit=10.0,
+    W(name="position jump", watches="distance between fixes beyond what the boat can sail", enter=JUMP_M, exit=10.0,
       unit="m", enter_s=0.0, exit_s=5.0, severity=S.WARNING, response=Response.NO_BOAT_PLANS, at_rest=True,
       why="a GPS jump may put the start into an obstacle; the plan on the autopilot does not depend on us"),
     W(name="wind untrusted", watches="the wind room's verdict (frozen, mirrored, spiking, silent vane)", enter=1.0,
@@ -114,7 +114,6 @@ IRONS_TWA_RAD = math.radians(35.0)
 IRONS_TWS_MPS = 1.5            # less wind than this is a calm, not irons
 MOVING_MPS = 0.5
 PROGRESS_WINDOW_S = 180.0
-JUMP_MPS = 8.0                 # no boat of ours sails faster
 
 
 # -------------------------------------------------------------------------------------- conditions
@@ -136,13 +135,7 @@ def _position_lost(turn: Turn) -> float | None:
 
 
 def _jump(turn: Turn) -> float | None:
-    here, last = turn.snapshot.position_en_m, turn.state.last_seen
-    if here is None or last is None:
-        return None
-    elapsed = turn.t_s - last[0]
-    if elapsed > 10.0:
-        return 0.0
-    return max(0.0, distance_m(here, (last[1], last[2])) - JUMP_MPS * elapsed)
+    return turn.jump_m if turn.snapshot.position_en_m is not None else None
 
 
 def _wind(turn: Turn) -> float | None:

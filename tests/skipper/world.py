@@ -67,7 +67,8 @@ def forecast(t_s: float, twd_rad: float, tws_mps: float = 5.0, sigma_rad: float 
     level = np.array([0.5, 0.8, 0.9, 0.95])
     z = np.array([0.674, 1.282, 1.645, 1.96])
     return WindForecast(
-        t_s=t_s, horizon_s=np.array(HORIZONS), mean_twd_from_rad=np.full(n, twd_rad), sigma_twd_rad=np.full(n, sigma_rad),
+        t_s=t_s, horizon_s=np.array(HORIZONS), mean_twd_from_rad=np.full(n, twd_rad),
+        sigma_twd_rad=np.full(n, sigma_rad),
         mean_tws_mps=np.full(n, tws_mps), sigma_tws_mps=np.full(n, 0.5), level=level,
         half_width_rad=np.outer(np.full(n, sigma_rad), z), correlation_time_s=30.0)
 

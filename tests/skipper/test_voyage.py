@@ -1,0 +1,530 @@
+"""Whole voyages in the tiny world: the main job, and each way in which it can go wrong."""
+
+import math
+
+import numpy as np
+import pytest
+from shapely.geometry import box
+
+from companion.geo.angles import difference_rad
+from companion.messages import MissionItem, Mode, StatusText
+from companion.skipper import actions as act
+from companion.skipper.config import DRY_RUN, Permissions, ReplanPolicy
+from companion.skipper.geometry import bearing_rad, distance_m
+from companion.skipper.route import effective, ends_safely, is_same_mission
+from companion.skipper.snapshot import AutopilotRebooted, OperatorWish, UploadResult, WindHealth
+from companion.skipper.state import Phase
+from companion.skipper.voyage import Goal, Side
+from tests.skipper.world import World, restarted, skipper, voyage
+
+ISLANDS = (box(-40, 120, 30, 160), box(60, 220, 120, 260), box(-120, 230, -20, 270))
+GOAL = Goal(en_m=(0.0, 400.0), radius_m=6.0, name="the goal")
+FAST = {"expansions": 1500}
+
+
+def swinging(t):
+    return 0.15 * math.sin(t / 60.0), 5.0
+
+
+def ar1(seed, sd_deg, rho=0.036):
+    rng, a, x = np.random.default_rng(seed), math.exp(-rho), [0.0]
+    for _ in range(4000):
+        x.append(a * x[-1] + math.radians(sd_deg) * math.sqrt(1 - a * a) * rng.standard_normal())
+    return lambda t: (x[int(t)], 5.0)
+
+
+def is_done(world):
+    return world.state.phase is Phase.DONE
+
+
+def is_sailing(world):
+    return world.state.sailing and world.state.phase is Phase.STANDARD
+
+
+def make(*goals, config=None, obstacles=ISLANDS, **world):
+    made = voyage(*(goals or (GOAL,)), obstacles=obstacles, **world.pop("voyage", {}))
+    return World(skipper=skipper(made, **(config or {})), **{"wind": swinging, **FAST, **world})
+
+
+def said(world, code):
+    return [entry for entry in world.log if entry[1] == code]
+
+
+# ------------------------------------------------------------------------------------- the main job
+@pytest.mark.parametrize("seed", range(4))
+def test_beats_through_islands_to_a_goal_upwind(seed):
+    world = make(wind=ar1(seed, 8.0), sigma=math.radians(8.0))
+    assert world.run(1500, is_done)
+    assert distance_m(world.position, GOAL.en_m) < 10.0
+    assert world.clearance() > world.skipper.config.margin_floor_m
+    assert ends_safely(world.mission)
+    assert world.state.reached == (0,)
+
+
+def test_runs_to_a_goal_downwind():
+    world = make(wind=lambda t: (math.pi, 6.0))
+    assert world.run(600, is_done)
+    assert world.clearance() > world.skipper.config.margin_floor_m
+
+
+def test_replans_at_each_waypoint_from_the_next_one_and_before_it_is_reached():
+    world = make()
+    assert world.run(1500, is_done)
+    asked = [(t, a) for t, a in world.actions if isinstance(a, act.RequestPlan)
+             and a.reason is act.ReplanReason.WAYPOINT]
+    assert len(asked) >= 2
+    for _, action in asked:
+        assert action.from_seq is not None
+    # Uploads of such plans never touch the item being sailed for.
+    for t, action in world.actions:
+        if isinstance(action, act.UploadMission) and action.set_current is None:
+            asked_for = [a for s, a in asked if s <= t][-1]
+            assert action.keep_first >= asked_for.from_seq
+
+
+def test_by_forecast_policy_a_steady_wind_means_no_new_plans():
+    steady = make(config={"replan_policy": ReplanPolicy.FORECAST}, wind=lambda t: (0.0, 5.0))
+    assert steady.run(1500, is_done)
+    reasons = [a.reason for _, a in steady.actions if isinstance(a, act.RequestPlan)]
+    assert act.ReplanReason.FORECAST not in reasons
+    assert act.ReplanReason.WAYPOINT not in reasons
+    shifting = make(config={"replan_policy": ReplanPolicy.FORECAST}, wind=lambda t: (0.0, 5.0 if t < 30 else 9.0))
+    assert shifting.run(1500, is_done)
+    reasons = [a.reason for _, a in shifting.actions if isinstance(a, act.RequestPlan)]
+    assert act.ReplanReason.FORECAST in reasons
+
+
+def test_a_90_degree_shift_in_mid_leg():
+    world = make(wind=lambda t: (0.0 if t < 60.0 else math.pi / 2, 5.0), obstacles=())
+    assert world.run(1200, is_done)
+    reasons = {a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)}
+    assert reasons & {act.ReplanReason.WIND_SHIFT, act.ReplanReason.NO_GO}
+
+
+def test_a_header_that_closes_the_leg_is_answered_within_seconds():
+    world = make(Goal(en_m=(300.0, 330.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0 if t < 40 else 0.5, 5.0))
+    assert world.run(40)
+    assert is_sailing(world)
+    assert world.run(25, lambda w: any(
+        isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.NO_GO for _, a in w.actions))
+    assert world.run(900, is_done)
+
+
+def test_speed_is_not_lost_by_replanning():
+    world = make(wind=lambda t: (0.0, 5.0))
+    slow = math.inf
+    world.run(60)
+
+    def look(w):
+        nonlocal slow
+        turning = abs(difference_rad(w.heading, bearing_rad(w.track[-6], w.track[-1]))) > 0.3
+        if not turning and w.state.pending_upload is not None:
+            slow = min(slow, w.speed)
+        return is_done(w)
+
+    assert world.run(1200, look)
+    assert slow > 1.4
+
+
+# ------------------------------------------------------------------------------------ goals, buoys
+@pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
+def test_five_laps_of_the_regatta_course_without_missing_a_buoy(side):
+    hand = 1.0 if side is Side.PORT else -1.0
+    places = [(0.0, 150.0), (-90.0 * hand, 75.0), (0.0, 0.0)]
+    start = (20.0 * hand, -40.0)
+    world = make(*(Goal(en_m=p, side=side, name=f"buoy {n}") for n, p in enumerate(places)), obstacles=(),
+                 voyage={"laps": 5, "home": start}, position=start, expansions=600)
+    seen = set()
+
+    def look(w):
+        seen.add(w.state.phase)
+        return is_done(w)
+
+    assert world.run(3000, look)
+    assert len(world.state.reached) == 15
+    assert Phase.BUOY_APPROACH in seen
+    for number, place in enumerate(places[:2]):
+        turned = sum(
+            difference_rad(bearing_rad(place, b), bearing_rad(place, a))
+            for a, b in zip(world.track[:-1], world.track[1:], strict=True))
+        assert -hand * turned / (2 * math.pi) == pytest.approx(5.0, abs=0.25), number
+        assert min(distance_m(place, p) for p in world.track) > 3.0
+
+
+def test_several_goals_without_a_stop_between():
+    goals = [Goal(en_m=p, radius_m=6.0) for p in ((150.0, 0.0), (150.0, 150.0), (0.0, 150.0))]
+    world = make(*goals, obstacles=(), wind=lambda t: (math.radians(-45), 5.0))
+    assert world.run(900, is_done)
+    assert world.state.reached == (0, 1, 2)
+    assert all(min(distance_m(p, g.en_m) for p in world.track) <= 6.0 for g in goals)
+    assert not any("loitering" in entry[2] for entry in world.log if entry[1] == "holding")
+
+
+def test_a_band_bounds_the_way():
+    made = Goal(en_m=(0.0, 400.0), radius_m=6.0, bandwidth_m=40.0)
+    world = make(made, obstacles=(), wind=lambda t: (0.0, 5.0))
+    assert world.run(1200, is_done)
+    assert max(abs(p[0]) for p in world.track) < 48.0
+
+
+def test_a_long_voyage_starts_its_numbering_again():
+    places = [(0.0, 60.0), (60.0, 60.0), (60.0, 0.0), (0.0, 0.0)]
+    world = make(*(Goal(en_m=p, radius_m=6.0) for p in places), obstacles=(), voyage={"laps": 6},
+                 config={"max_items": 14}, wind=lambda t: (math.radians(45), 5.0), expansions=300)
+    assert world.run(3000, is_done)
+    assert len(world.state.reached) == 24
+    assert max(len(a.items) for _, a in world.actions if isinstance(a, act.UploadMission)) <= 24
+
+
+# ---------------------------------------------------------------------------------------- permission
+def test_a_dry_run_touches_nothing_and_says_what_it_waits_for():
+    world = make(permissions=DRY_RUN)
+    world.run(200)
+    kinds = {type(a) for _, a in world.actions}
+    assert kinds <= {act.ReadMission, act.RequestPlan, act.Announce, act.CancelPlan}
+    assert "permission" in world.state.why
+
+
+@pytest.mark.parametrize(("given", "words"), [
+    (Permissions(may_upload=True), "operator to set AUTO"),
+    (Permissions(may_upload=True, may_set_mode=True), "operator to arm"),
+])
+def test_waits_for_what_it_may_not_do(given, words):
+    world = make(permissions=given)
+    world.run(60)
+    assert words in world.state.why
+    assert not world.armed
+    world.set_mode(Mode.AUTO)
+    world.armed = True
+    world.set_mode(Mode.AUTO)
+    assert world.run(30, is_sailing)
+
+
+def test_does_not_take_a_boat_that_somebody_drives():
+    world = make(mode=Mode.MANUAL, armed=True)
+    world.run(60)
+    assert world.mode is Mode.MANUAL
+    assert "waiting for the operator" in world.state.why
+
+
+@pytest.mark.parametrize(("missing", "words"), [
+    ({"vehicle": None, "position_en_m": None, "vehicle_age_s": None}, "position"),
+    ({"heartbeat_age_s": None}, "never heard"),
+])
+def test_waiting_names_what_is_missing(missing, words):
+    world = make(extra=missing)
+    world.run(10)
+    assert world.state.phase is Phase.WAITING
+    assert words in world.state.why
+    world.extra = {}
+    assert world.run(30, is_sailing)
+
+
+@pytest.mark.parametrize("health", [WindHealth.NONE, WindHealth.SETTLING, WindHealth.UNTRUSTED])
+def test_does_not_start_in_a_wind_that_it_cannot_believe(health):
+    world = make(wind_health=health)
+    world.run(30)
+    assert world.state.phase is Phase.WAITING
+    assert "wind" in world.state.why
+    assert world.count(act.RequestPlan) == 0
+
+
+# ------------------------------------------------------------------------------------------ operator
+@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.HOLD, Mode.RTL, Mode.GUIDED, Mode.LOITER])
+def test_the_operator_takes_over_and_gives_back(mode):
+    world = make()
+    world.run(60)
+    world.set_mode(mode)
+    world.step()
+    assert world.state.phase is Phase.OPERATOR
+    before = len(world.actions)
+    world.run(120)
+    quiet = [a for _, a in world.actions[before:] if not isinstance(a, act.Announce)]
+    assert quiet == []
+    assert world.mode is mode
+    world.position = (world.position[0] + 30.0, world.position[1] - 20.0)
+    world.set_mode(Mode.AUTO)
+    assert world.run(1500, is_done)
+    assert world.clearance() > world.skipper.config.margin_floor_m - 1.0
+    assert any(isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.OPERATOR_BACK for _, a in world.actions)
+
+
+def test_disarming_is_taking_over():
+    world = make()
+    world.run(60)
+    world.armed = False
+    world.run(30)
+    assert world.state.phase is Phase.OPERATOR
+    assert world.count(act.Arm) == 1
+    world.armed = True
+    world.set_mode(Mode.AUTO)
+    assert world.run(1500, is_done)
+
+
+def test_a_mission_that_the_operator_brought_is_his():
+    world = make()
+    world.run(60)
+    theirs = (MissionItem(command=16, lat_e7=511_010_000, lon_e7=-13_000_000), MissionItem(command=20))
+    world.set_mode(Mode.MANUAL)
+    world.run(5)
+    world.install(theirs)
+    world.set_mode(Mode.AUTO)
+    world.run(60)
+    assert world.mission == theirs
+    assert world.state.phase is Phase.OPERATOR
+    assert "not ours" in world.state.why
+    world.events.append(OperatorWish.REPLACE_FOREIGN)
+    assert world.run(1500, is_done)
+
+
+def test_a_mission_changed_under_way_is_noticed_and_left_alone():
+    world = make()
+    world.run(60)
+    theirs = (MissionItem(command=16, lat_e7=511_010_000, lon_e7=-13_000_000), MissionItem(command=20))
+    world.install(theirs)
+    world.events.append(StatusText(t_s=world.t, severity=6, text="Flight plan received"))
+    uploads = world.count(act.UploadMission)
+    world.run(60)
+    assert world.state.foreign
+    assert world.count(act.UploadMission) == uploads
+    assert said(world, "foreign mission")
+
+
+def test_a_foreign_mission_is_not_resumed_at_the_start():
+    theirs = (MissionItem(command=16, lat_e7=511_010_000, lon_e7=-13_000_000), MissionItem(command=20))
+    world = make(mission=theirs, seq=1)
+    world.run(60)
+    assert world.mission == theirs
+    assert not world.armed
+    assert "not ours" in world.state.why
+    allowed = make(mission=theirs, seq=1, permissions=Permissions(
+        may_upload=True, may_set_mode=True, may_arm=True, may_replace_foreign=True))
+    assert allowed.run(1500, is_done)
+
+
+def test_hold_by_wish_and_go_on():
+    world = make()
+    world.run(60)
+    world.events.append(OperatorWish.HOLD)
+    world.run(90)
+    assert world.state.phase is Phase.HOLDING
+    assert len(effective(world.mission)) == world.seq
+    world.events.append(OperatorWish.GO_ON)
+    assert world.run(1500, is_done)
+
+
+# ----------------------------------------------------------------------------------- restart, reboot
+@pytest.mark.parametrize("when", range(1, 60, 4))
+def test_killed_at_any_moment_it_goes_on_without_an_upload(when):
+    world = make(wind=lambda t: (0.0, 5.0))
+    world.run(when)
+    mission, uploads = world.mission, world.count(act.UploadMission)
+    restarted(world)
+    if mission:
+        world.run(8)
+        assert world.state.route is not None
+        assert world.count(act.UploadMission) == uploads
+        assert is_same_mission(world.mission, mission)
+        assert said(world, "adopted")
+    assert world.run(1500, is_done)
+    assert world.clearance() > world.skipper.config.margin_floor_m
+
+
+def test_killed_in_the_middle_of_an_upload_the_mixture_is_put_right():
+    world = make(uploads_fail=lambda n: UploadResult.TIMEOUT if n == 2 else UploadResult.OK)
+    killed = []
+
+    def at_mixture(w):
+        if w.uploads == 2 and not killed:
+            killed.append(w.t)
+            restarted(w)
+        return is_done(w)
+
+    assert world.run(1800, at_mixture)
+    assert killed
+    assert world.clearance() > world.skipper.config.margin_floor_m
+
+
+@pytest.mark.parametrize("result", [UploadResult.TIMEOUT, UploadResult.REFUSED, UploadResult.MISMATCH,
+                                    UploadResult.LINK])
+def test_failed_uploads_are_looked_at_and_made_good(result):
+    world = make(uploads_fail=lambda n: result if n in {2, 3, 5} else UploadResult.OK)
+    assert world.run(1800, is_done)
+    assert said(world, "upload failed")
+    route = world.state.route
+    assert route is not None
+    assert is_same_mission(world.mission, route.items)
+
+
+def test_a_state_of_another_voyage_is_not_used():
+    world = make()
+    world.run(30)
+    saved = world.skipper.persisted(world.state)
+    other = skipper(voyage(GOAL, obstacles=ISLANDS))
+    stale = type(saved)(voyage="another", gate=0, sailing=True, route=saved.route, pending=None)
+    world.skipper, world.state = other, other.initial(stale)
+    world.pending = []
+    world.run(30)
+    assert "not ours" in world.state.why
+
+
+def test_the_autopilot_reboots_under_way():
+    world = make()
+    world.run(80)
+    world.boot_s -= 150.0
+    world.armed, world.mode = False, Mode.MANUAL
+    world.events.append(AutopilotRebooted())
+    uploads = world.count(act.UploadMission)
+    assert world.run(30, lambda w: w.armed and w.mode is Mode.AUTO)
+    assert world.count(act.UploadMission) == uploads
+    assert world.run(1500, is_done)
+
+
+def test_after_a_reboot_without_permission_it_waits():
+    world = make()
+    world.run(80)
+    world.boot_s -= 150.0
+    world.armed, world.mode, world.permissions = False, Mode.MANUAL, Permissions(may_upload=True)
+    world.run(60)
+    assert not world.armed
+    assert world.state.phase is Phase.WAITING
+    assert "operator" in world.state.why
+
+
+# -------------------------------------------------------------------------------------- nothing found
+def test_nothing_found_climbs_down_the_ladder_and_backs_off():
+    world = make(planner=lambda problem, seed: None)
+    world.run(1800)
+    asked = world.count(act.RequestPlan)
+    assert 10 < asked < 120
+    assert said(world, "no plan at all")
+    assert world.state.phase is Phase.WAITING
+    assert "next try" in world.state.why
+
+
+def test_an_old_plan_that_is_sound_stays_when_nothing_better_is_found():
+    world = make(wind=lambda t: (0.0, 5.0))
+    assert world.run(60, is_sailing)
+    world.planner = lambda problem, seed: None
+    assert world.run(1500, is_done)
+    assert said(world, "no plan")
+    assert world.count(act.UploadMission) == 1
+
+
+def test_a_closed_way_ends_in_a_named_hold():
+    wall = (box(-400, 150, 400, 200),)
+    world = make(obstacles=wall, voyage={"limits": box(-300, -100, 300, 600)})
+    world.run(300)
+    assert said(world, "ladder 0")
+    assert world.state.phase in {Phase.WAITING, Phase.HOLDING}
+    assert world.clearance() > world.skipper.config.margin_floor_m
+
+
+def test_a_way_that_opens_only_at_the_floor_is_sailed_with_less_margin():
+    gate = (box(-300, 150, -12, 200), box(12, 150, 300, 200))
+    world = make(Goal(en_m=(0.0, 300.0), radius_m=6.0), obstacles=gate, wind=lambda t: (math.pi / 2, 5.0),
+                 voyage={"limits": box(-280, -100, 280, 500)})
+    assert world.run(900, is_done)
+    assert world.clearance() > 8.0
+    assert any("margin" in entry[2] for entry in world.log)
+
+
+# ------------------------------------------------------------------------------------------ watchdogs
+def test_the_boat_in_irons_bears_away_and_sails_on():
+    world = make(obstacles=())
+    world.run(60)
+    stuck = {"until": world.t + 14.0}
+    sail = world.sail
+
+    def held(dt):
+        if world.t < stuck["until"] and world.mode is Mode.AUTO:
+            world.heading, world.speed = world.wind(world.t)[0], 0.05
+            return
+        sail(dt)
+
+    world.sail = held
+    assert world.run(20, lambda w: w.mode is Mode.GUIDED)
+    assert any(isinstance(a, act.SteerHeading) for _, a in world.actions)
+    assert world.run(40, lambda w: w.mode is Mode.AUTO)
+    assert world.state.phase is not Phase.OPERATOR
+    assert world.run(1500, is_done)
+
+
+def test_becalmed_it_waits_without_plans_and_sails_on():
+    world = make(wind=lambda t: (0.0, 5.0 if t < 60.0 or t > 600.0 else 0.2))
+    world.run(200)
+    assert any(r.name == "becalmed" for r in world.state.raised)
+    asked = world.count(act.RequestPlan)
+    world.run(300)
+    assert world.count(act.RequestPlan) == asked
+    assert world.run(2000, is_done)
+
+
+def test_a_position_jump_into_an_island_moves_no_plan():
+    world = make()
+    world.run(60)
+    asked = world.count(act.RequestPlan)
+    world.position_offset = (-world.position[0], 140.0 - world.position[1])
+    world.step()
+    world.position_offset = (0.0, 0.0)
+    world.step()
+    assert any(r.name == "position jump" for r in world.state.raised)
+    world.run(3)
+    assert world.count(act.RequestPlan) == asked
+    assert world.run(1500, is_done)
+    assert world.clearance() > world.skipper.config.margin_floor_m
+
+
+def test_an_untrusted_wind_changes_no_plan():
+    world = make()
+    world.run(60)
+    world.wind_health = WindHealth.UNTRUSTED
+    world.run(10)
+    asked = world.count(act.RequestPlan)
+    world.run(30)
+    assert world.count(act.RequestPlan) == asked
+    assert "wind untrusted" in world.state.why
+    world.wind_health = WindHealth.GOOD
+    assert world.run(1500, is_done)
+
+
+@pytest.mark.parametrize("seconds", [3, 30])
+def test_a_silent_link_means_no_actions(seconds):
+    world = make()
+    world.run(60)
+    before = len(world.actions)
+    for n in range(seconds):
+        world.heartbeat_age = 3.1 + n
+        world.step()
+    assert all(isinstance(a, (act.Announce, act.CancelPlan)) for _, a in world.actions[before:])
+    world.heartbeat_age = 0.2
+    assert world.run(1500, is_done)
+
+
+def test_without_a_next_plan_it_loiters_and_goes_on_when_there_is_one():
+    goals = [Goal(en_m=(150.0, 0.0), radius_m=6.0), Goal(en_m=(150.0, 150.0), radius_m=6.0)]
+    world = make(*goals, obstacles=(), wind=lambda t: (math.radians(-45), 5.0))
+    assert world.run(30, is_sailing)
+    world.planner = lambda problem, seed: None
+    world.run(150)
+    assert world.state.phase is Phase.HOLDING
+    assert distance_m(world.position, (150.0, 0.0)) < 20.0
+    world.planner = None
+    assert world.run(900, is_done)
+
+
+def test_a_critical_battery_goes_to_the_refuge():
+    from dataclasses import replace
+
+    world = make(obstacles=(), voyage={"refuges": ((120.0, 60.0),)})
+    world.run(60)
+    snapshot = world.snapshot
+
+    def low():
+        made = snapshot()
+        return replace(made, autopilot=replace(made.autopilot, battery_remaining=0.05))
+
+    world.snapshot = low
+    assert world.run(300, lambda w: distance_m(w.position, (120.0, 60.0)) < 12.0)
+    world.run(60)
+    assert distance_m(world.position, (120.0, 60.0)) < 25.0
