@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from companion.planner.kernels import Boat, Floats, Grid, is_free, jit, track, walk, worst_half
 from companion.planner.moves import corner, fit_corners, kind_of
 
-MOST_POINTS = 400
+MOST_POINTS = 1200
 
 
 @jit
@@ -243,11 +243,12 @@ def propose(
 @jit
 def anneal(
     g: Grid, b: Boat, points: Floats, h0: float, goal: Floats, size: float, spots: Floats, rounds: int,
-    hot: float, cold: float, rng: NDArray[np.uint64],
+    hot: float, cold: float, price: float, rng: NDArray[np.uint64],
 ) -> tuple[float, Floats, float, Floats]:
     """Anneal for ``rounds`` moves from temperature ``hot`` to ``cold`` [s]; the path must be feasible.
 
-    Returns (best cost, best points, last cost, last points).
+    Every point costs ``price`` [s] besides, so that a leg has to earn its place. Returns (best cost, best points,
+    last cost, last points), costs without the price.
     """
     n = points.shape[0]
     xs, ys = np.empty(MOST_POINTS + 4), np.empty(MOST_POINTS + 4)
@@ -257,6 +258,7 @@ def anneal(
         xs[i], ys[i] = points[i, 0], points[i, 1]
         bx[i], by[i] = xs[i], ys[i]
     cost = walk(b, xs, ys, n, h0)
+    cost += price * n
     best, bn = cost, n
     ratio = (cold / hot) ** (1.0 / max(1, rounds))
     heat = hot
@@ -268,10 +270,10 @@ def anneal(
         if cn < 2:
             continue
         limit = cost - heat * math.log(1.0 - uniform(rng))
-        new = walk(b, cx, cy, cn, h0)
+        new = walk(b, cx, cy, cn, h0) + price * cn
         if new == math.inf and b.kind != 0:
             fit_corners(b, cx, cy, cn, h0, 1, False)
-            new = walk(b, cx, cy, cn, h0)
+            new = walk(b, cx, cy, cn, h0) + price * cn
         if new > limit or collides(g, cx, cy, cn, xs, ys, n):
             continue
         cost, n = new, cn
@@ -286,7 +288,7 @@ def anneal(
         out[i, 0], out[i, 1] = bx[i], by[i]
     for i in range(n):
         last[i, 0], last[i, 1] = xs[i], ys[i]
-    return best, out, cost, last
+    return best - price * bn, out, cost - price * n, last
 
 
 @jit
@@ -341,3 +343,61 @@ def zigzag(
                 return out, now, course, True
         parts = parts + 1 if parts < 4 else parts + parts // 2
     return empty, t, h, False
+
+
+@jit
+def follow(
+    g: Grid, b: Boat, ax: float, ay: float, h: float, t: float, ex: float, ey: float, deepest: int
+) -> tuple[Floats, float, float, bool]:
+    """Return (points after a, arrival time, TWA on arrival, ok): a sailable path close along the segment a to e.
+
+    Direct, or one corner either way, or else each half of the segment in the same manner: tacks get as short as
+    the room needs, and only where it needs it.
+    """
+    out = np.empty((2 << deepest, 2))
+    count = 0
+    stack = np.empty((64, 3))
+    top = 1
+    stack[0, 0], stack[0, 1], stack[0, 2] = ex, ey, 0.0
+    x, y = ax, ay
+    while top > 0:
+        qx, qy, depth = stack[top - 1, 0], stack[top - 1, 1], stack[top - 1, 2]
+        dx, dy = qx - x, qy - y
+        d = math.hypot(dx, dy)
+        if d < 1e-9:
+            top -= 1
+            continue
+        a, v = track(b, dx, dy, t)
+        done = False
+        if v > 1e-9 and abs(a) <= b.max_twa:
+            dh = abs(a - h)
+            t1 = t + min(dh, 2.0 * math.pi - dh) / b.omega
+            if abs(a) >= worst_half(b, t1, t1 + d / v) and is_free(g, x, y, qx, qy):
+                t, h, done = t1 + d / v, a, True
+        if not done:
+            first = 0 if dy > 0.0 else 2
+            keep = 1 if h < 0.0 else 0
+            for way in range(2):
+                w = (keep + way) % 2
+                mx, my, t2, ok = corner(b, x, y, h, t, qx, qy, first + w, first + 1 - w)
+                if ok and is_free(g, x, y, mx, my) and is_free(g, mx, my, qx, qy):
+                    if count >= out.shape[0] - 2:
+                        return np.empty((0, 2)), t, h, False
+                    out[count, 0], out[count, 1] = mx, my
+                    count += 1
+                    t, h, done = t2, math.atan2(qx - mx, qy - my), True
+                    break
+        if done:
+            if count >= out.shape[0] - 1:
+                return np.empty((0, 2)), t, h, False
+            out[count, 0], out[count, 1] = qx, qy
+            count += 1
+            x, y = qx, qy
+            top -= 1
+            continue
+        if depth >= deepest or top >= 63:
+            return np.empty((0, 2)), t, h, False
+        stack[top - 1, 2] = depth + 1.0
+        stack[top, 0], stack[top, 1], stack[top, 2] = 0.5 * (x + qx), 0.5 * (y + qy), depth + 1.0
+        top += 1
+    return out[:count].copy(), t, h, True

@@ -36,8 +36,8 @@ def turning_s(world: World) -> float:
     if b.cx != 0.0 or b.cy != 0.0 or d <= world.goal_radius:
         return 0.0
     course, spread = math.atan2(gx, gy), math.asin(min(1.0, world.goal_radius / d))
-    least = max(0.0, world.problem.no_go_min_rad - NO_GO_SLACK_RAD)
-    most = min(math.pi, b.max_twa + NO_GO_SLACK_RAD)
+    least = max(0.0, world.problem.no_go_min_rad)
+    most = min(math.pi, b.max_twa)
 
     def apart(a: float, c: float) -> float:
         return abs((a - c + math.pi) % (2.0 * math.pi) - math.pi)
@@ -114,9 +114,15 @@ class Bound:
         self.is_exact = False
 
     @property
-    def value_s(self) -> float:
-        """The bound [s]; inf proves that there is no path."""
+    def tight_s(self) -> float:
+        """Bound for paths that do not use the scorer's angular slack, as this planner's do not [s]."""
         return max(self.metric_s, self.progress_s) + self.turning_s
+
+    @property
+    def value_s(self) -> float:
+        """Bound for every path that the scorer passes [s]; inf proves that there is none."""
+        turning = max(0.0, self.turning_s - 4.0 * NO_GO_SLACK_RAD / self.world.boat.omega)
+        return max(self.metric_s / self.gauge.slack, self.progress_s) + turning
 
     def sharpen(self, upper_s: float, tests: int) -> int:
         """Search the visibility graph with at most about ``tests`` visibility tests; return those made."""
@@ -127,7 +133,7 @@ class Bound:
         limit = upper_s - self.turning_s if math.isfinite(upper_s) else math.inf
         nodes = graph_nodes(world.corners, gauge, (*world.goal, world.goal_radius), limit)
         _, parent, low, end, made = geodesics(
-            world.grid, nodes, gauge.normals, gauge.blocked, gauge.table, goal, False, limit, tests
+            world.grid, nodes, gauge.normals, gauge.blocked, gauge.table, goal, 0, limit, tests
         )
         found = end >= 0 and made <= tests
         if end >= 0:

@@ -2,7 +2,7 @@
 
 With velocities V = {v(a) (sin a, cos a) : a allowed} the least time over a displacement d, turning apart, is the
 gauge γ(d) = min {t : d ∈ t conv(V ∪ 0)}: any mixture of courses is a mean velocity in the hull. The no-go zone is
-taken at its narrowest, so γ bounds from below at every time. The hull is made of samples pushed out by one part
+taken at its narrowest, so γ bounds from below at every time. The hull is made of samples pushed out by two parts
 in a million, more than a chord can cut off, so the bound stays a bound.
 """
 
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from companion.planner.kernels import Floats, jit
-from companion.planner.problem import Problem
+from companion.planner.problem import NO_GO_SLACK_RAD, Problem
 
-_SAMPLES = 7200
-_OUT = 1.0 + 1e-6
+_SAMPLES = 1800
+_OUT = 1.0 + 2e-6
 _TABLE = 2048
 
 
@@ -27,7 +27,7 @@ class Gauge:
 
     ``table`` is a lower bound of γ of the unit vector by direction [s/m], for look-up; ``blocked`` (k, 2) are unit
     directions in which no progress is possible at all (empty for a boat that can beat). ``can_move`` is False when
-    no course is allowed.
+    no course is allowed. ``slack`` is by how much a path that uses the scorer's angular slack may beat the metric.
     """
 
     normals: Floats
@@ -36,6 +36,7 @@ class Gauge:
     blocked: Floats
     least_half_rad: float
     can_move: bool
+    slack: float = 1.0
 
     def disc(self, dx: float, dy: float, radius_m: float) -> float:
         """Return the least time [s] to come within ``radius_m`` of the displacement (dx, dy); inf if it cannot."""
@@ -58,22 +59,41 @@ def disc_time(normals: Floats, blocked: Floats, dx: float, dy: float, radius: fl
     return best
 
 
+@jit
+def _chain(order: Floats) -> Floats:
+    """Return one half of the convex hull of points sorted by x (Andrew's monotone chain), last point left out."""
+    out = np.empty_like(order)
+    n = 0
+    for i in range(order.shape[0]):
+        x, y = order[i, 0], order[i, 1]
+        while n > 1:
+            ax, ay, bx, by = out[n - 2, 0], out[n - 2, 1], out[n - 1, 0], out[n - 1, 1]
+            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                break
+            n -= 1
+        out[n, 0], out[n, 1] = x, y
+        n += 1
+    return out[: n - 1].copy()
+
+
 def _hull(points: Floats) -> Floats:
-    """Return the convex hull counter-clockwise (Andrew's monotone chain)."""
-    order = points[np.lexsort((points[:, 1], points[:, 0]))]
+    """Return the convex hull counter-clockwise."""
+    order = np.ascontiguousarray(points[np.lexsort((points[:, 1], points[:, 0]))])
+    return np.vstack([_chain(order), _chain(np.ascontiguousarray(order[::-1]))])
 
-    def chain(sequence: Floats) -> list[Floats]:
-        out: list[Floats] = []
-        for q in sequence:
-            while len(out) > 1:
-                (ax, ay), (bx, by) = out[-2], out[-1]
-                if (bx - ax) * (q[1] - ay) - (by - ay) * (q[0] - ax) > 0.0:
-                    break
-                out.pop()
-            out.append(q)
-        return out[:-1]
 
-    return np.asarray(chain(order) + chain(order[::-1]))
+@jit
+def _tabulate(normals: Floats, size: int) -> Floats:
+    """Return max(normals @ u) for unit vectors u at the ``size`` + 1 directions of a table over [-π, π]."""
+    out = np.zeros(size + 1)
+    for i in range(size + 1):
+        a = -math.pi + 2.0 * math.pi * i / size
+        x, y = math.sin(a), math.cos(a)
+        best = 0.0
+        for k in range(normals.shape[0]):
+            best = max(best, normals[k, 0] * x + normals[k, 1] * y)
+        out[i] = best
+    return out
 
 
 def velocities(p: Problem, half_rad: float) -> Floats:
@@ -82,7 +102,7 @@ def velocities(p: Problem, half_rad: float) -> Floats:
     if half_rad > top:
         return np.empty((0, 2))
     nodes = np.asarray([a for a in p.boat.polar_twa_rad if half_rad <= a <= top], np.float64)
-    a = np.unique(np.concatenate([np.linspace(half_rad, top, _SAMPLES // 2), nodes]))
+    a = np.unique(np.concatenate([np.linspace(half_rad, top, _SAMPLES), nodes]))
     v = np.interp(a, p.boat.polar_twa_rad, p.boat.polar_mps) * _OUT
     drift = p.current.set_rad - p.wind.twd_from_rad
     half = np.column_stack([v * np.sin(a), v * np.cos(a)])
@@ -112,15 +132,29 @@ def make_gauge(p: Problem) -> Gauge:
     open_ = support > 1e-7 * fast
     normals = np.ascontiguousarray(unit[open_] / support[open_][:, None])
     blocked = np.ascontiguousarray(unit[~open_])
-    edges_at = np.linspace(-math.pi, math.pi, _TABLE + 1)
-    directions = np.column_stack([np.sin(edges_at), np.cos(edges_at)])
-    values = np.maximum(0.0, (directions @ normals.T).max(axis=1)) if len(normals) else np.zeros(_TABLE + 1)
+    thin = _thin(normals)
+    values = _tabulate(thin, _TABLE)
     # Between two table directions the convex γ may dip below both by about |γ| Δ²: taken off.
     table = np.minimum(values[:-1], values[1:]) * (1.0 - 2e-5)
     steepest = float(np.max(np.hypot(normals[:, 0], normals[:, 1]))) if len(normals) else 0.0
     dip = steepest * (2.0 * math.pi / _TABLE) ** 2
-    return Gauge(normals=_thin(normals), table=np.maximum(0.0, table - dip), table_max=steepest, blocked=blocked,
-                 least_half_rad=least, can_move=True)
+    return Gauge(normals=thin, table=np.maximum(0.0, table - dip), table_max=steepest, blocked=blocked,
+                 least_half_rad=least, can_move=True, slack=_slack(p, thin, least))
+
+
+def _slack(p: Problem, normals: Floats, least_rad: float) -> float:
+    """Return the largest gauge of the velocities within the angular slack of the limits, at least 1."""
+    top = min(p.boat.max_twa_rad, math.pi)
+    angles = np.array([max(0.0, least_rad - NO_GO_SLACK_RAD * f) for f in (1.0, 0.5)]
+                      + [min(math.pi, top + NO_GO_SLACK_RAD * f) for f in (1.0, 0.5)])
+    v = np.interp(angles, p.boat.polar_twa_rad, p.boat.polar_mps)
+    drift = p.current.set_rad - p.wind.twd_from_rad
+    worst = 1.0
+    for sign in (1.0, -1.0):
+        q = np.column_stack([sign * v * np.sin(angles), v * np.cos(angles)])
+        q = q + p.current.drift_mps * np.array([math.sin(drift), math.cos(drift)])
+        worst = max(worst, float(np.max(q @ normals.T)) if len(normals) else 1.0)
+    return worst * (1.0 + 1e-7)
 
 
 def _thin(normals: Floats) -> Floats:

@@ -26,16 +26,17 @@ def _time(normals: Floats, dx: float, dy: float) -> float:
 
 @jit
 def geodesics(
-    g: Grid, nodes: Floats, normals: Floats, blocked: Floats, table: Floats, goal: Floats, backward: bool,
+    g: Grid, nodes: Floats, normals: Floats, blocked: Floats, table: Floats, goal: Floats, mode: int,
     bound: float, budget: int,
 ) -> tuple[Floats, Ints, float, int, int]:
     """Search the visibility graph over ``nodes`` (node 0 is the start) with the gauge as the cost.
 
-    Forward: from the start, with the distance to the goal's disc as heuristic, until the disc is reached.
-    Backward: from the goal's disc to every node (no heuristic). Corners whose least time through them exceeds
+    Mode 0: from the start until the goal's disc is reached, with the distance to it as heuristic. Mode 1: from the
+    start to every node. Mode 2: from every node to the goal's disc. Corners whose least time through them exceeds
     ``bound`` are left out; ``budget`` counts visibility tests. Returns (cost to each node, parent of each node,
     -1 for the root, lower bound on the shortest path, the node before the goal or -1, tests made).
     """
+    backward = mode == 2
     n = nodes.shape[0]
     cost = np.full(n, np.inf)
     parent = np.full(n, -1, np.int32)
@@ -63,13 +64,14 @@ def geodesics(
         cost[0] = 0.0
         state[0] = 0
     while True:
+        limit = min(bound, end_cost) if mode == 0 else bound
         best, k = math.inf, -1
         for i in range(n):
             if state[i] == 0 and cost[i] < math.inf:
                 f = cost[i] + (from_start[i] if backward else to_go[i])
                 if f < best:
                     best, k = f, i
-        if k < 0 or (not backward and best >= end_cost) or best > bound:
+        if k < 0 or (mode == 0 and best >= end_cost) or best > bound:
             return cost, parent, (min(end_cost, best) if not backward else 0.0), end, tests
         if tests > budget:
             return cost, parent, (min(end_cost, best) if not backward else 0.0), end, tests
@@ -85,6 +87,7 @@ def geodesics(
                 or disc_open(g, nodes[k, 0], nodes[k, 1], goal)
             ):
                 end, end_cost = k, best
+                limit = min(bound, end_cost)
         for i in range(n):
             if state[i] != 0:
                 continue
@@ -93,7 +96,7 @@ def geodesics(
                 dx, dy = -dx, -dy
             c = int((math.atan2(dx, dy) + math.pi) / (2.0 * math.pi) * n_table) % n_table
             low = cost[k] + table[c] * math.hypot(dx, dy)
-            if low >= cost[i] or low + (from_start[i] if backward else to_go[i]) > min(bound, end_cost):
+            if low >= cost[i] or low + (from_start[i] if backward else to_go[i]) > limit:
                 continue
             new = cost[k] + _time(normals, dx, dy)
             if new >= cost[i]:
@@ -130,3 +133,18 @@ def graph_nodes(corners: Floats, gauge: Gauge, goal: tuple[float, float, float],
 def _table_time(gauge: Gauge, d: Floats) -> Floats:
     cell = ((np.arctan2(d[:, 0], d[:, 1]) + math.pi) / (2.0 * math.pi) * len(gauge.table)).astype(int)
     return np.asarray(gauge.table[cell % len(gauge.table)] * np.hypot(d[:, 0], d[:, 1]), np.float64)
+
+
+@jit
+def crossings(points: Floats, marks: Floats) -> Ints:
+    """Return how often the path passes below each mark, eastward minus westward: which side it takes of each."""
+    out = np.zeros(marks.shape[0], np.int32)
+    for k in range(marks.shape[0]):
+        x, y = marks[k, 0], marks[k, 1]
+        for i in range(points.shape[0] - 1):
+            ax, bx = points[i, 0], points[i + 1, 0]
+            if (ax <= x) != (bx <= x):
+                f = (x - ax) / (bx - ax)
+                if points[i, 1] + f * (points[i + 1, 1] - points[i, 1]) < y:
+                    out[k] += 1 if bx > ax else -1
+    return out

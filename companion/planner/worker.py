@@ -50,6 +50,7 @@ class InlinePlanner:
     def __init__(self, *, virtual_s: float = 1.0, expansions: int = 60_000) -> None:
         self.virtual_s, self.expansions = virtual_s, expansions
         self.is_alive = True
+        self.restarts = 0
 
     async def __aenter__(self) -> Self:
         """Nothing to start."""

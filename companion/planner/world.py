@@ -19,18 +19,31 @@ SIGMA_KINDS = {"none": 0, "kalman": 1, "ar1": 2, "forecast": 3}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class World:
-    """The problem in the wind frame (see kernels.py). ``corners`` are the solid's convex vertices (m, 2)."""
+    """The problem in the wind frame (see kernels.py).
+
+    ``corners`` are the solid's convex vertices (m, 2), ``outward`` their
+    bisectors into the water, ``marks`` one inner point of each obstacle (k, 2).
+    """
 
     problem: Problem
     grid: Grid
     boat: Boat
     corners: Floats
+    outward: Floats
+    marks: Floats
     goal: tuple[float, float]
     goal_radius: float
     h0: float
     box: tuple[float, float, float, float]
     fence_box: bool
+    solids: tuple[shapely.Geometry, ...]
     free: shapely.Geometry | None
+
+    def is_open(self, en: tuple[float, float]) -> bool:
+        """Is the point of the problem's frame in free water? A quick look; False may also mean: on a boundary."""
+        if self.free is not None and not shapely.contains_xy(self.free, *en):
+            return False
+        return not (self.solids and bool(np.any(shapely.intersects_xy(np.asarray(self.solids), *en))))
 
     def to_wind(self, en: NDArray[np.float64]) -> Floats:
         """Return points (n, 2) of the problem in the wind frame."""
@@ -90,14 +103,15 @@ def merged_solids(p: Problem) -> tuple[list[shapely.Geometry], shapely.Geometry 
     return inside, fence
 
 
-def boundary_edges(rings: list[NDArray[np.float64]]) -> tuple[Floats, Floats]:
-    """Return (segments (m, 4) moved into the solid, the solid's convex corners (k, 2)).
+def boundary_edges(rings: list[NDArray[np.float64]]) -> tuple[Floats, Floats, Floats]:
+    """Return (segments (m, 4) moved into the solid, the solid's convex corners (k, 2), their outward bisectors).
 
     Each ring is closed, (n + 1, 2), and has the solid on its left. A vertex moves along its bisector so that both
     edges move by SKIN_M, at most 20 times that at a spike and never by more than a quarter of its shorter edge.
     """
     edges: list[Floats] = []
     corners: list[Floats] = []
+    outward: list[Floats] = []
     for ring in rings:
         q = ring[:-1]
         step = np.roll(q, -1, axis=0) - q
@@ -118,10 +132,12 @@ def boundary_edges(rings: list[NDArray[np.float64]]) -> tuple[Floats, Floats]:
         moved = q + shift
         edges.append(np.hstack([moved, np.roll(moved, -1, axis=0)]))
         turn = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
-        corners.append(q[turn > 1e-9])
+        convex = turn > 1e-9
+        corners.append(q[convex])
+        outward.append(-(both / np.maximum(np.hypot(both[:, 0], both[:, 1]), 1e-12)[:, None])[convex])
     if not edges:
-        return np.empty((0, 4)), np.empty((0, 2))
-    return np.ascontiguousarray(np.vstack(edges)), np.ascontiguousarray(np.vstack(corners))
+        return np.empty((0, 4)), np.empty((0, 2)), np.empty((0, 2))
+    return tuple(np.ascontiguousarray(np.vstack(a)) for a in (edges, corners, outward))  # type: ignore[return-value]
 
 
 def _rings(p: Problem, solids: list[shapely.Geometry], fence: shapely.Geometry | None) -> list[NDArray[np.float64]]:
@@ -193,7 +209,8 @@ def _constant_base(p: Problem) -> float:
 def make_world(p: Problem) -> World:
     """Return ``p`` ready for the search. ``p.defect`` must be None."""
     solids, fence = merged_solids(p)
-    edges, corners = boundary_edges(_rings(p, solids, fence))
+    edges, corners, outward = boundary_edges(_rings(p, solids, fence))
+    marks = np.asarray([(q.x, q.y) for q in (g.representative_point() for g in solids)]).reshape(-1, 2)
     goal = to_wind(p, np.asarray([p.goal_en]))[0]
     points = np.vstack([np.zeros((1, 2)), goal[None, :]])
     if len(edges):
@@ -201,8 +218,9 @@ def make_world(p: Problem) -> World:
     x0, y0 = points.min(axis=0)
     x1, y1 = points.max(axis=0)
     return World(
-        problem=p, grid=make_grid(edges), boat=make_boat(p), corners=corners, goal=(float(goal[0]), float(goal[1])),
+        problem=p, grid=make_grid(edges), boat=make_boat(p), corners=corners, outward=outward,
+        marks=np.ascontiguousarray(to_wind(p, marks)), goal=(float(goal[0]), float(goal[1])),
         goal_radius=p.goal_radius_m,
         h0=(p.start_heading_rad - p.wind.twd_from_rad + math.pi) % (2.0 * math.pi) - math.pi,
-        box=(float(x0), float(y0), float(x1), float(y1)), fence_box=fence is not None, free=fence,
+        box=(float(x0), float(y0), float(x1), float(y1)), fence_box=fence is not None, solids=tuple(solids), free=fence,
     )
