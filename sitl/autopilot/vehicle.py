@@ -64,6 +64,8 @@ class Vehicle:
         self.state[k.S_MOORED] = float(is_moored)
         self.state[k.S_TACK_END] = -k.TACK_RETRY_S
         self.load_parameters()
+        # compiles the kernel, or loads it, now rather than in the middle of a voyage in real time
+        k.advance(self.state, self._settings, np.zeros((1, 2)), 0, _NONE, 0)
 
     # ------------------------------------------------------------------------------------------- time
     def load_parameters(self) -> None:
