@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from companion.errors import InputError
+from companion.wind.arma import Arma
 from companion.wind.estimator import Estimator
 from companion.wind.forecaster import Forecaster
+from companion.wind.garch import Garch
+from companion.wind.kalman import AdaptiveKalman
+from companion.wind.means import RollingMean
 from companion.wind.ou import OrnsteinUhlenbeck
 
 __all__ = ["NAMES", "Forecaster", "make"]
 
 _MAKERS: dict[str, Callable[..., Estimator]] = {
     "default": Forecaster,
+    "kalman": AdaptiveKalman,
     "ou": OrnsteinUhlenbeck,
+    "arma": Arma,
+    "garch": Garch,
+    "mean90": partial(RollingMean, window_s=90.0),
+    "mean5": partial(RollingMean, window_s=5.0),
 }
 
 NAMES = tuple(_MAKERS)

@@ -23,7 +23,7 @@ from companion.messages import WindForecast
 HORIZONS_S = (0.0, 1.0, 3.0, 10.0, 20.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 450.0, 600.0, 900.0, 1800.0, 3600.0)
 LEVELS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.99)
 
-SIGMA_MAX_RAD = 1.9     # [rad] about 109 deg: a normal this wide, wrapped, is uniform on the circle
+SIGMA_MAX_RAD = math.pi   # [rad] a normal this wide, wrapped, is uniform on the circle
 SIGMA_MIN_RAD = 1e-4
 _RESTART_S = 10.0       # [s] a clock that steps back further than this has been restarted
 _NORMAL = NormalDist()
