@@ -80,6 +80,7 @@ class SailOptions:
         limit_s: end after this long [s].
         wait_s: how long to wait for the autopilot's first heartbeat [s].
         offload: where disk work is done.
+        is_durable: force files to the disk, against power cuts; a simulation has none.
         signing: key and timestamp for a signed link.
         budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
         command: what was typed, for the record.
@@ -93,6 +94,7 @@ class SailOptions:
     limit_s: float | None = None
     wait_s: float = 30.0
     offload: Offload = in_thread
+    is_durable: bool = True
     signing: SigningStore | None = None
     budget_scale: float = 1.0
     command: str = ""
@@ -241,7 +243,8 @@ class _Shell:
         if persisted != self._persisted:
             self._persisted = persisted
             data = json.dumps(persisted.to_dict()).encode()
-            await self.options.offload(lambda: write_atomically(self.state_path, data))
+            await self.options.offload(lambda: write_atomically(
+                self.state_path, data, is_durable=self.options.is_durable))
         if self.on_status is not None:
             self.on_status(self.status, step)
 
@@ -269,7 +272,8 @@ class _Shell:
     async def _sync(self) -> None:
         while True:
             await asyncio.sleep(SYNC_EVERY_S)
-            await self.options.offload(self.recorder.sync)
+            if self.options.is_durable:
+                await self.options.offload(self.recorder.sync)
 
     # ---------------------------------------------------------------------------------------- files
     def _load_state(self) -> Persisted | None:

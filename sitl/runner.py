@@ -140,7 +140,7 @@ async def _sail_and_restart(
     kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
     deadline_s = now_s() + scenario.limit_s
     options = SailOptions(
-        seed=seed, epoch_s=EPOCH_S, expansions=expansions, offload=at_once, state_path=folder / "state.json",
+        seed=seed, epoch_s=EPOCH_S, expansions=expansions, offload=at_once, is_durable=False, state_path=folder / "state.json",
         command=f"sitl run {scenario.name}",
     )
 

@@ -38,13 +38,14 @@ TRACK_COLUMNS = (
 )
 
 
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write ``data`` to ``path`` whole or not at all: a new file beside it, synced, renamed."""
+def write_atomically(path: Path, data: bytes, *, is_durable: bool = True) -> None:
+    """Write ``data`` to ``path`` whole or not at all: a new file beside it, synced if durable, renamed."""
     beside = path.with_name(path.name + ".new")
     with beside.open("wb") as file:
         file.write(data)
         file.flush()
-        os.fsync(file.fileno())
+        if is_durable:
+            os.fsync(file.fileno())
     beside.replace(path)
 
 
