@@ -1,14 +1,13 @@
 """The watchdogs: what can go wrong under way, as one table of data, and the conditions behind it.
 
 Each row has an entry (a condition that holds for ``enter_s``), an exit (its opposite, with a hysteresis, for
-``exit_s``) and a response. ``python -m companion.skipper.watchdogs`` prints docs/watchdogs.md from the table.
+``exit_s``) and a response. ``python -m companion.skipper.document`` prints docs/watchdogs.md from the table.
 """
 
 from __future__ import annotations
 
 import enum
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -298,34 +297,3 @@ def _is_under_way(turn: Turn) -> bool:
     return (
         turn.state.sailing and status is not None and status.is_armed and status.mode in {Mode.AUTO, own}
     )
-
-
-# ---------------------------------------------------------------------------------------- document
-def markdown() -> str:
-    """Return docs/watchdogs.md."""
-    rows = [
-        "# Watchdogs",
-        "",
-        "Made from the table in `companion/skipper/watchdogs.py` by `python -m companion.skipper.watchdogs`; a test",
-        "checks that it is current. A watchdog is raised when its figure has been at or beyond the entry threshold",
-        "for the time given, and cleared when it has been at or beyond the exit threshold (or cannot be told) for its",
-        "time.",
-        "Those marked * are watched before the boat sails, too.",
-        "",
-        "| watchdog | watches | entry | exit | says | then | why |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for dog in TABLE:
-        sign, back = ("≥", "≤") if dog.enter >= dog.exit else ("≤", "≥")
-        unit = f" {dog.unit}" if dog.unit else ""
-        rows.append(" | ".join((
-            f"| {dog.name}{'*' if dog.at_rest else ''}", dog.watches,
-            f"{sign} {dog.enter:g}{unit} for {dog.enter_s:g} s",
-            f"{back} {dog.exit:g}{unit} for {dog.exit_s:g} s", dog.severity.name.lower(), dog.response.value,
-            f"{dog.why} |",
-        )))
-    return "\n".join(rows) + "\n"
-
-
-if __name__ == "__main__":
-    sys.stdout.write(markdown())
