@@ -401,13 +401,13 @@ def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: 
         if reach is None or not shapely.covers(shapely.buffer(polygon, slack_m), reach):
             return f"the keep-in zone is not inside {zone.name or 'the limits'}"
     margin = shapely.union_all([
-        shapely.buffer(p, max(margin_m, o.margin_m or 0.0), quad_segs=64) for o, p in obstacles
+        shapely.buffer(p, max(margin_m, o.margin_m or 0.0), quad_segs=16) for o, p in obstacles
     ] or [Polygon()])
     limits, _ = _limits(area, plane, [plane.point(inside[0])])
     limits = _cut_by_rings(area, plane, [plane.point(inside[0])], limits, [])
     useful: BaseGeometry | None = None
     if limits is not None:
-        useful = shapely.buffer(limits, -margin_m, quad_segs=64)
+        useful = shapely.buffer(limits, -margin_m, quad_segs=16)
         margin = shapely.union(margin, shapely.difference(shapely.box(*limits.buffer(1e4).bounds), useful))
     for zone in zones:
         outer, _ = _shape(zone.shape, plane, cover=True)
