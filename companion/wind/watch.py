@@ -7,12 +7,15 @@ good again.
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 
-from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample
+from companion.geo.angles import wrap_pi
+from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
 from companion.wind.estimator import gain
+from companion.wind.faults import FrozenVane, Spikes, TackOffset
 from companion.wind.parameters import VaneParameters
-from companion.wind.true_wind import LIGHT_MPS, TURNING_RADPS
+from companion.wind.true_wind import LIGHT_MPS, TURNING_RADPS, apparent_wind
 
 
 class Verdict(enum.Enum):
@@ -21,7 +24,7 @@ class Verdict(enum.Enum):
     GOOD = "good"
     CALM = "calm"                        # too little wind for a direction
     TURNING = "turning"                  # in a manoeuvre: compass and vane lag
-    FROZEN = "frozen"                    # the vane does not move although the boat or the wind does
+    FROZEN = "frozen"                    # the vane does not move although the boat turns under it
     SPIKING = "spiking"                  # single readings far from their neighbours
     MISALIGNED = "misaligned"            # port and starboard tack disagree: the vane is mounted wrong
     RETURNED = "returned"                # readings are back after a gap
@@ -37,7 +40,8 @@ class WindStatus:
 
     The forecast's sigma is widened to hypot(``widening`` sigma, ``extra_sigma_rad``); ``weight`` in 0..1 is how far
     the last sample moved the estimate. ``offset_rad`` is the estimated mounting error of the vane, positive when it
-    reads too far clockwise, None when the boat has not tacked enough to tell. ``reason`` is one line of text.
+    reads too far clockwise, ``side_rad`` what it reads too wide on both tacks; None when the boat has not tacked
+    enough to tell. ``sample`` is the last sample with the quality that it was given. ``reason`` is one line of text.
     """
 
     t_s: float
@@ -49,6 +53,7 @@ class WindStatus:
     sample: WindSample | None
     age_s: float | None
     reason: str
+    side_rad: float | None = None
 
     @property
     def is_good(self) -> bool:
@@ -56,60 +61,153 @@ class WindStatus:
         return self.verdicts == (Verdict.GOOD,)
 
 
+# How far each verdict widens sigma (a factor), unless its proportion is computed.
+_GAP_S = 10.0             # [s] without a sample is a gap
+_RETURN_S = 30.0          # [s] after it during which the estimate settles
+_HELD_S = 10.0            # [s] of the very same true wind on a boat that moves
+_HELD_BLIND_S = 20.0      # [s] likewise when the boat's motion is not known
+_ZERO_S = 10.0            # [s] of a speed of exactly nothing
+_NEAR_S = 1.5             # [s] vehicle and wind of one instant
+_TURNED_S = 10.0          # [s] after a turn for which vane and compass still lag
+_INVENTED_RAD = math.radians(45.0)
+_ASSUMED_MPS = 3.0        # [m/s] wind assumed where there is no speed, to bound what the boat's own motion hides
+
+
 class WindWatch:
     """Judges samples. Feed it everything: ``vehicle``, ``apparent``, ``judge`` in order of time."""
 
     def __init__(self, parameters: VaneParameters | None = None) -> None:
         self.parameters = parameters or VaneParameters()
+        self.tacks = TackOffset()
+        self._frozen, self._spikes = FrozenVane(), Spikes()
         self._vehicle: VehicleState | None = None
         self._apparent: ApparentWind | None = None
         self._last: WindSample | None = None
         self._speed_mps = 0.0
-        self._back_s: float | None = None
-        self._gap_s = 0.0
+        self._back_s, self._gap_s = -math.inf, 0.0
+        self._turn_s = -math.inf
+        self._frozen_s: float | None = None
+        self._same_s = self._zero_s = 0.0       # since when the same true wind, a speed of nothing
+        self._same_heading_rad = 0.0
+        self._has_moved = False
 
     def vehicle(self, state: VehicleState) -> None:
         """Take how the boat moves."""
+        before = self._vehicle
         self._vehicle = state
+        rate = state.yaw_rate_radps
+        if rate is None and before is not None and 0.0 < state.t_s - before.t_s < 5.0:
+            rate = wrap_pi(state.heading_rad - before.heading_rad) / (state.t_s - before.t_s)
+        if rate is not None and abs(rate) > TURNING_RADPS:
+            self._turn_s = state.t_s
+        turned = abs(wrap_pi(state.heading_rad - self._same_heading_rad)) > math.radians(1.0)
+        self._has_moved = self._has_moved or turned or state.speed_mps > 0.3
 
     def apparent(self, wind: ApparentWind) -> None:
         """Take what the boat feels."""
         self._apparent = wind
+        if self._vehicle is not None and abs(wind.t_s - self._vehicle.t_s) <= _NEAR_S and wind.aws_mps > 0.0:
+            self._frozen.update(wind.t_s, wind.awa_rad, self._vehicle.heading_rad)
 
+    # ------------------------------------------------------------------------------------------ judging
     def judge(self, sample: WindSample) -> WindStatus:
         """Take a true wind sample and return its verdicts."""
-        found: list[Verdict] = []
-        widening, weight = 1.0, 1.0
-        last = self._last
-        dt_s = 0.0 if last is None else max(0.0, sample.t_s - last.t_s)
-        self._speed_mps = sample.tws_mps if last is None else (
-            self._speed_mps + gain(dt_s, 10.0) * (sample.tws_mps - self._speed_mps)
-        )
-        if dt_s > 10.0:
-            self._back_s, self._gap_s = sample.t_s, dt_s
-        if self._back_s is not None and sample.t_s - self._back_s < 30.0:
-            found.append(Verdict.RETURNED)
-            widening *= 1.0 + min(1.0, self._gap_s / 300.0)
-        if self.parameters.is_direction_invented:
-            found.append(Verdict.SYNTHESISED)
-            widening *= 3.0
-        if self.parameters.has_no_speed_sensor:
-            found.append(Verdict.NO_SPEED_SENSOR)
-            widening *= 1.5
-        elif self._speed_mps < LIGHT_MPS:
-            found.append(Verdict.CALM)
-            widening *= 1.0 + (1.0 - self._speed_mps / LIGHT_MPS)
-            weight = 0.2
-        turning = sample.quality is WindQuality.TURNING or (
-            self._vehicle is not None and self._vehicle.yaw_rate_radps is not None
-            and abs(self._vehicle.yaw_rate_radps) > TURNING_RADPS
-        )
-        if turning:
-            found.append(Verdict.TURNING)
-            weight = min(weight, 0.3)
+        last, t = self._last, sample.t_s
+        dt_s = 0.0 if last is None else max(0.0, t - last.t_s)
         self._last = sample
-        verdicts = tuple(found) or (Verdict.GOOD,)
+        found: list[tuple[Verdict, str]] = []
+        widening, extra, weight = 1.0, 0.0, 1.0
+
+        has_no_speed = self._lacks_speed(sample, dt_s)
+        self._speed_mps += (1.0 if last is None else gain(dt_s, 10.0)) * (sample.tws_mps - self._speed_mps)
+        if has_no_speed:
+            found.append((Verdict.NO_SPEED_SENSOR, "no wind speed: the direction is vane plus heading, not true"))
+            boat = self._vehicle.speed_mps if self._vehicle is not None else 1.0
+            extra = math.hypot(extra, math.atan2(boat, _ASSUMED_MPS))
+        elif self._speed_mps < LIGHT_MPS:
+            found.append((Verdict.CALM, f"{self._speed_mps:.1f} m/s is too little for a direction"))
+            lack = 1.0 - self._speed_mps / LIGHT_MPS
+            widening *= 1.0 + 2.0 * lack
+            weight = min(weight, 1.0 - 0.8 * lack)
+        if self.parameters.is_direction_invented:
+            found.append((Verdict.SYNTHESISED, f"WNDVN_TYPE {self.parameters.vane_type}: the direction is invented"))
+            extra = math.hypot(extra, _INVENTED_RAD)
+        if self._is_held(sample, last):
+            found.append((Verdict.HELD, "the autopilot repeats an old true wind"))
+            widening *= 1.0 + min(2.0, (t - self._same_s) / 60.0)
+            weight = 0.0
+        is_turning = sample.quality is WindQuality.TURNING or t - self._turn_s < _TURNED_S
+        if is_turning:
+            found.append((Verdict.TURNING, "the boat turns: vane and compass lag"))
+            weight = min(weight, 0.3)
+        frozen_s = self._frozen_for(t)
+        if frozen_s > 0.0:
+            found.append((Verdict.FROZEN, f"the vane has not moved for {frozen_s:.0f} s"))
+            widening *= 1.0 + min(2.0, frozen_s / 60.0)
+            weight = 0.0
+        # In a calm a wandering direction is no fault of the vane.
+        if self._speed_mps >= 1.5 * LIGHT_MPS and not is_turning and frozen_s == 0.0:
+            if self._spikes.update(t, sample.twd_from_rad):
+                weight = 0.0
+            if self._spikes.is_spiking:
+                found.append((Verdict.SPIKING, f"{100 * self._spikes.share:.0f} % of the readings are spikes"))
+                widening *= 1.0 + min(1.0, 4.0 * self._spikes.share)
+        self._compare_tacks(sample, is_turning=is_turning or frozen_s > 0.0)
+        if self.tacks.is_misaligned:
+            offset, side = self.tacks.offset_rad or 0.0, self.tacks.side_rad or 0.0
+            found.append((Verdict.MISALIGNED, (
+                f"the tacks disagree: vane off by {math.degrees(offset):+.0f} deg, "
+                f"{math.degrees(side):+.0f} deg to the side of the wind"
+            )))
+            extra = math.hypot(extra, abs(offset) + abs(side))
+        if dt_s > _GAP_S:
+            self._back_s, self._gap_s = t, dt_s
+        if t - self._back_s < _RETURN_S:
+            found.append((Verdict.RETURNED, f"back after {self._gap_s:.0f} s of silence"))
+            widening *= 1.0 + min(1.0, self._gap_s / 300.0) * (1.0 - (t - self._back_s) / _RETURN_S)
         return WindStatus(
-            t_s=sample.t_s, verdicts=verdicts, widening=widening, extra_sigma_rad=0.0, weight=weight, offset_rad=None,
-            sample=sample, age_s=0.0, reason=", ".join(v.value for v in verdicts),
+            t_s=t, verdicts=tuple(v for v, _ in found) or (Verdict.GOOD,), widening=widening, extra_sigma_rad=extra,
+            weight=weight, offset_rad=self.tacks.offset_rad, side_rad=self.tacks.side_rad, sample=sample, age_s=0.0,
+            reason="; ".join(text for _, text in found) or "good",
         )
+
+    def _lacks_speed(self, sample: WindSample, dt_s: float) -> bool:
+        """No speed sensor configured, or a speed of exactly nothing on a boat that sails."""
+        self._zero_s = self._zero_s + dt_s if sample.tws_mps == 0.0 else 0.0
+        sails = self._vehicle is not None and self._vehicle.speed_mps > 0.5
+        return self.parameters.has_no_speed_sensor or (self._zero_s >= _ZERO_S and sails)
+
+    def _is_held(self, sample: WindSample, last: WindSample | None) -> bool:
+        """Below WNDVN_SPEED_MIN, or bit for bit the same true wind while the boat moves."""
+        if sample.source is not WindSource.AUTOPILOT_TRUE:
+            return False
+        is_same = last is not None and (last.twd_from_rad, last.tws_mps) == (sample.twd_from_rad, sample.tws_mps)
+        if not is_same:
+            self._same_s, self._has_moved = sample.t_s, False
+            if self._vehicle is not None:
+                self._same_heading_rad = self._vehicle.heading_rad
+        least = self.parameters.speed_min_mps
+        if least and self._apparent is not None and sample.t_s - self._apparent.t_s < 3.0:
+            return self._apparent.aws_mps < least
+        same_s = sample.t_s - self._same_s
+        return same_s >= _HELD_S and (self._has_moved or (self._vehicle is None and same_s >= _HELD_BLIND_S))
+
+    def _frozen_for(self, t_s: float) -> float:
+        """Return for how long the vane has been seen frozen [s], 0 when it is not."""
+        is_known = self._apparent is not None and t_s - self._apparent.t_s < 3.0
+        if not (is_known and self._frozen.is_frozen):
+            self._frozen_s = None
+            return 0.0
+        if self._frozen_s is None:
+            self._frozen_s = t_s
+        return max(1.0, t_s - self._frozen_s)
+
+    def _compare_tacks(self, sample: WindSample, *, is_turning: bool) -> None:
+        boat = self._vehicle
+        if boat is None or abs(boat.t_s - sample.t_s) > _NEAR_S:
+            return
+        felt = self._apparent
+        if felt is None or abs(felt.t_s - sample.t_s) > _NEAR_S:
+            felt = apparent_wind(sample, boat)
+        wind = (sample.tws_mps * math.sin(sample.twd_from_rad), sample.tws_mps * math.cos(sample.twd_from_rad))
+        self.tacks.update(sample.t_s, wind, boat.velocity_en_mps, felt.awa_rad, is_turning=is_turning)
