@@ -6,7 +6,8 @@ it), turning at most 90 degrees, on headings 45 to 160 degrees off the wind. The
 eq. 4.6. The remaining time is estimated at 7 knots. The goal is a place and a heading: the bearing from start to
 goal, turned away from the wind until it can be sailed. Ships become fixed discs where they would be met (eq. 4.7).
 
-What the thesis leaves open: the grid is stretched by less than half a cell so that start and goal are both nodes;
+What the thesis leaves open: the grid is stretched so that start and goal are both nodes (a goal less than a quarter
+of a cell off the start's row or column counts as on it, and the last leg makes up for it);
 the first turn may exceed 90 degrees; a problem's own limits and its widened no-go zone narrow the range of
 headings further; a boat faster than 7 knots is estimated at its own top speed, or the estimate would overestimate.
 The grid refuses to be larger than ``memory_bytes``, the weak spot that the thesis names in its conclusion.
@@ -37,6 +38,7 @@ KNOT_MPS = 1852.0 / 3600.0
 CELLS_ACROSS = 40        # of the default grid, start to goal: 20 m for the 800 m legs that AVALON was tested on
 STATE_BYTES = 8 + 8 + 4 + 1 + 2 * 12  # cost, clock, parent, closed, and room for two heap entries
 CHUNK = 2000
+LEAST_SHARE = 0.25       # of the spacing: a goal nearer to the start's row or column than this counts as on it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +97,8 @@ def grid_of(problem: Problem, grid_m: float) -> Grid:
     (sx, sy), (gx, gy) = problem.start_en, problem.goal_en
 
     def fit(low: float, high: float, start: float, goal: float) -> tuple[float, float, int, int, int]:
-        between = round(abs(goal - start) / grid_m)
+        apart = abs(goal - start)
+        between = max(round(apart / grid_m), int(apart >= LEAST_SHARE * grid_m))
         d = abs(goal - start) / between if between > 0 else grid_m
         below = max(0, math.floor((min(start, goal) - low) / d + 1e-9))
         above = max(0, math.floor((high - max(start, goal)) / d + 1e-9))
@@ -240,10 +243,11 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: Grid, 
     effort.found()
     goal_state = grid.goal * kernels.HEADINGS + goal_heading
     trace["objective"] = float(g[goal_state])
-    return Outcome(waypoints_en=_path(grid, parent, goal_state), lower_bound_s=simple_bound_s(problem), trace=trace)
+    way_en = _path(problem, grid, parent, goal_state)
+    return Outcome(waypoints_en=way_en, lower_bound_s=simple_bound_s(problem), trace=trace)
 
 
-def _path(grid: Grid, parent: NDArray[np.int32], state: int) -> NDArray[np.float64]:
+def _path(problem: Problem, grid: Grid, parent: NDArray[np.int32], state: int) -> NDArray[np.float64]:
     """Return the places where the heading changes, start and goal included, (n, 2)."""
     first = grid.columns * grid.rows * kernels.HEADINGS
     states = [state]
@@ -253,4 +257,7 @@ def _path(grid: Grid, parent: NDArray[np.int32], state: int) -> NDArray[np.float
     nodes = [grid.start, *(s // kernels.HEADINGS for s in states[1:])]
     headings = [s % kernels.HEADINGS for s in states[1:]]
     keep = [nodes[0], *(nodes[i] for i in range(1, len(nodes) - 1) if headings[i - 1] != headings[i]), nodes[-1]]
-    return np.array([grid.place(n) for n in keep])
+    way = [grid.place(n) for n in keep]
+    if math.dist(way[-1], problem.goal_en) > problem.goal_radius_m:
+        way.append(problem.goal_en)
+    return np.array(way)

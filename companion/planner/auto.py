@@ -109,6 +109,7 @@ def _lattices(s: Searcher) -> str | None:
 
 def _improve(s: Searcher) -> None:
     """Anneal the candidates and look for others until the effort ends."""
+    _ = s.world.problem.eval_solid  # made now, so that the exact check at the end takes no time then
     has_solid = len(s.world.grid.edges) > 0
     lattices = list(_LATTICES)
     spent, looked = 0.0, not has_solid

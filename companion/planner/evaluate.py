@@ -122,7 +122,8 @@ def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
             reasons.append(f"leg {i}: the boat makes no way on it")
         if not p.eval_solid.is_empty and p.eval_solid.intersects(shapely.LineString([a, b])):
             reasons.append(f"leg {i}: collides with an obstacle or the fence")
-        hit = target_hit(p, a, b, t, t1)
+        hit = target_hit(p, a, a, t - spent, t)
+        hit = target_hit(p, a, b, t, t1) if hit is None else hit
         if hit is not None:
             reasons.append(f"leg {i}: meets target {hit}")
         legs.append(Leg(from_en=a, to_en=b, heading_rad=wrap_two_pi(h), twa_rad=twa, turn_rad=turn, length_m=length,
@@ -143,7 +144,7 @@ def target_hit(
     """Return the first target whose disc the boat enters between a at t0 and b at t1 (constant speed), or None.
 
     The squared distance minus the squared radius is a quadratic in time: its minimum over the common window is
-    exact. Turning at ``a`` before t0 is not tested here (the next leg's start is).
+    exact.
     """
     for i, target in enumerate(p.targets):
         lo, hi = max(t0_s, target.from_s), min(t1_s, target.until_s)

@@ -64,6 +64,22 @@ def _sift_down(keys: Floats, items: Ints, n: int) -> None:
 
 
 @jit
+def _misses(
+    b: Boat, x: float, y: float, h: float, t: float, mx: float, my: float, ex: float, ey: float
+) -> bool:
+    """Do the two legs by way of (mx, my) keep clear of every target?"""
+    for leg in range(2):
+        qx, qy = (mx, my) if leg == 0 else (ex, ey)
+        a, v = track(b, qx - x, qy - y, t)
+        t1 = t + turn_time(b, h, a)
+        t2 = t1 + math.hypot(qx - x, qy - y) / max(v, 1e-9)
+        if meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, qx, qy, t1, t2):
+            return False
+        x, y, h, t = qx, qy, a, t2
+    return True
+
+
+@jit
 def lattice_search(
     g: Grid, b: Boat, h0: float, axes: Floats, shape: Ints, steps: Ints, goal: Floats, box: Floats, gauge: Floats,
     slack: float, bound: float, max_pops: int, shot_m: float,
@@ -142,13 +158,17 @@ def lattice_search(
                 t2 = t1 + d * f_d / v
                 if abs(a) >= worst_half(b, t1, t2):
                     direct = True
-                    if t2 < best and is_free(g, x, y, ex, ey) and not meets_target(b, x, y, ex, ey, t1, t2):
+                    if t2 < best and is_free(g, x, y, ex, ey) and not (
+                        meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, ex, ey, t1, t2)
+                    ):
                         best, best_state, end_x, end_y, with_via = t2, s, ex, ey, False
             if not direct:
                 first = 0 if gy > 0.0 else 2
                 for way in range(2):
                     mx, my, t2, ok = corner(b, x, y, angle[k], t, ex, ey, first + way, first + 1 - way)
-                    if ok and t2 < best and is_free(g, x, y, mx, my) and is_free(g, mx, my, ex, ey):
+                    if ok and t2 < best and is_free(g, x, y, mx, my) and is_free(g, mx, my, ex, ey) and (
+                        b.targets.shape[0] == 0 or _misses(b, x, y, angle[k], t, mx, my, ex, ey)
+                    ):
                         best, best_state, end_x, end_y = t2, s, ex, ey
                         via_x, via_y, with_via = mx, my, True
         # ---- neighbours: turn either way, or sail one step on
@@ -180,6 +200,10 @@ def lattice_search(
                 h_node[node1] = max(0.0, gauge[c] * math.hypot(qx, qy) - slack)
             f1 = t1 + h_node[node1]
             if f1 >= best:
+                continue
+            if move < 2 and b.targets.shape[0] > 0 and (
+                came[s] == (_COUNTER if move == 0 else _CLOCKWISE) or meets_target(b, x, y, x, y, t, t1)
+            ):
                 continue
             if move == 2:
                 if abs(angle[k]) < worst_half(b, t, t1) - 0.5 * SLACK_RAD or not is_free(g, x, y, x1, y1):
@@ -272,7 +296,7 @@ def run_lattice(
         if v > 1e-6 and abs(a) <= b.max_twa + SLACK_RAD and abs(a) >= gauge.least_half_rad - 1e-9:
             steps.append((a, di, dj))
     steps.sort()
-    if not steps or ni * nj * len(steps) > 60_000_000:
+    if not steps or ni * nj * len(steps) > 24_000_000:
         return LatticeResult(cost_s=math.inf, points=None, pops=0, exhausted=False)
     cost, points, pops, exhausted = lattice_search(
         world.grid, b, world.h0, axes, np.array([ni, nj, -low[0], -low[1]], np.int32),

@@ -231,18 +231,22 @@ def leg_risk(  # type: ignore[no-untyped-def]
     The entry at the leg's start counts in full when the leg is on the other side of the wind than the one before
     (or the first: before_t < 0), else only by what the barrier came nearer. Up-crossings of a barrier at z standard
     deviations come at the rate z phi(z) (1 / tau + |sigma'| / sigma) (Aldous 1989, the clumping heuristic, which
-    overstates for low barriers); below z = 1 the rate at 1 is taken.
+    overstates for low barriers); below z = 1 the rate at 1 is taken. That rate holds once the wind has had time to
+    come back from the barrier; at first it presses like a Brownian motion, which adds phi(z) sqrt(4 t / (pi tau)) to
+    a full entry, at most the entry once more (the reflection principle).
     """
     margin = abs(twa) - half
     s_start = sigma_at(t0, model, s0, s1, rho, table_t, table_s)
     if max(s_start, sigma_at(t1, model, s0, s1, rho, table_t, table_s)) <= 1e-9:
         return 0.0 if margin >= -1e-9 else 1.0
     entry = _tail(margin / max(s_start, 1e-9))
+    is_full = True
     if before_t >= 0.0 and before_twa * twa > 0.0:
         s_before = max(sigma_at(before_t, model, s0, s1, rho, table_t, table_s), 1e-9)
         entry = max(0.0, entry - _tail((abs(before_twa) - half) / s_before))
-    total = entry
-    n = 6
+        is_full = False
+    total, press = 0.0, 0.0
+    n = 16
     dt = (t1 - t0) / n
     for i in range(n):
         t = t0 + (i + 0.5) * dt
@@ -261,7 +265,10 @@ def leg_risk(  # type: ignore[no-untyped-def]
             earlier = sigma_at(t - 0.5 * dt, model, s0, s1, rho, table_t, table_s)
             growth = max(0.0, (later - earlier) / max(dt, 1e-9) / s)
         total += z * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi) * (inverse_tau + growth) * dt
-    return min(1.0, total)
+        press = max(press, z * math.sqrt(4.0 / math.pi * (t1 - t0) * inverse_tau))
+    if is_full:
+        entry *= 1.0 + min(1.0, press)
+    return min(1.0, entry + total)
 
 
 @njit(nogil=True, cache=True)

@@ -58,6 +58,7 @@ class Searcher:
         self.pool: list[Candidate] = []
         self.best: Candidate | None = None
         self.turns = 0
+        self.pops_per_s = 6e5
 
     # ------------------------------------------------------------------------------------ candidates
     @property
@@ -251,13 +252,18 @@ class Searcher:
         """Run one lattice whose axes fit the no-go zone at ``half_at_s`` and offer its path."""
         b = self.world.boat
         half = self.world.problem.no_go_half_rad(half_at_s)
+        began_s = self.effort.elapsed_s
+        most = 1e9 if self.effort.limit is None else 8.0 * (self.effort.limit - self.effort.used)
+        most = min(most, max(2_000.0, 0.8 * self.pops_per_s * self.effort.remaining_s))
         downwind = self.world.goal[1] < 0.0 and b.down < math.pi - 1e-6
         found = run_lattice(
             self.world, self.gauge, cells=cells, reach=reach,
             half_rad=math.pi - b.down if downwind else max(half, b.up),
             box=self.inner_box(margin), downwind=downwind, stretch=stretch,
-            bound_s=self.upper_s if bound_s is None else bound_s,
+            bound_s=self.upper_s if bound_s is None else bound_s, max_pops=int(most),
         )
+        if found.pops > 20_000:
+            self.pops_per_s = found.pops / max(1e-6, self.effort.elapsed_s - began_s)
         self.effort.spend(max(1, found.pops // 8))
         return self.offer(found.points, f"lattice {cells}")
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from companion.clock import effort_s
@@ -29,6 +30,9 @@ ALGORITHMS: Mapping[str, tuple[str, str]] = {
     "astar": ("companion.planner.astar", "search"),
 }
 """Name -> module and function; modules are imported when asked for."""
+
+
+_loaded: set[str] = set()
 
 
 class Effort:
@@ -69,6 +73,11 @@ class Effort:
             return True
         return math.isfinite(self.budget_s) and self.elapsed_s >= self.budget_s
 
+    @property
+    def remaining_s(self) -> float:
+        """Computing time left [s]; inf without a budget in seconds."""
+        return self.budget_s - self.elapsed_s
+
     def remaining(self, chunk: int) -> int:
         """Return how much of a chunk of expansions is left."""
         return chunk if self.limit is None else max(0, min(chunk, self.limit - self.used))
@@ -105,7 +114,8 @@ def plan(
 
     Args:
         problem: what to plan.
-        budget_s: computing time [s]; 1 s when neither budget is given.
+        budget_s: computing time [s]; 1 s when neither budget is given. The first plan of a process loads the
+            compiled kernels first (on a new machine: compiles them); that time is not counted.
         expansions: effort in the algorithm's own steps; with it and a seed the plan does not depend on the
             machine, unless ``budget_s`` is given too and ends the search first.
         seed: of every random choice.
@@ -123,21 +133,39 @@ def plan(
         raise InputError("plan", "expansions", f"{expansions} is not positive", "give a count")
     if budget_s is None and expansions is None:
         budget_s = DEFAULT_BUDGET_S
+    _load(algorithm)
     effort = Effort(budget_s, expansions)
     empty = Plan(status=PlanStatus.INVALID, reason=problem.defect or "", waypoints_en=np.empty((0, 2)),
                  algorithm=algorithm, seed=seed, elapsed_s=effort.elapsed_s)
     if problem.defect is not None:
         return replace(empty, why=Why(text=f"Cannot be planned: {problem.defect}."))
-    module, name = ALGORITHMS[algorithm]
+    try:
+        return _solved(problem, effort, empty)
+    except shapely.errors.GEOSException as error:
+        reason = f"the obstacles or the fence cannot be made valid ({str(error).splitlines()[0]})"
+        return replace(empty, reason=reason, elapsed_s=effort.elapsed_s, why=Why(text=reason))
+
+
+def _load(algorithm: str) -> None:
+    """Compile or load the kernels of ``auto`` once in a process, before the budget starts to count."""
+    if algorithm == "auto" and algorithm not in _loaded:
+        _loaded.add(algorithm)
+        from companion.planner.warm import warm
+
+        warm()
+
+
+def _solved(problem: Problem, effort: Effort, empty: Plan) -> Plan:
+    module, name = ALGORITHMS[empty.algorithm]
     search: Search = getattr(importlib.import_module(module), name)
     if problem.risk is None:
-        return _judged(problem, search(problem, effort, seed), effort, empty)
+        return _judged(problem, search(problem, effort, empty.seed), effort, empty)
     from companion.planner.risk import keep_limit, search_within
 
-    if algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)
-        outcome = search(problem, effort, seed)
+    if empty.algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)
+        outcome = search(problem, effort, empty.seed)
     else:
-        outcome = search_within(search, problem, effort, seed)
+        outcome = search_within(search, problem, effort, empty.seed)
     return keep_limit(problem, _judged(problem, outcome, effort, empty))
 
 

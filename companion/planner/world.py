@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.planner.kernels import Boat, Floats, Grid, rasterise
-from companion.planner.problem import Problem
+from companion.planner.problem import TOUCH_M, Problem
 
 SKIN_M = 3e-4
 """Boundaries are moved this far into the solid [m], so that a path may touch them; the scorer allows 1e-3."""
@@ -71,6 +71,11 @@ def polygons(geometry: shapely.Geometry) -> list[shapely.Geometry]:
     return [g for g in parts if g.geom_type == "Polygon" and not g.is_empty and g.area > 0.0]
 
 
+def _vanishes(g: shapely.Geometry) -> bool:
+    """Is the polygon a sliver that the scorer's slack removes altogether? Its in-radius is at least area / length."""
+    return g.area < TOUCH_M * g.length and bool(g.buffer(-TOUCH_M, join_style="mitre", mitre_limit=5.0).is_empty)
+
+
 def merged_solids(p: Problem) -> tuple[list[shapely.Geometry], shapely.Geometry | None]:
     """Return (obstacles as disjoint valid polygons, fence with what crosses its line cut out, or None).
 
@@ -88,6 +93,7 @@ def merged_solids(p: Problem) -> tuple[list[shapely.Geometry], shapely.Geometry 
         if touching:
             alone = [g for i, g in enumerate(solids) if i not in set(touching)]
             solids = alone + polygons(shapely.union_all([solids[i] for i in touching]))
+    solids = [g for g in solids if not _vanishes(g)]
     fence = p.fence_polygon
     if fence is None:
         return solids, None
