@@ -104,6 +104,7 @@ class GuidanceState:
     stuck_since_s: float | None = None
     failed_tacks: int = 0
     irons: int = 0
+    irons_side: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,9 +179,7 @@ def helm(
         if abs(twa) > habits.no_go_half_rad and way > 0.3:
             state = replace(state, manoeuvre=Manoeuvre.SAIL, stuck_since_s=None)
         else:
-            # Bear away on the side that the bow has fallen to; after half a minute try the other one.
-            flip = -1 if int((t - state.since_s) / 30.0) % 2 else 1
-            return replace(state, wanted_rad=wanted), twd - side * flip * math.radians(100.0), "in irons: bear away"
+            return replace(state, wanted_rad=wanted), _out_of_irons(state, situation, twa, way, habits), "in irons"
     if state.manoeuvre is Manoeuvre.TACK:
         over = side == goal_side and abs(twa) > 0.6 * habits.no_go_half_rad
         if over:
@@ -209,6 +208,23 @@ def helm(
     return replace(state, wanted_rad=wanted), wanted, "field"
 
 
+def _out_of_irons(state: GuidanceState, situation: Situation, twa: float, way_mps: float, habits: Habits) -> float:
+    """Return the heading that gets a boat out of irons: to the side it was caught on, by the rudder that works.
+
+    With way on, the heading wanted is the one to bear away to. With sternway the rudder works in reverse: asking for
+    the other side makes the autopilot put it over the way that swings the bow to the wanted one. Half a minute
+    without success changes sides.
+    """
+    assert situation.twd_from_rad is not None
+    t = situation.t_s - state.since_s
+    side = state.irons_side * (-1 if int(t / 30.0) % 2 else 1)
+    # Over the ground she drifts to leeward even at rest: the rudder feels the water.
+    water = way_mps + habits.leeway_share * situation.tws_mps * math.cos(twa)
+    if water < 0.0:
+        side = -side
+    return situation.twd_from_rad - side * math.radians(100.0)
+
+
 def outside_no_go(heading_rad: float, twd_from_rad: float, half_rad: float, q: int = 1) -> float:
     """Return the heading, or the nearer edge of the no-go zone where it is inside (q decides dead upwind)."""
     off = wrap_pi(heading_rad - twd_from_rad)
@@ -225,8 +241,10 @@ def _watch_irons(state: GuidanceState, t_s: float, twa: float, way_mps: float, h
     since = t_s if state.stuck_since_s is None else state.stuck_since_s
     patience = habits.tack_s if state.manoeuvre is Manoeuvre.TACK else 4.0
     if t_s - since >= patience:
-        return replace(state, manoeuvre=Manoeuvre.IRONS, since_s=t_s, stuck_since_s=None,
-                       failed_tacks=state.failed_tacks + 1, irons=state.irons + 1)
+        return replace(
+            state, manoeuvre=Manoeuvre.IRONS, since_s=t_s, stuck_since_s=None, failed_tacks=state.failed_tacks + 1,
+            irons=state.irons + 1, irons_side=1 if twa > 0.0 else -1,
+        )
     return replace(state, stuck_since_s=since)
 
 
