@@ -137,8 +137,9 @@ def main(argv=None):
                     break
                 continue
             ratio = "-" if row["ratio"] is None else f"{row['ratio']:.2f}"
+            verdict = "ok" if row["holds"] else "NO"
             print(f"{name:22} {given:>6} {row['cost_s']:7.0f} {100 * row['promise']:6.1f} % "
-                  f"{100 * row['share']:6.1f} % {ratio:>6} {'ok' if row['holds'] else 'NO':>4} {100 * row['instant_promise']:6.1f} % "
+                  f"{100 * row['share']:6.1f} % {ratio:>6} {verdict:>4} {100 * row['instant_promise']:6.1f} % "
                   f"{100 * row['instant_share']:5.1f} %{' held' if row['held'] else ''}"
                   f"{'' if row['instant_holds'] else ' NO'}", flush=True)
     sailed = [r for r in rows if "share" in r]
