@@ -210,12 +210,16 @@ class Autopilot:
     async def set_current(self, seq: int, *, reset: bool = True) -> CommandAnswer:
         """Make item ``seq`` current; ``reset`` (p2 = 1) starts a mission that is complete or stopped again.
 
+        Outside AUTO p2 stays 0: ArduRover would start the leg at once, before its navigation has its limits, and
+        the internal error that follows forbids arming until a reboot. AUTO then begins at ``seq`` by itself.
+
         Confirmed by MISSION_CURRENT; sent again when that does not show it.
         """
         answer = CommandAnswer(outcome=Outcome.TIMEOUT, text="not sent")
         for _ in range(SET_CURRENT_TRIES):
             since_s = now_s()
-            answer = await self.link.command(wire.MAV_CMD_DO_SET_MISSION_CURRENT, float(seq), float(reset))
+            resets = reset and self.status is not None and self.status.mode is Mode.AUTO
+            answer = await self.link.command(wire.MAV_CMD_DO_SET_MISSION_CURRENT, float(seq), float(resets))
             if not answer.is_ok or await self._wait_status(lambda s: s.mission_seq == seq, since_s):
                 return answer
         now = self.status.mission_seq if self.status else None
