@@ -1,0 +1,122 @@
+"""``companion plan`` as a user meets it: exit codes, files, one-line errors."""
+
+import json
+import math
+
+import pytest
+
+from companion import cli
+from companion.planner import Problem
+
+GOOD = {
+    "id": "pond", "title": "Across the pond", "start": {"x": 0, "y": 0, "heading_deg": 0},
+    "goal": {"x": 0, "y": 200, "radius": 5}, "obstacles": ["POLYGON((-20 80,30 80,30 120,-20 120,-20 80))"],
+    "fence": None,
+    "wind": {"from_deg": 30, "speed_mps": 5,
+             "sigma": {"model": "ar1", "sigma0_deg": 2, "sigma_inf_deg": 6, "rho_hz": 0.03}},
+    "boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
+             "speed": {"model": "constant", "v_mps": 1.5}},
+    "delta_s": 0.7,
+}
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(**change):
+        path = tmp_path / "problem.json"
+        path.write_text(json.dumps({**GOOD, **change}), encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+def run(capsys, *args):
+    code = cli.main(["plan", *map(str, args)])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+@pytest.mark.parametrize("algorithm", ["auto", "rrtstar", "astar"])
+def test_it_prints_a_summary_and_writes_a_plan_that_scores(capsys, file, tmp_path, algorithm):
+    out_file = tmp_path / "plan.json"
+    code, out, err = run(capsys, file(), "--budget", "0.5", "--algorithm", algorithm, "--out", out_file)
+    assert code == 0, out + err
+    assert "above the bound" in out
+    assert "risk: the wind forces the boat" in out
+    assert str(out_file) in out
+    written = json.loads(out_file.read_text(encoding="utf-8"))
+    assert all(len(w) == 2 for w in written["waypoints"])
+    judged = Problem.from_json(file()).evaluate(written["waypoints"])
+    assert judged.is_feasible, judged.reasons
+    assert judged.time_s == pytest.approx(written["cost_s"])
+    assert written["risk"] is not None
+    assert all(leg["clearance_m"] is not None for leg in written["legs"])
+
+
+def test_json_is_json_and_only_json(capsys, file):
+    args = (file(), "--expansions", "3000", "--algorithm", "rrtstar", "--seed", "4", "--json")
+    code, out, _ = run(capsys, *args)
+    assert code == 0
+    answer = json.loads(out)
+    assert answer["seed"] == 4
+    assert answer["status"] in {"found", "optimal"}
+    again = json.loads(run(capsys, *args)[1])
+    assert again["waypoints"] == answer["waypoints"]
+
+
+def test_it_draws_a_picture(capsys, file, tmp_path):
+    picture = tmp_path / "p.png"
+    code, _, _ = run(capsys, file(), "--expansions", "1500", "--algorithm", "rrtstar", "--plot", picture)
+    assert code == 0
+    assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_explain_adds_reasons(capsys, file):
+    code, out, _ = run(capsys, file(), "--budget", "0.3", "--explain", "--explain-budget", "1")
+    assert code == 0
+    assert "Leg" in out
+
+
+def test_no_plan_is_exit_1_with_the_reason(capsys, file, tmp_path):
+    ring = "POLYGON((-40 160,40 160,40 240,-40 240,-40 160),(-20 180,20 180,20 220,-20 220,-20 180))"
+    picture = tmp_path / "none.png"
+    code, out, _ = run(capsys, file(obstacles=[ring]), "--budget", "0.3", "--plot", picture)
+    assert code == 1
+    assert "no path" in out
+    assert picture.exists()
+
+
+@pytest.mark.parametrize("change", [
+    {"start": {"x": 0, "y": 100, "heading_deg": 0}}, {"delta_s": 0.2}, {"delta_s": math.nan},
+    {"wind": {**GOOD["wind"], "speed_mps": 0}}, {"goal": {"x": 0, "y": 200, "radius": -1}},
+])
+def test_what_cannot_be_planned_is_exit_2_with_the_reason(capsys, file, change):
+    code, out, err = run(capsys, file(**change), "--budget", "0.2")
+    assert code == 2
+    assert "invalid" in out + err
+
+
+@pytest.mark.parametrize(("text", "place"), [
+    ("{", "JSON"), ("[]", "JSON object"), ('{"id": "x"}', "start"),
+    (json.dumps({**GOOD, "obstacles": ["POLYGON((0 0"]}), "obstacles"),
+    (json.dumps({**GOOD, "boat": {**GOOD["boat"], "speed": {"model": "warp"}}}), "speed"),
+])
+def test_what_cannot_be_read_is_exit_2_and_one_line(capsys, tmp_path, text, place):
+    path = tmp_path / "bad.json"
+    path.write_text(text, encoding="utf-8")
+    code, out, err = run(capsys, path)
+    assert code == 2
+    assert out == ""
+    assert err.count("\n") == 1
+    assert str(path) in err
+    assert place in err
+
+
+def test_bad_options_are_exit_2(capsys, file, tmp_path):
+    assert run(capsys, tmp_path / "nowhere.json")[0] == 2
+    assert run(capsys, file(), "--budget", "-1")[0] == 2
+    assert run(capsys, file(), "--expansions", "0")[0] == 2
+    assert run(capsys, file(), "--out", tmp_path / "no" / "such" / "folder.json")[0] == 2
+    code, _, err = run(capsys, file(), "--budget", "0.2", "--plot", tmp_path / "p.nonsense")
+    assert code == 2
+    assert "p.nonsense" in err
