@@ -7,17 +7,24 @@ from companion.skipper.actions import Arm, SetCurrent, SetMode
 from companion.skipper.planning import upload
 from companion.skipper.turn import Turn
 
+ARMING, CURRENT = "arming", "set current"
 CHECK_S = 3.0   # MISSION_CURRENT comes once a second: by then it shows what was asked for
 
 
-def is_busy(turn: Turn) -> bool:
-    """Return whether a command is unanswered or the last refusal too fresh."""
-    return turn.state.pending_command is not None or turn.t_s < turn.state.command_retry.not_before_s
+SHOWS_S = 2.5   # a command that was accepted shows in the next heartbeats: it is not repeated before that
+
+
+def is_busy(turn: Turn, what: str) -> bool:
+    """Return whether a command is unanswered, the last refusal too fresh, or this one just accepted."""
+    state = turn.state
+    if state.pending_command is not None or turn.t_s < state.command_retry.not_before_s:
+        return True
+    return state.accepted is not None and state.accepted[0] == what and turn.t_s < state.accepted[1] + SHOWS_S
 
 
 def set_mode(turn: Turn, mode: Mode, text: str) -> bool:
     """Ask for a mode; False when not permitted or not now."""
-    if is_busy(turn) or not turn.snapshot.permissions.may_set_mode:
+    if is_busy(turn, mode.name) or not turn.snapshot.permissions.may_set_mode:
         return False
     number = turn.new_id()
     if not turn.act(SetMode(command_id=number, mode=mode, text=text)):
@@ -28,24 +35,24 @@ def set_mode(turn: Turn, mode: Mode, text: str) -> bool:
 
 def arm(turn: Turn) -> bool:
     """Ask for arming; False when not permitted or not now."""
-    if is_busy(turn):
+    if is_busy(turn, ARMING):
         return False
     number = turn.new_id()
     if not turn.act(Arm(command_id=number)):
         return False
-    turn.update(pending_command=(number, turn.t_s, "arming"))
+    turn.update(pending_command=(number, turn.t_s, ARMING))
     return True
 
 
 def make_current(turn: Turn, seq: int) -> bool:
     """Make an item current and the mission run (p2 = 1); False when not permitted or not now."""
-    if is_busy(turn):
+    if is_busy(turn, CURRENT):
         return False
     number = turn.new_id()
     if not turn.act(SetCurrent(command_id=number, seq=seq, reset=True)):
         return False
     turn.update(
-        pending_command=(number, turn.t_s, "set current"), current_asked_s=turn.t_s, asked_seq=seq, index=seq - 1)
+        pending_command=(number, turn.t_s, CURRENT), current_asked_s=turn.t_s, asked_seq=seq, index=seq - 1)
     return True
 
 

@@ -19,14 +19,13 @@ from companion.skipper.snapshot import (
     UploadOutcome,
     UploadResult,
 )
-from companion.skipper.state import PATIENT, Phase, Retry
+from companion.skipper.state import PATIENT, Phase
 from companion.skipper.turn import FRESH_S, Turn
 from companion.skipper.voyage import Side
 
 HISTORY_STEP_S = 10.0
 HISTORY_KEPT = 19            # 180 s and the present
 BOOT_SLACK_S = 1.0
-SHOWS_S = 2.5                # a command that was accepted shows in the next heartbeats
 FOREIGN_TEXTS = ("Flight plan received",)   # somebody finished an upload
 
 
@@ -71,8 +70,7 @@ def _take_command(turn: Turn, outcome: CommandOutcome) -> None:
     if pending is None or pending[0] != outcome.command_id:
         return
     if outcome.result is CommandResult.ACCEPTED:
-        # The heartbeat that shows it comes once a second: until then nothing is concluded from the old one.
-        turn.update(pending_command=None, command_retry=Retry(not_before_s=turn.t_s + SHOWS_S))
+        turn.update(pending_command=None, command_retry=PATIENT, accepted=(pending[2], turn.t_s))
         return
     turn.update(pending_command=None, command_retry=turn.failed(turn.state.command_retry))
     turn.say(Severity.WARNING, f"refused {pending[2]}",

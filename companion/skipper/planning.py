@@ -20,6 +20,7 @@ from companion.skipper.route import Tail, common_prefix, loiter_place, path_leng
 from companion.skipper.snapshot import PlanOutcome, UploadOutcome, UploadResult
 from companion.skipper.state import PendingPlan, PendingUpload, Phase, Retry, Route
 from companion.skipper.turn import Turn
+from companion.skipper.voyage import PointEn
 
 UPLOAD_LATENCY_S = 1.5   # item protocol, a few dozen items, and the read-back
 SAME_M = 1.0             # a new waypoint this near to the old one is the old one
@@ -44,14 +45,16 @@ def request(
     if start is None or gate is None:
         return False
     wind = turn.wind_mean
-    start = repaired(turn.voyage, start, step.margin_m, wind[0] if wind else None)
+    floor_m = min(turn.config.margin_floor_m, step.margin_m)
+    start = repaired(
+        turn.voyage, start, margin_m=step.margin_m, floor_m=floor_m, twd_from_rad=wind[0] if wind else None)
     aim = _aim(turn, gate, start, step)
     number = turn.new_id()
-    name = ", ".join(part for part in (step.name, "start repaired" if start.lead_in else "") if part)
+    name = ", ".join(part for part in (step.name, "start repaired" if start.text else "") if part)
     try:
         problem = Problem.from_json(problem_dict(
             turn.voyage, turn.gates[gate], start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
-            delta_s=step.delta_s, no_go_half_rad=turn.planned_no_go_rad, title=reason.value,
+            delta_s=step.delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
         ))
     except (ValueError, InputError) as error:
         turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
@@ -209,7 +212,7 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
 
 def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
     """Splice a plan into the route and ask for its upload."""
-    points = [(float(e), float(n)) for e, n in plan.waypoints_en[1:]]
+    points = _apart([(float(e), float(n)) for e, n in plan.waypoints_en])[1:]
     tail = Tail(start_en=pending.start_en_m, points_en=(*pending.lead_in, *points), gate=pending.gate)
     if pending.lead_in:
         boat = turn.boat_en
@@ -233,6 +236,19 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
         turn.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
         return
     upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}")
+
+
+def _apart(points: list[PointEn]) -> list[PointEn]:
+    """Return the points without those that stand on the one before: the autopilot cannot sail a leg of no length."""
+    out = points[:1]
+    for n, point in enumerate(points[1:], start=1):
+        if distance_m(out[-1], point) >= SAME_M:
+            out.append(point)
+        elif n == len(points) - 1 and len(out) > 1:
+            out[-1] = point   # the end stays where it was planned
+        elif n == len(points) - 1:
+            out.append(point)
+    return out
 
 
 def _is_same(a: Route, b: Route) -> bool:

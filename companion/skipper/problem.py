@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,17 +26,22 @@ from companion.skipper.voyage import PointEn, Voyage
 
 REPAIR_RINGS_M = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0)
 REPAIR_DIRECTIONS = 24
+NOTCH = 2.0     # radius of the notch as a multiple of what the start lacks: room to turn out of it
 HAIR_M = 0.2    # a repaired point stands this far clear of the margin it was repaired for
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """Where a plan begins: the point, the heading there, when, and a lead-in if the point had to be repaired."""
+    """Where a plan begins: the point, the heading there, when, and how it had to be repaired.
+
+    ``lead_in`` are waypoints before it; ``notch_m`` is the radius of a notch that is cut into the margin around it.
+    """
 
     en_m: PointEn
     heading_rad: float
     after_s: float = 0.0
     lead_in: tuple[PointEn, ...] = ()
+    notch_m: float = 0.0
     text: str = ""
 
 
@@ -98,15 +103,22 @@ def wind_part(forecast: WindForecast, *, after_s: float, length_s: float, delta_
     }
 
 
-def repaired(voyage: Voyage, start: Start, margin_m: float, twd_from_rad: float | None) -> Start:
-    """Return the start, moved into free water if it is nearer than ``margin_m`` to an obstacle or limit.
+def repaired(
+    voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, twd_from_rad: float | None,
+) -> Start:
+    """Return the start made plannable if it is nearer than ``margin_m`` to an obstacle or limit.
 
-    The lead-in goes from the boat to the nearest free point on a line that never comes nearer to the obstacle than
-    the boat is now; of equally near ones the one that is not upwind.
+    Down to ``floor_m`` the margin around it gets a notch, so that the plan begins where the boat is. Nearer than
+    that, or inside, the plan begins in free water and a lead-in goes there: from the boat to the nearest free point
+    on a line that never comes nearer to the obstacle than the boat is now; of equally near ones the one that is not
+    upwind.
     """
     here = float(voyage.area.clearance_m([start.en_m])[0])
     if here >= margin_m:
         return start
+    if here >= floor_m:
+        text = f"the start is {here:.1f} m from an obstacle or limit: the margin gets a notch around it"
+        return replace(start, notch_m=NOTCH * (margin_m - here) + HAIR_M, text=text)
     for ring_m in REPAIR_RINGS_M:
         best: tuple[float, PointEn] | None = None
         for n in range(REPAIR_DIRECTIONS):
@@ -168,7 +180,8 @@ def band(gate: Gate, start_en: PointEn, aim_en: PointEn) -> Polygon | None:
 
 def problem_dict(
     voyage: Voyage, gate: Gate, *, start: Start, aim: Aim, forecast: WindForecast,
-    margin_m: float, delta_s: float, no_go_half_rad: float, extra_obstacles: Sequence[str] = (), title: str = "",
+    margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
+    extra_obstacles: Sequence[str] = (), title: str = "",
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
 
@@ -176,6 +189,9 @@ def problem_dict(
         ValueError: when no water is left inside the fence at this margin.
     """
     fence = voyage.area.fence_wkt(margin_m, start.en_m)
+    obstacles = [*voyage.area.obstacles_wkt(margin_m)]
+    if start.notch_m > 0.0:
+        obstacles, fence = _notched(voyage, start, obstacles, fence, floor_m)
     corridor = band(gate, start.en_m, aim.en_m)
     if corridor is not None:
         limits = shapely.intersection(corridor, shapely.from_wkt(fence)) if fence is not None else corridor
@@ -194,9 +210,32 @@ def problem_dict(
         "title": title,
         "start": {"x": start.en_m[0], "y": start.en_m[1], "heading_deg": math.degrees(wrap_two_pi(start.heading_rad))},
         "goal": {"x": aim.en_m[0], "y": aim.en_m[1], "radius": aim.radius_m},
-        "obstacles": [*voyage.area.obstacles_wkt(margin_m), *gate.keep_out, *extra_obstacles],
+        "obstacles": [*obstacles, *gate.keep_out, *extra_obstacles],
         "fence": fence,
         "wind": wind,
         "boat": boat,
         "delta_s": delta_s,
     }
+
+
+def _notched(
+    voyage: Voyage, start: Start, obstacles: Sequence[str], fence: str | None, floor_m: float,
+) -> tuple[list[str], str | None]:
+    """Return obstacles and fence with the notch around the start: there the floor holds instead of the margin."""
+    disc = shapely.buffer(shapely.points(start.en_m), start.notch_m, quad_segs=4)
+    core = shapely.union_all([shapely.from_wkt(w) for w in voyage.area.obstacles_wkt(floor_m)])
+    opening = shapely.difference(disc, core)
+    open_obstacles: list[str] = []
+    for text in obstacles:
+        rest = shapely.difference(shapely.from_wkt(text), opening)
+        open_obstacles.extend(
+            shapely.to_wkt(p, rounding_precision=4) for p in shapely.get_parts(rest)
+            if isinstance(p, Polygon) and not p.is_empty)
+    if fence is not None:
+        inner = voyage.area.fence_wkt(floor_m, start.en_m)
+        if inner is not None:
+            wider = shapely.union(shapely.from_wkt(fence), shapely.intersection(disc, shapely.from_wkt(inner)))
+            pieces = [p for p in shapely.get_parts(wider) if isinstance(p, Polygon)]
+            here = shapely.points(start.en_m)
+            fence = shapely.to_wkt(min(pieces, key=lambda p: (float(p.distance(here)), -p.area)), rounding_precision=4)
+    return open_obstacles, fence

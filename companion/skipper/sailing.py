@@ -252,7 +252,7 @@ def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
     until = turn.state.steering_until_s
     out = vehicle is not None and wind is not None and vehicle.speed_mps > SAILS_MPS and (
         abs(difference_rad(wind[0], vehicle.heading_rad)) > SAILS_TWA_RAD)
-    refused = status is not None and status.mode is Mode.AUTO and not is_busy(turn)
+    refused = status is not None and status.mode is Mode.AUTO and not is_busy(turn, Mode.GUIDED.name)
     over = out or refused or (until is not None and turn.t_s > until)
     if over and (refused or set_mode(turn, Mode.AUTO, "sailing again" if out else "bearing away took too long")):
         # The mode we asked for ourselves stays ours until AUTO shows.

@@ -118,6 +118,7 @@ class SkipperState:
     pending_read: tuple[int, float] | None = None          # id, since
     pending_command: tuple[int, float, str] | None = None  # id, since, what
     unsure_route: Route | None = None  # of an upload that failed: the mission on board may be it or a mixture
+    accepted: tuple[str, float] | None = None  # the last command that was accepted, and when
     ready_route: Route | None = None   # planned, not allowed or not yet possible to upload
     own_mode: Mode | None = None       # a mode other than AUTO that we asked for ourselves
     rung: int = 0                      # step of the ladder being tried

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapely.geometry import box
 
 from companion.boat import Boat, ardurover_sitl
-from companion.planner import Problem
+from companion.planner import Problem, plan
 from companion.skipper.config import SkipperConfig
 from companion.skipper.gates import gates_of
 from companion.skipper.judge import half_width_rad, judge, predicted_beat
@@ -102,16 +102,34 @@ def test_problem_is_one_that_the_planner_reads(after):
 def test_a_start_inside_the_margin_is_led_out():
     made = voyage(obstacles=(box(-50, -50, 50, -4),))
     start = Start(en_m=(0.0, 0.0), heading_rad=0.0)
-    out = repaired(made, start, 15.0, 0.0)
+    out = repaired(made, start, margin_m=15.0, floor_m=8.0, twd_from_rad=0.0)
     assert out.lead_in
     assert made.area.clearance_m([out.en_m])[0] >= 15.0
     assert "from an obstacle" in out.text
-    assert repaired(made, start, 3.0, 0.0) is start
+    assert repaired(made, start, margin_m=3.0, floor_m=2.0, twd_from_rad=0.0) is start
+
+
+@pytest.mark.parametrize("limits", [None, box(-300, -5, 300, 900)])
+def test_a_start_between_floor_and_margin_gets_a_notch(limits):
+    made = voyage(Goal(en_m=(0.0, 300.0), radius_m=6.0), obstacles=(box(-50, -50, 50, 30),), limits=limits)
+    start = Start(en_m=(0.0, 40.0), heading_rad=0.0)
+    out = repaired(made, start, margin_m=15.0, floor_m=8.0, twd_from_rad=math.pi)
+    assert out.en_m == start.en_m
+    assert not out.lead_in
+    assert out.notch_m > 5.0
+    gate = gates_of(made)[0]
+    problem = Problem.from_json(problem_dict(
+        made, gate, start=out, aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0), forecast=forecast(0.0, math.pi),
+        margin_m=15.0, delta_s=0.95, no_go_half_rad=math.radians(47.0), floor_m=8.0))
+    answer = plan(problem, expansions=500)
+    assert answer.has_path
+    assert made.area.path_clearance_m(answer.waypoints_en) >= 8.0
 
 
 def test_a_start_inside_the_obstacle_is_led_out_too():
     made = voyage(obstacles=(box(-50, -50, 50, 10),))
-    out = repaired(made, Start(en_m=(0.0, 0.0), heading_rad=0.0), 15.0, math.pi)
+    out = repaired(
+        made, Start(en_m=(0.0, 0.0), heading_rad=0.0), margin_m=15.0, floor_m=8.0, twd_from_rad=math.pi)
     assert made.area.clearance_m([out.en_m])[0] >= 15.0
 
 
