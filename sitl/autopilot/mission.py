@@ -122,15 +122,16 @@ class Mission:
         self.nav_index, self.nav_item, self.is_loaded = None, None, False
         self._jumps.clear()
 
-    def set_current(self, index: int, *, reset: bool = False) -> bool:
-        """Go to an item; False if there is none. A complete mission only becomes stopped, unless ``reset``."""
+    def set_current(self, index: int, *, run: bool = False) -> bool:
+        """Go to an item; False if there is none.
+
+        A complete mission only becomes stopped, and a stopped one stays so, unless ``run``: a reset in AUTO.
+        """
         if index >= len(self.items) or len(self.items) <= 1:
             return False
-        was_complete = self.state is RunState.COMPLETE
-        if reset:
+        if run:
             self.reset()
-            if was_complete:
-                self.state = RunState.RUNNING
+            self.state = RunState.RUNNING
         if index == 0 or self.state is RunState.COMPLETE:
             self._jumps.clear()
         index = max(index, 1)

@@ -16,12 +16,13 @@ from companion.clock import now_s
 from companion.errors import LinkError
 from companion.mavlink.transport import LinkName, Transport, open_link, parse_link
 from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.config import Truth
 from sitl.autopilot.links import LOOP_S
 
 # Behind by more than this the machine is too slow for the speed asked for: simulated time stretches instead.
 MAX_LAG_S = 2.0
 # Never sleep longer: ``truth`` is read by others between wakes.
-MAX_SLEEP_S = 0.5
+MAX_SLEEP_S = 0.2
 MAX_PEERS = 8
 
 
@@ -34,8 +35,14 @@ class Server:
         self._ports: dict[int, Any] = {}
         self._numbers = 0
         self._wake: asyncio.Future[None] | None = None
-        self._zero_s = 0.0
+        self._zero_s: float | None = None
         self._task: asyncio.Task[None] | None = None
+
+    @property
+    def truth(self) -> Truth:
+        """The truth at this moment of the loop's clock (``autopilot.truth`` may be up to 0.2 s old)."""
+        self.catch_up()
+        return self.autopilot.truth
 
     # ----------------------------------------------------------------------------------------------- ports
     def add_port(self, write: Any) -> int:
@@ -65,6 +72,8 @@ class Server:
     # ------------------------------------------------------------------------------------------------ time
     def catch_up(self) -> None:
         """Bring the autopilot up to the clock and send what it says."""
+        if self._zero_s is None:
+            self._zero_s = now_s() - self.autopilot.t_s
         loops = int((now_s() - self._zero_s - self.autopilot.t_s) / LOOP_S + 1e-6)
         if loops > 0:
             lag_s = loops * LOOP_S
@@ -93,9 +102,9 @@ class Server:
     async def run(self) -> None:
         """Follow the clock for ever."""
         loop = asyncio.get_running_loop()
-        self._zero_s = now_s() - self.autopilot.t_s
         while True:
             self.catch_up()
+            assert self._zero_s is not None
             due_s = self._zero_s + min(self.autopilot.next_wake_s, self.autopilot.t_s + MAX_SLEEP_S)
             self._wake = loop.create_future()
             timer = loop.call_at(due_s, self._kick)
