@@ -370,7 +370,12 @@ class Link:
     async def _beat(self) -> None:
         """Send the heartbeat; watch for streams that fell below their rate."""
         next_s = now_s()
+        connections = self.transport.stats.connections
         while True:
+            if self.transport.stats.connections != connections:
+                # a new connection may be a new port of the autopilot, which knows nothing of what was asked before
+                connections = self.transport.stats.connections
+                self._want_rates.set()
             if not self._is_quiet or self._heartbeat_s is None:
                 # a listener speaks only until it is heard: routers forward nothing to a link that never spoke
                 self.send(codec.heartbeat(self._system_status))
@@ -396,6 +401,7 @@ class Link:
     async def _keep_rates(self) -> None:
         while True:
             await self._want_rates.wait()
+            await self._found.wait()
             self._want_rates.clear()
             self._asked_s = now_s()
             for stream in self.monitor.table:

@@ -99,7 +99,8 @@ class Retry:
 
     def again(self, t_s: float) -> bool:
         """Return whether to send again at ``t_s``; False: give up."""
-        if t_s - self._since_s >= self.give_up_s:
+        # the same sum as in wake_s: a difference would round, and a machine wake for ever a bit too early
+        if t_s >= self._since_s + self.give_up_s:
             return False
         self.tries += 1
         self._interval_s = min(self._interval_s * self.growth, self.cap_s)

@@ -1,0 +1,316 @@
+"""The link and the facade against the simulated autopilot, under the virtual clock."""
+
+import asyncio
+import itertools
+
+import pytest
+
+from companion.clock import now_s, run_virtual
+from companion.errors import LinkError
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.frames import Drop
+from companion.mavlink.items import canonical, mission_hash, sailed
+from companion.mavlink.link import Link, LinkIdentity
+from companion.mavlink.machines import Outcome
+from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
+from sitl.autopilot import Autopilot as SimulatedAutopilot
+from sitl.autopilot import AutopilotConfig, MemoryLink, serve
+from sitl.autopilot.memory import Impairment
+from sitl.wind import Constant
+
+HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
+
+
+def mission(count, *, east=0.001, north=0.0):
+    """Return ``count`` waypoints eastward and a safe end."""
+    points = [GeoPoint(lat_deg=51.1 + north, lon_deg=-1.3 + east * (i + 1)) for i in range(count)]
+    return [*(waypoint(p) for p in points), waypoint(points[-1], command=Command.NAV_LOITER_UNLIM)]
+
+
+def sail(main, *, impairment=None, seed=1, **link_options):
+    """Run ``main(boat, link, autopilot, memory)`` with a warm boat at the other end of a memory link."""
+    async def whole():
+        boat = SimulatedAutopilot(AutopilotConfig(is_warm=True, home=HOME), Constant(0.0, 5.0), seed=seed)
+        memory = MemoryLink(seed=seed, impairment=impairment or Impairment())
+        async with (
+            serve(boat, [memory.far]), Link(memory.near, **link_options) as link, Autopilot(link) as autopilot,
+        ):
+            return await main(boat, link, autopilot, memory)
+
+    return run_virtual(whole())
+
+
+async def set_sail(autopilot, items):
+    assert (await autopilot.upload_mission(items)).is_ok
+    assert (await autopilot.set_mode(Mode.AUTO)).is_ok
+    assert (await autopilot.arm()).is_ok
+
+
+@pytest.mark.parametrize("method", ["items", "ftp", "auto"])
+def test_a_mission_goes_up_and_comes_back(method):
+    async def main(boat, link, autopilot, memory):
+        items = mission(9)
+        result = await autopilot.upload_mission(items, method=method)
+        assert (result.outcome, result.count) == (Outcome.OK, 10)
+        read = await autopilot.read_mission()
+        assert [canonical(i) for i in read.items] == [canonical(i) for i in items]
+        assert mission_hash(read.items) == mission_hash(items)
+        assert read.home is not None
+        return result
+
+    result = sail(main)
+    assert result.method == ("items" if method == "items" else "ftp")
+    assert result.duration_s < 0.6
+
+
+def test_a_shorter_plan_over_a_running_one_leaves_nothing_of_the_old():
+    async def main(boat, link, autopilot, memory):
+        await set_sail(autopilot, mission(10))
+        await asyncio.sleep(15.0)
+        short = mission(3, north=0.001)
+        result = await autopilot.upload_mission(short, set_current=1)
+        assert result.is_ok, result
+        read = await autopilot.read_mission()
+        assert sailed(read.items) == tuple(canonical(i) for i in short)
+        old = {canonical(i) for i in mission(10)}
+        assert not old & set(read.items)
+        assert mission_hash(read.items) == mission_hash(short)
+        status = autopilot.status
+        assert (status.mission_seq, status.mission_state) == (1, MissionState.ACTIVE)
+
+    sail(main)
+
+
+def test_a_partial_write_keeps_the_leg_that_is_sailed():
+    async def main(boat, link, autopilot, memory):
+        old = mission(8)
+        await set_sail(autopilot, old)
+        await asyncio.sleep(10.0)
+        new = [*old[:2], *mission(6, north=0.0005)[2:]]
+        result = await autopilot.upload_mission(new, method="partial", keep_first=2)
+        assert result.is_ok, result
+        read = await autopilot.read_mission()
+        assert mission_hash(read.items) == mission_hash(new)
+        assert autopilot.status.mission_seq == 1
+        piece = await autopilot.upload_partial(3, [new[2]])
+        assert piece.is_ok
+
+    sail(main)
+
+
+def test_refusals_have_the_autopilots_words():
+    async def main(boat, link, autopilot, memory):
+        answer = await autopilot.set_mode(Mode.AUTO)
+        assert answer.outcome is Outcome.REFUSED
+        assert "No Mission" in answer.text
+        many = await autopilot.upload_mission(mission(700), method="items")
+        assert many.outcome is Outcome.REFUSED
+        assert "655" in many.text
+        bad = [MissionItem(command=5001, lat_e7=511000000, lon_e7=-13000000, params=(5.0, 0.0, 0.0, 0.0), frame=0)] * 3
+        fence = await autopilot.upload_fence(bad)
+        assert fence.outcome is Outcome.REFUSED
+        assert "Fence validation failed" in fence.text
+        missing = await autopilot.get_parameter("NO_SUCH_PARAM")
+        assert missing.outcome is Outcome.TIMEOUT
+        current = await autopilot.set_current(99)
+        assert current.outcome is Outcome.REFUSED
+
+    sail(main)
+
+
+def test_fences_rally_points_and_parameters():
+    async def main(boat, link, autopilot, memory):
+        ring = [(511100000, -13100000), (511100000, -12800000), (510900000, -12800000), (510900000, -13100000)]
+        fence = [
+            *(MissionItem(command=5001, lat_e7=a, lon_e7=o, params=(4.0, 0.0, 0.0, 0.0), frame=0) for a, o in ring),
+            MissionItem(command=5004, lat_e7=511000000, lon_e7=-12950000, params=(25.5, 0.0, 0.0, 0.0), frame=0),
+        ]
+        assert (await autopilot.upload_fence(fence)).is_ok
+        read = await autopilot.read_fence()
+        assert [canonical(i) for i in read.items] == [canonical(i) for i in fence]
+        assert (await autopilot.clear_fence()).is_ok
+        assert (await autopilot.read_fence()).items == ()
+        rally = [MissionItem(command=5100, lat_e7=511000000, lon_e7=-12990000)]
+        assert (await autopilot.upload_rally(rally)).is_ok
+        assert (await autopilot.get_parameter("MAV_SYSID")).value == 1.0
+        assert (await autopilot.set_parameter("SAIL_XTRACK_MAX", 25.0)).is_ok
+        assert (await autopilot.get_parameter("SAIL_XTRACK_MAX")).value == 25.0
+        table = await autopilot.read_parameters()
+        assert table.outcome is Outcome.OK
+        assert table.get("MAV_SYSID") == table.get("SYSID_THISMAV") == 1.0
+        assert table.get("SAIL_XTRACK_MAX") == 25.0
+
+    sail(main)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("method", ["items", "ftp"])
+def test_a_link_that_loses_a_third_still_delivers_the_whole_mission(method, seed):
+    async def main(boat, link, autopilot, memory):
+        items = mission(6)
+        for _ in range(3):
+            result = await autopilot.upload_mission(items, method=method)
+            if result.is_ok:
+                break
+        assert result.is_ok, result
+        memory.impairment = Impairment()
+        await asyncio.sleep(15.0)
+        read = await autopilot.read_mission()
+        assert mission_hash(read.items) == mission_hash(items)
+
+    bad = Impairment(loss=0.3, duplicate=0.15, reorder=0.15, corrupt=0.02, delay_s=0.05, jitter_s=0.05)
+    sail(main, impairment=bad, seed=seed)
+
+
+@pytest.mark.parametrize("cut_after_s", [0.03, 0.07, 0.11, 0.15])
+def test_an_ftp_upload_cut_short_leaves_the_old_mission_whole(cut_after_s):
+    async def main(boat, link, autopilot, memory):
+        old, new = mission(10), mission(10, north=0.002)
+        await set_sail(autopilot, old)
+        await asyncio.sleep(5.0)
+        upload = asyncio.ensure_future(autopilot.upload_mission(new, method="ftp"))
+        await asyncio.sleep(cut_after_s)
+        memory.cut()
+        result = await upload
+        assert result.outcome is Outcome.LINK
+        memory.mend()
+        await asyncio.sleep(5.0)
+        read = await autopilot.read_mission()
+        assert mission_hash(read.items) in {mission_hash(old), mission_hash(new)}
+
+    sail(main)
+
+
+def test_a_cut_item_upload_is_told_and_repaired_by_the_next():
+    async def main(boat, link, autopilot, memory):
+        await set_sail(autopilot, mission(10))
+        new = mission(10, north=0.002)
+        upload = asyncio.ensure_future(autopilot.upload_mission(new, method="items"))
+        await asyncio.sleep(0.09)
+        memory.cut()
+        assert (await upload).outcome is Outcome.LINK
+        memory.mend()
+        await asyncio.sleep(2.0)
+        assert (await autopilot.upload_mission(new)).is_ok
+
+    sail(main)
+
+
+def test_rates_are_asked_for_and_again_after_a_reboot():
+    async def main(boat, link, autopilot, memory):
+        await asyncio.sleep(20.0)
+        health = {h.stream.name: h for h in link.monitor.health(now_s())}
+        for name in ("GLOBAL_POSITION_INT", "ATTITUDE", "WIND", "MISSION_CURRENT", "HEARTBEAT"):
+            assert health[name].is_fresh, name
+            assert health[name].is_on_rate, name
+            assert health[name].is_trusted, name
+        assert health["ATTITUDE"].rate_hz == pytest.approx(5.0, abs=0.5)
+        assert link.stats.reboots == 0
+        boat.reboot()
+        await asyncio.sleep(30.0)
+        assert link.stats.reboots == 1
+        assert autopilot.assembler.reboots == 1
+        health = {h.stream.name: h for h in link.monitor.health(now_s())}
+        assert health["ATTITUDE"].rate_hz == pytest.approx(5.0, abs=0.5)
+
+    sail(main)
+
+
+def test_own_traffic_of_normal_sailing_is_small():
+    async def main(boat, link, autopilot, memory):
+        await set_sail(autopilot, mission(8))
+        status = CompanionStatus(
+            t_s=now_s(), state="destination approach", twd_from_rad=1.0, twd_sigma_rad=0.1, tws_mps=5.0,
+            tws_sigma_mps=0.5, promised_risk=0.02, next_tack_s=40.0, cross_track_m=-3.0, alert_code="wind shift",
+            alert_text="the wind turned 25 deg against the plan's: planning again from waypoint 4", plan_id=3,
+        )
+        for _ in range(30):
+            autopilot.send_status(status)
+            await asyncio.sleep(2.0)
+        assert link.bytes_per_s()[1] < 200.0
+        return link.bytes_per_s()[1]
+
+    assert sail(main) > 60.0
+
+
+def test_everything_is_in_the_sink_both_ways():
+    frames = []
+
+    async def main(boat, link, autopilot, memory):
+        await autopilot.upload_mission(mission(3))
+        return link.stats.frames_in, link.stats.frames_out
+
+    counts = sail(main, sink=lambda t_s, frame: frames.append((t_s, frame)))
+    ours = [f for _, f in frames if f[6] == 191]
+    assert len(frames) == sum(counts)
+    assert len(ours) == counts[1]
+    assert all(a[0] <= b[0] for a, b in itertools.pairwise(frames))
+
+
+def test_the_same_seed_repeats_every_byte():
+    def once():
+        frames = []
+
+        async def main(boat, link, autopilot, memory):
+            await set_sail(autopilot, mission(4))
+            await asyncio.sleep(20.0)
+
+        sail(main, sink=lambda t_s, frame: frames.append((t_s, frame)), impairment=Impairment(loss=0.1, reorder=0.1))
+        return frames
+
+    assert once() == once()
+
+
+def test_we_are_an_onboard_computer_with_the_boats_system_id():
+    frames = []
+
+    async def whole():
+        boat = SimulatedAutopilot(AutopilotConfig(is_warm=True, sysid=7), Constant(0.0, 5.0), seed=1)
+        memory = MemoryLink(seed=1)
+        async with serve(boat, [memory.far]), Link(memory.near, sink=lambda _, f: frames.append(f)) as link:
+            party = await link.wait_autopilot(10.0)
+            await asyncio.sleep(3.0)
+            return party
+
+    party = run_virtual(whole())
+    assert (party.target_system, party.own_system, party.own_component) == (7, 7, 191)
+    beats = [f for f in frames if f[6] == 191 and f[7:10] == b"\x00\x00\x00"]
+    assert beats[-1][5] == 7
+    assert beats[-1][10 + 4] == 18, "MAV_TYPE_ONBOARD_CONTROLLER"
+    assert beats[-1][10 + 5] == 8, "MAV_AUTOPILOT_INVALID"
+
+
+def test_another_system_is_not_listened_to():
+    async def whole():
+        boat = SimulatedAutopilot(AutopilotConfig(is_warm=True, sysid=7), Constant(0.0, 5.0), seed=1)
+        memory = MemoryLink(seed=1)
+        async with serve(boat, [memory.far]), Link(memory.near, target_system=3) as link:
+            heard = []
+            link.subscribe(lambda _, m: heard.append(m))
+            with pytest.raises(LinkError, match="no autopilot's heartbeat of system 3"):
+                await link.wait_autopilot(5.0)
+            assert not heard
+            assert link.dropped()[Drop.FOREIGN_SYSTEM] > 3
+
+    run_virtual(whole())
+
+
+def test_a_silent_link_is_an_error_of_one_line():
+    async def whole():
+        memory = MemoryLink(seed=1)
+        async with Link(memory.near) as link:
+            await link.wait_autopilot(5.0)
+
+    with pytest.raises(LinkError, match="nothing was heard at all") as caught:
+        run_virtual(whole())
+    assert "\n" not in str(caught.value)
+
+
+def test_a_listener_speaks_once_and_then_listens():
+    async def main(boat, link, autopilot, memory):
+        await asyncio.sleep(10.0)
+        return link.stats.frames_out
+
+    listener = {"identity": LinkIdentity(system=254, component=25), "streams": (), "is_quiet": True}
+    # one or two heartbeats until the autopilot is heard, and the version that the facade asks for
+    assert sail(main, **listener) <= 4
