@@ -247,8 +247,9 @@ def main(argv: list[str] | None = None) -> int:
         q = t["quantiles"]
         sys.stdout.write(
             f"{method:8s} {t['complete']}/{t['runs']} complete ({100 * t['share_complete']:.1f} %)  "
-            f"stayed {t['stayed']}  left in time {t['left_in_time']}  kept clear {t['kept_clear']}  least distance {t['least_m']:.1f} m "
-            f"(5 %: {q['least_m']['p05']:.1f} m)  left after {q['left_after_s']['median']:.0f} s median  "
+            f"stayed {t['stayed']}  left in time {t['left_in_time']}  kept clear {t['kept_clear']}  "
+            f"least distance {t['least_m']:.1f} m (5 %: {q['least_m']['p05']:.1f} m)  "
+            f"left after {q['left_after_s']['median']:.0f} s median  "
             f"irons {t['irons']}  plans {t['plans']}  last resort {t['last_resort_s']:.0f} s\n"
         )
         if t["failed_seeds"]:

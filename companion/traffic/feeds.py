@@ -1,0 +1,201 @@
+"""AIS receivers and event feeds: the shell that reads them (serial, UDP, TCP) and hands over reports.
+
+The one module of this room with sockets. A feed is named like a link::
+
+    udpin:0.0.0.0:10110      datagrams of NMEA sentences, or of JSON (a datagram that begins with {)
+    tcp:HOST:PORT            a multiplexer that serves NMEA lines
+    /dev/ttyUSB0:38400       a receiver on a serial port
+
+A feed never raises once it is open: streams connect again for ever with capped jitter, noise is counted.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import random
+import re
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from typing import Any
+
+from companion.clock import now_s
+from companion.errors import InputError, LinkError
+from companion.messages import AisReport
+from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json
+
+OnReport = Callable[[AisReport], None]
+
+DEFAULT_BAUD = 38400          # ITU-R M.1371 receivers: NMEA 0183-HS
+MAX_PARTIAL = 1024            # bytes without a line end: noise, dropped
+SILENT_S = 60.0               # a feed unheard for this long is stale: say so, AIS traffic or not
+_BACKOFF_BASE_S, _BACKOFF_CAP_S = 0.5, 15.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeedName:
+    """A parsed feed name."""
+
+    text: str
+    kind: str
+    host: str = ""
+    port: int = 0
+    baud: int = DEFAULT_BAUD
+
+
+def parse_feed(text: str) -> FeedName:
+    """Parse a feed name.
+
+    Raises:
+        InputError: it is not one.
+
+    """
+    match = re.fullmatch(r"(udpin|tcp):([^:\s]+):(\d{1,5})", text)
+    if match and 0 < int(match[3]) < 65536:
+        return FeedName(text=text, kind=match[1], host=match[2], port=int(match[3]))
+    match = re.fullmatch(r"(/[^\s:]+)(?::(\d{3,7}))?", text)
+    if match:
+        return FeedName(text=text, kind="serial", host=match[1], baud=int(match[2] or DEFAULT_BAUD))
+    raise InputError("AIS feed", text, "is not a feed", "write udpin:HOST:PORT, tcp:HOST:PORT or /dev/NAME:BAUD")
+
+
+class AisFeed:
+    """One feed in its life; make it with ``open_feed``."""
+
+    def __init__(self, name: FeedName, on_report: OnReport, *, seed: int = 0) -> None:
+        self.name = name
+        self._on_report = on_report
+        self._decoder = NmeaDecoder()
+        self._rng = random.Random(seed)
+        self._partial = b""
+        self.connections = 0
+        self.last_heard_s: float | None = None
+        self.last_error = ""
+
+    @property
+    def counts(self) -> DecodeCounts:
+        """What came in and what became of it."""
+        return self._decoder.counts
+
+    @property
+    def is_silent(self) -> bool:
+        """Has nothing come for a minute?"""
+        return self.last_heard_s is None or now_s() - self.last_heard_s > SILENT_S
+
+    def sentence(self) -> str:
+        """Return one line for the status."""
+        c = self.counts
+        heard = "never heard" if self.last_heard_s is None else f"heard {now_s() - self.last_heard_s:.0f} s ago"
+        refused = c.bad_form + c.bad_checksum + c.bad_payload + c.bad_fragment
+        text = f"{self.name.text}: {heard}, {c.reports} reports of {c.lines} lines, {refused} refused"
+        return f"{text}, {self.last_error}" if self.last_error else text
+
+    # ------------------------------------------------------------------------------------------ bytes
+    def datagram(self, data: bytes) -> None:
+        """Take a datagram: JSON, or whole lines of NMEA."""
+        t_s = now_s()
+        self.last_heard_s = t_s
+        if data.lstrip()[:1] == b"{":
+            self.counts.lines += 1
+            report = decode_json(data, t_s)
+            if report is None:
+                self.counts.bad_form += 1
+            else:
+                self.counts.reports += 1
+                self._on_report(report)
+            return
+        for line in data.splitlines()[:64]:
+            self._line(line, t_s)
+
+    def stream(self, data: bytes) -> None:
+        """Take a piece of a byte stream: lines may be cut anywhere."""
+        t_s = now_s()
+        self.last_heard_s = t_s
+        *lines, self._partial = (self._partial + data).split(b"\n")
+        for line in lines:
+            self._line(line, t_s)
+        if len(self._partial) > MAX_PARTIAL:
+            self._partial = b""
+            self.counts.bad_form += 1
+
+    def _line(self, line: bytes, t_s: float) -> None:
+        if not line.strip():
+            return
+        report = self._decoder.feed(line, t_s)
+        if report is not None:
+            self._on_report(report)
+
+    # ------------------------------------------------------------------------------------------- life
+    async def run_stream(self) -> None:
+        """Connect, read to the end, connect again; for ever."""
+        attempt = 0
+        while True:
+            writer: asyncio.StreamWriter | None = None
+            try:
+                reader, writer = await self._open_stream()
+                self.connections += 1
+                attempt, self.last_error, self._partial = 0, "", b""
+                while data := await reader.read(4096):
+                    self.stream(data)
+                self.last_error = "closed by the other end"
+            except (OSError, TimeoutError) as error:
+                self.last_error = str(error) or type(error).__name__
+            finally:
+                if writer is not None:
+                    writer.close()
+            await asyncio.sleep(self._rng.uniform(0.0, min(_BACKOFF_CAP_S, _BACKOFF_BASE_S * 2.0**min(attempt, 10))))
+            attempt += 1
+
+    async def _open_stream(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        if self.name.kind == "tcp":
+            async with asyncio.timeout(10.0):
+                return await asyncio.open_connection(self.name.host, self.name.port)
+        import serial_asyncio_fast
+
+        return await serial_asyncio_fast.open_serial_connection(
+            url=self.name.host, baudrate=self.name.baud, exclusive=True
+        )
+
+
+class _Datagrams(asyncio.DatagramProtocol):
+    def __init__(self, feed: AisFeed) -> None:
+        self._feed = feed
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:  # noqa: ARG002 - asyncio's signature
+        self._feed.datagram(data)
+
+    def error_received(self, exc: Exception) -> None:
+        self._feed.last_error = str(exc)
+
+
+@contextlib.asynccontextmanager
+async def open_feed(name: str, on_report: OnReport, *, seed: int = 0) -> AsyncIterator[AisFeed]:
+    """Run a feed while the block runs; ``on_report`` is called in the loop with each report.
+
+    Raises:
+        InputError: the name is not a feed.
+        LinkError: the local UDP port cannot be bound.
+
+    """
+    feed = AisFeed(parse_feed(name), on_report, seed=seed)
+    loop = asyncio.get_running_loop()
+    if feed.name.kind == "udpin":
+        try:
+            wire, _ = await loop.create_datagram_endpoint(
+                lambda: _Datagrams(feed), local_addr=(feed.name.host, feed.name.port)
+            )
+        except OSError as error:
+            raise LinkError(f"AIS feed {name}: {error}") from error
+        feed.connections = 1
+        try:
+            yield feed
+        finally:
+            wire.close()
+        return
+    task = loop.create_task(feed.run_stream(), name=f"AIS feed {name}")
+    try:
+        yield feed
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
