@@ -14,7 +14,8 @@ from companion.wind.estimator import gain
 
 _STILL_RAD = math.radians(0.4)        # a vane within this has not moved (instruments report whole degrees)
 _SWEPT_RAD = math.radians(20.0)       # boat turned this much under a vane that has not moved: frozen
-_STILL_LEAST_S = 6.0
+_STILL_LEAST_S = 3.0
+_SUSPECT_RAD = math.radians(6.0)      # turned this much: not believed, no verdict yet
 _IDENTICAL_RAD = 1e-7                 # the very same number again
 _IDENTICAL_S = 20.0                   # for this long while the boat swung a little: a silent sensor
 _SWUNG_RAD = math.radians(5.0)
@@ -30,7 +31,7 @@ class FrozenVane:
         self._low = self._high = 0.0
         self._same_low = self._same_high = 0.0
         self._heading = 0.0
-        self.is_frozen = False
+        self.is_frozen = self.is_suspect = False
 
     def update(self, t_s: float, awa_rad: float, heading_rad: float) -> bool:
         """Take an apparent angle with the heading of that moment; return the verdict."""
@@ -47,6 +48,8 @@ class FrozenVane:
         self._low, self._high = min(self._low, turned), max(self._high, turned)
         self._same_low, self._same_high = min(self._same_low, turned), max(self._same_high, turned)
         still_s = t_s - (self._since_s if self._since_s is not None else t_s)
+        # A boat that spins carries a frozen vane's wind with it at once: stop believing before being sure.
+        self.is_suspect = not moved and self._high - self._low >= _SUSPECT_RAD
         self.is_frozen = (
             (still_s >= _STILL_LEAST_S and self._high - self._low >= _SWEPT_RAD)
             or (t_s - self._same_s >= _IDENTICAL_S and self._same_high - self._same_low >= _SWUNG_RAD)
@@ -54,7 +57,7 @@ class FrozenVane:
         return self.is_frozen
 
 
-_SPIKE_RAD = math.radians(40.0)       # a lone reading this far from the last seconds is none of the wind's doing
+_SPIKE_RAD = math.radians(45.0)       # a lone reading this far from the last seconds is none of the wind's doing
 _SPIKE_ROUGH = 6.0                    # ... or this many times the usual departure, whichever is more
 _SHIFT_S = 4.0                        # readings that stay away this long are a shift, not a spike
 _SHARE_S = 60.0
@@ -186,9 +189,14 @@ class TackOffset:
         return self._solve()[1] if self.tacks >= 2 else None
 
     @property
-    def is_misaligned(self) -> bool:
-        """Whether ε or κ is surely more than 4 deg."""
+    def sure_rad(self) -> float:
+        """The part of |ε| + |κ| that is surely there: more than 4 deg and than three standard errors; else 0."""
         if self.tacks < 2:
-            return False
+            return 0.0
         e, k, se, sk = self._solve()
-        return (abs(e) > max(_OFFSET_LEAST_RAD, _SURE * se)) or (abs(k) > max(_OFFSET_LEAST_RAD, _SURE * sk))
+        return sum(abs(v) for v, s in ((e, se), (k, sk)) if abs(v) > max(_OFFSET_LEAST_RAD, _SURE * s))
+
+    @property
+    def is_misaligned(self) -> bool:
+        """Whether ε or κ is surely there."""
+        return self.sure_rad > 0.0

@@ -16,7 +16,7 @@ from companion.messages import ApparentWind, VehicleState, WindForecast, WindQua
 from companion.wind.catalogue import Forecaster
 from companion.wind.estimator import SIGMA_MAX_RAD, Estimator, gain
 from companion.wind.parameters import VaneParameters
-from companion.wind.true_wind import true_wind
+from companion.wind.true_wind import LIGHT_MPS, true_wind
 from companion.wind.watch import Verdict, WindStatus, WindWatch
 
 SILENT_S = 5.0            # [s] without a sample before the wind counts as silent
@@ -104,10 +104,11 @@ class WindRoom:
         begin = self._mean_s is None
         self._mean_s = sample.t_s
         g = 1.0 if begin else gain(dt_s, 90.0)
-        self._mean_sin += g * (math.sin(sample.twd_from_rad) - self._mean_sin)
-        self._mean_cos += g * (math.cos(sample.twd_from_rad) - self._mean_cos)
+        self._mean_sin += g * (sample.tws_mps * math.sin(sample.twd_from_rad) - self._mean_sin)
+        self._mean_cos += g * (sample.tws_mps * math.cos(sample.twd_from_rad) - self._mean_cos)
         off = abs(wrap_pi(sample.twd_from_rad - math.atan2(self._mean_sin, self._mean_cos)))
-        self._rough_rad += gain(dt_s, 600.0) * (min(1.2, off) - self._rough_rad)
+        if sample.tws_mps >= LIGHT_MPS:
+            self._rough_rad += gain(dt_s, 600.0) * (min(1.2, off) - self._rough_rad)
         tau_s = self._watch.parameters.true_tau_s
         return 0.45 * self._rough_rad * min(1.5, math.sqrt(tau_s / 3.2))
 

@@ -18,7 +18,7 @@ from companion.geo.angles import heading_of, wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindQuality, WindReference, WindSample, WindSource
 
 LIGHT_MPS = 1.0                          # [m/s] below this the direction is nearly without meaning (recorded wind)
-TURNING_RADPS = math.radians(2.5)        # [rad/s] 25 deg in 10 s: compass and vane lag
+TURNING_RADPS = math.radians(10.0)       # [rad/s] no wave, a manoeuvre: compass and vane lag
 STALE_S = 1.0                            # [s] apparent wind and vehicle further apart than this are not one instant
 
 

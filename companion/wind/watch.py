@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections import deque
 from dataclasses import dataclass
 
 from companion.geo.angles import wrap_pi
@@ -15,7 +16,7 @@ from companion.messages import ApparentWind, VehicleState, WindQuality, WindSamp
 from companion.wind.estimator import gain
 from companion.wind.faults import FrozenVane, Spikes, TackOffset
 from companion.wind.parameters import VaneParameters
-from companion.wind.true_wind import LIGHT_MPS, TURNING_RADPS, apparent_wind
+from companion.wind.true_wind import LIGHT_MPS, apparent_wind
 
 
 class Verdict(enum.Enum):
@@ -68,7 +69,10 @@ _HELD_S = 10.0            # [s] of the very same true wind on a boat that moves
 _HELD_BLIND_S = 20.0      # [s] likewise when the boat's motion is not known
 _ZERO_S = 10.0            # [s] of a speed of exactly nothing
 _NEAR_S = 1.5             # [s] vehicle and wind of one instant
-_TURNED_S = 10.0          # [s] after a turn for which vane and compass still lag
+_TURNED_S = 10.0          # [s] within which a change of heading is a turn
+_LAG_S = 2.0              # [s] after it
+_DEAD_MPS = 0.3           # [m/s] less wind than this has no direction at all
+TURNED_RAD = math.radians(25.0)   # of heading within those seconds: the definition of the records' ``turning``
 _INVENTED_RAD = math.radians(45.0)
 _ASSUMED_MPS = 3.0        # [m/s] wind assumed where there is no speed, to bound what the boat's own motion hides
 
@@ -86,6 +90,7 @@ class WindWatch:
         self._speed_mps = 0.0
         self._back_s, self._gap_s = -math.inf, 0.0
         self._turn_s = -math.inf
+        self._headings: deque[tuple[float, float]] = deque(maxlen=11)
         self._frozen_s: float | None = None
         self._same_s = self._zero_s = 0.0       # since when the same true wind, a speed of nothing
         self._same_heading_rad = 0.0
@@ -93,12 +98,14 @@ class WindWatch:
 
     def vehicle(self, state: VehicleState) -> None:
         """Take how the boat moves."""
-        before = self._vehicle
         self._vehicle = state
-        rate = state.yaw_rate_radps
-        if rate is None and before is not None and 0.0 < state.t_s - before.t_s < 5.0:
-            rate = wrap_pi(state.heading_rad - before.heading_rad) / (state.t_s - before.t_s)
-        if rate is not None and abs(rate) > TURNING_RADPS:
+        # A heading that has changed for good, not the yaw rate: a small boat yaws faster than this in every wave.
+        if not self._headings or state.t_s - self._headings[-1][0] >= 1.0 or state.t_s < self._headings[-1][0]:
+            self._headings.append((state.t_s, state.heading_rad))
+        if any(
+            0.0 < state.t_s - then_s <= _TURNED_S and abs(wrap_pi(state.heading_rad - heading)) > TURNED_RAD
+            for then_s, heading in self._headings
+        ):
             self._turn_s = state.t_s
         turned = abs(wrap_pi(state.heading_rad - self._same_heading_rad)) > math.radians(1.0)
         self._has_moved = self._has_moved or turned or state.speed_mps > 0.3
@@ -128,7 +135,7 @@ class WindWatch:
             found.append((Verdict.CALM, f"{self._speed_mps:.1f} m/s is too little for a direction"))
             lack = 1.0 - self._speed_mps / LIGHT_MPS
             widening *= 1.0 + 2.0 * lack
-            weight = min(weight, 1.0 - 0.8 * lack)
+            weight = min(weight, 1.0 - 0.8 * lack) if sample.tws_mps >= _DEAD_MPS else 0.0
         if self.parameters.is_direction_invented:
             found.append((Verdict.SYNTHESISED, f"WNDVN_TYPE {self.parameters.vane_type}: the direction is invented"))
             extra = math.hypot(extra, _INVENTED_RAD)
@@ -136,17 +143,19 @@ class WindWatch:
             found.append((Verdict.HELD, "the autopilot repeats an old true wind"))
             widening *= 1.0 + min(2.0, (t - self._same_s) / 60.0)
             weight = 0.0
-        is_turning = sample.quality is WindQuality.TURNING or t - self._turn_s < _TURNED_S
+        is_turning = sample.quality is WindQuality.TURNING or t - self._turn_s < _LAG_S
         if is_turning:
             found.append((Verdict.TURNING, "the boat turns: vane and compass lag"))
             weight = min(weight, 0.3)
         frozen_s = self._frozen_for(t)
         if frozen_s > 0.0:
             found.append((Verdict.FROZEN, f"the vane has not moved for {frozen_s:.0f} s"))
-            widening *= 1.0 + min(2.0, frozen_s / 60.0)
+            widening *= 1.5 + min(1.5, frozen_s / 60.0)
+            weight = 0.0
+        elif self._frozen.is_suspect:
             weight = 0.0
         # In a calm a wandering direction is no fault of the vane.
-        if self._speed_mps >= 1.5 * LIGHT_MPS and not is_turning and frozen_s == 0.0:
+        if self._speed_mps >= 2.0 * LIGHT_MPS and not is_turning and frozen_s == 0.0:
             if self._spikes.update(t, sample.twd_from_rad):
                 weight = 0.0
             if self._spikes.is_spiking:
@@ -159,7 +168,7 @@ class WindWatch:
                 f"the tacks disagree: vane off by {math.degrees(offset):+.0f} deg, "
                 f"{math.degrees(side):+.0f} deg to the side of the wind"
             )))
-            extra = math.hypot(extra, abs(offset) + abs(side))
+            extra = math.hypot(extra, self.tacks.sure_rad)
         if dt_s > _GAP_S:
             self._back_s, self._gap_s = t, dt_s
         if t - self._back_s < _RETURN_S:
