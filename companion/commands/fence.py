@@ -1,0 +1,309 @@
+"""``companion fence``: check, convert, upload and download fences and obstacle files."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from companion.errors import InputError, JobError
+
+if TYPE_CHECKING:
+    from companion.geofence import Area, Document, Finding
+    from companion.geofence.autopilot_fence import AutopilotFence
+    from companion.geofence.losses import Written
+    from companion.messages import GeoPoint
+
+_EPILOG = """\
+examples:
+  companion fence check islands.wkt --near 50.82,-1.31
+  companion fence check missions/archipelago.toml          (with its start, goals, margin and wind)
+  companion fence convert islands.wkt islands.plan
+  companion fence convert crossing.wkt fixed.wkt --repair
+  companion fence upload missions/archipelago.toml --link udpin:0.0.0.0:14550 --enable
+  companion fence download boat.geojson --link /dev/ttyUSB0:57600
+
+Formats: WKT, EWKT, GeoJSON, QGroundControl .plan, .waypoints, Mission Planner .fen and .poly, GPX, KML, KMZ; a
+mission TOML stands for its area. A file is told by its content, not its name.
+Exit codes: 0 in order, 1 faults found or a failed transfer, 2 a file or option that cannot be believed.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
+    """Add the command with its four verbs."""
+    parser = subparsers.add_parser(
+        "fence", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verbs = parser.add_subparsers(dest="verb", metavar="check|convert|upload|download", required=True)
+    check = verbs.add_parser("check", help="find and name what is wrong with a fence, an obstacle file, a mission")
+    check.add_argument("file", metavar="FILE")
+    reading_options(check)
+    place_options(check)
+    check.add_argument("--wind-from", type=float, metavar="DEG", help="wind for which gaps must be wide enough")
+    check.add_argument("--no-go", type=float, default=47.0, metavar="DEG", help="half angle of the no-go zone (47)")
+    check.add_argument("--plot", metavar="P.png", help="draw the area")
+    check.set_defaults(run=_check)
+
+    convert = verbs.add_parser("convert", help="write a file in another format and say what it does not carry")
+    convert.add_argument("file", metavar="FILE")
+    convert.add_argument("out", metavar="OUT", help="its extension is the format")
+    reading_options(convert)
+    place_options(convert)
+    convert.add_argument("--repair", action="store_true",
+                         help="write broken rings repaired: no repair makes the sea larger")
+    convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
+    convert.add_argument("--simplify", action="store_true",
+                         help="write the 84 items for the autopilot (needs --margin and --start, or a mission)")
+    convert.set_defaults(run=_convert)
+
+    upload = verbs.add_parser("upload", help="simplify to what the autopilot holds, write, read back, compare")
+    upload.add_argument("file", metavar="FILE")
+    link_options(upload)
+    reading_options(upload)
+    place_options(upload)
+    upload.add_argument("--exact", action="store_true", help="never simplify: the zones as the file has them")
+    upload.add_argument("--enable", action="store_true", help="also set FENCE_TYPE 4 (polygons) and FENCE_ENABLE 1")
+    upload.set_defaults(run=_upload)
+
+    download = verbs.add_parser("download", help="read the autopilot's fence into a file")
+    download.add_argument("out", metavar="OUT", help="its extension is the format")
+    link_options(download)
+    download.add_argument("--lossy", action="store_true", help="write even if zones are left out")
+    download.set_defaults(run=_download)
+
+
+def link_options(parser: argparse.ArgumentParser) -> None:
+    """Add --link and --timeout."""
+    parser.add_argument("--link", required=True, metavar="LINK",
+                        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="wait this long for a heartbeat (10)")
+
+
+def reading_options(parser: argparse.ArgumentParser) -> None:
+    """Add how a file is to be understood."""
+    parser.add_argument("--kind", choices=("inclusion", "exclusion"), default="exclusion",
+                        help="what zones are where the file does not say (exclusion)")
+    parser.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto",
+                        help="order of WKT coordinates (longitude first, checked against the place)")
+    parser.add_argument("--near", metavar="LAT,LON", help="where the file should lie: farther than 50 km is an error")
+    parser.add_argument("--point-radius", type=float, default=10.0, metavar="M",
+                        help="radius of an obstacle that is a point or line (10)")
+
+
+def place_options(parser: argparse.ArgumentParser) -> None:
+    """Add start, goals and margin."""
+    parser.add_argument("--start", metavar="LAT,LON")
+    parser.add_argument("--goal", metavar="LAT,LON", action="append", default=[])
+    parser.add_argument("--margin", type=float, metavar="M", help="what the planner keeps clear [m]")
+
+
+def read_input(args: argparse.Namespace) -> Document:
+    """Return the document that the arguments name."""
+    from companion.commands.shore import place_argument
+    from companion.geofence import ZoneKind, read
+    from companion.geofence.mission import load_mission
+    from companion.geofence.mission_files import document_of
+
+    if Path(args.file).suffix.lower() == ".toml":
+        return document_of(load_mission(args.file))
+    near = args.near or args.start
+    return read(args.file, kind=ZoneKind(args.kind), axis=args.axis, areas=True,
+                near=place_argument(near, "--near") if near else None)
+
+
+def places(args: argparse.Namespace) -> tuple[GeoPoint | None, tuple[GeoPoint, ...], float | None]:
+    """Return start, goals and margin of the arguments, or of a mission TOML."""
+    from companion.commands.shore import place_argument
+    from companion.geofence.mission import load_mission
+
+    start = place_argument(args.start, "--start") if args.start else None
+    goals = tuple(place_argument(g, "--goal") for g in args.goal)
+    margin_m = args.margin
+    if margin_m is not None and not (math.isfinite(margin_m) and 0.0 <= margin_m <= 1000.0):
+        raise InputError("--margin", "", f"{margin_m:g} is outside 0..1000 m")
+    if Path(args.file).suffix.lower() == ".toml":
+        mission = load_mission(args.file)
+        start = start or mission.origin
+        goals = goals or tuple(g.point for g in mission.goals)
+        margin_m = mission.margin_m if margin_m is None else margin_m
+    return start, goals, margin_m
+
+
+def area_of(document: Document, point_radius_m: float) -> Area:
+    """Return a document's zones and marks as an area."""
+    from companion.geofence import Area, Fence, ZoneKind
+
+    return Area(
+        obstacles=document.as_obstacles(point_radius_m),
+        fence=Fence(tuple(z for z in document.zones if z.kind is ZoneKind.INCLUSION)),
+    )
+
+
+def print_findings(findings: tuple[Finding, ...], source: str) -> bool:
+    """Print findings and return whether one of them is an error."""
+    from companion.geofence import Severity
+
+    for finding in findings:
+        print(finding.line(source))
+    return any(f.severity is Severity.ERROR for f in findings)
+
+
+def print_losses(losses: tuple[Finding, ...], out: str) -> None:
+    """Print what a file does not carry."""
+    for loss in losses:
+        print(loss.line(out))
+
+
+def summary(document: Document) -> str:
+    """Return what a document holds in a few words."""
+    from companion.geofence import Circle, ZoneKind
+
+    counts = [
+        (sum(z.kind is ZoneKind.INCLUSION for z in document.zones), "keep-in zone"),
+        (sum(z.kind is ZoneKind.EXCLUSION for z in document.zones), "keep-out zone"),
+        (len(document.marks), "point or line"), (len(document.items), "mission item"),
+        (len(document.rally), "rally point"), (len(document.tracks), "track"),
+    ]
+    vertices = sum(1 if isinstance(z.shape, Circle) else len(z.shape.exterior.coords) - 1 for z in document.zones)
+    words = ", ".join(f"{n} {word}{'s' if n != 1 else ''}" for n, word in counts if n)
+    return (words or "nothing") + (f" ({vertices} fence items)" if document.zones else "")
+
+
+def _check(args: argparse.Namespace) -> int:
+    from companion.geofence.check import Conditions, check_area
+
+    document = read_input(args)
+    start, goals, margin_m = places(args)
+    wind_deg = args.wind_from
+    if Path(args.file).suffix.lower() == ".toml":
+        from companion.geofence.mission import load_mission
+
+        mission = load_mission(args.file)
+        wind_deg = mission.wind.preview_from_deg if wind_deg is None else wind_deg
+        args.no_go = mission.boat.no_go_half_deg
+    area = area_of(document, args.point_radius)
+    bad = print_findings(document.findings, args.file)
+    bad |= print_findings(check_area(area, Conditions(
+        start=start, goals=goals, margin_m=margin_m, no_go_half_rad=math.radians(args.no_go),
+        twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
+    )), args.file)
+    if args.plot:
+        from companion.plots.mission import save_area
+
+        save_area(area, args.plot, start=start, goals=goals, margin_m=margin_m or 0.0,
+                  twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
+                  no_go_half_rad=math.radians(args.no_go), title=Path(args.file).name)
+    print(f"{args.file}: {document.format}: {summary(document)}: {'NOT in order' if bad else 'in order'}")
+    return int(bad)
+
+
+def write_out(written: Written, out: str, *, lossy: bool) -> None:
+    """Write a file, or refuse when it would protect less than its source and nobody said ``--lossy``."""
+    from companion.geofence import Severity
+
+    print_losses(written.losses, out)
+    if any(f.severity is Severity.ERROR for f in written.losses) and not lossy:
+        raise JobError(f"{out}: not written: zones would be missing; choose another format or say --lossy")
+    try:
+        Path(out).write_bytes(written.data)
+    except OSError as error:
+        raise InputError(out, "", f"cannot be written ({error.strerror})") from None
+
+
+def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
+    """Return the autopilot's fence for the arguments. Raises JobError with the reason when there is none."""
+    from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
+
+    start, goals, margin_m = places(args)
+    if start is None or margin_m is None:
+        raise InputError(args.file, "", "simplifying needs a margin and a start",
+                         "give --margin M and --start LAT,LON, or a mission TOML")
+    result = fence_for_autopilot(area_of(document, args.point_radius), margin_m, inside=[start, *goals])
+    if result.status is not FenceStatus.OK:
+        raise JobError(f"{args.file}: no fence for the autopilot: {result.reason}")
+    for note in result.notes:
+        print(f"{args.file}: note: {note}")
+    print(f"{args.file}: {len(result.items)} fence items, which use {result.used_m:.1f} m of the {margin_m:g} m margin")
+    return result
+
+
+def _convert(args: argparse.Namespace) -> int:
+    from companion.geofence import Document
+    from companion.geofence.formats import write
+
+    document = read_input(args)
+    if not args.repair:
+        document.require_clean()
+    print_findings(document.findings, args.file)
+    if args.simplify:
+        document = Document(source=document.source, format="simplified", zones=simplified(args, document).zones)
+    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy)
+    print(f"{args.out}: written: {summary(document)}")
+    return 0
+
+
+def _upload(args: argparse.Namespace) -> int:
+    from companion.commands.shore import Shore, upload_and_compare
+    from companion.geofence.fence_items import MAX_FENCE_ITEMS, zones_to_items
+    from companion.geofence.mission_files import zones_only
+    from companion.messages import MissionType
+
+    document = read_input(args).require_clean()
+    items, losses = zones_to_items(zones_only(document, args.point_radius), return_point=document.return_point)
+    if not items:
+        raise JobError(f"{args.file}: there is no zone to upload")
+    start, _, margin_m = places(args)
+    if not args.exact and start is not None and margin_m is not None:
+        items = simplified(args, document).items
+    elif len(items) > MAX_FENCE_ITEMS:
+        raise JobError(
+            f"{args.file}: takes {len(items)} fence items, the autopilot holds {MAX_FENCE_ITEMS}: simplify it with "
+            "--margin and --start"
+        )
+    else:
+        print_losses(tuple(losses), args.file)
+    with Shore(args.link, timeout_s=args.timeout) as shore:
+        name = upload_and_compare(shore, MissionType.FENCE, items)
+        print(f"fence of {len(items)} items uploaded and read back the same, hash {name}")
+        if args.enable:
+            shore.set_param("FENCE_TYPE", 4.0)  # polygons alone: the default's 300 m circle round home would breach
+            shore.set_param("FENCE_ENABLE", 1.0)
+            print(f"fence enabled: FENCE_TYPE 4, FENCE_ACTION {shore.get_param('FENCE_ACTION'):g}")
+        else:
+            enabled, kind = shore.get_param("FENCE_ENABLE"), shore.get_param("FENCE_TYPE")
+            print(f"FENCE_ENABLE is {enabled:g} and FENCE_TYPE {kind:g}: "
+                  + ("in force" if enabled and int(kind) & 4 else "not in force; --enable sets both"))
+    return 0
+
+
+def _download(args: argparse.Namespace) -> int:
+    from companion.commands.shore import Shore, download_list
+    from companion.geofence.fence_items import items_to_zones
+    from companion.geofence.formats import format_of, write
+    from companion.geofence.rings import Findings
+    from companion.mavlink.items import mission_hash
+    from companion.messages import MissionType
+
+    format_of(args.out)
+    with Shore(args.link, timeout_s=args.timeout) as shore:
+        items = download_list(shore, MissionType.FENCE)
+    findings = Findings()
+    zones, return_point = items_to_zones(items, findings)
+    document = _document(zones, return_point, findings)
+    bad = print_findings(document.findings, "autopilot")
+    if not items:
+        print("the autopilot holds no fence; nothing is written", file=sys.stderr)
+        return 1
+    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy)
+    print(f"{args.out}: written: {summary(document)}, hash {mission_hash(items)}")
+    return int(bad)
+
+
+def _document(zones: Any, return_point: GeoPoint | None, findings: Any) -> Document:
+    from companion.geofence import Document
+
+    return Document(source="autopilot", format="autopilot", zones=zones, return_point=return_point,
+                    findings=tuple(findings))

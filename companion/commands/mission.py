@@ -1,0 +1,268 @@
+"""``companion mission``: check, make, convert, upload and download missions."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from companion.errors import InputError, JobError
+
+if TYPE_CHECKING:
+    from companion.geofence import Document, Mission
+
+_EPILOG = """\
+examples:
+  companion mission check missions/archipelago.toml --plot archipelago.png
+  companion mission new bay.toml --start 50.817,-1.31 --goal 50.8203,-1.31 --land islands.wkt --margin 12 --plot bay.png
+  companion mission new bay.toml --from drawn-in-qgroundcontrol.plan
+  companion mission convert bay.toml bay.plan          (also .waypoints, .gpx, .kml, .geojson)
+  companion mission convert route.gpx route.waypoints
+  companion mission upload route.waypoints --link udpin:0.0.0.0:14550
+  companion mission download boat.plan --link /dev/ttyUSB0:57600
+
+A mission TOML holds goals and an area; the companion plans the way itself (companion run). Waypoint files are sailed
+by the autopilot as they are.
+Exit codes: 0 in order, 1 faults found or a failed transfer, 2 a file or option that cannot be believed.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
+    """Add the command with its five verbs."""
+    from companion.commands.fence import link_options
+
+    parser = subparsers.add_parser(
+        "mission", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verbs = parser.add_subparsers(dest="verb", metavar="check|new|convert|upload|download", required=True)
+    check = verbs.add_parser("check", help="read a mission as the boat would and name what is wrong")
+    check.add_argument("file", metavar="FILE")
+    preview_options(check)
+    check.set_defaults(run=_check)
+
+    new = verbs.add_parser("new", help="make a mission TOML with its area files")
+    new.add_argument("out", metavar="OUT.toml")
+    new.add_argument("--from", dest="source", metavar="FILE", help="a drawing: .plan, .waypoints, GPX, KML, GeoJSON")
+    new.add_argument("--start", metavar="LAT,LON", help="where the boat will start (else the drawing's home)")
+    new.add_argument("--goal", metavar="LAT,LON", action="append", default=[], help="in order; repeat it")
+    new.add_argument("--land", metavar="FILE", action="append", default=[], help="obstacles, any format; repeat it")
+    new.add_argument("--fence", metavar="FILE", help="water to stay inside of, any format")
+    new.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto", help="order of WKT coordinates")
+    new.add_argument("--name", help="of the mission (else of the file)")
+    new.add_argument("--margin", type=float, metavar="M", help="what plans keep clear of everything (12)")
+    new.add_argument("--radius", type=float, metavar="M", help="of the goals (10)")
+    new.add_argument("--force", action="store_true", help="overwrite files")
+    preview_options(new)
+    new.set_defaults(run=_new)
+
+    convert = verbs.add_parser("convert", help="write a mission in another format and say what it does not carry")
+    convert.add_argument("file", metavar="FILE")
+    convert.add_argument("out", metavar="OUT", help="its extension is the format")
+    convert.add_argument("--part", choices=("mission", "fence", "rally"), default="mission",
+                         help="what goes into a .waypoints file, which holds one list (mission)")
+    convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
+    convert.add_argument("--force", action="store_true", help="overwrite the files of a mission TOML")
+    convert.set_defaults(run=_convert)
+
+    upload = verbs.add_parser("upload", help="write a waypoint file to the autopilot, read back, compare")
+    upload.add_argument("file", metavar="FILE")
+    upload.add_argument("--part", choices=("mission", "rally"), default="mission")
+    link_options(upload)
+    upload.set_defaults(run=_upload)
+
+    download = verbs.add_parser("download", help="read the autopilot's mission into a file")
+    download.add_argument("out", metavar="OUT", help="its extension is the format")
+    download.add_argument("--part", choices=("mission", "rally"), default="mission")
+    link_options(download)
+    download.set_defaults(run=_download)
+
+
+def preview_options(parser: argparse.ArgumentParser) -> None:
+    """Add --plot and what it assumes."""
+    parser.add_argument("--plot", metavar="P.png", help="draw obstacles, fence, margins, laylines and a plan")
+    parser.add_argument("--wind", metavar="SPEED@FROM", help="for the picture [m/s, degrees] (else the mission's, 5@0)")
+    parser.add_argument("--no-plan", action="store_true", help="draw no plan")
+
+
+def _preview(mission: Mission, args: argparse.Namespace) -> None:
+    from companion.plots.mission import save_mission
+
+    speed_mps, from_deg = mission.wind.preview_speed_mps, mission.wind.preview_from_deg
+    if args.wind:
+        speed_mps, from_deg = wind_argument(args.wind)
+    for line in save_mission(mission, args.plot, tws_mps=speed_mps, twd_from_rad=math.radians(from_deg),
+                             with_plan=not args.no_plan):
+        print(line)
+    print(f"{args.plot}: written")
+
+
+def wind_argument(text: str) -> tuple[float, float]:
+    """Return (speed [m/s], from [deg]) of ``SPEED@FROM``. Raises InputError."""
+    try:
+        speed, direction = (float(part) for part in text.split("@"))
+    except ValueError:
+        raise InputError("--wind", "", f"{text[:30]!r} is not a wind", "write SPEED@FROM, as 5@350") from None
+    if not (0.0 < speed <= 50.0 and -360.0 <= direction <= 360.0):
+        raise InputError("--wind", "", f"{text[:30]!r} is out of range", "speed 0..50 m/s, direction in degrees")
+    return speed, direction % 360.0
+
+
+def _read(path: str) -> Document:
+    from companion.geofence import read
+    from companion.geofence.mission import load_mission
+    from companion.geofence.mission_files import document_of
+    from companion.geofence.routes import lines_as_route
+
+    if Path(path).suffix.lower() == ".toml":
+        return document_of(load_mission(path))
+    return lines_as_route(read(path)).require_clean()
+
+
+def _check(args: argparse.Namespace) -> int:
+    from companion.commands.fence import print_findings, summary
+    from companion.geofence.check import Conditions, check_area
+    from companion.geofence.mission import load_mission
+
+    if Path(args.file).suffix.lower() != ".toml":
+        document = _read(args.file)
+        print_findings(document.findings, args.file)
+        print(f"{args.file}: {document.format}: {summary(document)}: in order")
+        return 0
+    mission = load_mission(args.file)
+    from companion.compose import polar_of
+
+    polar_of(mission)
+    bad = print_findings(mission.findings, args.file)
+    wind_deg = wind_argument(args.wind)[1] if args.wind else mission.wind.preview_from_deg
+    bad |= print_findings(check_area(mission.area, Conditions(
+        start=mission.start, goals=tuple(g.point for g in mission.goals), margin_m=mission.margin_m,
+        twd_from_rad=math.radians(wind_deg), no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
+    )), args.file)
+    if args.plot:
+        _preview(mission, args)
+    goals = f"{len(mission.goals)} goal{'s' if len(mission.goals) != 1 else ''}"
+    print(f"{args.file}: {mission.name}: {goals}, {len(mission.area.solids)} obstacles: "
+          f"{'NOT in order' if bad else 'in order'}")
+    return int(bad)
+
+
+def _new(args: argparse.Namespace) -> int:
+    from dataclasses import replace
+
+    from companion.commands.fence import print_findings, print_losses
+    from companion.commands.shore import place_argument
+    from companion.geofence import Document, ZoneKind, read
+    from companion.geofence.mission import load_mission
+    from companion.geofence.mission_files import mission_files
+
+    out = Path(args.out)
+    if out.suffix.lower() != ".toml":
+        raise InputError(args.out, "", "a mission file ends in .toml")
+    drawing = _read(args.source) if args.source else Document(source="--goal")
+    start = place_argument(args.start, "--start") if args.start else None
+    goals = tuple(place_argument(g, "--goal") for g in args.goal)
+    near = start or drawing.home or (goals[0] if goals else None)
+    land = Document()
+    sources = [(f, ZoneKind.EXCLUSION) for f in args.land] + [(f, ZoneKind.INCLUSION) for f in [args.fence] if f]
+    for name, kind in sources:
+        more = read(name, kind=kind, axis=args.axis, near=near, areas=True).require_clean()
+        print_findings(more.findings, name)
+        land = replace(land, zones=(*land.zones, *more.zones), marks=(*land.marks, *more.marks))
+    if args.margin is not None and not (math.isfinite(args.margin) and 0.0 <= args.margin <= 1000.0):
+        raise InputError("--margin", "", f"{args.margin:g} is outside 0..1000 m")
+    if args.radius is not None and not (math.isfinite(args.radius) and 0.0 < args.radius <= 5000.0):
+        raise InputError("--radius", "", f"{args.radius:g} is outside 0..5000 m")
+    try:
+        made = mission_files(drawing, args.name or out.stem, start=start, goals=goals, margin_m=args.margin,
+                             radius_m=args.radius, land=land)
+    except ValueError as error:
+        raise InputError(args.source or "companion mission new", "", str(error)) from None
+    print_losses(made.losses, args.out)
+    _write_all({args.out: made.toml, **{str(out.parent / n): d for n, d in made.files.items()}}, force=args.force)
+    mission = load_mission(out)
+    if args.plot:
+        _preview(mission, args)
+    return 0
+
+
+def _write_all(files: dict[str, bytes], *, force: bool) -> None:
+    """Write all files or none: an existing one is not overwritten without ``force``."""
+    there = [name for name in files if Path(name).exists()]
+    if there and not force:
+        raise InputError(there[0], "", "exists", "say --force to overwrite it")
+    for name, data in files.items():
+        try:
+            Path(name).write_bytes(data)
+        except OSError as error:
+            raise InputError(name, "", f"cannot be written ({error.strerror})") from None
+        print(f"{name}: written")
+
+
+def _convert(args: argparse.Namespace) -> int:
+    from companion.commands.fence import print_findings, print_losses, summary, write_out
+    from companion.geofence.formats import write
+    from companion.geofence.mission import load_mission
+    from companion.geofence.mission_files import goal_losses, mission_files
+
+    document = _read(args.file)
+    print_findings(document.findings, args.file)
+    if Path(args.file).suffix.lower() == ".toml":
+        print_losses(tuple(goal_losses(load_mission(args.file))), args.out)
+    out = Path(args.out)
+    if out.suffix.lower() == ".toml":
+        try:
+            made = mission_files(document, out.stem)
+        except ValueError as error:
+            raise InputError(args.file, "", str(error)) from None
+        print_losses(made.losses, args.out)
+        _write_all({args.out: made.toml, **{str(out.parent / n): d for n, d in made.files.items()}}, force=args.force)
+        load_mission(out)
+        return 0
+    only_mission = out.suffix.lower() in {".waypoints", ".txt"} and args.part == "mission"
+    # A .waypoints file is one list by design: that the others are not in it is said, and is no reason to refuse.
+    write_out(write(document, args.out, part=args.part), args.out, lossy=args.lossy or only_mission)
+    print(f"{args.out}: written from {summary(document)}")
+    return 0
+
+
+def _upload(args: argparse.Namespace) -> int:
+    from companion.commands.shore import Shore, upload_and_compare
+    from companion.messages import MissionType
+
+    if Path(args.file).suffix.lower() == ".toml":
+        raise InputError(args.file, "", "holds goals, not the way to them",
+                         "sail it with 'companion run', or convert it to .waypoints to sail straight lines")
+    document = _read(args.file)
+    kind = MissionType.RALLY if args.part == "rally" else MissionType.MISSION
+    items = document.rally if kind is MissionType.RALLY else document.items
+    if not items:
+        raise JobError(f"{args.file}: there is no {args.part} to upload")
+    with Shore(args.link, timeout_s=args.timeout) as shore:
+        name = upload_and_compare(shore, kind, items, home=document.home)
+    print(f"{args.part} of {len(items)} items uploaded and read back the same, hash {name}")
+    return 0
+
+
+def _download(args: argparse.Namespace) -> int:
+    from companion.commands.fence import summary, write_out
+    from companion.commands.shore import Shore, download_list
+    from companion.geofence import Document
+    from companion.geofence.formats import format_of, write
+    from companion.mavlink.items import mission_hash
+    from companion.messages import MissionType
+
+    format_of(args.out)
+    kind = MissionType.RALLY if args.part == "rally" else MissionType.MISSION
+    with Shore(args.link, timeout_s=args.timeout) as shore:
+        items = download_list(shore, kind)
+    if not items:
+        print(f"the autopilot holds no {args.part}; nothing is written", file=sys.stderr)
+        return 1
+    document = Document(source="autopilot", format="autopilot", items=items if args.part == "mission" else (),
+                        rally=items if args.part == "rally" else ())
+    write_out(write(document, args.out, part=args.part), args.out, lossy=False)
+    print(f"{args.out}: written: {summary(document)}, hash {mission_hash(items)}")
+    return 0

@@ -1,0 +1,305 @@
+"""Pictures of missions before they are sailed: land, margins, fences, marks, laylines for a wind, a plan."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import shapely
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle as Disc
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path as DrawnPath
+from numpy.typing import NDArray
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from companion.errors import InputError
+from companion.geo.angles import difference_rad, heading_of, unit_en
+from companion.geo.frame import LocalFrame
+from companion.geofence import Area, LocalArea, Mission, ZoneKind
+from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
+from companion.geofence.shapes import center_of, polygon_en
+from companion.messages import GeoPoint
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from companion.planner import Plan
+
+LAND, LAND_EDGE, SEA = "#d9cfb4", "#8d7f5a", "#eaf3f8"
+MARGIN, LIMIT, AUTOPILOT = "#f0b27a", "#34495e", "#8e44ad"
+PORT, STARBOARD, PATH, START, GOAL, WIND = "#c0392b", "#1e8449", "#1f4e9c", "#00a3b4", "#d68910", "#1f4e79"
+
+En = tuple[float, float]
+Handle = Patch | Line2D
+Points = NDArray[np.float64]
+
+
+def save_mission(
+    mission: Mission, path: str | Path, *, tws_mps: float, twd_from_rad: float, with_plan: bool = True,
+) -> list[str]:
+    """Draw a mission and save it; return what the picture has to say in words.
+
+    The plan is the planner's in this wind, held steady, one goal after the other. Raises InputError when the file
+    cannot be written.
+    """
+    from companion.compose import boat_of
+
+    frame = mission.frame()
+    local = mission.area.local(frame)
+    start = frame.en_from_geo(mission.start) if mission.start is not None else None
+    goals = [frame.en_from_geo(g.point) for g in mission.goals]
+    boat = boat_of(mission)
+    beat_rad = boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad
+    plans = _plans(mission, local, tws_mps, twd_from_rad) if with_plan and start is not None else []
+    figure, axes = plt.subplots(figsize=(8.0, 8.6), layout="constrained")
+    handles = draw_area(axes, local, mission.margin_m)
+    handles += _draw_autopilot(axes, mission, frame)
+    legs = [np.asarray(p.waypoints_en) for p in plans if p.has_path]
+    places = [*([start] if start is not None else []), *goals]
+    extent = _extent(local, places, legs)
+    handles += _draw_laylines(axes, [*([start] if start else []), *goals], twd_from_rad, beat_rad, extent)
+    for leg in legs:
+        axes.plot(leg[:, 0], leg[:, 1], "-", color=PATH, lw=1.8, zorder=6, solid_joinstyle="round")
+        axes.plot(leg[1:-1, 0], leg[1:-1, 1], "o", color=PATH, ms=3.0, zorder=6)
+    if legs:
+        handles.append(Line2D([], [], color=PATH, lw=1.8, label="plan in this wind, held steady"))
+    _draw_marks(axes, mission, start, goals)
+    _finish(axes, extent, twd_from_rad, tws_mps, handles)
+    words = _words(mission, plans)
+    axes.set_title(f"{mission.name}\n{words[0] if words else mission.options.description}", fontsize=10, loc="left")
+    _save(figure, path)
+    return words
+
+
+def save_area(
+    area: Area, path: str | Path, *, start: GeoPoint | None = None, goals: tuple[GeoPoint, ...] = (),
+    margin_m: float = 0.0, twd_from_rad: float | None = None, no_go_half_rad: float = math.radians(47.0),
+    title: str = "",
+) -> None:
+    """Draw an area alone and save it. Raises InputError when the file cannot be written."""
+    shapes = [z.shape for z in area.fence.inclusions] + [o.shape for o in area.solids]
+    if not shapes and start is None:
+        raise InputError(str(path), "", "there is nothing to draw")
+    frame = LocalFrame(start or (goals[0] if goals else center_of(shapes[0])))
+    local = area.local(frame)
+    places = [frame.en_from_geo(p) for p in ((start,) if start else ()) + goals]
+    figure, axes = plt.subplots(figsize=(8.0, 8.6), layout="constrained")
+    handles = draw_area(axes, local, margin_m)
+    extent = _extent(local, places, [])
+    if twd_from_rad is not None:
+        handles += _draw_laylines(axes, places, twd_from_rad, no_go_half_rad, extent)
+    for index, place in enumerate(places):
+        is_start = start is not None and index == 0
+        axes.plot(*place, "o", color=START if is_start else GOAL, ms=8, mec="black", mew=0.6, zorder=8)
+    _finish(axes, extent, twd_from_rad, None, handles)
+    axes.set_title(title, fontsize=10, loc="left")
+    _save(figure, path)
+
+
+def _save(figure: Figure, path: str | Path) -> None:
+    try:
+        figure.savefig(path, dpi=110)
+    except (OSError, ValueError) as error:
+        raise InputError("--plot", str(path), f"cannot be written ({error})", "name a .png in a folder") from None
+    finally:
+        plt.close(figure)
+
+
+def draw_area(axes: Axes, local: LocalArea, margin_m: float) -> list[Handle]:
+    """Draw land, the margin round it, and the limits; return the legend's handles."""
+    handles: list[Handle] = []
+    axes.set_facecolor(SEA)
+    water = local.limits
+    if water is not None:
+        beyond = shapely.difference(shapely.box(-1e5, -1e5, 1e5, 1e5), water)
+        axes.add_patch(PathPatch(outline(beyond), fc="#c9d3da", ec="none", zorder=1))
+        axes.add_patch(PathPatch(outline(water), fc="none", ec=LIMIT, lw=1.4, zorder=4))
+        handles.append(Patch(fc="#c9d3da", ec=LIMIT, label="outside the fence"))
+    if margin_m > 0.0:
+        closed: BaseGeometry = local.buffered(margin_m) if local.polygons else MultiPolygon()
+        inner = local.water(margin_m)
+        if water is not None and inner is not None:
+            closed = shapely.intersection(shapely.union(closed, shapely.difference(water, inner)), water)
+        if not closed.is_empty:
+            axes.add_patch(PathPatch(outline(closed), fc=MARGIN, alpha=0.35, ec=MARGIN, lw=0.8, zorder=2))
+            handles.append(Patch(fc=MARGIN, alpha=0.5, label=f"margin of {margin_m:g} m: no plan enters"))
+    if local.polygons:
+        axes.add_patch(PathPatch(outline(local.solid), fc=LAND, ec=LAND_EDGE, lw=0.9, zorder=3))
+        handles.append(Patch(fc=LAND, ec=LAND_EDGE, label="obstacles"))
+        if len(local.polygons) <= 30:
+            for name, polygon in zip(local.names, local.polygons, strict=True):
+                at = polygon.representative_point()
+                axes.annotate(name, (at.x, at.y), fontsize=6.5, ha="center", va="center", color="#5b5135", zorder=5,
+                              annotation_clip=True)
+    return handles
+
+
+def _draw_autopilot(axes: Axes, mission: Mission, frame: LocalFrame) -> list[Handle]:
+    """Draw the autopilot's own fence where there is one."""
+    inside = [*([mission.start] if mission.start else []), *(g.point for g in mission.goals)]
+    result = fence_for_autopilot(mission.area, mission.margin_m, inside=inside)
+    if result.status is not FenceStatus.OK:
+        return []
+    for zone in result.zones:
+        ring = polygon_en(zone.shape, frame, cover=zone.kind is ZoneKind.EXCLUSION)
+        axes.add_patch(PathPatch(outline(ring), fc="none", ec=AUTOPILOT, lw=0.9, ls=(0, (3, 2)), zorder=4))
+    return [Line2D([], [], color=AUTOPILOT, lw=0.9, ls=(0, (3, 2)),
+                   label=f"fence on the autopilot ({len(result.items)} items)")]
+
+
+def _draw_laylines(
+    axes: Axes, places: list[En], twd_from_rad: float, beat_rad: float, extent: tuple[float, float, float, float],
+) -> list[Handle]:
+    """Draw the two laylines of each mark that lies to windward of the place before it."""
+    reach_m = math.hypot(extent[2] - extent[0], extent[3] - extent[1])
+    drawn = False
+    for before, mark in itertools.pairwise(places):
+        course_rad = heading_of(mark[0] - before[0], mark[1] - before[1])
+        if abs(difference_rad(course_rad, twd_from_rad)) >= beat_rad:
+            continue
+        drawn = True
+        length_m = min(reach_m, 1.1 * math.hypot(mark[0] - before[0], mark[1] - before[1]))
+        for side, colour in ((-1.0, STARBOARD), (1.0, PORT)):  # wind over starboard: heading = from - angle
+            east, north = unit_en(twd_from_rad + side * beat_rad)
+            axes.plot([mark[0], mark[0] - length_m * east], [mark[1], mark[1] - length_m * north], color=colour, lw=1.0,
+                      ls=(0, (7, 3)), zorder=4)
+    if not drawn:
+        return []
+    angle = math.degrees(beat_rad)
+    return [
+        Line2D([], [], color=STARBOARD, lw=1.0, ls=(0, (7, 3)), label=f"layline, starboard tack (TWA {angle:.0f}°)"),
+        Line2D([], [], color=PORT, lw=1.0, ls=(0, (7, 3)), label=f"layline, port tack (TWA {angle:.0f}°)"),
+    ]
+
+
+def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En]) -> None:
+    if start is not None:
+        axes.plot(*start, "o", color=START, ms=8, mec="black", mew=0.6, zorder=8)
+        axes.annotate("start", start, xytext=(7, -10), textcoords="offset points", fontsize=8, zorder=9)
+    for index, (place, goal) in enumerate(zip(goals, mission.goals, strict=True)):
+        colour = {"port": PORT, "starboard": STARBOARD}.get(goal.rounding or "", GOAL)
+        axes.add_patch(Disc(place, goal.radius_m, fc="none", ec=colour, lw=1.3, zorder=7))
+        axes.plot(*place, "o", color=colour, ms=6, mec="black", mew=0.6, zorder=8)
+        name = goal.name or (f"goal {index + 1}" if len(goals) > 1 else "goal")
+        text = f"{name}\nleave to {goal.rounding}" if goal.rounding else name
+        axes.annotate(text, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
+
+
+def _finish(
+    axes: Axes, extent: tuple[float, float, float, float], twd_from_rad: float | None, tws_mps: float | None,
+    handles: list[Handle],
+) -> None:
+    axes.set(xlim=(extent[0], extent[2]), ylim=(extent[1], extent[3]), aspect="equal")
+    axes.tick_params(labelsize=7)
+    axes.set_xlabel("east of the start [m]", fontsize=8)
+    axes.set_ylabel("north of the start [m]", fontsize=8)
+    axes.grid(visible=True, color="white", lw=0.6, zorder=0)
+    if twd_from_rad is not None:
+        east, north = unit_en(twd_from_rad)
+        cx, cy, size = 0.91, 0.91, 0.05
+        axes.annotate(
+            "", (cx - size * east, cy - size * north), (cx + size * east, cy + size * north),
+            xycoords="axes fraction", textcoords="axes fraction",
+            arrowprops={"arrowstyle": "-|>", "lw": 2.0, "color": WIND}, zorder=10)
+        speed = f", {tws_mps:g} m/s" if tws_mps is not None else ""
+        axes.text(cx, cy - 0.075, f"from {math.degrees(twd_from_rad) % 360.0:03.0f}°{speed}", transform=axes.transAxes,
+                  ha="center", va="top", fontsize=8, color=WIND, zorder=10,
+                  bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 1.5})
+    if handles:
+        axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=2, fontsize=8,
+                    frameon=False)
+
+
+def _extent(
+    local: LocalArea, places: list[En], paths: list[Points],
+) -> tuple[float, float, float, float]:
+    """Return a square that holds the places, the paths, and what land lies about them."""
+    xy = [np.array(places).reshape(-1, 2), *paths]
+    points = np.vstack(xy)
+    if points.shape[0] == 0:
+        shapes = [*local.polygons, *([local.limits] if local.limits is not None else [])]
+        west, south, east, north = shapely.total_bounds(shapes)
+    else:
+        (west, south), (east, north) = points.min(axis=0), points.max(axis=0)
+        near = shapely.box(west, south, east, north).buffer(max(150.0, 0.35 * max(east - west, north - south)))
+        shapes = [p for p in local.polygons if shapely.intersects(near, p)]
+        shapes += [local.limits] if local.limits is not None else []
+        clipped = [shapely.intersection(near, s) for s in shapes]
+        bounds = np.array([c.bounds for c in clipped if not c.is_empty] or [(west, south, east, north)])
+        west, south = min(west, bounds[:, 0].min()), min(south, bounds[:, 1].min())
+        east, north = max(east, bounds[:, 2].max()), max(north, bounds[:, 3].max())
+    half = 0.54 * max(east - west, north - south, 20.0)
+    cx, cy = (west + east) / 2.0, (south + north) / 2.0
+    return float(cx - half), float(cy - half), float(cx + half), float(cy + half)
+
+
+def _plans(mission: Mission, local: LocalArea, tws_mps: float, twd_from_rad: float) -> list[Plan]:
+    """Return the planner's way from goal to goal, first lap, in a steady wind."""
+    from companion.compose import boat_of
+    from companion.planner import Problem, plan
+
+    frame = mission.frame()
+    assert mission.start is not None
+    here = frame.en_from_geo(mission.start)
+    heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
+    boat = boat_of(mission).problem_boat(tws_mps)
+    plans = []
+    for goal in mission.goals:
+        east_m, north_m = frame.en_from_geo(goal.point)
+        problem = Problem.from_json({
+            "id": mission.name, "title": mission.name,
+            "start": {"x": here[0], "y": here[1], "heading_deg": heading_deg % 360.0},
+            "goal": {"x": east_m, "y": north_m, "radius": goal.radius_m},
+            "obstacles": local.obstacles_wkt(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here),
+            "wind": {"from_deg": math.degrees(twd_from_rad), "speed_mps": tws_mps, "sigma": {"model": "none"}},
+            "boat": boat, "delta_s": mission.risk.delta_s,
+        })
+        answer = plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0)
+        plans.append(answer)
+        if not answer.has_path:
+            break
+        here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
+        heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
+    return plans
+
+
+def _words(mission: Mission, plans: list[Plan]) -> list[str]:
+    """Return what came of the plans, one line each."""
+    out = []
+    for goal, answer in zip(mission.goals, plans, strict=False):
+        name = goal.name or "goal"
+        if answer.has_path:
+            out.append(f"{name}: {answer.cost_s:.0f} s in {len(answer.legs)} legs")
+        else:
+            out.append(f"{name}: no path ({answer.status.value}): {answer.reason}")
+    if len(out) > 1 and all(p.has_path for p in plans):
+        out.insert(0, f"{sum(p.cost_s for p in plans):.0f} s to all {len(plans)} goals")
+    return out
+
+
+def outline(shape: BaseGeometry) -> DrawnPath:
+    """Return the rings of a polygonal geometry as a path; holes stay holes."""
+    points: list[Points] = []
+    codes: list[int] = []
+    for part in shapely.get_parts(shape):
+        if not isinstance(part, Polygon) or part.is_empty:
+            continue
+        oriented = shapely.geometry.polygon.orient(part)
+        for ring in (oriented.exterior, *oriented.interiors):
+            xy = np.asarray(ring.coords)[:, :2]
+            points.append(xy)
+            codes += [int(DrawnPath.MOVETO), *([int(DrawnPath.LINETO)] * (len(xy) - 2)), int(DrawnPath.CLOSEPOLY)]
+    if not points:
+        return DrawnPath(np.zeros((0, 2)))
+    return DrawnPath(np.vstack(points), codes)
