@@ -26,6 +26,7 @@ from companion.wind.records import Record
 HORIZONS_S = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 SCORED_LEVELS = (0.50, 0.80, 0.95)
 STEP_S, WARM_S, MIN_MPS, WITHIN_S = 30.0, 600.0, 1.0, 1.05
+TRACE_S = 120.0          # [s] horizon of Score.trace and Score.pit
 FEWEST = 20              # forecasts of a horizon below which it has no score
 
 Array = NDArray[np.float64]
@@ -73,12 +74,15 @@ class Score:
     """What an estimator did on a record; a horizon with too few targets is absent.
 
     ``pit`` (n,) are the probability integral transforms at 120 s, by the estimator's own intervals, for reliability.
+    ``trace`` (m, 6) are all forecasts for 120 s ahead: time they are for, mean direction, half widths of 50 and 95 %,
+    mean speed, its sigma.
     """
 
     record: str
     estimator: str
     horizons: tuple[HorizonScore, ...]
     pit: Array
+    trace: Array
 
     def at(self, horizon_s: float) -> HorizonScore | None:
         """Return the score of a horizon."""
@@ -114,6 +118,7 @@ def score(
     target = {h: targets(record, h, asked) for h in horizons_s}
     errors: dict[float, list[tuple[float, ...]]] = {h: [] for h in horizons_s}
     pit: list[float] = []
+    trace: list[tuple[float, ...]] = []
     due = {int(row): k for k, row in enumerate(asked)}
     direction, speed = record.twd_from_rad, record.tws_mps
     for i in range(len(record)):
@@ -123,6 +128,9 @@ def score(
         k = due.get(i)
         if k is None:
             continue
+        mean, _, mean_speed, sigma_speed = estimator.forecast(TRACE_S)
+        half = [min(math.pi, estimator.interval(TRACE_S, p)) for p in (0.5, 0.95)]
+        trace.append((float(record.t_s[i]) + TRACE_S, mean, *half, mean_speed, sigma_speed))
         for h in horizons_s:
             j = int(target[h][k])
             if j < 0:
@@ -135,7 +143,7 @@ def score(
                 crps_circular(error, sigma), abs(error), sigma, 2.0 * half[-1], *(abs(error) <= w for w in half),
                 crps_normal(speed_error, sigma_speed), abs(speed_error) <= normal_half_width(0.95) * sigma_speed,
             ))
-            if h == 120.0:
+            if h == TRACE_S:
                 pit.append(transform(estimator, ahead, error))
     found = []
     for h in horizons_s:
@@ -146,7 +154,10 @@ def score(
                 horizon_s=h, count=len(errors[h]), crps_rad=m[0], mae_rad=m[1], sigma_rad=m[2], width95_rad=m[3],
                 coverage=tuple(m[4:n]), speed_crps_mps=m[n], speed_coverage95=m[n + 1],
             ))
-    return Score(record=record.name, estimator=estimator.name, horizons=tuple(found), pit=np.array(pit))
+    return Score(
+        record=record.name, estimator=estimator.name, horizons=tuple(found), pit=np.array(pit),
+        trace=np.array(trace, dtype=np.float64).reshape(len(trace), 6),
+    )
 
 
 def transform(estimator: Estimator, horizon_s: float, error_rad: float) -> float:
