@@ -1,0 +1,213 @@
+"""``companion doctor``: is this autopilot set up to be sailed? It changes nothing unless told ``--apply``."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from companion.geofence import Mission
+    from companion.mavlink.autopilot import Autopilot
+    from companion.mavlink.transport import Transport
+    from companion.skipper.checks import Examined, Finding, Needs
+
+LISTEN_S = 6.0   # long enough for messages of once a second to show their rate
+
+_EPILOG = """\
+examples:
+  companion doctor --link udpin:127.0.0.1:14551
+  companion doctor --link /dev/serial0:921600 --mission missions/lake.toml
+  companion doctor --link udpin:127.0.0.1:14551 --mission missions/lake.toml --apply
+
+With --mission the parameters are held against that voyage's margins, distances and boat. --apply sets what the
+warnings and errors name (never what is only good to know), one parameter at a time, and reads each back.
+Exit codes: 0 nothing in the way, 1 an error was found or the autopilot did not answer, 2 bad usage or input.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """A parameter that was set, or was to be: what it reads afterwards (None: not set)."""
+
+    name: str
+    before: float | None
+    wanted: float
+    after: float | None
+    text: str = ""
+
+    @property
+    def is_done(self) -> bool:
+        """It reads back as wanted."""
+        return self.after is not None and math.isclose(self.after, self.wanted, rel_tol=1e-6, abs_tol=1e-6)
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "doctor", help=summary, epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Read the autopilot's parameters, version, streams, fence and mission; say what would spoil a "
+        "voyage and what to set.",
+    )
+    parser.add_argument("--link", required=True, metavar="LINK",
+                        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="hold the settings against this voyage")
+    parser.add_argument("--apply", action="store_true", help="set what the warnings and errors name, and read it back")
+    parser.add_argument("--json", action="store_true", help="print findings and changes as JSON")
+    parser.add_argument("--wait", type=float, default=30.0, metavar="S", help="for the first heartbeat (default: 30)")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from companion.clock import run as run_loop
+    from companion.geofence import load_mission
+    from companion.mavlink.transport import open_link
+    from companion.skipper.checks import Level
+
+    mission = load_mission(args.mission) if args.mission is not None else None
+    transport = open_link(args.link)
+    findings, changes = run_loop(diagnose(transport, needs_of(mission), wait_s=args.wait, apply=args.apply))
+    if args.json:
+        print(json.dumps(as_json(findings, changes), indent=1))
+    else:
+        sys.stdout.write(as_text(findings, changes, applied=args.apply))
+    left = [f for f in findings if f.level is Level.ERROR and not _is_cured(f, changes)]
+    return 1 if left or any(not change.is_done for change in changes) else 0
+
+
+def needs_of(mission: Mission | None) -> Needs:
+    """Return what a voyage needs of the autopilot."""
+    from companion.skipper.checks import Needs
+
+    if mission is None:
+        return Needs()
+    from companion.compose import boat_of, config_of
+
+    boat, config, frame = boat_of(mission), config_of(mission), mission.frame()
+    places = [frame.en_from_geo(goal.point) for goal in mission.goals]
+    return Needs(
+        no_go_half_rad=boat.no_go_half_rad, margin_m=config.margin_m, margin_floor_m=config.margin_floor_m,
+        goal_radius_m=min(goal.radius_m for goal in mission.goals), loiter_radius_m=config.loiter_radius_m,
+        speed_mps=boat.polar.max_speed_mps(mission.wind.preview_speed_mps or 5.0), hull=boat.hull,
+        reach_m=max(math.hypot(*place) for place in places), has_fence=mission.operator.upload_fence,
+    )
+
+
+async def diagnose(
+    transport: Transport, needs: Needs, *, wait_s: float = 30.0, listen_s: float = LISTEN_S, apply: bool = False,
+) -> tuple[tuple[Finding, ...], tuple[Change, ...]]:
+    """Read everything, judge it, and set what is to be set if ``apply``.
+
+    Raises:
+        LinkError: no autopilot was heard.
+    """
+    from companion.mavlink.autopilot import Autopilot
+    from companion.mavlink.link import Link
+    from companion.skipper.checks import examine
+
+    async with Link(transport) as link:
+        await link.wait_autopilot(wait_s)
+        async with Autopilot(link) as autopilot:
+            findings = examine(await read(autopilot, listen_s), needs)
+            changes = await _apply(autopilot, findings) if apply else ()
+            return findings, changes
+
+
+async def read(autopilot: Autopilot, listen_s: float = LISTEN_S) -> Examined:
+    """Read parameters, version, mission and fence, and count messages for ``listen_s``."""
+    from companion.clock import now_s
+    from companion.skipper.checks import RATES_HZ, Examined
+
+    counts = dict.fromkeys(RATES_HZ, 0)
+
+    def count(_: float, message: Any) -> None:
+        kind = message.get_type()
+        if kind in counts:
+            counts[kind] += 1
+
+    # The streams are asked for when the autopilot is found: give them a moment before counting.
+    await asyncio.sleep(1.0)
+    began_s = now_s()
+    stop = autopilot.link.subscribe(count)
+    try:
+        await asyncio.sleep(listen_s)
+        elapsed_s = max(now_s() - began_s, 1e-3)
+    finally:
+        stop()
+    table = await autopilot.read_parameters()
+    mission = await autopilot.read_mission()
+    fence = await autopilot.read_fence()
+    return Examined(
+        parameters=table.values,
+        version=autopilot.version.version if autopilot.version is not None else None,
+        mission=mission.items,
+        fence=fence.items,
+        rates_hz={name: n / elapsed_s for name, n in counts.items()},
+        system_id=autopilot.link.party.target_system,
+    )
+
+
+async def _apply(autopilot: Autopilot, findings: Sequence[Finding]) -> tuple[Change, ...]:
+    """Set what warnings and errors want, worst first, each parameter once, and read it back."""
+    from companion.skipper.checks import Level
+
+    changes: dict[str, Change] = {}
+    for finding in findings:
+        name, wanted = finding.parameter, finding.wanted
+        if finding.level is Level.INFO or name is None or wanted is None or name in changes:
+            continue
+        written = await autopilot.set_parameter(name, wanted)
+        seen = await autopilot.get_parameter(name)
+        changes[name] = Change(
+            name=seen.name or name, before=finding.value, wanted=wanted, after=seen.value if seen.is_ok else None,
+            text=written.text)
+    return tuple(changes.values())
+
+
+def _is_cured(finding: Finding, changes: Sequence[Change]) -> bool:
+    return any(change.before == finding.value and change.wanted == finding.wanted and change.is_done
+               for change in changes) and finding.wanted is not None
+
+
+def as_json(findings: Sequence[Finding], changes: Sequence[Change]) -> dict[str, Any]:
+    """Return findings and changes as JSON values."""
+    return {
+        "findings": [
+            {"level": f.level.name.lower(), "code": f.code, "what": f.what, "why": f.why, "parameter": f.parameter,
+             "value": f.value, "wanted": f.wanted}
+            for f in findings
+        ],
+        "changes": [
+            {"parameter": c.name, "before": c.before, "wanted": c.wanted, "after": c.after, "done": c.is_done}
+            for c in changes
+        ],
+    }
+
+
+def as_text(findings: Sequence[Finding], changes: Sequence[Change], *, applied: bool) -> str:
+    """Return the findings as lines for a person, worst first."""
+    from companion.skipper.checks import Level
+
+    lines = []
+    for f in findings:
+        lines.append(f"{f.level.name.lower():8}{f.what}")
+        lines.append(f"        {f.why}")
+        if f.wanted is not None and f.parameter is not None and f.level is not Level.INFO:
+            now = f" (now {f.value:g})" if f.value is not None else ""
+            lines.append(f"        set {f.parameter} {f.wanted:g}{now}")
+    for c in changes:
+        before = "?" if c.before is None else f"{c.before:g}"
+        state = "set, reads back" if c.is_done else f"NOT set: {c.text or 'it reads back otherwise'}, reads"
+        after = "nothing" if c.after is None else f"{c.after:g}"
+        lines.append(f"apply   {c.name} {before} -> {c.wanted:g}: {state} {after}")
+    errors = sum(f.level is Level.ERROR for f in findings)
+    warnings = sum(f.level is Level.WARNING for f in findings)
+    lines.append(f"{errors} errors, {warnings} warnings" + ("" if applied else "; nothing was changed"))
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,148 @@
+"""The doctor: each setting that would spoil a voyage is found, nothing is changed unasked, what is set reads back."""
+
+import math
+
+import pytest
+
+from companion.clock import run_virtual
+from companion.commands.doctor import as_json, as_text, diagnose
+from companion.messages import GeoPoint, MissionItem
+from companion.skipper.checks import Examined, Level, Needs, examine
+
+# ArduRover's sailboat as `sim_vehicle.py -f sailboat` starts it.
+DEFAULTS = {
+    "FRAME_CLASS": 2.0, "SAIL_ENABLE": 1.0, "SAIL_NO_GO_ANGLE": 45.0, "SAIL_XTRACK_MAX": 10.0, "SAIL_LOIT_RADIUS": 5.0,
+    "LOIT_TYPE": 1.0, "WNDVN_TYPE": 4.0, "WNDVN_SPEED_TYPE": 4.0, "WNDVN_SPEED_MIN": 0.0, "WNDVN_TRUE_FILT": 0.05,
+    "WP_RADIUS": 3.0, "TURN_RADIUS": 0.9, "AVOID_ENABLE": 3.0, "OA_TYPE": 0.0, "MIS_RESTART": 0.0,
+    "MIS_DONE_BEHAVE": 1.0, "FENCE_ENABLE": 0.0, "FENCE_TYPE": 6.0, "FENCE_RADIUS": 300.0, "FENCE_ACTION": 1.0,
+    "FS_THR_ENABLE": 1.0, "FS_GCS_ENABLE": 0.0, "FS_ACTION": 2.0, "FS_EKF_ACTION": 1.0, "FS_CRASH_CHECK": 0.0,
+    "CRASH_ANGLE": 0.0, "BATT_MONITOR": 4.0, "BATT_FS_LOW_ACT": 0.0, "SYSID_THISMAV": 1.0, "SYSID_MYGCS": 255.0,
+}
+RATES = {"WIND": 2.0, "GLOBAL_POSITION_INT": 5.0, "ATTITUDE": 5.0, "MISSION_CURRENT": 1.0, "EKF_STATUS_REPORT": 1.0}
+GOOD = {**DEFAULTS, "AVOID_ENABLE": 0.0, "FS_THR_ENABLE": 2.0}
+
+
+def seen(**changes):
+    parameters = {**GOOD, **{k: v for k, v in changes.items() if k.isupper()}}
+    rest = {k: v for k, v in changes.items() if not k.isupper()}
+    return Examined(**{"parameters": parameters, "version": (4, 6, 0), "mission": (), "fence": (), "rates_hz": RATES,
+                       "system_id": 1, **rest})
+
+
+def codes(findings, level):
+    return {f.code for f in findings if f.level is level}
+
+
+def test_a_boat_that_is_set_up_has_nothing_in_its_way():
+    findings = examine(seen(), Needs(speed_mps=2.5))
+    assert codes(findings, Level.ERROR) == set()
+    assert codes(findings, Level.WARNING) == set()
+
+
+@pytest.mark.parametrize(("changes", "needs", "code", "level", "name", "wanted"), [
+    ({"SAIL_ENABLE": 0.0}, {}, "sail_enable", Level.ERROR, "SAIL_ENABLE", 1.0),
+    ({"FRAME_CLASS": 1.0}, {}, "frame_class", Level.ERROR, "FRAME_CLASS", 2.0),
+    ({"WNDVN_TYPE": 0.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", None),
+    ({"WNDVN_TYPE": 1.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", None),
+    ({"WNDVN_TYPE": 11.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", 10.0),
+    ({"WNDVN_SPEED_TYPE": 0.0}, {}, "wind speed", Level.WARNING, "WNDVN_SPEED_TYPE", None),
+    ({"WNDVN_TRUE_FILT": 0.01}, {}, "wind filter", Level.WARNING, "WNDVN_TRUE_FILT", 0.05),
+    ({"SAIL_XTRACK_MAX": 30.0}, {}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
+    ({"SAIL_XTRACK_MAX": 0.0}, {}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 7.0),
+    ({"SAIL_NO_GO_ANGLE": 35.0}, {}, "no-go", Level.WARNING, "SAIL_NO_GO_ANGLE", 45.0),
+    ({"SAIL_LOIT_RADIUS": 20.0}, {}, "loiter", Level.WARNING, "SAIL_LOIT_RADIUS", 6.0),
+    ({"WP_RADIUS": 15.0}, {"margin_m": 30.0}, "waypoint radius", Level.WARNING, "WP_RADIUS", 3.0),
+    ({"AVOID_ENABLE": 7.0}, {}, "avoidance", Level.WARNING, "AVOID_ENABLE", 0.0),
+    ({"OA_TYPE": 2.0}, {}, "two planners", Level.WARNING, "OA_TYPE", 0.0),
+    ({"MIS_RESTART": 1.0}, {}, "mis_restart", Level.WARNING, "MIS_RESTART", 0.0),
+    ({"FENCE_ENABLE": 1.0}, {"reach_m": 400.0, "margin_m": 40.0}, "home circle", Level.ERROR, "FENCE_TYPE", 4.0),
+    ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0}, {"margin_m": 40.0}, "empty fence", Level.WARNING, "FENCE_ENABLE", 0.0),
+    ({}, {"has_fence": True, "reach_m": 10.0}, "fence off", Level.WARNING, "FENCE_ENABLE", 1.0),
+    ({"FENCE_ENABLE": 1.0, "FENCE_ACTION": 0.0}, {"margin_m": 40.0}, "fence action", Level.WARNING, "FENCE_ACTION",
+     1.0),
+    ({"FS_THR_ENABLE": 1.0}, {}, "radio failsafe", Level.WARNING, "FS_THR_ENABLE", 2.0),
+    ({"FS_GCS_ENABLE": 1.0}, {}, "station failsafe", Level.WARNING, "FS_GCS_ENABLE", 2.0),
+    ({"FS_GCS_ENABLE": 2.0, "FS_THR_ENABLE": 1.0}, {}, "station failsafe", Level.WARNING, "FS_THR_ENABLE", 2.0),
+    ({"FS_EKF_ACTION": 0.0}, {}, "EKF failsafe", Level.WARNING, "FS_EKF_ACTION", 1.0),
+    ({"CRASH_ANGLE": 30.0}, {}, "crash check", Level.WARNING, "CRASH_ANGLE", 0.0),
+    ({"SYSID_MYGCS": 1.0}, {}, "system id", Level.ERROR, "SYSID_MYGCS", 255.0),
+    ({"system_id": 2}, {}, "system id", Level.WARNING, "SYSID_THISMAV", None),
+    ({"version": (4, 0, 0)}, {}, "version", Level.WARNING, None, None),
+    ({"mission": None}, {}, "mission", Level.WARNING, None, None),
+    ({"mission": (MissionItem(command=16, lat_e7=1, lon_e7=1),)}, {}, "mission end", Level.WARNING, None, None),
+    ({"fence": (MissionItem(command=5001),) * 90}, {}, "fence size", Level.ERROR, None, None),
+    ({"rates_hz": {**RATES, "WIND": 0.0}}, {}, "streams", Level.ERROR, None, None),
+    ({"rates_hz": {**RATES, "ATTITUDE": 0.3}}, {}, "streams", Level.WARNING, None, None),
+])
+def test_what_would_spoil_a_voyage_is_found(changes, needs, code, level, name, wanted):
+    findings = [f for f in examine(seen(**changes), Needs(**{"speed_mps": 2.5, **needs}))
+                if f.code == code and f.level is level]
+    assert len(findings) == 1, [f.code for f in examine(seen(**changes), Needs(**needs))]
+    assert findings[0].parameter == name
+    assert findings[0].wanted == wanted
+    assert findings[0].why
+
+
+def test_names_of_4_7_are_understood():
+    parameters = {k: v for k, v in GOOD.items() if not k.startswith("SYSID")}
+    parameters |= {"MAV_SYSID": 1.0, "MAV_GCS_SYSID": 1.0}
+    assert "system id" in codes(examine(seen(parameters=parameters), Needs()), Level.ERROR)
+
+
+def test_silence_points_at_signing():
+    findings = examine(seen(parameters={}), Needs())
+    assert "signing" in next(f.why for f in findings if f.code == "no parameters")
+
+
+def test_what_is_wanted_cures():
+    """Setting what the findings want leaves no finding that wants something else (no two that fight)."""
+    parameters = {**DEFAULTS, "SAIL_XTRACK_MAX": 30.0, "WP_RADIUS": 15.0, "OA_TYPE": 2.0, "FENCE_ENABLE": 1.0,
+                  "FS_GCS_ENABLE": 1.0, "SAIL_LOIT_RADIUS": 20.0, "CRASH_ANGLE": 10.0}
+    needs = Needs(reach_m=500.0, margin_m=25.0, speed_mps=2.5)
+    for _ in range(3):
+        for finding in examine(seen(parameters=parameters, fence=(MissionItem(command=5001),)), needs):
+            if finding.wanted is not None and finding.level > Level.INFO:
+                parameters[finding.parameter] = finding.wanted
+    left = examine(seen(parameters=parameters, fence=(MissionItem(command=5001),)), needs)
+    assert [f for f in left if f.level > Level.INFO and f.wanted is not None] == []
+
+
+def doctor(parameters, *, apply):
+    """Run the doctor against the simulated autopilot over a link in memory."""
+    from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+    from sitl.wind import parse_wind
+
+    async def consult():
+        autopilot = Autopilot(
+            AutopilotConfig(home=GeoPoint(lat_deg=50.8, lon_deg=-1.3), heading_rad=0.0, is_warm=True, is_moored=True,
+                            parameters=parameters), parse_wind("5@0"), seed=1)
+        link = MemoryLink("doctor", seed=1)
+        async with serve(autopilot, [link.far]):
+            return await diagnose(link.near, Needs(speed_mps=2.5), apply=apply)
+
+    return run_virtual(consult())
+
+
+@pytest.fixture(scope="module")
+def consulted():
+    return doctor({"OA_TYPE": 2.0, "AVOID_ENABLE": 3.0}, apply=True)
+
+
+def test_the_doctor_reads_a_living_autopilot_and_changes_nothing_unasked():
+    findings, changes = doctor({"OA_TYPE": 2.0, "AVOID_ENABLE": 3.0}, apply=False)
+    assert changes == ()
+    assert {"two planners", "avoidance"} <= codes(findings, Level.WARNING)
+    assert not any(f.code == "streams" for f in findings)
+    text = as_text(findings, changes, applied=False)
+    assert "set OA_TYPE 0 (now 2)" in text
+    assert "nothing was changed" in text
+
+
+def test_apply_sets_and_reads_back(consulted):
+    findings, changes = consulted
+    done = {c.name: c for c in changes}
+    assert done["OA_TYPE"].is_done
+    assert done["AVOID_ENABLE"].after == 0.0
+    data = as_json(findings, changes)
+    assert {c["parameter"] for c in data["changes"]} == set(done)
+    assert all(math.isfinite(c["wanted"]) for c in data["changes"])
