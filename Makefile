@@ -14,6 +14,9 @@ $(STAMP): requirements-dev.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $(STAMP)
 
+demo: $(STAMP)
+	$(BIN)/sitl run sitl/scenarios/demo.toml --live
+
 test: $(STAMP)
 	$(BIN)/python -m pytest -n 2
 
@@ -22,6 +25,9 @@ check: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 	@! grep -nE 'https?://|file:|index-url|find-links' requirements*.lock
+
+campaign: $(STAMP)
+	$(BIN)/sitl campaign sitl/scenarios/demo.toml --runs 50
 
 clean:
 	rm -rf $(VENV) build dist

@@ -13,6 +13,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+# Loading takes about two seconds; beyond this the operator is told why nothing happens [s].
+PATIENCE_S = 4.0
+
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
@@ -76,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
 
 async def _sail(mission: Any, transport: Any, folder: Path, options: Any) -> dict[str, Any]:
     from companion.app import sail
+    from companion.errors import JobError
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.progress import ProgressLine
 
@@ -85,6 +89,13 @@ async def _sail(mission: Any, transport: Any, folder: Path, options: Any) -> dic
         with contextlib.suppress(NotImplementedError):
             loop.add_signal_handler(number, stop.set)
     async with PlannerWorker() as planner:
+        ready = asyncio.ensure_future(planner.ready())
+        if not (await asyncio.wait({ready}, timeout=PATIENCE_S / options.budget_scale))[0]:
+            print("preparing the planner: its kernels are compiled once on each machine", flush=True)
+        try:
+            await ready
+        except (TimeoutError, EOFError, OSError) as error:
+            raise JobError(f"the planner's process did not start: {error!r}") from error
         with ProgressLine(sys.stdout) as progress:
             return await sail(mission, transport, planner, folder, options,
                               on_status=progress.show, stop=stop)

@@ -108,6 +108,19 @@ class PlannerWorker:
         """End the child."""
         await self._stop()
 
+    async def ready(self) -> None:
+        """Wait until the child's kernels are loaded (compiled, the first time on a machine).
+
+        Raises:
+            TimeoutError: they are not after three minutes; EOFError or OSError: the child died.
+        """
+        async with self._lock:
+            if not self.is_alive:
+                await self._replace()
+            if not self._is_warm:
+                await self._answer(_START_LIMIT_S)
+                self._is_warm = True
+
     async def plan(
         self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
         algorithm: str = "auto",

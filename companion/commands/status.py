@@ -1,0 +1,174 @@
+"""``companion status``: what the companion says of itself, heard on any link of the autopilot."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import math
+import sys
+from collections.abc import Callable
+from typing import Any
+
+EXIT_NO_LINK, EXIT_STALE, EXIT_ALARM = 3, 4, 5
+# States of the skipper that somebody ashore should look at.
+ALARM_STATES = frozenset({"holding"})
+SCHEMA = "companion.status/1"
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "status", help=summary,
+        description="Show the companion's status from its MAVLink messages alone, on another link of the autopilot: "
+        "the shore end of a telemetry radio. Speaks once when it starts, so that the autopilot routes to it, and "
+        "then only listens.",
+        epilog="Exit codes: 0 all is well, 3 no link or no companion heard, 4 what was heard is old, 5 the companion "
+        "raises an alarm. Example: companion status --link /dev/ttyUSB0:57600 --once",
+    )
+    parser.add_argument("--link", required=True, metavar="LINK",
+                        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--once", action="store_true", help="print one status and end")
+    parser.add_argument("--json", action="store_true", help="JSON, one object per status; unknown is null")
+    parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="for the first status (default: 10)")
+    parser.add_argument("--max-age", type=float, default=10.0, metavar="S", help="older is stale (default: 10)")
+    parser.add_argument("--every", type=float, default=2.0, metavar="S", help="without --once (default: 2)")
+    parser.add_argument("--units", choices=("ms", "kn"), default="ms", help="of speeds in the text (default: ms)")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from companion.clock import run as run_loop
+    from companion.mavlink.transport import open_link
+
+    return run_loop(_watch(args, open_link(args.link)))
+
+
+async def _watch(args: argparse.Namespace, transport: Any) -> int:
+    from companion.clock import now_s
+    from companion.mavlink.assembler import VehicleAssembler
+    from companion.mavlink.link import Link, LinkIdentity
+    from companion.mavlink.status_wire import StatusReader
+
+    reader, vehicle = StatusReader(), VehicleAssembler()
+    heard = asyncio.Event()
+    async with Link(
+        transport, identity=LinkIdentity(system=255, component=190), streams=(), is_quiet=True,
+    ) as link:
+
+        def take(t_s: float, message: Any) -> None:
+            vehicle.take(t_s, message)
+            if reader.take(t_s, message):
+                heard.set()
+
+        link.subscribe(take)
+        try:
+            async with asyncio.timeout(args.timeout):
+                await heard.wait()
+                # The parts take turns on the air; a moment more brings the packed one.
+                while args.once and not _has_packed(reader.report(now_s())):
+                    heard.clear()
+                    await heard.wait()
+        except TimeoutError:
+            if reader.report(now_s()) is None:
+                what = "an autopilot, but no companion" if link.has_autopilot else "nothing"
+                sys.stderr.write(f"companion status: {what} heard on {transport.name} in {args.timeout:g} s\n")
+                return EXIT_NO_LINK
+        write: Callable[[dict[str, Any]], None] = _write_json if args.json else (lambda d: _write_text(d, args.units))
+        while True:
+            report = reader.report(now_s())
+            assert report is not None
+            document = status_document(report, vehicle.status, link.is_alive, link.bytes_per_s()[0], link.loss())
+            write(document)
+            if args.once:
+                return _exit_code(document, args.max_age)
+            await asyncio.sleep(args.every)
+
+
+def _has_packed(report: Any) -> bool:
+    return report is not None and bool(report.has_packed)
+
+
+def _exit_code(document: dict[str, Any], max_age_s: float) -> int:
+    if document["age_s"] > max_age_s:
+        return EXIT_STALE
+    return EXIT_ALARM if document["state"] in ALARM_STATES else 0
+
+
+def status_document(report: Any, autopilot: Any, is_alive: bool, bytes_in: float, loss: float) -> dict[str, Any]:
+    """Return the JSON form: SI units, degrees where the key says so, an age in every group."""
+    s = report.status
+    wind_age = min((a for n, a in report.age_s.items() if n in {"status", "wind", "co_twd"}), default=None)
+    return {
+        "schema": SCHEMA,
+        "age_s": round(report.newest_age_s, 2),
+        "state": s.state,
+        "alert": {"code": s.alert_code, "text": s.alert_text, "age_s": _age(report, "status")},
+        "waypoint": {
+            "seq": s.waypoint_seq, "count": s.waypoint_count, "distance_m": _round(s.waypoint_distance_m),
+            "cross_track_m": _round(s.cross_track_m), "next_tack_s": s.next_tack_s, "age_s": _age(report, "status"),
+        },
+        "goal": {
+            "index": s.goal_index, "count": s.goal_count, "distance_m": _round(s.goal_distance_m),
+            "age_s": _age(report, "status"),
+        },
+        "wind": {
+            "twd_deg": None if s.twd_from_rad is None else round(math.degrees(s.twd_from_rad), 1),
+            "sigma_deg": None if s.twd_sigma_rad is None else round(math.degrees(s.twd_sigma_rad), 1),
+            "tws_mps": _round(s.tws_mps), "tws_sigma_mps": _round(s.tws_sigma_mps), "reference": "ground",
+            "age_s": None if wind_age is None else round(wind_age, 2),
+        },
+        "plan": {
+            "id": s.plan_id, "plan_age_s": s.plan_age_s, "replans": s.replans, "tacks": s.tacks,
+            "promised_risk": _round(s.promised_risk, 4), "clearance_m": _round(s.clearance_m),
+            "age_s": _age(report, "status"),
+        },
+        "position": None if s.position is None else {
+            "lat_deg": s.position.lat_deg, "lon_deg": s.position.lon_deg, "age_s": _age(report, "status"),
+        },
+        "autopilot": {
+            "mode": None if autopilot is None or autopilot.mode is None else autopilot.mode.name,
+            "armed": None if autopilot is None else autopilot.is_armed,
+            "battery_v": _round(s.battery_v), "heard": is_alive,
+        },
+        "link": {"bytes_per_s_in": round(bytes_in), "loss": round(loss, 4),
+                 "companion_bytes_per_s": None if s.bytes_out_per_s is None else round(s.bytes_out_per_s)},
+        "ages_s": {name: round(age, 2) for name, age in report.age_s.items()},
+    }
+
+
+def _age(report: Any, part: str) -> float | None:
+    age = report.age_s.get(part)
+    return None if age is None else round(age, 2)
+
+
+def _round(value: float | None, digits: int = 2) -> float | None:
+    return None if value is None else round(value, digits)
+
+
+def _write_json(document: dict[str, Any]) -> None:
+    print(json.dumps(document), flush=True)
+
+
+def _write_text(d: dict[str, Any], units: str) -> None:
+    """Print the status as four lines; nothing without its age."""
+    factor, unit = (1.943844, "kn") if units == "kn" else (1.0, "m/s")
+
+    def show(value: float | None, form: str = ".0f", scale: float = 1.0) -> str:
+        return "-" if value is None else format(value * scale, form)
+
+    w, wind, plan, goal, pilot = d["waypoint"], d["wind"], d["plan"], d["goal"], d["autopilot"]
+    armed = {None: "?", True: "ARMED", False: "disarmed"}[pilot["armed"]]
+    safe = None if plan["promised_risk"] is None else 1.0 - plan["promised_risk"]
+    print(f"{d['state'].upper()}  {pilot['mode'] or '?'} {armed}  (age {d['age_s']:.1f} s)  {d['alert']['text']}")
+    print(f"  WP {show(w['seq'])}/{show(w['count'])} {show(w['distance_m'])} m  xt {show(w['cross_track_m'], '+.1f')} m"
+          f"  next tack {show(w['next_tack_s'])} s | goal {show(goal['distance_m'])} m"
+          f"  ({(goal['index'] or 0) + 1} of {show(goal['count'])})")
+    print(f"  TWD {show(wind['twd_deg'], '03.0f')}±{show(wind['sigma_deg'])}°"
+          f"  TWS {show(wind['tws_mps'], '.1f', factor)} {unit}  (age {show(wind['age_s'], '.1f')} s)"
+          f" | P(safe) {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
+          f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {show(plan['replans'])} replans")
+    link = d["link"]
+    print(f"  battery {show(pilot['battery_v'], '.1f')} V | link {link['bytes_per_s_in']} B/s in,"
+          f" loss {100.0 * link['loss']:.0f} %, companion {show(link['companion_bytes_per_s'])} B/s", flush=True)
