@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 from companion.errors import InputError, JobError
 
 if TYPE_CHECKING:
+    from companion.boat import Boat
     from companion.geofence import Document, Mission
+    from companion.planner import Plan
 
 _EPILOG = """\
 examples:
@@ -88,15 +90,53 @@ def preview_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _preview(mission: Mission, args: argparse.Namespace) -> None:
+    """Draw the mission in the wind that the arguments or the mission give."""
+    from companion.compose import boat_of
     from companion.plots.mission import save_mission
 
-    speed_mps, from_deg = mission.wind.preview_speed_mps, mission.wind.preview_from_deg
+    tws_mps, from_deg = mission.wind.preview_speed_mps, mission.wind.preview_from_deg
     if args.wind:
-        speed_mps, from_deg = wind_argument(args.wind)
-    for line in save_mission(mission, args.plot, tws_mps=speed_mps, twd_from_rad=math.radians(from_deg),
-                             with_plan=not args.no_plan):
+        tws_mps, from_deg = wind_argument(args.wind)
+    twd_from_rad, boat = math.radians(from_deg), boat_of(mission)
+    lines = save_mission(
+        mission, args.plot, tws_mps=tws_mps, twd_from_rad=twd_from_rad,
+        beat_rad=boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad,
+        plans=[] if args.no_plan else _plans(mission, boat, tws_mps, twd_from_rad),
+    )
+    for line in lines:
         print(line)
     print(f"{args.plot}: written")
+
+
+def _plans(mission: Mission, boat: Boat, tws_mps: float, twd_from_rad: float) -> list[Plan]:
+    """Return the planner's way from goal to goal, first lap, in a steady wind."""
+    from companion.planner import Problem, plan
+
+    if mission.start is None:
+        return []
+    frame = mission.frame()
+    local = mission.area.local(frame)
+    here = frame.en_from_geo(mission.start)
+    heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
+    limits = boat.problem_boat(tws_mps)
+    plans = []
+    for goal in mission.goals:
+        east_m, north_m = frame.en_from_geo(goal.point)
+        problem = Problem.from_json({
+            "id": mission.name, "title": mission.name,
+            "start": {"x": here[0], "y": here[1], "heading_deg": heading_deg % 360.0},
+            "goal": {"x": east_m, "y": north_m, "radius": goal.radius_m},
+            "obstacles": local.obstacles_wkt(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here),
+            "wind": {"from_deg": math.degrees(twd_from_rad), "speed_mps": tws_mps, "sigma": {"model": "none"}},
+            "boat": limits, "delta_s": mission.risk.delta_s,
+        })
+        answer = plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0)
+        plans.append(answer)
+        if not answer.has_path:
+            break
+        here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
+        heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
+    return plans
 
 
 def wind_argument(text: str) -> tuple[float, float]:

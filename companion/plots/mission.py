@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,29 +47,25 @@ Points = NDArray[np.float64]
 
 
 def save_mission(
-    mission: Mission, path: str | Path, *, tws_mps: float, twd_from_rad: float, with_plan: bool = True,
+    mission: Mission, path: str | Path, *, tws_mps: float, twd_from_rad: float, beat_rad: float,
+    plans: Sequence[Plan] = (),
 ) -> list[str]:
     """Draw a mission and save it; return what the picture has to say in words.
 
-    The plan is the planner's in this wind, held steady, one goal after the other. Raises InputError when the file
-    cannot be written.
+    ``beat_rad`` is the boat's best angle to windward in this wind, for the laylines; ``plans`` lead from goal to
+    goal. Raises InputError when the file cannot be written.
     """
-    from companion.compose import boat_of
-
     frame = mission.frame()
     local = mission.area.local(frame)
     start = frame.en_from_geo(mission.start) if mission.start is not None else None
     goals = [frame.en_from_geo(g.point) for g in mission.goals]
-    boat = boat_of(mission)
-    beat_rad = boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad
-    plans = _plans(mission, local, tws_mps, twd_from_rad) if with_plan and start is not None else []
     figure, axes = plt.subplots(figsize=(8.0, 8.6), layout="constrained")
     handles = draw_area(axes, local, mission.margin_m)
     handles += _draw_autopilot(axes, mission, frame)
     legs = [np.asarray(p.waypoints_en) for p in plans if p.has_path]
     places = [*([start] if start is not None else []), *goals]
     extent = _extent(local, places, legs)
-    handles += _draw_laylines(axes, [*([start] if start else []), *goals], twd_from_rad, beat_rad, extent)
+    handles += _draw_laylines(axes, places, twd_from_rad, beat_rad, extent)
     for leg in legs:
         axes.plot(leg[:, 0], leg[:, 1], "-", color=PATH, lw=1.8, zorder=6, solid_joinstyle="round")
         axes.plot(leg[1:-1, 0], leg[1:-1, 1], "o", color=PATH, ms=3.0, zorder=6)
@@ -216,9 +213,9 @@ def _finish(
         axes.text(cx, cy - 0.075, f"from {math.degrees(twd_from_rad) % 360.0:03.0f}°{speed}", transform=axes.transAxes,
                   ha="center", va="top", fontsize=8, color=WIND, zorder=10,
                   bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 1.5})
-    if handles:
-        axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=2, fontsize=8,
-                    frameon=False)
+    figure = axes.get_figure(root=True)
+    if handles and figure is not None:
+        figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
 
 
 def _extent(
@@ -232,9 +229,12 @@ def _extent(
         west, south, east, north = shapely.total_bounds(shapes)
     else:
         (west, south), (east, north) = points.min(axis=0), points.max(axis=0)
-        near = shapely.box(west, south, east, north).buffer(max(150.0, 0.35 * max(east - west, north - south)))
+        span = max(east - west, north - south)
+        near = shapely.box(west, south, east, north).buffer(max(150.0, 0.35 * span))
         shapes = [p for p in local.polygons if shapely.intersects(near, p)]
-        shapes += [local.limits] if local.limits is not None else []
+        if local.limits is not None and not local.limits.is_empty:
+            near = shapely.box(west, south, east, north).buffer(max(300.0, 1.5 * span))
+            shapes.append(local.limits)
         clipped = [shapely.intersection(near, s) for s in shapes]
         bounds = np.array([c.bounds for c in clipped if not c.is_empty] or [(west, south, east, north)])
         west, south = min(west, bounds[:, 0].min()), min(south, bounds[:, 1].min())
@@ -244,37 +244,7 @@ def _extent(
     return float(cx - half), float(cy - half), float(cx + half), float(cy + half)
 
 
-def _plans(mission: Mission, local: LocalArea, tws_mps: float, twd_from_rad: float) -> list[Plan]:
-    """Return the planner's way from goal to goal, first lap, in a steady wind."""
-    from companion.compose import boat_of
-    from companion.planner import Problem, plan
-
-    frame = mission.frame()
-    assert mission.start is not None
-    here = frame.en_from_geo(mission.start)
-    heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
-    boat = boat_of(mission).problem_boat(tws_mps)
-    plans = []
-    for goal in mission.goals:
-        east_m, north_m = frame.en_from_geo(goal.point)
-        problem = Problem.from_json({
-            "id": mission.name, "title": mission.name,
-            "start": {"x": here[0], "y": here[1], "heading_deg": heading_deg % 360.0},
-            "goal": {"x": east_m, "y": north_m, "radius": goal.radius_m},
-            "obstacles": local.obstacles_wkt(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here),
-            "wind": {"from_deg": math.degrees(twd_from_rad), "speed_mps": tws_mps, "sigma": {"model": "none"}},
-            "boat": boat, "delta_s": mission.risk.delta_s,
-        })
-        answer = plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0)
-        plans.append(answer)
-        if not answer.has_path:
-            break
-        here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
-        heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
-    return plans
-
-
-def _words(mission: Mission, plans: list[Plan]) -> list[str]:
+def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
     """Return what came of the plans, one line each."""
     out = []
     for goal, answer in zip(mission.goals, plans, strict=False):
@@ -285,6 +255,8 @@ def _words(mission: Mission, plans: list[Plan]) -> list[str]:
             out.append(f"{name}: no path ({answer.status.value}): {answer.reason}")
     if len(out) > 1 and all(p.has_path for p in plans):
         out.insert(0, f"{sum(p.cost_s for p in plans):.0f} s to all {len(plans)} goals")
+    if plans and any(g.rounding for g in mission.goals):
+        out.append("the preview sails to the marks; on which side they are left is the skipper's part")
     return out
 
 
