@@ -41,7 +41,7 @@ class CommandSend:
 
     def __init__(
         self, party: Party, command: int, params: tuple[float, ...] = (), *,
-        message: Message | None = None, give_up_s: float = 6.0,
+        message: Message | None = None, give_up_s: float = 8.0,
     ) -> None:
         self.result: CommandAnswer | None = None
         self._party, self._command, self._params, self._message = party, command, params, message

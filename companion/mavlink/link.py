@@ -256,7 +256,7 @@ class Link:
         return machine.result
 
     async def command(
-        self, command: int, *params: float, message: Message | None = None, give_up_s: float = 6.0
+        self, command: int, *params: float, message: Message | None = None, give_up_s: float = 8.0
     ) -> CommandAnswer:
         """Send a COMMAND_LONG (or the prepared ``message``) and return its answer."""
         machine = CommandSend(self.party, command, params, message=message, give_up_s=give_up_s)

@@ -20,7 +20,7 @@ from companion.messages import MissionItem, MissionType
 # The reason for a refusal comes as text, up to 7 ms behind the ACK in recordings; a radio may need longer [s].
 REASON_WAIT_S = 0.4
 # ArduRover repeats its request every 1 s: silence for longer than this with all items sent means a lost last ACK [s].
-LAST_ACK_WAIT_S = 3.5
+LAST_ACK_WAIT_S = 5.0
 # ... and it drops the upload 8 s after the last item it got [s].
 UPLOAD_DEAD_S = 10.0
 CANCELLED_RESTARTS = 3
@@ -58,7 +58,7 @@ class ListUpload:
         self.result: ListResult | None = None
         self._party, self._type, self._first, self._partial = party, mission_type, first, partial
         self._items: Mapping[int, MissionItem] = {first + i: item for i, item in enumerate(items)}
-        self._retry = Retry(give_up_s=6.0)
+        self._retry = Retry(give_up_s=8.0)
         self._texts = Texts(party)
         self._sent: set[int] = set()
         self._heard_s = 0.0
@@ -243,7 +243,7 @@ class ListClear:
     def __init__(self, party: Party, mission_type: MissionType) -> None:
         self.result: ListResult | None = None
         self._party, self._type = party, mission_type
-        self._retry = Retry(give_up_s=6.0)
+        self._retry = Retry(give_up_s=8.0)
         self._texts = Texts(party)
 
     @property

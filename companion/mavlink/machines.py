@@ -82,7 +82,7 @@ class Retry:
     """
 
     first_s: float = 0.7
-    cap_s: float = 2.0
+    cap_s: float = 1.0
     growth: float = 1.4
     give_up_s: float = 12.0
     wake_s: float = 0.0
