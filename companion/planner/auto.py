@@ -15,6 +15,7 @@ import shapely
 
 from companion.planner.anneal import check_path
 from companion.planner.bound import Bound, cut_off, no_course
+from companion.planner.evaluate import target_hit
 from companion.planner.gauge import make_gauge
 from companion.planner.kernels import Floats
 from companion.planner.plan import PlanStatus
@@ -40,6 +41,10 @@ def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
     if math.hypot(*world.goal) <= world.goal_radius:
         effort.found()
         return Outcome(waypoints_en=np.asarray([problem.start_en]))
+    for i, target in enumerate(problem.targets):
+        if target_hit(problem, problem.start_en, problem.start_en, 0.0, 0.0) == i:
+            name = target.name or f"target {i}"
+            return Outcome(waypoints_en=None, status=PlanStatus.INFEASIBLE, reason=f"the start is inside {name}")
     gauge = make_gauge(problem)
     bound = Bound(world, gauge)
     if not math.isfinite(bound.value_s):

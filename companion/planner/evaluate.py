@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -136,6 +136,20 @@ def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
         tacks=tacks, gybes=gybes, legs=tuple(legs),
         min_margin_rad=min((leg.margin_rad for leg in legs), default=math.inf),
     )
+
+
+def clearances(p: Problem, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
+    """Return the legs with ``clearance_m`` filled in: the distance to the nearest obstacle or fence line."""
+    lines = [shapely.LineString([leg.from_en, leg.to_en]) for leg in legs]
+    walls = [] if p.obstacle_union.is_empty else [p.obstacle_union]
+    if p.fence_polygon is not None:
+        walls.append(p.fence_polygon.boundary)
+    if not lines or not walls:
+        return legs
+    for wall in walls:
+        shapely.prepare(wall)
+    nearest = np.min([shapely.distance(wall, np.asarray(lines)) for wall in walls], axis=0)
+    return tuple(replace(leg, clearance_m=float(d)) for leg, d in zip(legs, nearest, strict=True))
 
 
 def target_hit(

@@ -146,8 +146,15 @@ def _legs_in_words(plan: Plan, legs: list[dict[str, Any]]) -> str:
     numbers: dict[str, list[int]] = {}
     for i, (leg, bound) in enumerate(zip(plan.legs, legs, strict=True), start=1):
         for bind in bound["binds"]:
-            numbers.setdefault(_bind_in_words(leg, bind), []).append(i)
+            if bind["by"] != "no_go":
+                numbers.setdefault(_bind_in_words(bind), []).append(i)
+            else:
+                tack = "starboard" if leg.twa_rad < 0.0 else "port"
+                numbers.setdefault(f"close-hauled on {tack} tack", []).append(i)
     sentences = [f"{_legs_of(which)} {text}." for text, which in numbers.items()]
+    zones = [bind for bound in legs for bind in bound["binds"] if bind["by"] == "no_go"]
+    if zones:
+        sentences.append(_zone_in_words(zones))
     if not sentences:
         return "No leg is bound by anything but its corners."
     shown = sentences if len(sentences) <= 12 else [*sentences[:11], f"And {len(sentences) - 11} more such bounds."]
@@ -160,14 +167,20 @@ def _legs_of(which: list[int]) -> str:
     return f"Legs {', '.join(map(str, which[:-1]))} and {which[-1]}"
 
 
-def _bind_in_words(leg: Leg, bind: dict[str, Any]) -> str:
-    if bind["by"] == "no_go":
-        tack = "starboard" if leg.twa_rad < 0.0 else "port"
-        text = f"close-hauled on {tack} tack at {bind['half_angle_deg']:.0f}°"
-        if bind["widened_deg"] > 0.0:
-            text += (f", {bind['widened_deg']:.0f}° of it for a wind uncertain by {bind['sigma_deg']:.0f}° "
-                     f"({bind['sigmas']:.2f} sigma)")
-        return text
+def _zone_in_words(zones: list[dict[str, Any]]) -> str:
+    """Say how wide the no-go zone is where it binds, and at what sigma."""
+    def span(key: str) -> str:
+        low, high = round(min(z[key] for z in zones)), round(max(z[key] for z in zones))
+        return f"{low}°" if low == high else f"{low} to {high}°"
+
+    text = f"Close-hauled is {span('half_angle_deg')} off the wind"
+    if max(z["widened_deg"] for z in zones) > 0.0:
+        text += (f", {span('widened_deg')} of it for a wind uncertain by {span('sigma_deg')} "
+                 f"({max(z['sigmas'] for z in zones):.2f} sigma)")
+    return f"{text}."
+
+
+def _bind_in_words(bind: dict[str, Any]) -> str:
     if bind["by"] == "obstacle":
         east, north = bind["around_en"]
         verb = {"along it": "along", "turns at it": "up to a turn at", "leaves it": "from a turn at",

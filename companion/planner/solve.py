@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from companion.clock import effort_s
 from companion.errors import InputError
+from companion.planner.evaluate import clearances
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem import Problem
 
@@ -188,6 +189,6 @@ def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> 
     reason = f"{100.0 * gap:.1f} % above the bound" if math.isfinite(gap) else "no useful bound"
     return replace(
         spent, status=status, reason=reason, waypoints_en=np.array(outcome.waypoints_en, dtype=np.float64),
-        legs=judged.legs, cost_s=judged.time_s, lower_bound_s=bound, first_s=effort.first_s,
+        legs=clearances(problem, judged.legs), cost_s=judged.time_s, lower_bound_s=bound, first_s=effort.first_s,
         elapsed_s=effort.elapsed_s,
     )

@@ -1,0 +1,108 @@
+"""The problem format: what is read, what is refused, what the tightened no-go zone is."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from hypothesis import given, settings
+from scipy.stats import norm
+
+from companion.errors import InputError
+from companion.planner import Plan, PlanStatus, Problem, plan
+from tests.planner.problems import box, random_problems, simple
+
+
+@pytest.mark.parametrize(("change", "place"), [
+    ({"boat": {}}, "boat.speed"),
+    ({"obstacles": ["POLYGON ((0 0, 1"]}, "obstacles[0]"),
+    ({"obstacles": ["POINT (1 2)"]}, "obstacles[0]"),
+    ({"obstacles": "POLYGON EMPTY"}, "obstacles"),
+    ({"delta_s": "high"}, "delta_s"),
+    ({"delta_s": True}, "delta_s"),
+    ({"goal": {"x": 0, "y": 0}}, "goal.radius"),
+    ({"wind": {"from_deg": 0, "sigma": {"model": "garch"}}}, "wind.sigma.model"),
+    ({"wind": {"from_deg": 0, "sigma": {"model": "forecast", "horizon_s": [0, 0], "sigma_deg": [1, 2]}}},
+     "wind.sigma.horizon_s"),
+    ({"start": 3}, "start"),
+])
+def test_what_cannot_be_read_names_the_place(change, place):
+    with pytest.raises(InputError) as caught:
+        Problem.from_json(simple(**change))
+    assert caught.value.place == place
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_json(tmp_path):
+    path = tmp_path / "p.json"
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(InputError, match="not JSON"):
+        Problem.from_json(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        Problem.from_json(tmp_path / "missing.json")
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(random_problems())
+def test_write_then_read_is_the_same_problem(raw):
+    first = Problem.from_json(raw)
+    again = Problem.from_json(json.loads(json.dumps(first.to_dict())))
+    assert again.obstacles == first.obstacles
+    assert again.goal_en == first.goal_en
+    for t in (0.0, 7.0, 300.0):
+        assert again.no_go_half_rad(t) == pytest.approx(first.no_go_half_rad(t), abs=1e-12)
+
+
+def test_extensions_survive_write_then_read():
+    raw = simple(
+        wind={"from_deg": 10, "speed_mps": 5, "sigma": {"model": "forecast", "horizon_s": [0, 60], "sigma_deg": [2, 8],
+                                                        "half_width_deg": [1, 9]}},
+        current={"set_deg": 90, "drift_mps": 0.3}, clearance_floor_m=3.0,
+        targets=[{"x": 1, "y": 2, "vx": 3, "vy": 4, "radius_m": 5, "growth_mps": 0.1, "from_s": 1, "until_s": 9}],
+        risk={"max_path_risk": 0.05, "correlation_time_s": 30}, note_of_mine="kept",
+    )
+    first = Problem.from_json(raw)
+    again = Problem.from_json(first.to_dict())
+    assert (again.current, again.targets, again.risk) == (first.current, first.targets, first.risk)
+    assert again.clearance_floor_m == 3.0
+    assert again.extra["note_of_mine"] == "kept"
+    assert math.degrees(again.widening_rad(30.0)) == pytest.approx(5.0)      # half widths, not k sigma
+
+
+def test_the_zone_widens_with_probability_and_time():
+    sigma = {"model": "kalman", "sigma0_deg": 3, "growth_deg_per_sqrt_s": 0.5}
+    p = Problem.from_json(simple(delta_s=0.8, wind={"from_deg": 0, "sigma": sigma}))
+    expected = 45 + norm.ppf(0.8) * math.sqrt(9 + 0.25 * 100)
+    assert math.degrees(p.no_go_half_rad(100.0)) == pytest.approx(expected)
+    assert p.no_go_half_rad(100.0) > p.no_go_half_rad(0.0) > p.boat.no_go_half_rad
+    ar1 = {"model": "ar1", "sigma0_deg": 2, "sigma_inf_deg": 8, "rho_hz": 0.01}
+    q = Problem.from_json(simple(delta_s=0.8, wind={"from_deg": 0, "sigma": ar1}))
+    assert math.degrees(q.no_go_half_rad(1e9)) == pytest.approx(45 + norm.ppf(0.8) * 8)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ({"delta_s": 0.4}, "delta_s"), ({"delta_s": 1.0}, "delta_s"), ({"delta_s": math.nan}, "delta_s"),
+    ({"wind": {"from_deg": 0, "speed_mps": 0, "sigma": {"model": "none"}}}, "no wind"),
+    ({"goal": {"x": 0, "y": 100, "radius": -1}}, "radius"),
+    ({"goal": {"x": math.inf, "y": 100, "radius": 1}}, "goal.x"),
+    ({"boat": simple()["boat"] | {"speed": {"model": "constant", "v_mps": 0}}}, "polar"),
+    ({"boat": simple()["boat"] | {"turn_rate_rad_s": 0}}, "turn rate"),
+    ({"obstacles": [box(-10, -10, 10, 10)]}, "start is inside"),
+    ({"obstacles": [box(-10, 90, 10, 110)]}, "goal is inside"),
+    ({"fence": box(-10, 5, 10, 110)}, "start is inside an obstacle or outside"),
+])
+def test_what_cannot_be_planned_is_invalid_with_the_reason(change, words):
+    answer = plan(Problem.from_json(simple(**change)), expansions=2_000)
+    assert answer.status is PlanStatus.INVALID
+    assert words in answer.reason
+    assert len(answer.waypoints_en) == 0
+
+
+def test_a_plan_survives_json():
+    answer = plan(Problem.from_json(simple()), expansions=5_000)
+    again = Plan.from_dict(json.loads(json.dumps(answer.to_dict())))
+    assert again.status is answer.status
+    assert again.cost_s == answer.cost_s
+    assert again.legs[0].no_go_half_rad == pytest.approx(answer.legs[0].no_go_half_rad)
+    assert again.waypoints_en.tolist() == answer.waypoints_en.tolist()
