@@ -147,6 +147,9 @@ class _Shell:
             persisted,
         )
         self._write_description(transport.name)
+        self.recorder.decision(self._stamped(self._quantised(now_s())[1], {
+            "kind": "start", "persisted": None if persisted is None else persisted.to_dict(),
+        }))
         try:
             async with (
                 Link(transport, sink=self._on_frame, signing=self.options.signing) as link,

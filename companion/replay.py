@@ -1,1 +1,188 @@
-"""Replay."""
+"""Folds a recorded voyage again: the same messages, outcomes and ticks must give the same actions.
+
+The telemetry log holds every message, decisions.jsonl every outcome and action, track.csv when the skipper stepped
+and how many messages and outcomes it had seen by then. Numbers are compared with a tolerance, since plans were
+written in degrees.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from companion.compose import config_of, estimator_of, voyage_of
+from companion.errors import InputError
+from companion.fold import VoyageFold
+from companion.geofence import load_mission
+from companion.mavlink.frames import Codec, Message
+from companion.mavlink.link import OWN_COMPONENT
+from companion.mavlink.tlog import read_tlog
+from companion.messages import MissionItem
+from companion.planner import Plan
+from companion.skipper import Skipper
+from companion.skipper.config import Permissions
+from companion.skipper.snapshot import (
+    CommandOutcome,
+    CommandResult,
+    Outcome,
+    PlanOutcome,
+    ReadOutcome,
+    UploadOutcome,
+    UploadResult,
+)
+from companion.skipper.state import Persisted
+from companion.telemetry.recorder import DECISIONS, TLOG, TRACK, VOYAGE, jsonable, read_jsonl
+from companion.telemetry.records import action_record
+from companion.wind import WindRoom
+
+TOLERANCE = 1e-6
+# Fields of a record that say when it was written, not what was decided.
+_STAMPS = frozenset({"t_s", "utc"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """One step whose actions came out differently."""
+
+    t_s: float
+    recorded: list[dict[str, Any]]
+    replayed: list[dict[str, Any]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayReport:
+    """What a replay did."""
+
+    steps: int
+    messages: int
+    actions: int
+    restarts: int
+    differences: tuple[Difference, ...]
+
+
+def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
+    """Fold the voyage in ``folder`` again.
+
+    Args:
+        folder: what ``companion run`` or ``sitl run`` left.
+        mission_path: the mission file, where it is not at the recorded place any more.
+
+    Raises:
+        InputError: a file is missing or is not one of a voyage.
+    """
+    for name in (VOYAGE, TLOG, DECISIONS, TRACK):
+        if not (folder / name).is_file():
+            raise InputError(str(folder), name, "is missing", "name a folder that `companion run` left")
+    description = tomllib.loads((folder / VOYAGE).read_text(encoding="utf-8"))
+    epoch_s = float(description["run"]["epoch_s"])
+    mission = load_mission(mission_path or Path(description["mission"]["path"]))
+    skipper = Skipper(voyage=voyage_of(mission), config=config_of(mission))
+    decisions = read_jsonl(folder / DECISIONS)
+    rows = _rows(folder / TRACK)
+    starts = [(float(d["t_s"]), d["persisted"]) for d in decisions if d["kind"] == "start"] or [(-1e18, None)]
+    ends = [*(t for t, _ in starts[1:]), 1e18]
+    differences: list[Difference] = []
+    steps = messages = actions = 0
+    for (start_s, persisted), end_s in zip(starts, ends, strict=True):
+        fold = VoyageFold(
+            skipper, WindRoom(estimator=estimator_of(mission)), Permissions(**description["permissions"]),
+            None if persisted is None else Persisted.from_dict(persisted),
+        )
+        heard = _messages(folder / TLOG, epoch_s, start_s, end_s)
+        outcomes = iter([d for d in decisions if start_s <= d["t_s"] < end_s and d["kind"] in {"plan", "outcome"}])
+        recorded = _actions_by_time([d for d in decisions if start_s <= d["t_s"] < end_s])
+        for t_s, n_messages, n_outcomes in rows:
+            if not start_s <= t_s < end_s:
+                continue
+            for _ in range(n_messages):
+                at_s, message = next(heard)
+                fold.message(at_s, message)
+            for _ in range(n_outcomes):
+                record = next(outcomes)
+                fold.take_outcome(float(record["t_s"]), _outcome(record))
+            step = fold.tick(t_s)
+            mine = [
+                _plain(action_record(a, step.snapshot, skipper.config)) for a in step.actions
+            ]
+            theirs = recorded.get(t_s, [])
+            steps, messages, actions = steps + 1, messages + n_messages, actions + len(mine)
+            if not _same(mine, theirs):
+                differences.append(Difference(t_s=t_s, recorded=theirs, replayed=mine))
+    return ReplayReport(
+        steps=steps, messages=messages, actions=actions, restarts=len(starts) - 1, differences=tuple(differences))
+
+
+def _rows(path: Path) -> list[tuple[float, int, int]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return [
+            (float(r["t_s"]), int(r["frames"]), int(r["outcomes"]))
+            for r in csv.DictReader(file) if None not in r.values() and r["outcomes"]
+        ]
+
+
+def _messages(path: Path, epoch_s: float, start_s: float, end_s: float) -> Iterator[tuple[float, Message]]:
+    """Yield what the fold heard: messages of the autopilot's system that are not our own."""
+    codec = Codec(system=1, component=OWN_COMPONENT)
+    target: int | None = None
+    for record in read_tlog(path):
+        at_s = record.unix_us / 1e6 - epoch_s
+        if not start_s <= at_s < end_s:
+            continue
+        for message in codec.feed(record.frame):
+            if message.get_srcComponent() == OWN_COMPONENT:
+                continue
+            if target is None and message.get_type() == "HEARTBEAT" and message.get_srcComponent() == 1:
+                target = message.get_srcSystem()
+            if message.get_srcSystem() == target:
+                yield at_s, message
+
+
+def _actions_by_time(decisions: list[dict[str, Any]]) -> dict[float, list[dict[str, Any]]]:
+    out: dict[float, list[dict[str, Any]]] = {}
+    for record in decisions:
+        if record["kind"] == "action":
+            plain = {k: v for k, v in record.items() if k not in _STAMPS}
+            out.setdefault(float(record["t_s"]), []).append(plain)
+    return out
+
+
+def _plain(record: dict[str, Any]) -> dict[str, Any]:
+    plain: dict[str, Any] = json.loads(json.dumps(jsonable(record)))
+    return plain
+
+
+def _outcome(record: dict[str, Any]) -> Outcome:
+    if record["kind"] == "plan":
+        plan = None if record["plan"] is None else Plan.from_dict(record["plan"])
+        return PlanOutcome(request_id=record["request_id"], plan=plan, text=record["text"])
+    kind = record["outcome"]
+    if kind == "UploadOutcome":
+        return UploadOutcome(
+            upload_id=record["upload_id"], result=UploadResult[record["result"]], text=record["text"])
+    if kind == "ReadOutcome":
+        items = record["items"]
+        return ReadOutcome(
+            read_id=record["read_id"], text=record["text"], items=None if items is None else tuple(
+                MissionItem(command=c, lat_e7=lat, lon_e7=lon, alt_m=alt, frame=frame,
+                            params=(p[0], p[1], p[2], p[3]))
+                for c, lat, lon, alt, frame, p in items
+            ))
+    return CommandOutcome(
+        command_id=record["command_id"], result=CommandResult[record["result"]], text=record["text"])
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, bool) or isinstance(b, bool) or a is None or b is None:
+        return a is b
+    if isinstance(a, int | float) and isinstance(b, int | float):
+        return abs(a - b) <= TOLERANCE * max(1.0, abs(a), abs(b))
+    if isinstance(a, list) and isinstance(b, list):
+        return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_same(a[k], b[k]) for k in a)
+    return bool(a == b)

@@ -33,7 +33,7 @@ MIN_FREE_BYTES = 50_000_000
 MAX_TLOG_BYTES = 1_000_000_000
 
 TRACK_COLUMNS = (
-    "t_s", "frames", "lat_deg", "lon_deg", "east_m", "north_m", "heading_deg", "sog_mps", "cog_deg",
+    "t_s", "frames", "outcomes", "lat_deg", "lon_deg", "east_m", "north_m", "heading_deg", "sog_mps", "cog_deg",
     "twd_deg", "twd_sigma_deg", "tws_mps", "mode", "phase", "waypoint", "cross_track_m", "clearance_m",
 )
 

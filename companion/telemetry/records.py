@@ -71,13 +71,13 @@ def outcome_record(outcome: Outcome) -> dict[str, Any]:
 
 def track_row(step: Step, frames: int, clearance_m: float | None) -> tuple[Any, ...]:
     """Return one row of track.csv (see TRACK_COLUMNS)."""
-    snapshot, vehicle, autopilot, wind = step.snapshot, step.snapshot.vehicle, step.snapshot.autopilot, None
-    wind = snapshot.wind
+    snapshot = step.snapshot
+    vehicle, autopilot, wind = snapshot.vehicle, snapshot.autopilot, snapshot.wind
     east_m, north_m = snapshot.position_en_m or (None, None)
     sigma_rad = sigma_ahead_rad(snapshot)
     return (
         # The time is written so that reading it back gives the same number: a replay depends on it.
-        repr(snapshot.t_s), frames,
+        repr(snapshot.t_s), frames, len(snapshot.outcomes),
         None if vehicle is None else round(vehicle.position.lat_deg, 7),
         None if vehicle is None else round(vehicle.position.lon_deg, 7),
         _round(east_m, 2), _round(north_m, 2),

@@ -1,0 +1,37 @@
+"""``companion replay``: fold a recorded voyage again and report what came out differently."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+SHOWN = 5
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "replay", help=summary,
+        description="Feed a recorded voyage's messages, outcomes and ticks through today's code and compare every "
+        "action with the one recorded. Exit code 1 when something differs.",
+        epilog="Example: companion replay voyages/20260714T101500Z-archipelago",
+    )
+    parser.add_argument("voyage", type=Path, metavar="VOYAGE_DIR", help="the folder that `companion run` left")
+    parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="where the mission file is now")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from companion.replay import replay
+
+    report = replay(args.voyage, args.mission)
+    print(f"{report.steps} steps, {report.messages} messages, {report.actions} actions, {report.restarts} restarts: "
+          f"{len(report.differences)} steps differ")
+    for difference in report.differences[:SHOWN]:
+        print(f"  t = {difference.t_s:.1f} s")
+        print(f"    recorded {json.dumps(difference.recorded)[:400]}")
+        print(f"    replayed {json.dumps(difference.replayed)[:400]}")
+    return 1 if report.differences else 0
