@@ -1,0 +1,300 @@
+"""``companion wind``: forecast recorded wind and say how good the forecasts were."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from companion.errors import InputError
+
+if TYPE_CHECKING:
+    from companion.wind.ar1 import Ar1Fit
+    from companion.wind.records import Record
+    from companion.wind.score import HorizonScore, Score
+
+_EPILOG = """\
+examples:
+  companion wind afternoon.csv
+  companion wind afternoon.csv --estimator all --plot afternoon.png
+  companion wind 2026-07-14.tlog                  WIND as ArduRover sent it; or an ArduPilot .bin
+  companion wind records/ --estimator all         every CSV in the folder, and the averages
+  companion wind afternoon.csv --cost             microseconds per update and forecast
+
+A CSV record has a header and the columns t_s,wind_from_deg,wind_speed_ms (where the true wind comes from, degrees
+clockwise from true north); turning (1 in manoeuvres), heading_deg and awa_deg are used when they are there. Every
+reading is fed; a forecast is made every 30 s after ten minutes and scored against the reading at t + h unless the
+boat was turning or the wind was below 1 m/s. CRPS is the circular continuous ranked probability score: like a mean
+error, but of the whole forecast; smaller is better.
+"""
+
+_LONG_ROWS = 5000                   # from here on a progress bar is worth its line
+_REFERENCES = ("kalman", "mean90")  # drawn beside whatever was asked for
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
+    """Add the command's options."""
+    parser = subparsers.add_parser(
+        "wind", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "record", metavar="RECORD", nargs="+", type=Path, help="CSV, tlog, ArduPilot .bin, or a folder of CSV")
+    parser.add_argument(
+        "--estimator", default="default", metavar="NAME", help="default, kalman, ou, arma, garch, mean90, mean5 or all")
+    parser.add_argument(
+        "--plot", type=Path, metavar="P.png", help="draw the (first) record, its forecasts and their scores")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
+    parser.add_argument("--cost", action="store_true", help="time update and forecast instead of scoring")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Score, print, write and draw; return the exit code."""
+    from companion.wind.ar1 import fit
+    from companion.wind.catalogue import NAMES, make
+
+    names = list(NAMES) if args.estimator == "all" else [args.estimator]
+    for name in names:
+        make(name)                      # an unknown name is refused before anything is read
+    for path, flag in ((args.plot, "--plot"), (args.json, "--json")):
+        if path is not None and not path.absolute().parent.is_dir():
+            raise InputError(flag, str(path), "is in a folder that does not exist", "make the folder first")
+    records = [read_record(path) for path in _files(args.record)]
+    if args.cost:
+        _print_cost(records[0], names)
+        return 0
+    wanted = names + [n for n in _REFERENCES if args.plot is not None and n not in names]
+    scores: list[list[Score]] = []
+    fits: list[Ar1Fit] = []
+    total = sum(len(r) for r in records) * len(wanted)
+    with _progress(total) as advance:
+        for i, record in enumerate(records):
+            drawn = wanted if i == 0 else names
+            scores.append([_score(record, name, advance) for name in drawn])
+            fits.append(fit(record))
+    for record, found, ar1 in zip(records, scores, fits, strict=True):
+        _print_record(record, found[:len(names)], ar1)
+    if len(records) > 1:
+        from companion.wind.score import average
+
+        print(f"mean of {len(records)} records")
+        _print_table([(name, list(average([s[i] for s in scores]))) for i, name in enumerate(names)])
+    if args.json is not None:
+        document = {"records": [_document(r, s[:len(names)], f) for r, s, f in zip(records, scores, fits, strict=True)]}
+        args.json.write_text(json.dumps(document, indent=1) + "\n")
+    if args.plot is not None:
+        from companion.plots.wind import save_wind
+
+        save_wind(records[0], scores[0], args.plot)
+        print(f"drawn in {args.plot}")
+    return 0
+
+
+def _score(record: Record, name: str, advance: Any) -> Score:
+    from companion.wind.catalogue import make
+    from companion.wind.score import score
+
+    done = 0
+
+    def progress(row: int) -> None:
+        nonlocal done
+        advance(row - done)
+        done = row
+
+    found = score(record, make(name), progress=progress)
+    advance(len(record) - done)
+    return found
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Any]:
+    """Yield a function that advances a bar on stderr, when there is a person to see it and enough to wait for."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=total < _LONG_ROWS or not console.is_terminal) as bar:
+        task = bar.add_task("forecasting", total=total)
+        yield lambda rows: bar.advance(task, rows)
+
+
+# ----------------------------------------------------------------------------------------------- reading
+def _files(paths: Sequence[Path]) -> list[Path]:
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(path.glob("*.csv"))
+            if not inside:
+                raise InputError(str(path), "", "no CSV records in the folder", "name a record or another folder")
+            found.extend(inside)
+        else:
+            found.append(path)
+    return found
+
+
+def read_record(path: Path) -> Record:
+    """Return the wind in a CSV file, a tlog or an ArduPilot .bin.
+
+    Raises InputError when the file cannot be read or holds no wind.
+    """
+    from companion.wind.records import parse_csv
+
+    if not path.is_file():
+        raise InputError(str(path), "", "no such file", "name a CSV, tlog or .bin")
+    if path.suffix.lower() in {".tlog", ".bin"}:
+        return _read_log(path)
+    try:
+        with path.open(newline="", encoding="utf-8") as lines:
+            return parse_csv(lines, path.name)
+    except UnicodeDecodeError as error:
+        raise InputError(str(path), "", f"is not text ({error.reason})", "name a CSV, tlog or .bin") from error
+
+
+def _read_log(path: Path) -> Record:
+    """Return WIND of a tlog or .bin; a reading is ``turning`` within 10 s of a heading change of 25 deg in 10 s."""
+    from pymavlink import mavutil
+
+    from companion.wind.records import Record
+
+    rows: list[tuple[float, float, float]] = []
+    headings: list[tuple[float, float]] = []
+    felt: list[tuple[float, float]] = []
+    try:
+        log = mavutil.mavlink_connection(str(path))
+        while (message := log.recv_match(type=["WIND", "ATTITUDE", "ATT", "NAMED_VALUE_FLOAT"])) is not None:
+            t_s, kind = float(message._timestamp), message.get_type()  # noqa: SLF001 pymavlink's only clock
+            if kind == "ATTITUDE":
+                headings.append((t_s, float(message.yaw)))
+            elif kind == "ATT":
+                headings.append((t_s, math.radians(float(message.Yaw))))
+            elif kind == "NAMED_VALUE_FLOAT":
+                if message.name == "AppWndDir":
+                    felt.append((t_s, math.radians(float(message.value))))
+            elif hasattr(message, "DrTrue"):
+                rows.append((t_s, float(message.DrTrue), float(message.SpdTru)))
+                felt.append((t_s, math.radians(float(message.DrApp))))
+            else:
+                rows.append((t_s, float(message.direction), float(message.speed)))
+    except (OSError, ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(str(path), "", f"cannot be read as a log ({error})", "name a tlog or .bin") from error
+    kept = [r for i, r in enumerate(rows) if i == 0 or r[0] > rows[i - 1][0]]
+    kept = [r for r in kept if all(math.isfinite(v) for v in r) and r[2] >= 0.0]
+    if len(kept) < 2:
+        raise InputError(str(path), "", f"{len(kept)} WIND messages", "log or request WIND (message 168)")
+    table = np.array(kept, dtype=np.float64)
+    t = table[:, 0]
+    heading = _at(t, headings)
+    return Record(
+        name=path.name, t_s=t - t[0], twd_from_rad=np.radians(table[:, 1]), tws_mps=table[:, 2],
+        turning=_turning(t, headings), heading_rad=heading, awa_rad=_at(t, felt),
+    )
+
+
+def _at(t: np.ndarray[Any, Any], series: list[tuple[float, float]]) -> np.ndarray[Any, Any] | None:
+    """Return the latest value of ``series`` at each time, None without one."""
+    if not series:
+        return None
+    times, values = np.array(series).T
+    return np.asarray(values[np.clip(np.searchsorted(times, t, side="right") - 1, 0, None)])
+
+
+def _turning(t: np.ndarray[Any, Any], headings: list[tuple[float, float]]) -> np.ndarray[Any, Any]:
+    marked = np.zeros(t.size, dtype=np.bool_)
+    if headings:
+        times, values = np.array(headings).T
+        before = np.clip(np.searchsorted(times, times - 10.0), 0, None)
+        change = np.abs((values - values[before] + math.pi) % (2.0 * math.pi) - math.pi)
+        for moment in times[change > math.radians(25.0)]:
+            marked[np.searchsorted(t, moment - 10.0):np.searchsorted(t, moment + 10.0)] = True
+    return marked
+
+
+# ---------------------------------------------------------------------------------------------- printing
+def _print_record(record: Record, found: Sequence[Score], ar1: Ar1Fit) -> None:
+    minutes = record.duration_s / 60.0
+    speed = record.tws_mps
+    print(
+        f"{record.name}: {len(record)} readings, {minutes:.0f} min, wind {np.mean(speed):.1f} m/s "
+        f"({np.percentile(speed, 5):.1f}..{np.percentile(speed, 95):.1f}) from "
+        f"{math.degrees(ar1.mean_twd_from_rad) % 360.0:.0f} deg"
+    )
+    print(
+        f"AR(1) by maximum likelihood (step {ar1.step_s:.2g} s): rho {ar1.rho_hz:.4f} ± {ar1.rho_error_hz:.4f} Hz, "
+        f"noise {ar1.noise_radps:.4f} ± {ar1.noise_error_radps:.4f} rad/s; "
+        f"so sd {math.degrees(ar1.sigma_rad):.1f} deg, correlation time {ar1.correlation_time_s:.0f} s"
+    )
+    if not any(s.horizons for s in found):
+        print("too short to score: a horizon needs 20 forecasts, the first after ten minutes")
+        return
+    _print_table([(s.estimator, list(s.horizons)) for s in found])
+
+
+def _print_table(rows: Sequence[tuple[str, Sequence[HorizonScore]]]) -> None:
+    head = "  ".join(f"{text:>7}" for text in ("h s", "n", "CRPS", "MAE", "sigma", "width95"))
+    tail = "  ".join(f"{text:>5}" for text in ("50 %", "80 %", "95 %"))
+    print(f"{'estimator':10}{head}  {tail}  speed CRPS   (deg, % inside, m/s)")
+    for name, horizons in rows:
+        for s in horizons:
+            degrees = [math.degrees(v) for v in (s.crps_rad, s.mae_rad, s.sigma_rad, s.width95_rad)]
+            print(
+                f"{name:10}{s.horizon_s:7.0f}  {s.count:7d}  " + "  ".join(f"{v:7.2f}" for v in degrees) + "  "
+                + "  ".join(f"{100 * c:5.1f}" for c in s.coverage) + f"  {s.speed_crps_mps:10.3f}"
+            )
+    sys.stdout.flush()
+
+
+def _document(record: Record, found: Sequence[Score], ar1: Ar1Fit) -> dict[str, Any]:
+    from companion.wind.score import SCORED_LEVELS
+
+    return {
+        "record": record.name, "readings": len(record), "duration_s": record.duration_s,
+        "ar1": {
+            "step_s": ar1.step_s, "rho_hz": ar1.rho_hz, "rho_error_hz": ar1.rho_error_hz,
+            "noise_radps": ar1.noise_radps, "noise_error_radps": ar1.noise_error_radps,
+        },
+        "scores": [
+            {
+                "estimator": s.estimator, "horizon_s": h.horizon_s, "count": h.count,
+                "crps_deg": math.degrees(h.crps_rad), "mae_deg": math.degrees(h.mae_rad),
+                "width95_deg": math.degrees(h.width95_rad), "speed_crps_mps": h.speed_crps_mps,
+                "coverage": {f"{p:g}": c for p, c in zip(SCORED_LEVELS, h.coverage, strict=True)},
+            }
+            for s in found for h in s.horizons
+        ],
+    }
+
+
+def _print_cost(record: Record, names: Sequence[str]) -> None:
+    """Time every estimator over the record; the Kalman filter of filterpy is timed in the same run, as the unit."""
+    from companion.wind.catalogue import make
+
+    rows = min(len(record), 5000)
+    cost: dict[str, tuple[float, float]] = {}
+    for name in dict.fromkeys(["kalman", *names]):
+        estimator = make(name)
+        update_s = forecast_s = 0.0
+        asked = 0
+        for i in range(rows):
+            t, d, v = float(record.t_s[i]), float(record.twd_from_rad[i]), float(record.tws_mps[i])
+            begin = time.perf_counter()
+            estimator.update(t, d, v)
+            update_s += time.perf_counter() - begin
+            if i % 10 == 9:
+                begin = time.perf_counter()
+                estimator.forecast(120.0)
+                forecast_s += time.perf_counter() - begin
+                asked += 1
+        cost[name] = (1e6 * update_s / rows, 1e6 * forecast_s / max(1, asked))
+    unit = cost["kalman"][0]
+    print(f"{'estimator':10}{'update us':>11}{'of kalman':>11}{'forecast us':>13}   ({rows} readings)")
+    for name, (update_us, forecast_us) in cost.items():
+        print(f"{name:10}{update_us:11.1f}{update_us / unit:11.2f}{forecast_us:13.1f}")
