@@ -313,13 +313,13 @@ class Autopilot:
             await self.read_version()
         async with self.link.lock("lists"):
             result = TransferResult(outcome=Outcome.LINK, text="the link is silent")
-            for attempt in range(UPLOAD_TRIES):
-                chosen = self._choose(items, method, keep_first if attempt == 0 else 0)
+            for chosen in self._ways(items, method, keep_first):
+                if chosen == "ftp" and self._ftp_works is False:
+                    continue
                 result = await self._upload_once(items, chosen, keep_first)
-                if chosen != "items" and method == "auto" and not result.is_ok and self.link.is_alive:
-                    # the careful way did not work: the plain one, which every autopilot has
-                    result = await self._upload_once(items, "items", 0)
-                if result.outcome not in {Outcome.TIMEOUT, Outcome.MISMATCH} or not self.link.is_alive:
+                if result.is_ok or self.link.is_lost:
+                    break
+                if chosen == "items" and result.outcome not in {Outcome.TIMEOUT, Outcome.MISMATCH}:
                     break
         if result.is_ok and set_current is not None:
             answer = await self.set_current(set_current, reset=True)
@@ -365,16 +365,17 @@ class Autopilot:
         return await self._clear(MissionType.FENCE)
 
     # ------------------------------------------------------------------------------------------ inside
-    def _choose(self, items: Sequence[MissionItem], method: Method, keep_first: int) -> Method:
+    def _ways(self, items: Sequence[MissionItem], method: Method, keep_first: int) -> tuple[Method, ...]:
+        """Return the protocols to try, in order: twice the chosen one, at last the plain one."""
         if method != "auto":
-            return method
+            return (method,) * UPLOAD_TRIES
         if self._ftp_works is not False and (self.version is None or self.version.has_ftp):
-            return "ftp"
+            return "ftp", "ftp", "items", "items"
         total = self.status.mission_total if self.status else None
         # a partial write may lengthen the list by one item at most
         if keep_first > 0 and total is not None and keep_first < len(items) <= total + 1:
-            return "partial"
-        return "items"
+            return "partial", "items", "items"
+        return "items", "items"
 
     def _running_total(self) -> int:
         """Return how many items a write that does not clear leaves there: those of a mission under way."""
@@ -399,8 +400,7 @@ class Autopilot:
             outcome, text = written.outcome, written.text
             if outcome is Outcome.OK:
                 self._ftp_works = True
-            elif self.link.is_alive and outcome is not Outcome.UNCONFIRMED:
-                # a dead link says nothing about MAVFTP
+            elif outcome in {Outcome.UNSUPPORTED, Outcome.REFUSED} and self._ftp_works is None:
                 self._ftp_works = False
         elif method == "partial":
             sent = padded(items, self._running_total())
@@ -412,12 +412,12 @@ class Autopilot:
             listed = await self.link.perform(ListUpload(party, kind, (home, *sent)))
             outcome, text = listed.outcome, listed.text
         if outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
-            if not self.link.is_alive:
+            if self.link.is_lost:
                 outcome = Outcome.LINK
             return TransferResult(outcome=outcome, text=text, method=method)
         read = await self._read(kind, "ftp" if method == "ftp" else "items")
         if read.items is None:
-            outcome = read.outcome if self.link.is_alive else Outcome.LINK
+            outcome = read.outcome if not self.link.is_lost else Outcome.LINK
             return TransferResult(outcome=outcome, text=f"written, not read back: {read.text}", method=method)
         difference = first_difference(sailed(sent), sailed(read.items))
         if not difference and len(read.items) < len(sent):
@@ -435,7 +435,7 @@ class Autopilot:
             for _ in range(UPLOAD_TRIES):
                 written = await self.link.perform(ListUpload(self.link.party, kind, items))
                 if written.outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
-                    outcome = written.outcome if self.link.is_alive else Outcome.LINK
+                    outcome = written.outcome if not self.link.is_lost else Outcome.LINK
                     result = TransferResult(outcome=outcome, text=written.text, method="items")
                 else:
                     read = await self._read(kind, "items")
@@ -447,7 +447,7 @@ class Autopilot:
                             outcome=Outcome.MISMATCH if difference else Outcome.OK, text=difference, method="items",
                             count=len(read.items),
                         )
-                if result.outcome not in {Outcome.TIMEOUT, Outcome.MISMATCH} or not self.link.is_alive:
+                if result.outcome not in {Outcome.TIMEOUT, Outcome.MISMATCH} or self.link.is_lost:
                     break
         return self._timed(result, began_s)
 
@@ -460,11 +460,11 @@ class Autopilot:
     async def _read(self, kind: MissionType, method: Method) -> ReadResult:
         if method == "ftp":
             result = await self._read_ftp(kind)
-            if result.is_ok or not self.link.is_alive:
+            if result.is_ok or self.link.is_lost:
                 return result
         read = await self.link.perform(ListDownload(self.link.party, kind))
         if read.outcome is not Outcome.OK:
-            outcome = read.outcome if self.link.is_alive else Outcome.LINK
+            outcome = read.outcome if not self.link.is_lost else Outcome.LINK
             return ReadResult(outcome=outcome, text=read.text)
         return _without_home(kind, read.items)
 

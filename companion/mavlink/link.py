@@ -37,6 +37,9 @@ OWN_COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 HEARTBEAT_S = 1.0
 # Without a heartbeat of the autopilot for this long the link is silent [s].
 SILENCE_S = 3.0
+# ... and for this long it is lost: a conversation that ends now ended for that. A line that loses a third of its frames
+# is silent for 3 s every half minute, for 6 s hardly ever [s].
+LOST_S = 6.0
 # A gap longer than this may have been a reboot: rates are asked for again [s].
 GAP_S = 5.0
 # Streams below their rate are asked for again this often, at most [s].
@@ -180,6 +183,12 @@ class Link:
         """The newest boot time of the autopilot [s], 0 before it told one."""
         return self._boot_s or 0.0
 
+    @property
+    def is_lost(self) -> bool:
+        """The autopilot has not been heard for so long that nothing can be expected of it."""
+        age_s = self.heartbeat_age_s
+        return age_s is None or age_s > LOST_S
+
     def bytes_per_s(self) -> tuple[float, float]:
         """Return what came in and went out [bytes/s], over the last 10 s."""
         self._forget_traffic(now_s())
@@ -261,7 +270,7 @@ class Link:
         """Send a COMMAND_LONG (or the prepared ``message``) and return its answer."""
         machine = CommandSend(self.party, command, params, message=message, give_up_s=give_up_s)
         answer = await self.perform(machine, f"command {command}")
-        if answer.outcome is Outcome.TIMEOUT and not self.is_alive:
+        if answer.outcome is Outcome.TIMEOUT and self.is_lost:
             return CommandAnswer(outcome=Outcome.LINK, text="the link is silent")
         return answer
 
