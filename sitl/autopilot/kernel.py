@@ -44,6 +44,7 @@ S_CURRENT_E, S_CURRENT_N = 58, 59                              # of the water [m
 S_VANE_FAULT, S_VANE_VALUE, S_AVOID = 60, 61, 62               # FAULT_, its angle [rad]; near a fence
 S_MOORED, S_MOTOR, S_THROTTLE = 63, 64, 65
 S_INDIRECT = 66
+S_WANT_SPEED = 69                                             # desired speed, accelerated at P_ACCEL
 S_GPS_E, S_GPS_N = 67, 68                                       # error of the position that the autopilot believes
 S_SIZE = 72
 
@@ -344,7 +345,12 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     lateral = p[P_VEL_P] * ((ve - s[S_VE]) * cos - (vn - s[S_VN]) * sin) + a_e * cos - a_n * sin
     limit = p[P_TURN_MAX_G] * 9.80665
     slowest = min(v, math.sqrt(limit * p[P_TURN_RADIUS]))
-    speed = max(forward, slowest, 0.1)
+    # the desired speed changes no faster than P_ACCEL; it starts at 0 when avoidance had eased the sheet
+    step = p[P_ACCEL] * LOOP_S
+    s[S_WANT_SPEED] = _clip(max(forward, slowest), s[S_WANT_SPEED] - step, s[S_WANT_SPEED] + step)
+    if s[S_EASE]:
+        s[S_WANT_SPEED] = 0.0
+    speed = max(s[S_WANT_SPEED], 0.1)
     return 0.0, _clip(lateral, -limit, limit) / speed, False, events
 
 

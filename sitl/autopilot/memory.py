@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import random
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -81,6 +82,7 @@ class MemoryEnd:
         self._stats = TransportStats()
         self._on_bytes: OnBytes | None = None
         self._last_arrival_s = 0.0
+        self._under_way: deque[bytes] = deque()
 
     @property
     def name(self) -> str:
@@ -134,11 +136,17 @@ class MemoryEnd:
                 place = rng.randrange(len(frame))
                 sent = frame[:place] + bytes([frame[place] ^ rng.randrange(1, 256)]) + frame[place + 1:]
             arrival_s = now_s() + faults.delay_s + faults.jitter_s * rng.random()
+            loop = asyncio.get_running_loop()
             if rng.random() < faults.reorder:
-                arrival_s += faults.reorder_s * rng.random()
+                loop.call_at(arrival_s + faults.reorder_s * rng.random(), self.other.deliver, sent)
             else:
+                # timers of one moment fire in any order; the queue keeps that of sending
                 arrival_s = self._last_arrival_s = max(arrival_s, self._last_arrival_s)
-            asyncio.get_running_loop().call_at(arrival_s, self.other.deliver, sent)
+                self._under_way.append(sent)
+                loop.call_at(arrival_s, self._deliver_first)
+
+    def _deliver_first(self) -> None:
+        self.other.deliver(self._under_way.popleft())
 
     def deliver(self, data: bytes) -> None:
         """Hand over what arrived, if anybody is there."""

@@ -161,7 +161,7 @@ class Vehicle:
             s[k.S_IN], s[k.S_PHASE] = curve_before, 0.0
             s[k.S_PE], s[k.S_PN] = unit_before
         else:
-            s[k.S_IN], s[k.S_PHASE], s[k.S_U], s[k.S_SCALE] = 0.0, 1.0, 0.0, 0.0
+            s[k.S_IN], s[k.S_PHASE], s[k.S_U], s[k.S_SCALE] = 0.0, 1.0, 0.0, 1.0
             s[k.S_TE], s[k.S_TN] = origin
         s[k.S_OUT] = 0.0
         if s[k.S_FAST] and following is not None:
@@ -181,7 +181,7 @@ class Vehicle:
         """The boat drifted while it waited: start its leg at the present position."""
         s = self.state
         s[k.S_OE], s[k.S_ON] = s[k.S_TE], s[k.S_TN] = self.position
-        s[k.S_IN], s[k.S_PHASE], s[k.S_U], s[k.S_SCALE] = 0.0, 1.0, 0.0, 0.0
+        s[k.S_IN], s[k.S_PHASE], s[k.S_U], s[k.S_SCALE] = 0.0, 1.0, 0.0, 1.0
         self._measure(self.destination)
 
     @property
@@ -232,6 +232,7 @@ class Vehicle:
         s = self.state
         if s[k.S_STEER] != how:
             s[k.S_INTEGRAL] = 0.0
+            s[k.S_WANT_SPEED] = abs(s[k.S_V])
             s[k.S_WANT_RATE] = s[k.S_RATE]
             s[k.S_XTRACK] = 0.0
         s[k.S_STEER] = how

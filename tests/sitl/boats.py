@@ -72,6 +72,7 @@ class Client:
         self.codec = mav.MAVLink(None, srcSystem=self.system, srcComponent=self.component)
         self.codec.robust_parsing = True
         self.bytes_in = b""
+        self.waiting: list[tuple[str, Callable[[Any], bool], asyncio.Future[Any]]] = []
 
     def on_bytes(self, data: bytes) -> None:
         self.bytes_in += data
@@ -80,6 +81,9 @@ class Client:
             answer = self.answers.get(m.get_type())
             if answer is not None:
                 answer(m)
+            for name, test, future in self.waiting:
+                if name == m.get_type() and not future.done() and test(m):
+                    future.set_result(m)
 
     def send(self, message: Any) -> None:
         self.write(message.pack(self.codec))
@@ -108,14 +112,15 @@ class Client:
         return self.of(name)[-1]
 
     async def wait(self, name: str, timeout: float = 30.0, test: Callable[[Any], bool] = lambda m: True) -> Any:
-        start, seen = now_s(), len(self.heard)
-        while now_s() - start < timeout:
-            for t, m in self.heard[seen:]:
-                if m.get_type() == name and test(m):
-                    return m
-            seen = len(self.heard)
-            await asyncio.sleep(0.02)
-        raise AssertionError(f"no {name} within {timeout} s; texts: {self.texts()[-5:]}")
+        entry = (name, test, asyncio.get_running_loop().create_future())
+        self.waiting.append(entry)
+        try:
+            async with asyncio.timeout(timeout):
+                return await entry[2]
+        except TimeoutError:
+            raise AssertionError(f"no {name} within {timeout} s; texts: {self.texts()[-5:]}") from None
+        finally:
+            self.waiting.remove(entry)
 
     async def ask(self, number: int, *params: float) -> int:
         self.command(number, *params)
