@@ -49,12 +49,16 @@ def save_wind(record: Record, scores: Sequence[Score], path: str | Path) -> None
     Raises InputError when the file cannot be written or its kind is unknown.
     """
     figure = plt.figure(figsize=(15.0, 9.4), layout="constrained")
-    grid = figure.add_gridspec(3, 6, hspace=0.02, width_ratios=(0.95, 0.75, 1.0, 1.0, 1.0, 1.0), height_ratios=(1.25, 0.85, 1.1))
-    strip = figure.add_subplot(grid[:, 0])
-    strip_speed = figure.add_subplot(grid[:, 1], sharey=strip)
-    direction = figure.add_subplot(grid[0, 2:])
-    speed = figure.add_subplot(grid[1, 2:], sharex=direction)
-    below = [figure.add_subplot(grid[2, 2 + i]) for i in range(4)]
+    whole = figure.add_gridspec(1, 2, width_ratios=(1.7, 4.0))
+    left = whole[0].subgridspec(1, 2, width_ratios=(0.95, 0.75))
+    right = whole[1].subgridspec(2, 1, height_ratios=(2.1, 1.1))
+    upper = right[0].subgridspec(2, 1, height_ratios=(1.25, 0.85))
+    lower = right[1].subgridspec(1, 4)
+    strip = figure.add_subplot(left[0])
+    strip_speed = figure.add_subplot(left[1], sharey=strip)
+    direction = figure.add_subplot(upper[0])
+    speed = figure.add_subplot(upper[1], sharex=direction)
+    below = [figure.add_subplot(lower[i]) for i in range(4)]
     centre = _centre(record)
     try:
         draw_strips(strip, strip_speed, record, centre)
@@ -66,7 +70,8 @@ def save_wind(record: Record, scores: Sequence[Score], path: str | Path) -> None
         draw_autocorrelation(below[3], record, centre)
         figure.suptitle(
             f"{record.name}: true wind, mean {np.mean(record.tws_mps):.1f} m/s from "
-            f"{math.degrees(centre) % 360.0:.0f}°, {record.duration_s / 60.0:.0f} min; forecasts by “{scores[0].estimator}”", fontsize=12,
+            f"{math.degrees(centre) % 360.0:.0f}°, {record.duration_s / 60.0:.0f} min; forecasts by "
+            f"“{scores[0].estimator}”", fontsize=12,
         )
         figure.savefig(path, dpi=110)
     except (OSError, ValueError) as error:
@@ -199,12 +204,12 @@ def draw_reliability(axes: Axes, scores: Sequence[Score]) -> None:
     axes.set_xlim(0, 100)
     axes.set_ylim(0, 100)
     axes.grid(alpha=0.3)
-    _legend_or_reason(axes, "upper left")
+    _legend_or_reason(axes)
 
 
-def _legend_or_reason(axes: Axes, place: str) -> None:
+def _legend_or_reason(axes: Axes) -> None:
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=7, loc=place)
+        axes.legend(fontsize=7, loc="upper left")
     else:
         axes.text(0.5, 0.5, "too short\nto score", transform=axes.transAxes, ha="center", va="center", color="#777777")
 
@@ -226,7 +231,7 @@ def draw_crps(axes: Axes, scores: Sequence[Score]) -> None:
     axes.set_ylabel("CRPS of direction [°]")
     axes.set_title("CRPS: smaller is better", fontsize=9)
     axes.grid(alpha=0.3)
-    _legend_or_reason(axes, "lower right")
+    _legend_or_reason(axes)
 
 
 def draw_histogram(axes: Axes, record: Record, centre_rad: float) -> None:
