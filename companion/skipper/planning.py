@@ -24,6 +24,9 @@ from companion.skipper.voyage import PointEn
 
 UPLOAD_LATENCY_S = 1.5   # item protocol, a few dozen items, and the read-back
 SAME_M = 1.0             # a new waypoint this near to the old one is the old one
+SPARE_SHARE = 0.001      # a path may get this much slower ...
+SPARE_S = 0.3            # ... and this much more, to have a waypoint less
+SIMPLIFIED_AT_MOST = 60  # waypoints: each costs a check of the whole path
 SLOW_MPS = 0.5           # slower than this the course over ground says nothing about the heading
 
 
@@ -212,7 +215,7 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
 
 def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
     """Splice a plan into the route and ask for its upload."""
-    points = _apart([(float(e), float(n)) for e, n in plan.waypoints_en])[1:]
+    points = simplified(pending.problem, _apart([(float(e), float(n)) for e, n in plan.waypoints_en]))[1:]
     tail = Tail(start_en=pending.start_en_m, points_en=(*pending.lead_in, *points), gate=pending.gate)
     if pending.lead_in:
         boat = turn.boat_en
@@ -249,6 +252,31 @@ def _apart(points: list[PointEn]) -> list[PointEn]:
         elif n == len(points) - 1:
             out.append(point)
     return out
+
+
+def simplified(problem: Problem, points: list[PointEn]) -> list[PointEn]:
+    """Return the path without the waypoints that it does not need.
+
+    A planner bends a leg a little as the no-go zone widens with time; each bend is an upload's item and a replan.
+    A waypoint goes when the path without it passes the planner's own check and is not slower than by
+    ``SPARE_SHARE`` and ``SPARE_S``.
+    """
+    if len(points) < 3 or len(points) > SIMPLIFIED_AT_MOST:
+        return points
+    whole = problem.evaluate(np.asarray(points))
+    if not whole.is_feasible:
+        return points
+    allowed_s = whole.time_s * (1.0 + SPARE_SHARE) + SPARE_S
+    kept = list(points)
+    n = 1
+    while n < len(kept) - 1:
+        shorter = kept[:n] + kept[n + 1:]
+        judged = problem.evaluate(np.asarray(shorter))
+        if judged.is_feasible and judged.time_s <= allowed_s:
+            kept = shorter
+        else:
+            n += 1
+    return kept
 
 
 def _is_same(a: Route, b: Route) -> bool:

@@ -23,6 +23,7 @@ from companion.skipper.intake import (
     take_events,
     take_outcomes,
 )
+from companion.skipper.ladder import rungs
 from companion.skipper.planning import request, upload
 from companion.skipper.route import is_mixture, is_same_mission
 from companion.skipper.sailing import sail
@@ -62,6 +63,15 @@ class Skipper:
         _decide(turn, fresh)
         remember_fix(turn)
         return turn.state, tuple(turn.actions)
+
+    def prepare(self) -> None:
+        """Grow the obstacles by the margins once, before sailing; on a coast of thousands of points it takes long.
+
+        It changes nothing but the time of the first plans.
+        """
+        for margin_m in sorted({step.margin_m for step in rungs(self.config)}):
+            self.voyage.area.obstacles_wkt(margin_m)
+        self.voyage.area.clearance_m([(0.0, 0.0)])
 
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
