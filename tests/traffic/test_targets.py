@@ -1,0 +1,150 @@
+"""The fold of reports: tracks, ages, two vessels under one number, clocks that jump, bounds."""
+
+from __future__ import annotations
+
+import math
+from time import process_time
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.messages import AisReport, GeoPoint
+from companion.traffic import Change, TargetLimits, Targets
+from companion.traffic.nmea import NmeaDecoder
+from tests.traffic.conftest import FRAME, report
+
+
+def test_a_track_keeps_the_age_of_its_report() -> None:
+    t = Targets.empty(FRAME).heard(report(100.0, (10.0, 20.0), age_s=8.0, course_rad=1.0, speed_mps=2.0))
+    p = t.picture(103.0)
+    assert p.age_s(p.vessels[0]) == pytest.approx(11.0)
+    assert p.vessels[0].antenna_en_m == pytest.approx((10.0, 20.0), abs=1e-3)
+
+
+def test_what_is_not_known_stays_unknown() -> None:
+    v = Targets.empty(FRAME).heard(report(0.0, (10.0, 20.0))).picture(0.0).vessels[0]
+    assert (v.course_rad, v.speed_mps, v.heading_rad, v.turn_rate_radps, v.nav_status) == (None,) * 5
+    assert not v.is_moving_known
+    assert not v.hull.is_known
+
+
+def test_velocity_from_positions_where_none_is_reported() -> None:
+    t = Targets.empty(FRAME).heard(report(0.0, (0.0, 0.0))).heard(report(10.0, (50.0, 0.0)))
+    v = t.picture(10.0).vessels[0]
+    assert v.derived
+    assert v.speed_mps == pytest.approx(5.0, abs=1e-3)
+    assert v.course_rad == pytest.approx(math.pi / 2, abs=1e-3)
+
+
+def test_static_data_finds_its_vessel() -> None:
+    t = Targets.empty(FRAME).heard(report(0.0, None, name="EARLY"))
+    assert t.counts.static_unknown == 1
+    t = t.heard(report(1.0, (0.0, 0.0))).heard(report(2.0, None, name="LATER", ship_type=70, bow_m=80.0, stern_m=20.0))
+    v = t.picture(2.0).vessels[0]
+    assert (v.name, v.ship_type, v.hull.length_m) == ("LATER", 70, 100.0)
+
+
+def test_two_vessels_with_one_number_are_two_vessels() -> None:
+    t = Targets.empty(FRAME)
+    for k in range(10):
+        t = t.heard(report(2.0 * k, (5.0 * k, 0.0), course_rad=math.pi / 2, speed_mps=2.5))
+        t = t.heard(report(2.0 * k + 1.0, (-8000.0, 3000.0 - 5.0 * k), course_rad=math.pi, speed_mps=2.5))
+    p = t.picture(20.0)
+    assert len(p.vessels) == 2
+    assert all(v.is_shared_mmsi and v.reports == 10 for v in p.vessels)
+    assert p.counts.shared_mmsi == 1
+    assert {v.branch for v in p.vessels} == {0, 1}
+
+
+def test_reports_out_of_order_do_not_move_a_track_back() -> None:
+    t = Targets.empty(FRAME).heard(report(10.0, (100.0, 0.0))).heard(report(11.0, (90.0, 0.0), age_s=5.0))
+    assert t.counts.late == 1
+    assert t.picture(11.0).vessels[0].antenna_en_m[0] == pytest.approx(100.0, abs=1e-3)
+
+
+def test_a_clock_set_back_keeps_the_ages() -> None:
+    t = Targets.empty(FRAME).heard(report(5000.0, (100.0, 0.0))).heard(report(1000.0, (300.0, 0.0), mmsi=2))
+    p = t.picture(1000.0)
+    assert p.counts.clock_jumps == 1
+    assert len(p.vessels) == 2
+    assert max(p.age_s(v) for v in p.vessels) < 1.0
+
+
+def test_a_feed_that_stops_is_seen_and_its_vessels_expire() -> None:
+    t = Targets.empty(FRAME).heard(report(0.0, (100.0, 0.0)))
+    assert t.picture(59.0).silence_s == 59.0
+    assert len(t.picture(599.0).vessels) == 1
+    assert t.picture(601.0).vessels == ()
+    assert Targets.empty(FRAME).picture(5.0).silence_s is None
+
+
+def test_own_transponder_is_refused() -> None:
+    t = Targets.empty(FRAME, TargetLimits(own_mmsi=42)).heard(report(0.0, (0.0, 0.0), mmsi=42))
+    assert t.picture(0.0).vessels == ()
+    assert t.counts.own == 1
+
+
+def test_another_continent_is_counted_not_tracked() -> None:
+    t = Targets.empty(FRAME).heard(AisReport(t_s=0.0, mmsi=3669154, position=GeoPoint(lat_deg=-40.0, lon_deg=170.0)))
+    assert t.picture(0.0).vessels == ()
+    assert t.counts.far == 1
+
+
+def test_changes_say_when_to_check_a_plan_again() -> None:
+    t = Targets.empty(FRAME).heard(report(0.0, (0.0, 0.0), course_rad=0.0, speed_mps=5.0))
+    assert t.changes[-1][2] is Change.APPEARED
+    straight = t.heard(report(10.0, (0.0, 50.0), course_rad=0.02, speed_mps=5.1))
+    assert len(straight.changes) == 1
+    turned = t.heard(report(10.0, (8.0, 49.0), course_rad=0.4, speed_mps=5.0))
+    assert turned.changes[-1][2] is Change.TURNED
+    slowed = t.heard(report(10.0, (0.0, 45.0), course_rad=0.0, speed_mps=2.0))
+    assert slowed.changes[-1][2] is Change.SPEED
+    assert straight.picture(10.0).changed_since(5.0) == ()
+    elsewhere = t.heard(report(10.0, (200.0, 50.0), course_rad=0.0, speed_mps=5.0))
+    assert elsewhere.changes[-1][2] is Change.SURPRISE
+
+
+def test_the_number_of_vessels_is_bounded_and_the_farthest_goes() -> None:
+    t = Targets.empty(FRAME, TargetLimits(max_vessels=20))
+    for k in range(60):
+        t = t.heard(report(float(k), (100.0 * k, 0.0), mmsi=1000 + k))
+    p = t.picture(60.0)
+    assert len(p.vessels) == 20
+    assert max(v.antenna_en_m[0] for v in p.vessels) < 2000.0
+    assert p.counts.forgotten == 40
+
+
+numbers = st.one_of(st.none(), st.floats(allow_nan=True, allow_infinity=True))
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.lists(st.tuples(st.floats(-1e4, 1e4), st.integers(1, 4), st.floats(-90, 90), st.floats(-180, 180), numbers,
+                          numbers, numbers, st.floats(-5, 1e4)), max_size=12))
+def test_nothing_a_feed_says_breaks_the_fold(rows: list[tuple[float, ...]]) -> None:
+    t = Targets.empty(FRAME, TargetLimits(max_vessels=5))
+    for t_s, mmsi, lat, lon, course, speed, turn, age in rows:
+        t = t.heard(AisReport(t_s=t_s, mmsi=mmsi, position=GeoPoint(lat_deg=lat, lon_deg=lon), course_rad=course,
+                              speed_mps=speed, turn_rate_radps=turn, age_s=age))
+    assert t.counts.heard == len(rows)
+    assert len(t.vessels) <= 5
+    for v in t.vessels.values():
+        assert all(math.isfinite(x) for x in v.antenna_en_m)
+
+
+def test_two_hundred_vessels_cost_little() -> None:
+    """60 messages a minute from each of 200 vessels: 200 sentences a second, decoded and tracked, and one picture."""
+    line = "!AIVDM,1,1,,A,15M:Ih0P0vJmfCPHvp88IVd1P000,0*64"
+    t = Targets.empty(FRAME)
+    for k in range(200):
+        t = t.heard(report(0.0, (30.0 * k, 0.0), mmsi=1000 + k, course_rad=0.0, speed_mps=1.0))
+    decoder = NmeaDecoder()
+    decoder.feed(line, 0.0)
+    began = process_time()
+    for second in range(1, 4):
+        for k in range(200):
+            decoder.feed(line, float(second))
+            t = t.heard(report(float(second), (30.0 * k, 1.0 * second), mmsi=1000 + k, course_rad=0.0, speed_mps=1.0))
+        t.picture(float(second))
+    # The bound of the test is loose for a busy machine; docs/traffic.md has the measured figure.
+    assert (process_time() - began) / 3.0 < 0.2
