@@ -29,5 +29,14 @@ check: $(STAMP)
 campaign: $(STAMP)
 	$(BIN)/sitl campaign sitl/scenarios/demo.toml --runs 50
 
+# The planners on the problem set (OMPL too, where requirements-bench.lock is installed), and risk against winds.
+bench: $(STAMP)
+	$(BIN)/python -m bench
+	$(BIN)/python -m bench.reliability
+
+# The papers' figures, into docs/figures.
+figures: $(STAMP)
+	$(BIN)/python -m bench.figures
+
 clean:
 	rm -rf $(VENV) build dist

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 LAND, LAND_EDGE = "#d9cfb4", "#8d7f5a"
 SEA, TREE = "#f2f7fa", "#9db4c4"
-PATH, FAN, START, GOAL = "#c1272d", "#e08a1e", "#00a3b4", "#2e8b3d"
+PATH, FAN, WIDER, START, GOAL = "#c1272d", "#eda94e", "#8e44ad", "#00a3b4", "#2e8b3d"
 FANS_MOST = 14
 
 
@@ -122,8 +122,8 @@ def _fans(axes: Axes, problem: Problem, plan: Plan, radius_m: float) -> None:
         at = (leg.from_en[0] + share * (leg.to_en[0] - leg.from_en[0]),
               leg.from_en[1] + share * (leg.to_en[1] - leg.from_en[1]))
         wide = min(180.0, math.degrees(problem.no_go_half_rad(float(t))))
-        for half, alpha in ((wide, 0.22), (own, 0.38)):
-            axes.add_patch(Wedge(at, radius_m, windward_deg - half, windward_deg + half, fc=FAN, alpha=alpha, lw=0,
+        for half, colour, alpha in ((wide, WIDER, 0.40), (own, FAN, 0.55)):
+            axes.add_patch(Wedge(at, radius_m, windward_deg - half, windward_deg + half, fc=colour, alpha=alpha, lw=0,
                                  zorder=4))
 
 

@@ -1,0 +1,227 @@
+"""Reproduce the papers' figures into docs/figures: ``python -m bench.figures [name ...]`` (make figures).
+
+- wolsieffer-6: four polygons; up wind at 60 %, no solution at 66 % where the Kalman filter's variance grows, down
+  wind at both. The tree is the reference RRT*'s.
+- wolsieffer-7: two channels; the wind just lets the right-hand one be sailed, noise closes it, down wind.
+- busser-5-1 .. busser-5-4: AVALON's costs added one by one: sailing time alone; turning; estimate and tunnel;
+  other winds.
+- risk: the promise of a path against simulated winds, as its limit is tightened.
+
+The polygons are drawn after the papers' pictures, which give no coordinates.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from PIL import Image
+
+from companion.boat import MPS_PER_KNOT, Boat, avalon
+from companion.planner import Problem, plan
+from companion.planner.astar import AstarSettings, search_with
+from companion.planner.plan import Plan, PlanStatus
+from companion.planner.risk import simulate_entries
+from companion.planner.solve import Effort
+from companion.plots.plan import draw_plan
+
+OUT = Path(__file__).resolve().parents[1] / "docs" / "figures"
+FOUR = [
+    "POLYGON((-110 95,-35 80,-20 130,-75 165,-110 95))", "POLYGON((25 60,95 75,80 130,30 120,25 60))",
+    "POLYGON((-60 210,0 190,25 240,-25 275,-60 210))", "POLYGON((60 190,130 175,140 250,85 260,60 190))",
+]
+CHANNELS = [  # an island between two shores: a channel on its left, one on its right
+    "POLYGON((-40 80,30 60,60 160,45 300,-20 320,-60 220,-40 80))",
+    "POLYGON((-400 -50,-210 -50,-150 120,-165 260,-130 380,-170 480,-400 480,-400 -50))",
+    "POLYGON((120 -50,400 -50,400 480,170 480,125 340,140 180,120 -50))",
+]
+WOLSIEFFER = {"no_go_half_deg": 45.0, "max_twa_deg": 180.0, "turn_rate_rad_s": 0.5,
+              "speed": {"model": "constant", "v_mps": 1.5}}
+
+
+def problem(**parts):
+    return Problem.from_json({"id": "", "title": "", "obstacles": [], "fence": None, "delta_s": 0.5, **parts})
+
+
+def end(x, y, **more):
+    return {"x": x, "y": y, **more}
+
+
+def kalman(from_deg, sigma0, growth):
+    return {"from_deg": from_deg, "speed_mps": 5.0,
+            "sigma": {"model": "kalman", "sigma0_deg": sigma0, "growth_deg_per_sqrt_s": growth}}
+
+
+def save(figure, name):
+    OUT.mkdir(parents=True, exist_ok=True)
+    raw = io.BytesIO()
+    figure.savefig(raw, dpi=80)
+    plt.close(figure)
+    # 128 colours are enough for drawings and a quarter of the size.
+    picture = Image.open(raw).convert("RGB").quantize(128, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    picture.save(OUT / f"{name}.png", optimize=True)
+    print(f"docs/figures/{name}.png")
+
+
+# ------------------------------------------------------------------------------------- Wolsieffer
+def wolsieffer_6():
+    low, high = end(0, 0, heading_deg=0), end(20, 330, heading_deg=180)
+    # With the half angle at 45 + c sqrt(t) degrees the boat gets 0.157 v / c^2 to windward (c in radians) before the
+    # zone is 180 degrees wide: at 66 % that is 311 m here, at 60 % 824 m.
+    wind = kalman(0.0, 0.0, 3.82)
+    figure, axes = plt.subplots(2, 2, figsize=(11.0, 12.4), layout="constrained")
+    for ax, letter, start, goal, delta in (
+        (axes[0, 0], "a", low, high, 0.60), (axes[0, 1], "b", low, high, DELTA_6B),
+        (axes[1, 0], "c", high, low, 0.60), (axes[1, 1], "d", high, low, DELTA_6B),
+    ):
+        p = problem(start=start, goal=end(goal["x"], goal["y"], radius=4), obstacles=FOUR, boat=WOLSIEFFER, wind=wind,
+                    delta_s=delta)
+        answer = plan(p, algorithm="rrtstar", expansions=6000, seed=1)
+        way = "up" if start is low else "down"
+        result = f"{answer.cost_s:.0f} s"
+        if not answer.has_path:
+            proved = plan(p, budget_s=1.0).status is PlanStatus.INFEASIBLE
+            result = "no solution" + (", proved by auto" if proved else "")
+        if answer.has_path:
+            first, last = (2.0 * np.degrees(p.no_go_half_rad(t)) for t in (0.0, answer.legs[-1].end_s))
+            result += f", no-go zone {first:.0f}° wide, at the end {last:.0f}°"
+        draw_plan(ax, p, answer, title=f"({letter}) {way} wind, {100 * delta:.0f} %: {result}", fans=answer.has_path)
+    save(figure, "wolsieffer-6")
+
+
+DELTA_6B = 0.66
+
+
+def wolsieffer_7():
+    figure, axes = plt.subplots(1, 3, figsize=(13.0, 5.6), layout="constrained")
+    up = {"start": end(0, -20, heading_deg=0), "goal": end(10, 420, radius=4)}
+    down = {"start": end(10, 420, heading_deg=180), "goal": end(0, -20, radius=4)}
+    for ax, letter, ends, sigma0, text in (
+        (axes[0], "a", up, 0.5, "steady wind"), (axes[1], "b", up, 14.0, "noisy wind"),
+        (axes[2], "c", down, 14.0, "down wind"),
+    ):
+        p = problem(**ends, obstacles=CHANNELS, boat=WOLSIEFFER, wind=kalman(WIND_7, sigma0, 0.05), delta_s=0.75)
+        answer = plan(p, budget_s=2.0)
+        result = f"{answer.cost_s:.0f} s" if answer.has_path else answer.reason
+        draw_plan(ax, p, answer, title=f"({letter}) {text}: {result}")
+        ax.set(xlim=(-270, 210), ylim=(-80, 490))
+    save(figure, "wolsieffer-7")
+
+
+WIND_7 = -30.0
+
+
+# ----------------------------------------------------------------------------------------- Büsser
+def lake(wind_from, knots=10.0):
+    boat = Boat(polar=avalon(), max_twa_rad=np.radians(160.0)).problem_boat(knots * MPS_PER_KNOT)
+    angles = np.linspace(0.0, 2.0 * np.pi, 33)
+    island = ", ".join(f"{120 + 90 * np.cos(a):.2f} {560 + 90 * np.sin(a):.2f}" for a in angles[:-1])
+    first = f"{120 + 90:.2f} 560.00"
+    return problem(
+        start=end(0, 0, heading_deg=0), goal=end(40, 900, radius=10), boat=boat,
+        obstacles=["POLYGON((-120 250,-20 250,-20 350,-120 350,-120 250))", f"POLYGON(({island}, {first}))"],
+        wind={"from_deg": wind_from, "speed_mps": knots * MPS_PER_KNOT, "sigma": {"model": "none"}},
+        fence="POLYGON((-450 -100,550 -100,550 1000,-450 1000,-450 -100))",
+    )
+
+
+def sail(p, **settings):
+    outcome = search_with(p, Effort(60.0, None), AstarSettings(grid_m=20.0, **settings))
+    if outcome.waypoints_en is None:
+        return Plan(status=PlanStatus.TIMEOUT, reason=outcome.reason, waypoints_en=np.empty((0, 2))), outcome
+    judged = p.evaluate(outcome.waypoints_en)
+    return Plan(status=PlanStatus.FOUND, reason="", waypoints_en=outcome.waypoints_en, legs=judged.legs,
+                cost_s=judged.time_s, algorithm="astar"), outcome
+
+
+def panel(ax, p, letter, text, **settings):
+    answer, outcome = sail(p, **settings)
+    turns = max(0, len(answer.legs) - 1)
+    result = outcome.reason if not answer.has_path else \
+        f"{answer.cost_s:.0f} s, {turns} turns, {outcome.trace['expanded']} nodes"
+    draw_plan(ax, p, answer, title=f"({letter}) {text}\n{result}", fans=False)
+
+
+def busser_5_1():
+    figure, axes = plt.subplots(1, 2, figsize=(10.0, 6.2), layout="constrained")
+    for ax, letter, knots in ((axes[0], "a", 10.0), (axes[1], "b", 20.0)):
+        panel(ax, lake(0.0, knots), letter, f"sailing time only, {knots:.0f} kn from 0°", turn_s_per_rad=0.0,
+              heuristic_mps=None)
+    save(figure, "busser-5-1")
+
+
+def busser_5_2():
+    figure, axes = plt.subplots(1, 2, figsize=(10.0, 6.2), layout="constrained")
+    for ax, letter, knots in ((axes[0], "a", 10.0), (axes[1], "b", 20.0)):
+        panel(ax, lake(0.0, knots), letter, f"and heading changes, f = 8, {knots:.0f} kn", heuristic_mps=None)
+    save(figure, "busser-5-2")
+
+
+def busser_5_3():
+    figure, axes = plt.subplots(1, 2, figsize=(10.0, 6.2), layout="constrained")
+    panel(axes[0], lake(0.0), "a", "and the estimate at 7 kn")
+    panel(axes[1], lake(0.0), "b", "and the tunnel cost, width 200 m", tunnel_width_m=200.0)
+    save(figure, "busser-5-3")
+
+
+def busser_5_4():
+    figure, axes = plt.subplots(1, 3, figsize=(14.0, 6.2), layout="constrained")
+    for ax, letter, wind in ((axes[0], "a", 45.0), (axes[1], "b", 100.0), (axes[2], "c", 182.0)):
+        panel(ax, lake(wind), letter, f"wind from {wind:.0f}°")
+    save(figure, "busser-5-4")
+
+
+# ------------------------------------------------------------------------------------------- risk
+def risk():
+    base = Problem.from_json(Path(__file__).resolve().parent / "problems" / "trap-beat.json")
+    from companion.planner.problem import RiskLimit
+
+    limits = [0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01]
+    promised, share, cost = [], [], []
+    for limit in limits:
+        p = replace(base, risk=RiskLimit(max_path_risk=limit))
+        answer = plan(p, budget_s=3.0)
+        if answer.has_path:
+            promised.append(answer.risk)
+            share.append(float(np.mean(simulate_entries(p, answer, winds=20_000, step_s=0.5) >= 0)))
+            cost.append(answer.cost_s)
+    figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.4), layout="constrained")
+    line = np.array([0.004, 0.6])
+    axes[0].fill_between(line, line / 3.0, line, color="#cfe3cf", label="allowed: a third to all of the promise")
+    axes[0].loglog(promised, share, "o-", color="#c1272d", label="forced into the no-go zone, of 20,000 winds")
+    axes[0].set(xlabel="promised risk of the path", ylabel="share of voyages", title="Is the promise true? (trap-beat)")
+    axes[0].legend(fontsize=8)
+    axes[1].semilogx(promised, cost, "o-", color="#1f4e79")
+    axes[1].set(xlabel="promised risk of the path", ylabel="time [s]", title="What safety costs")
+    for ax in axes:
+        ax.grid(visible=True, which="both", alpha=0.3)
+    save(figure, "risk")
+
+
+FIGURES = {
+    "wolsieffer-6": wolsieffer_6, "wolsieffer-7": wolsieffer_7, "busser-5-1": busser_5_1, "busser-5-2": busser_5_2,
+    "busser-5-3": busser_5_3, "busser-5-4": busser_5_4, "risk": risk,
+}
+
+
+def main(argv=None):
+    names = sys.argv[1:] if argv is None else argv
+    unknown = [n for n in names if n not in FIGURES]
+    if unknown:
+        print(f"bench.figures: unknown figure {unknown[0]!r}; choose from {', '.join(FIGURES)}", file=sys.stderr)
+        return 2
+    for name in names or FIGURES:
+        FIGURES[name]()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
