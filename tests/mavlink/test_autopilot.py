@@ -12,6 +12,7 @@ from companion.mavlink.frames import Drop
 from companion.mavlink.items import canonical, mission_hash, sailed
 from companion.mavlink.link import Link, LinkIdentity
 from companion.mavlink.machines import Outcome
+from companion.mavlink.status_wire import StatusReader
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
@@ -314,3 +315,58 @@ def test_a_listener_speaks_once_and_then_listens():
     listener = {"identity": LinkIdentity(system=254, component=25), "streams": (), "is_quiet": True}
     # one or two heartbeats until the autopilot is heard, and the version that the facade asks for
     assert sail(main, **listener) <= 4
+
+
+def test_the_status_crosses_to_another_link():
+    """As through a telemetry radio: the shore hears the companion on its own link of the autopilot."""
+    async def whole():
+        boat = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=1)
+        wire, radio = MemoryLink("wire", seed=1), MemoryLink("radio", seed=2)
+        shore_id = LinkIdentity(system=254, component=25)
+        async with (
+            serve(boat, [wire.far, radio.far]),
+            Link(wire.near) as link,
+            Link(radio.near, identity=shore_id, streams=(), is_quiet=True) as shore,
+        ):
+            reader = StatusReader()
+            shore.subscribe(reader.take)
+            autopilot = Autopilot(link)
+            await link.wait_autopilot()
+            await shore.wait_autopilot()
+            for _ in range(6):
+                autopilot.send_status(CompanionStatus(t_s=now_s(), state="standard", tws_mps=5.0, twd_from_rad=1.0))
+                await asyncio.sleep(2.0)
+            autopilot.say(4, "the wind turned: planning again from waypoint 4, which is more than fifty letters")
+            texts = []
+            shore.subscribe(lambda _, m: texts.append((m.get_srcComponent(), m.get_type())))
+            await asyncio.sleep(1.0)
+            return reader.report(now_s()), texts
+
+    report, texts = run_virtual(whole())
+    assert report.has_packed
+    assert report.status.state == "standard"
+    assert {"status", "wind", "co_twd", "co_tws"} <= set(report.age_s)
+    assert texts.count((191, "STATUSTEXT")) == 2, "in two chunks"
+
+
+def test_a_program_that_died_during_an_ftp_upload_is_followed_by_one_that_succeeds():
+    async def whole():
+        boat = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=1)
+        memory = MemoryLink(seed=1)
+        hashes = []
+        async with serve(boat, [memory.far]):
+            for life in range(6):
+                async with Link(memory.near) as link, Autopilot(link) as autopilot:
+                    new = mission(20, north=0.0005 * life)
+                    upload = asyncio.ensure_future(autopilot.upload_mission(new, method="ftp"))
+                    await asyncio.sleep(0.02 + 0.021 * life)
+                    upload.cancel()
+                    await asyncio.gather(upload, return_exceptions=True)
+            async with Link(memory.near) as link, Autopilot(link) as autopilot:
+                result = await autopilot.upload_mission(mission(7))
+                hashes.append(mission_hash((await autopilot.read_mission()).items))
+        return result, hashes[0]
+
+    result, seen = run_virtual(whole())
+    assert (result.outcome, result.method) == (Outcome.OK, "ftp")
+    assert seen == mission_hash(mission(7))
