@@ -126,7 +126,7 @@ def beat() -> dict[str, Any]:
 def test_beat_takes_as_long_and_tacks_as_often() -> None:
     b = beat()
     start = b["client"].text_time("Throttle armed")
-    assert b["end"] - start == pytest.approx(216.7, rel=0.03)
+    assert b["end"] - start == pytest.approx(216.7, rel=0.01)
     tacks = [t for t in b["tacks"] if t < b["end"]]
     assert len(tacks) == 5
     xtrack = [at(b["rows"], t)[1] for t in tacks]
@@ -141,10 +141,10 @@ def test_each_tack_costs_the_same() -> None:
         before = at(b["rows"], t)[3]
         during = b["rows"][(b["rows"][:, 0] > t) & (b["rows"][:, 0] < t + 8.0)]
         assert before == pytest.approx(1.99, abs=0.06)
-        assert during[:, 3].min() == pytest.approx(1.29, abs=0.1)
+        assert during[:, 3].min() == pytest.approx(1.29, abs=0.05)
         slowest = during[int(np.argmin(during[:, 3])), 0]
         again = during[(during[:, 0] > slowest) & (during[:, 3] >= 0.95 * before), 0][0]
-        assert again - t == pytest.approx(4.0, abs=0.6)
+        assert again - t == pytest.approx(4.0, abs=0.4)
         after = yaw[(yaw[:, 0] > t) & (yaw[:, 0] < t + 8.0)]
         final = after[-1, 1]
         settled = after[np.abs(after[:, 1] - final) < 8.0, 0][0]
@@ -184,9 +184,9 @@ def test_waypoints_are_reached_when_and_where_they_were() -> None:
     r = reach()
     start = r["client"].text_time("Throttle armed")
     measured = [43.8, 73.0, 119.5, 162.8, 196.2, 222.9]  # after "Throttle armed" at 7.12 s
-    assert [t - start for t in r["times"]] == pytest.approx(measured, abs=2.0)
+    assert [t - start for t in r["times"]] == pytest.approx(measured, abs=1.2)
     distance = [math.dist(at(r["rows"], t)[1:3], wp) for t, wp in zip(r["times"], REACH, strict=True)]
-    assert distance == pytest.approx([3.8, 3.05, 2.2, 2.7, 2.85, 1.9], abs=1.2)
+    assert distance == pytest.approx([3.8, 3.05, 2.2, 2.7, 2.85, 1.9], abs=0.8)
     assert r["client"].last("MISSION_CURRENT").mission_state == 5
 
 
@@ -201,8 +201,8 @@ def test_steady_speed_by_leg(from_end_s: float, leg: int, measured_mps: float) -
 def test_loiter_after_the_last_waypoint_keeps_sailing_near_it() -> None:
     r = reach()
     rows = r["rows"][r["rows"][:, 0] > r["end"]]
-    assert np.hypot(rows[:, 1] - REACH[-1][0], rows[:, 2] - REACH[-1][1]).max() == pytest.approx(12.3, abs=5.0)
-    assert rows[:, 3].mean() == pytest.approx(2.4, abs=0.35)
+    assert np.hypot(rows[:, 1] - REACH[-1][0], rows[:, 2] - REACH[-1][1]).max() == pytest.approx(12.3, abs=1.5)
+    assert rows[:, 3].mean() == pytest.approx(2.4, abs=0.15)
 
 
 def test_servos_of_the_sail() -> None:
@@ -411,3 +411,25 @@ def test_table_of_differences_is_in_the_documentation() -> None:
     text = (Path(__file__).parents[2] / "docs" / "simulated-autopilot.md").read_text()
     for name in NOT_IMITATED:
         assert name in text, f"docs/simulated-autopilot.md does not mention: {name}"
+
+
+def figures() -> str:
+    """Return the figures of the two voyages, measured | simulated."""
+    b, r = beat(), reach()
+    start, begin = b["client"].text_time("Throttle armed"), r["client"].text_time("Throttle armed")
+    tacks = [t for t in b["tacks"] if t < b["end"]]
+    lows = [b["rows"][(b["rows"][:, 0] > t) & (b["rows"][:, 0] < t + 8.0), 3].min() for t in tacks[:4]]
+    distance = [math.dist(at(r["rows"], t)[1:3], wp) for t, wp in zip(r["times"], REACH, strict=True)]
+    rows = r["rows"][r["rows"][:, 0] > r["end"]]
+    away = np.hypot(rows[:, 1] - REACH[-1][0], rows[:, 2] - REACH[-1][1]).max()
+    return "\n".join([
+        f"300 m beat [s]: 216.7 | {b['end'] - start:.1f}", f"tacks: 5 | {len(tacks)}",
+        f"lowest speed in a tack [m/s]: 1.28-1.30 | {min(lows):.2f}-{max(lows):.2f}",
+        f"marks [s]: 43.8 73.0 119.5 162.8 196.2 222.9 | {' '.join(f'{t - begin:.1f}' for t in r['times'])}",
+        f"distance when reached [m]: 3.8 3.1 2.2 2.7 2.9 1.9 | {' '.join(f'{d:.1f}' for d in distance)}",
+        f"loiter, farthest [m] and mean speed [m/s]: 12.3 2.4 | {away:.1f} {rows[:, 3].mean():.2f}",
+    ])
+
+
+if __name__ == "__main__":
+    print(figures())
