@@ -32,8 +32,6 @@ class RealTimeLoop(asyncio.SelectorEventLoop):
     """The monotonic clock, ``speedup`` times as fast."""
 
     def __init__(self, speedup: float = 1.0) -> None:
-        if not speedup > 0.0:
-            raise ValueError(f"speedup must be positive, not {speedup}")
         self._speedup = speedup
         super().__init__(_ScaledSelector(speedup) if speedup != 1.0 else None)
 
@@ -93,7 +91,14 @@ class _JumpingSelector(selectors.DefaultSelector):
 
 
 def run(main: Coroutine[Any, Any, T], *, speedup: float = 1.0) -> T:
-    """Run ``main`` in real time, or ``speedup`` times faster."""
+    """Run ``main`` in real time, or ``speedup`` times faster.
+
+    Raises:
+        ValueError: ``speedup`` is not positive.
+    """
+    if not speedup > 0.0:
+        main.close()
+        raise ValueError(f"speedup must be positive, not {speedup}")
     with asyncio.Runner(loop_factory=lambda: RealTimeLoop(speedup)) as runner:
         return runner.run(main)
 

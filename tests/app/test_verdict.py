@@ -1,0 +1,78 @@
+"""The judge: contacts, clearance and tacks of tracks whose answer is known."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sitl.scenario import ExpectSpec
+from sitl.verdict import Truth, contacts_and_clearance, count_tacks, judge, longest_silence_s
+
+ISLAND = shapely.Point(0.0, 0.0).buffer(10.0)
+
+
+def test_a_track_across_an_island_touches_once_even_between_samples():
+    far_apart = np.array([[-50.0, 0.0], [50.0, 0.0]])
+    assert contacts_and_clearance(far_apart, ISLAND) == (1, 0.0)
+
+
+def test_two_crossings_are_two_contacts():
+    track = np.array([[-20.0, 0], [0, 0], [20.0, 0], [20.0, 30], [0, 30], [0, 0], [0, -30.0]])
+    contacts, clearance = contacts_and_clearance(track, ISLAND)
+    assert (contacts, clearance) == (2, 0.0)
+
+
+def test_clearance_is_the_smallest_distance():
+    track = np.column_stack([np.linspace(-50, 50, 400), np.full(400, 17.0)])
+    contacts, clearance = contacts_and_clearance(track, ISLAND)
+    assert contacts == 0
+    assert clearance == pytest.approx(7.0, abs=0.05)
+
+
+def test_open_water_has_no_clearance():
+    assert contacts_and_clearance(np.zeros((3, 2)), shapely.Polygon()) == (0, math.inf)
+
+
+def _truth(headings_deg, twd_deg=0.0, step_s=0.25):
+    truth = Truth()
+    for k, heading in enumerate(headings_deg):
+        truth.add(k * step_s, (0.0, float(k)), math.radians(heading), 2.0, (math.radians(twd_deg), 5.0))
+    return truth
+
+
+def test_a_beat_has_tacks_and_a_run_has_gybes():
+    beat = [45.0] * 100 + list(np.linspace(45, -45, 12)) + [-45.0] * 100 + list(np.linspace(-45, 45, 12)) + [45.0] * 100
+    assert count_tacks(_truth(beat)) == (2, 0)
+    run = [150.0] * 100 + list(np.linspace(150, 210, 12)) + [210.0] * 100
+    assert count_tacks(_truth(run)) == (0, 1)
+
+
+def test_a_wobble_through_the_wind_is_no_tack():
+    assert count_tacks(_truth([10.0] * 40 + [-5.0] * 4 + [10.0] * 40)) == (0, 0)
+
+
+@settings(deadline=None, max_examples=30, derandomize=True)
+@given(st.floats(-720.0, 720.0))
+def test_turning_the_world_changes_no_count(turn_deg):
+    beat = np.array([45.0] * 60 + [-45.0] * 60 + [45.0] * 60)
+    assert count_tacks(_truth(beat + turn_deg, twd_deg=turn_deg)) == (2, 0)
+
+
+def test_silence_counts_both_ends():
+    assert longest_silence_s([10.0, 12.0], 0.0, 13.0) == 10.0
+    assert longest_silence_s([], 0.0, 30.0) == 30.0
+
+
+def test_a_verdict_fails_for_each_reason_by_name():
+    truth = _truth([45.0] * 20)
+    verdict = judge(
+        scenario="x", seed=1, expect=ExpectSpec(arrived=True, contacts=0, within_m=1.0, alerts=("irons",)),
+        truth=truth, solid=shapely.Point(0, 5).buffer(1.0), goal_en_m=(100.0, 0.0), summary={"arrived": False},
+        status_times_s=[0.0], alerts=[], errors=["boom"],
+    )
+    failed = {c.name for c in verdict.checks if not c.passed}
+    assert failed == {"no unhandled error", "arrived", "contacts", "distance to the goal, m", "announced irons"}
+    assert not verdict.passed
