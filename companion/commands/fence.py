@@ -107,11 +107,11 @@ def read_input(args: argparse.Namespace) -> Document:
     from companion.geofence.mission import load_mission
     from companion.geofence.mission_files import document_of
 
+    near = args.near or args.start
+    place = place_argument(near, "--near") if near else None
     if Path(args.file).suffix.lower() == ".toml":
         return document_of(load_mission(args.file))
-    near = args.near or args.start
-    return read(args.file, kind=ZoneKind(args.kind), axis=args.axis, areas=True,
-                near=place_argument(near, "--near") if near else None)
+    return read(args.file, kind=ZoneKind(args.kind), axis=args.axis, areas=True, near=place)
 
 
 def places(args: argparse.Namespace) -> tuple[GeoPoint | None, tuple[GeoPoint, ...], float | None]:
