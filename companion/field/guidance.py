@@ -66,6 +66,7 @@ class Habits:
 
     ``polar_mps`` is the speed at ``polar_twa_rad`` (rising, 0..π) in the present wind. ``tack_s`` is how long a tack
     takes and ``tack_min_mps`` the way it needs; ``lag_s`` how long the boat takes to gather the new speed.
+    ``comfort_m`` outside an obstacle's disc still costs a little, and so does crossing ahead of it (``ahead_cost``).
     """
 
     is_sailing: bool = True
@@ -80,6 +81,7 @@ class Habits:
     look_ahead: bool = True
     horizon_s: float = 90.0
     comfort_m: float = 15.0
+    ahead_cost: float = 0.6
     repulsive_sigma_m: float = 100.0
     near_m: float = 300.0
 
@@ -274,6 +276,7 @@ def _choose(
     if situation.obstacles:
         cost += np.where(margin < 0.0, 10.0 - 0.2 * margin, 0.0)
         cost += np.maximum(0.0, 1.0 - np.maximum(margin, 0.0) / habits.comfort_m)
+        cost += habits.ahead_cost * crosses_ahead(track, situation.obstacles)
     if intent.stay_in is not None:
         cost += 4.0 * _leaving(track, intent.stay_in, habits)
     best = int(np.argmin(cost))
@@ -326,6 +329,27 @@ def margins(track: NDArray[np.float64], obstacles: Sequence[Obstacle]) -> NDArra
         d = np.hypot(dx[:, :-1] + share * ex, dy[:, :-1] + share * ey) - (o.keep_m + o.growth_mps * t[:-1])
         least = np.minimum(least, d.min(axis=1))
     return least
+
+
+def crosses_ahead(track: NDArray[np.float64], obstacles: Sequence[Obstacle]) -> NDArray[np.float64]:
+    """Return how near ahead of a moving obstacle each track crosses its course line, (k,): 0 not, to 1 at the bow.
+
+    A crossing ahead at a minute's run or more of the other counts nothing: a cost, not a veto (COLREGs 15, by habit).
+    """
+    t = np.arange(track.shape[1]) * _STEP_S
+    worst = np.zeros(track.shape[0])
+    for o in obstacles:
+        speed = math.hypot(*o.velocity_en_mps)
+        if speed < 0.3:
+            continue
+        ux, uy = o.velocity_en_mps[0] / speed, o.velocity_en_mps[1] / speed
+        dx = track[:, :, 0] - o.en_m[0] - o.velocity_en_mps[0] * t
+        dy = track[:, :, 1] - o.en_m[1] - o.velocity_en_mps[1] * t
+        ahead, right = dx * ux + dy * uy, dx * uy - dy * ux
+        crossing = (right[:, :-1] * right[:, 1:] < 0.0) & (ahead[:, :-1] > 0.0)
+        near = np.maximum(0.0, 1.0 - ahead[:, :-1] / (60.0 * speed + o.keep_m))
+        worst = np.maximum(worst, np.where(crossing, near, 0.0).max(axis=1))
+    return worst
 
 
 def _leaving(

@@ -13,7 +13,18 @@ from typing import Protocol
 import numpy as np
 
 from companion.field.algebra import Uniform
-from companion.field.guidance import GuidanceState, Habits, Intent, Obstacle, Situation, foresee, go_to, margins, step
+from companion.field.guidance import (
+    GuidanceState,
+    Habits,
+    Intent,
+    Obstacle,
+    Situation,
+    crosses_ahead,
+    foresee,
+    go_to,
+    margins,
+    step,
+)
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.traffic import TargetLimits, Targets, Vessel, decode_json, predict
@@ -24,8 +35,11 @@ from sitl.tasks.afloat import LENGTH_M
 HALF_M = 100.0
 SHUTTLE_M = 30.0      # while waiting: to and fro across the wind, this far each side of the centre
 WAIT_BOX_M = 85.0
+AHEAD_S = 25.0        # what crossing ahead of the intruder is held to cost, at its bow
+FAR_M = 600.0         # beyond what both can run in a minute and a half
 CLEARANCE_M = 12.0    # between hulls; the task asks for 5
-KEEP = Keep(risk=1e-4, clearance_m=CLEARANCE_M, own_radius_m=0.5 * LENGTH_M, own_timing_mps=0.05, horizon_s=180.0)
+KEEP = Keep(risk=1e-4, clearance_m=CLEARANCE_M, own_radius_m=0.5 * LENGTH_M, own_timing_mps=0.05, ahead_m=25.0,
+            horizon_s=180.0)
 
 
 class Skipper(Protocol):
@@ -95,7 +109,8 @@ class FieldSkipper:
             self._end = -self._end
         box = (-WAIT_BOX_M, -WAIT_BOX_M, WAIT_BOX_M, WAIT_BOX_M)
         intent = go_to(end, seen.twd_from_rad, half_m=15.0)
-        return replace(intent, stay_in=box) if self._look_ahead else intent
+        is_near_edge = max(abs(seen.en_m[0]), abs(seen.en_m[1])) > 0.6 * WAIT_BOX_M
+        return replace(intent, stay_in=box) if self._look_ahead and is_near_edge else intent
 
     def _beyond(self, seen: Situation, centre: tuple[float, float], across: float) -> bool:
         along = (seen.en_m[0] - centre[0]) * math.sin(across) + (seen.en_m[1] - centre[1]) * math.cos(across)
@@ -114,6 +129,7 @@ class FieldSkipper:
         soon = np.where(outside.any(axis=1), outside.argmax(axis=1), outside.shape[1]) * 2.5
         margin = margins(track, seen.obstacles)
         cost = soon + np.where(margin < 10.0, 20.0 * (10.0 - np.maximum(margin, -20.0)) / 10.0, 0.0)
+        cost = cost + AHEAD_S * crosses_ahead(track, seen.obstacles)
         if self._exit_rad is not None:
             cost = cost + 8.0 * (1.0 - np.cos(fan - self._exit_rad))
         self._exit_rad = wrap_pi(float(fan[int(np.argmin(cost))]))
@@ -124,7 +140,10 @@ def obstacles_of(vessels: tuple[Vessel, ...], seen: Situation) -> tuple[Obstacle
     """Return the discs of the vessels as obstacles of the guidance, at the risk and clearance of ``KEEP``."""
     out = []
     for vessel in vessels:
-        now, later = predict(vessel, seen.t_s, STEADY), predict(vessel, seen.t_s + 90.0, STEADY)
+        now = predict(vessel, seen.t_s, STEADY)
+        if math.dist(now.mean_en_m, seen.en_m) > FAR_M:
+            continue
+        later = predict(vessel, seen.t_s + 90.0, STEADY)
         k = risk_factor(KEEP.risk)
         sigma_now = max(now.sigma_along_m, now.sigma_across_m)
         sigma_later = max(later.sigma_along_m, later.sigma_across_m)
