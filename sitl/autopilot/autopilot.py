@@ -8,27 +8,26 @@ compiled kernel runs alone.
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from companion.errors import InputError
 from companion.geo.angles import wrap_pi, wrap_two_pi
-from companion.geo.frame import LocalFrame
-from companion.messages import GeoPoint, Mode
-from sitl.autopilot import commands, items
+from companion.messages import Mode
+from sitl.autopilot import commands
 from sitl.autopilot import kernel as k
+from sitl.autopilot.chart import Chart
 from sitl.autopilot.config import EKF_READY_S, AutopilotConfig, GpsFault, Truth, VaneFault
 from sitl.autopilot.failsafe import Failsafe
 from sitl.autopilot.fence import CHECK_S, Fence
 from sitl.autopilot.ftp import FtpServer
 from sitl.autopilot.helm import Helm
-from sitl.autopilot.items import FENCE, MISSION, Item
+from sitl.autopilot.items import Item
 from sitl.autopilot.links import FIRST_STREAMS_S, LOOP_S, Link, Router
+from sitl.autopilot.parameter_server import ParameterServer
 from sitl.autopilot.parameters import Parameters
+from sitl.autopilot.storage import Storage
 from sitl.autopilot.telemetry import BUILDERS, POSITION_MODES, apparent_wind
 from sitl.autopilot.traffic import Traffic, Vessel
 from sitl.autopilot.transfer import TransferServer
@@ -37,7 +36,6 @@ from sitl.wind import Constant, Wind
 
 WARM_BOOT_S = 60.0
 ORIGIN_S = 19.8
-_PARAMETERS_PER_LOOP = 43
 _CHUNK = 50
 _BOOT_TEXTS: tuple[tuple[float, int, str], ...] = (
     (0.04, 6, "Calibrating barometer"), (1.64, 6, "Barometer 1 calibration complete"),
@@ -50,12 +48,6 @@ _BOOT_TEXTS: tuple[tuple[float, int, str], ...] = (
 )
 
 
-@dataclass(slots=True)
-class _ParameterList:
-    link: Link
-    index: int = 0
-
-
 class Autopilot:
     """One boat with its autopilot. See the package for how it is used."""
 
@@ -63,8 +55,7 @@ class Autopilot:
         self.config = config
         self.seed = seed
         self.links: dict[int, Link] = {}
-        self._frame = LocalFrame(config.home)
-        self._e7_cache: dict[tuple[int, int], tuple[float, float]] = {}
+        self.chart = Chart(config.home)
         self.parameters = Parameters(config.parameters, new_names=config.new_parameter_names)
         twd, tws = wind.at(0.0)
         self.parameters.put("SIM_WIND_DIR", math.degrees(twd))
@@ -103,14 +94,13 @@ class Autopilot:
         self._home_due_s = self.t_s
         self.fence = Fence()
         self._fence_due_s = self.t_s
-        self.rally: list[Item] = []
-        self._staged: list[Item] = []
+        self.storage: Storage = Storage(self)
         self.helm: Helm = Helm(self)
-        self.transfers = TransferServer(self)
+        self.transfers = TransferServer(self.storage)
         self.ftp = FtpServer(self)
         self.traffic = Traffic(self)
         self.failsafe = Failsafe(self)
-        self._parameter_lists: list[_ParameterList] = []
+        self._parameter_server = ParameterServer(self)
         self._text_id = 0
         self._late_texts: list[tuple[int, str]] = []
         self._texts = iter(_BOOT_TEXTS)
@@ -157,7 +147,7 @@ class Autopilot:
 
     def _due_tick(self) -> int:
         tick = self.vehicle.tick
-        if self._late_texts or self._parameter_lists or any(link.inbox for link in self.links.values()):
+        if self._late_texts or self._parameter_server.is_busy or any(link.inbox for link in self.links.values()):
             return tick + 1
         due = min(self.helm.due_s, self.failsafe.due_s, self._reboot_at_s)
         for link in self.links.values():
@@ -203,7 +193,7 @@ class Autopilot:
         if self.fence.is_enabled and t_s >= self._fence_due_s - 1e-9:
             self._fence_due_s = t_s + CHECK_S
             self._check_fence()
-        self._send_parameters()
+        self._parameter_server.update()
         for link in self.links.values():
             self._send_streams(link, t_s)
         late, self._late_texts = self._late_texts, []
@@ -250,8 +240,7 @@ class Autopilot:
         elif name.startswith("MISSION_"):
             self._mission_message(m, name, link)
         elif name.startswith("PARAM_"):
-            if name in {"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"}:
-                commands.parameter(self, m, link)
+            self._parameter_server.handle(m, link)
         elif name in {"SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_GLOBAL_INT", "SET_POSITION_TARGET_LOCAL_NED"}:
             commands.setpoint(self, m)
         elif name == "HEARTBEAT":
@@ -333,21 +322,6 @@ class Autopilot:
         link.send(message)
         return True
 
-    def start_parameter_list(self, link: Link) -> None:
-        """Begin to send all parameters."""
-        self._parameter_lists = [p for p in self._parameter_lists if p.link is not link]
-        self._parameter_lists.append(_ParameterList(link))
-
-    def _send_parameters(self) -> None:
-        for sending in self._parameter_lists:
-            for _ in range(_PARAMETERS_PER_LOOP):
-                entry = self.parameters.entry(sending.index)
-                if entry is None:
-                    break
-                sending.link.send(commands.parameter_message(self, entry, sending.index))
-                sending.index += 1
-        self._parameter_lists = [p for p in self._parameter_lists if p.index < len(self.parameters)]
-
     def parameter_changed(self, name: str) -> None:
         """Act on a parameter that somebody set."""
         if name in {"SIM_WIND_SPD", "SIM_WIND_DIR"}:
@@ -361,29 +335,13 @@ class Autopilot:
     @property
     def latlon_e7(self) -> tuple[int, int]:
         """Where the autopilot believes to be [deg x 1e7]."""
-        return self.to_e7(self.vehicle.position)
-
-    def to_e7(self, en: tuple[float, float]) -> tuple[int, int]:
-        """Return (lat, lon) x 1e7 of a position in metres from the boat's home."""
-        point = self._frame.geo_from_en(*en)
-        return round(point.lat_deg * 1e7), round(point.lon_deg * 1e7)
-
-    def to_en(self, lat_e7: int, lon_e7: int) -> tuple[float, float]:
-        """Return (east, north) [m] from the boat's home."""
-        key = (lat_e7, lon_e7)
-        found = self._e7_cache.get(key)
-        if found is None:
-            if len(self._e7_cache) > 4096:
-                self._e7_cache.clear()
-            point = GeoPoint(lat_deg=lat_e7 / 1e7, lon_deg=lon_e7 / 1e7)
-            found = self._e7_cache[key] = self._frame.en_from_geo(point)
-        return found
+        return self.chart.to_e7(self.vehicle.position)
 
     def refuge(self) -> tuple[float, float] | None:
         """Return home or the nearest rally point within RALLY_LIMIT_KM."""
         here = self.vehicle.position
         limit_m = self.parameters.get("RALLY_LIMIT_KM") * 1000.0
-        points = [self.to_en(i.x, i.y) for i in self.rally]
+        points = [self.chart.to_en(i.x, i.y) for i in self.storage.rally]
         points = [p for p in points if limit_m <= 0.0 or math.dist(p, here) <= limit_m]
         if not points:
             return self.home_en
@@ -455,74 +413,12 @@ class Autopilot:
             self.announce_after_ack(mav.MAV_SEVERITY_INFO, "Throttle disarmed")
         return True
 
-    # -------------------------------------------------------------------------------------------- lists
-    def read_list(self, kind: int) -> list[Item]:
-        """Return a stored list; item 0 of a mission is home as it is now."""
-        if kind == FENCE:
-            return self.fence.items
-        if kind != MISSION:
-            return self.rally
-        mission = self.helm.mission.items
-        if not mission:
-            return []
-        lat, lon = self.to_e7(self.home_en) if self.home_en is not None else (0, 0)
-        return [Item(mav.MAV_CMD_NAV_WAYPOINT, 0, x=lat, y=lon), *mission[1:]]
-
-    def begin_list(self, kind: int, count: int) -> None:
-        """An upload begins: a mission is cut to the new length at once, other lists are kept until the end."""
-        self._staged = []
-        if kind == MISSION:
-            self.helm.mission.truncate(count)
-
-    def write_item(self, kind: int, index: int, item: Item) -> None:
-        """Store an item of an upload."""
-        if kind == MISSION:
-            self.helm.mission.put(index, item)
-        else:
-            self._staged.append(item)
-
-    def end_list(self, kind: int) -> int:
-        """An upload is over."""
-        staged, self._staged = self._staged, []
-        if kind == FENCE:
-            if not self.fence.load(staged, self.to_en):
-                self.announce(mav.MAV_SEVERITY_INFO, "Incorrect item count")
-                self.announce(mav.MAV_SEVERITY_WARNING, "Fence validation failed")
-                return int(mav.MAV_MISSION_ERROR)
-            self.parameters.put("FENCE_TOTAL", float(len(staged) + 2 if staged else 0))
-            self.announce_after_ack(mav.MAV_SEVERITY_DEBUG, "Fence Indexed OK")
-        elif kind == MISSION:
-            self.parameters.put("MIS_TOTAL", float(len(self.helm.mission.items)))
-        else:
-            self.rally = staged
-            self.parameters.put("RALLY_TOTAL", float(len(staged)))
-        return int(mav.MAV_MISSION_ACCEPTED)
-
-    def clear_list(self, kind: int) -> bool:
-        """Empty a list; a running mission is not cleared while armed."""
-        if kind == MISSION:
-            if self.is_armed and not self.helm.mission.clear():
-                return False
-            if not self.is_armed:
-                self.helm.mission.stop()
-                self.helm.mission.clear()
-            self.parameters.put("MIS_TOTAL", 0.0)
-            return True
-        self._staged = []
-        self.end_list(kind)
-        return True
-
-    def replace_list(self, kind: int, new: list[Item]) -> bool:
-        """Put a whole fence or rally list in place of the old."""
-        self._staged = new
-        return self.end_list(kind) == int(mav.MAV_MISSION_ACCEPTED)
-
     def do_item(self, item: Item) -> None:
         """Carry out a DO command of the mission."""
         if item.command == mav.MAV_CMD_DO_FENCE_ENABLE:
             self.switch_fence(enabled=item.p1 == 1.0)
         elif item.command == mav.MAV_CMD_DO_SET_HOME:
-            self.set_home(None if item.p1 == 1.0 else self.to_en(item.x, item.y))
+            self.set_home(None if item.p1 == 1.0 else self.chart.to_en(item.x, item.y))
         elif item.command == mav.MAV_CMD_DO_AUX_FUNCTION and int(item.p1) == 63:
             self.vehicle.ask_tack()
 
@@ -558,7 +454,7 @@ class Autopilot:
         east, north = self.vehicle.true_position
         return Truth(
             t_s=self.t_s, boot_s=self.boot_s, east_m=east, north_m=north,
-            position=self._frame.geo_from_en(east, north), heading_rad=wrap_two_pi(float(s[k.S_YAW])),
+            position=self.chart.point((east, north)), heading_rad=wrap_two_pi(float(s[k.S_YAW])),
             speed_mps=math.hypot(float(s[k.S_VE]), float(s[k.S_VN])),
             velocity_en_mps=(float(s[k.S_VE]), float(s[k.S_VN])), twd_from_rad=wrap_two_pi(float(s[k.S_WDIR])),
             tws_mps=float(s[k.S_WSPD]), mode=self.helm.mode, is_armed=self.is_armed,
@@ -574,7 +470,7 @@ class Autopilot:
         """Start again: boot time 0, disarmed; mission, fence, rally points and parameters are in its memory."""
         self._reboots += 1
         self._reboot_at_s = math.inf
-        mission, fence, rally = list(self.helm.mission.items), self.fence.items, self.rally
+        storage, mission, fence = self.storage, list(self.helm.mission.items), self.fence.items
         self._boot_at_s = self.t_s
         self._router.forget()
         for link in self.links.values():
@@ -584,9 +480,7 @@ class Autopilot:
         self.vehicle.clear_tack()
         self.vehicle.avoid(near=False, ease=False)
         self._power_up()
-        self.helm.mission.items = mission
-        self.rally = rally
-        self.fence.load(fence, self.to_en)
+        self.storage.restore(storage, mission, fence)
 
     def set_mode(self, mode: Mode) -> bool:
         """The operator's switch."""
@@ -625,17 +519,3 @@ class Autopilot:
     def hear_vessel(self, vessel: Vessel) -> None:
         """An AIS receiver at the autopilot heard a vessel."""
         self.traffic.hear(vessel)
-
-
-def check_parameters(overrides: dict[str, float]) -> None:
-    """Refuse parameter values that a float of the wire cannot carry.
-
-    Raises:
-        InputError: naming the parameter.
-    """
-    for name, value in overrides.items():
-        if not math.isfinite(value) or len(name) > 16 or struct.unpack("f", struct.pack("f", value))[0] != value:
-            raise InputError("--param", name, f"{value} cannot be a parameter", "write NAME=NUMBER")
-
-
-__all__ = ["Autopilot", "check_parameters", "items"]

@@ -83,7 +83,7 @@ def _dispatch(a: Autopilot, m: Any, link: Link, p: tuple[float, ...], place: tup
         a.reboot_soon()
         return OK
     if command == mav.MAV_CMD_DO_SET_HOME:
-        return OK if a.set_home(None if p[0] == 1.0 else a.to_en(*place)) else FAILED
+        return OK if a.set_home(None if p[0] == 1.0 else a.chart.to_en(*place)) else FAILED
     if command == mav.MAV_CMD_GET_HOME_POSITION:
         return OK if a.send_once(link, mav.MAVLINK_MSG_ID_HOME_POSITION) else FAILED
     if command == mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES:
@@ -121,7 +121,7 @@ def _reposition(a: Autopilot, m: Any, p: tuple[float, ...], place: tuple[int, in
         return REFUSED
     if a.helm.mode is not Mode.GUIDED and not (int(p[1]) & 1 and a.helm.set_mode(Mode.GUIDED)):
         return FAILED
-    a.helm.go_to(a.to_en(*place))
+    a.helm.go_to(a.chart.to_en(*place))
     return OK
 
 
@@ -137,7 +137,7 @@ def setpoint(a: Autopilot, m: Any) -> None:
     if not mask & 0b111:
         if name == "SET_POSITION_TARGET_GLOBAL_INT":
             if abs(m.lat_int) <= 900_000_000 and abs(m.lon_int) <= 1_800_000_000:
-                a.helm.go_to(a.to_en(m.lat_int, m.lon_int))
+                a.helm.go_to(a.chart.to_en(m.lat_int, m.lon_int))
         elif math.isfinite(m.x) and math.isfinite(m.y):
             base = a.origin_en if m.coordinate_frame == mav.MAV_FRAME_LOCAL_NED else a.vehicle.position
             a.helm.go_to((base[0] + m.y, base[1] + m.x))
@@ -167,33 +167,6 @@ def _attitude_target(a: Autopilot, m: Any) -> None:
             a.helm.turn(m.body_yaw_rate, thrust)
         return
     a.helm.steer(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)), thrust)
-
-
-def parameter(a: Autopilot, m: Any, link: Link) -> None:
-    """Answer PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET."""
-    name = m.get_type()
-    if name == "PARAM_REQUEST_LIST":
-        a.start_parameter_list(link)
-        return
-    if name == "PARAM_REQUEST_READ":
-        key: str | int = m.param_index if m.param_index >= 0 else m.param_id
-        entry = a.parameters.entry(key)
-        if entry is not None:
-            link.send(parameter_message(a, entry, None if isinstance(key, str) else entry[3]))
-        return
-    if a.parameters.set(m.param_id, m.param_value):
-        a.parameter_changed(m.param_id)
-        entry = a.parameters.entry(m.param_id)
-        if entry is not None:
-            a.broadcast(parameter_message(a, entry, None))
-
-
-def parameter_message(a: Autopilot, entry: tuple[str, float, int, int], index: int | None) -> Any:
-    """Return PARAM_VALUE; single values have no index (65535)."""
-    name, value, kind, _ = entry
-    return mav.MAVLink_param_value_message(
-        name.encode(), value, kind, len(a.parameters), 65535 if index is None else index
-    )
 
 
 def send_group(a: Autopilot, m: Any, link: Link) -> None:

@@ -95,7 +95,7 @@ class FtpServer:
         return _ACK, b"", 0
 
     def _whole_file(self, kind: int) -> bytes:
-        stored = self._a.read_list(kind)
+        stored = self._a.storage.read_list(kind)
         head = HEADER.pack(MAGIC, kind, 0, 0, len(stored))
         return head + b"".join(to_file(item, seq, kind) for seq, item in enumerate(stored))
 
@@ -114,12 +114,12 @@ class FtpServer:
                 return False
             new.append(item)
         if kind != MISSION:
-            return self._a.replace_list(kind, new)
+            return self._a.storage.replace_list(kind, new)
         mission = self._a.helm.mission
         if start > len(mission.items):
             return False
         if not options & NO_CLEAR:
-            self._a.clear_list(MISSION)
+            self._a.storage.clear_list(MISSION)
         for n, item in enumerate(new):
             mission.put(start + n, item)
         return True

@@ -218,7 +218,7 @@ class Helm:
         return True
 
     def _place(self, item: Item) -> tuple[float, float]:
-        return self._a.to_en(item.x, item.y) if item.x or item.y else self._a.vehicle.position
+        return self._a.chart.to_en(item.x, item.y) if item.x or item.y else self._a.vehicle.position
 
     def verify_nav(self, index: int, item: Item) -> bool:
         """Return whether a navigation command is done."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Mapping
 
+from companion.errors import InputError
 from sitl.autopilot.parameter_table import NEW_NAMES, TABLE
 
 _TYPES = {"INT8": 2, "INT16": 4, "INT32": 6, "REAL32": 9}
@@ -90,3 +92,14 @@ class Parameters:
             value = float(max(low, min(high, round(value))))
         self.put(inside, value)
         return True
+
+
+def check_parameters(overrides: Mapping[str, float]) -> None:
+    """Refuse parameter values that a float of the wire cannot carry.
+
+    Raises:
+        InputError: naming the parameter.
+    """
+    for name, value in overrides.items():
+        if not math.isfinite(value) or len(name) > 16 or struct.unpack("f", struct.pack("f", value))[0] != value:
+            raise InputError("--param", name, f"{value} cannot be a parameter", "write NAME=NUMBER")

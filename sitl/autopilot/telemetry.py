@@ -127,7 +127,7 @@ def _nav(a: Autopilot) -> Any:
 def _target(a: Autopilot) -> Any:
     if a.helm.mode not in POSITION_MODES or a.vehicle.state[k.S_STEER] != k.STEER_LEG:
         return None
-    lat, lon = a.to_e7(a.vehicle.destination)
+    lat, lon = a.chart.to_e7(a.vehicle.destination)
     return mav.MAVLink_position_target_global_int_message(
         a.boot_ms, 0, 65016, lat, lon, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     )
@@ -158,7 +158,7 @@ def _mission_current(a: Autopilot) -> Any:
 def _home(a: Autopilot) -> Any:
     if a.home_en is None:
         return None
-    lat, lon = a.to_e7(a.home_en)
+    lat, lon = a.chart.to_e7(a.home_en)
     north, east = a.home_en[1] - a.origin_en[1], a.home_en[0] - a.origin_en[0]
     return mav.MAVLink_home_position_message(lat, lon, 0, north, east, 0.0, _NAN, 0.0, 0.0, 0.0, a.boot_us)
 
@@ -166,7 +166,7 @@ def _home(a: Autopilot) -> Any:
 def _origin(a: Autopilot) -> Any:
     if not a.has_origin:
         return None
-    lat, lon = a.to_e7(a.origin_en)
+    lat, lon = a.chart.to_e7(a.origin_en)
     return mav.MAVLink_gps_global_origin_message(lat, lon, 0, a.boot_us)
 
 
@@ -182,7 +182,7 @@ def _fence_status(a: Autopilot) -> Any:
 
 def _simstate(a: Autopilot) -> Any:
     s = a.vehicle.state
-    lat, lon = a.to_e7(a.vehicle.true_position)
+    lat, lon = a.chart.to_e7(a.vehicle.true_position)
     return mav.MAVLink_simstate_message(
         0.0, 0.0, float(s[k.S_YAW]), 0.0, 0.0, -9.80665, 0.0, 0.0, float(s[k.S_RATE]), lat, lon
     )

@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     from companion.errors import LinkError
     from companion.messages import GeoPoint
     from sitl.autopilot import Autopilot, AutopilotConfig, serve
-    from sitl.autopilot.autopilot import check_parameters
+    from sitl.autopilot.parameters import check_parameters
     from sitl.wind import parse_wind
 
     if not (math.isfinite(args.speedup) and args.speedup > 0.0):

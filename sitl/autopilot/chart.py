@@ -1,0 +1,36 @@
+"""Metres east and north of the boat's home, and the wire's degrees x 1e7."""
+
+from __future__ import annotations
+
+from companion.geo.frame import LocalFrame
+from companion.messages import GeoPoint
+
+_CACHE = 4096
+
+
+class Chart:
+    """One frame for the hull, the mission and the fence; what was converted once is remembered."""
+
+    def __init__(self, home: GeoPoint) -> None:
+        self._frame = LocalFrame(home)
+        self._seen: dict[tuple[int, int], tuple[float, float]] = {}
+
+    def point(self, en: tuple[float, float]) -> GeoPoint:
+        """Return a position in metres as a GeoPoint."""
+        return self._frame.geo_from_en(*en)
+
+    def to_e7(self, en: tuple[float, float]) -> tuple[int, int]:
+        """Return (lat, lon) x 1e7 of a position in metres."""
+        point = self._frame.geo_from_en(*en)
+        return round(point.lat_deg * 1e7), round(point.lon_deg * 1e7)
+
+    def to_en(self, lat_e7: int, lon_e7: int) -> tuple[float, float]:
+        """Return (east, north) [m]; what is not on the globe is brought to its edge."""
+        key = (max(-900_000_000, min(900_000_000, lat_e7)), max(-1_800_000_000, min(1_800_000_000, lon_e7)))
+        found = self._seen.get(key)
+        if found is None:
+            if len(self._seen) >= _CACHE:
+                self._seen.clear()
+            point = GeoPoint(lat_deg=key[0] / 1e7, lon_deg=key[1] / 1e7)
+            found = self._seen[key] = self._frame.en_from_geo(point)
+        return found
