@@ -22,7 +22,7 @@ from companion.mavlink.assembler import Value, VehicleAssembler
 from companion.mavlink.commands import CommandAnswer
 from companion.mavlink.frames import Message
 from companion.mavlink.ftp import FENCE_FILE, MISSION_FILE, RALLY_FILE, FtpRead, FtpWrite
-from companion.mavlink.items import first_difference, pack_mission_dat, padded, sailed, unpack_mission_dat
+from companion.mavlink.items import ENDING, first_difference, pack_mission_dat, padded, sailed, unpack_mission_dat
 from companion.mavlink.link import Link
 from companion.mavlink.lists import ListClear, ListDownload, ListUpload
 from companion.mavlink.machines import Outcome
@@ -303,8 +303,8 @@ class Autopilot:
             keep_first: so many leading items are on the autopilot already, unchanged.
             set_current: item to sail to next, sent with reset.
 
-        A running autopilot keeps the tail of a longer old mission over ftp and partial writes: the new one is padded
-        with copies of its last item to the old length.
+        A running autopilot keeps the tail of a longer old mission over ftp and partial writes. Over ftp the new one is
+        padded with copies of its last item to the old length; a partial write leaves the tail behind the new end.
         """
         if not items:
             raise ValueError("an empty mission is not uploaded; use clear_mission")
@@ -372,8 +372,9 @@ class Autopilot:
         if self._ftp_works is not False and (self.version is None or self.version.has_ftp):
             return "ftp", "ftp", "items", "items"
         total = self.status.mission_total if self.status else None
-        # a partial write may lengthen the list by one item at most
-        if keep_first > 0 and total is not None and keep_first < len(items) <= total + 1:
+        # a partial write may lengthen the list by one item at most, and leaves what stands behind it
+        is_ended = bool(items) and items[-1].command in ENDING
+        if is_ended and keep_first > 0 and total is not None and keep_first < len(items) <= total + 1:
             return "partial", "items", "items"
         return "items", "items"
 
@@ -403,7 +404,7 @@ class Autopilot:
             elif outcome in {Outcome.UNSUPPORTED, Outcome.REFUSED} and self._ftp_works is None:
                 self._ftp_works = False
         elif method == "partial":
-            sent = padded(items, self._running_total())
+            # not padded: every item written restarts the present leg
             listed = await self.link.perform(
                 ListUpload(party, kind, sent[keep_first:], first=keep_first + 1, partial=True)
             )

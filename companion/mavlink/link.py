@@ -27,7 +27,7 @@ from companion.mavlink.frames import Codec, Drop, Message
 from companion.mavlink.machines import Machine, Outcome, Party, ResultT_co
 from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, SigningStore
 from companion.mavlink.streams import DEFAULT_STREAMS, Stream, StreamMonitor
-from companion.mavlink.transport import Transport
+from companion.mavlink.transport import Transport, TransportState
 
 OnMessage = Callable[[float, Message], None]
 OnFrame = Callable[[float, bytes], None]
@@ -44,6 +44,8 @@ LOST_S = 6.0
 GAP_S = 5.0
 # Streams below their rate are asked for again this often, at most [s].
 REASK_S = 30.0
+# A quiet link speaks this often, so that an autopilot that rebooted knows of it again [s].
+LISTENER_BEAT_S = 30.0
 _RATE_WINDOW_S = 10.0
 _DUPLICATE_WINDOW = 32
 
@@ -78,7 +80,7 @@ class Link:
         streams: the table of messages to ask for; empty: ask for nothing.
         sink: gets (t_s, frame) for every good frame in and every frame out; the caller adds the wall clock.
         signing: signs and verifies, None: plain.
-        is_quiet: no heartbeat of ours after the first, for listeners on a radio.
+        is_quiet: for listeners on a radio: a heartbeat of ours only until the autopilot has heard it, and one in 30 s.
     """
 
     def __init__(
@@ -380,14 +382,19 @@ class Link:
         """Send the heartbeat; watch for streams that fell below their rate."""
         next_s = now_s()
         connections = self.transport.stats.connections
+        spoken, spoken_s = 0, 0.0
         while True:
             if self.transport.stats.connections != connections:
                 # a new connection may be a new port of the autopilot, which knows nothing of what was asked before
                 connections = self.transport.stats.connections
                 self._want_rates.set()
-            if not self._is_quiet or self._heartbeat_s is None:
-                # a listener speaks only until it is heard: routers forward nothing to a link that never spoke
+                spoken = 0
+            # A listener speaks too, but little: the autopilot forwards nothing to a link on which nobody spoke.
+            is_new = spoken < 2 or not self.is_alive
+            if not self._is_quiet or is_new or now_s() - spoken_s >= LISTENER_BEAT_S:
                 self.send(codec.heartbeat(self._system_status))
+                spoken += self.transport.state is TransportState.OPEN
+                spoken_s = now_s()
             if self._signing is not None:
                 self._advance_signing()
             now = now_s()
