@@ -15,7 +15,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.messages import Mode
-from sitl.autopilot import commands
 from sitl.autopilot import kernel as k
 from sitl.autopilot.chart import Chart
 from sitl.autopilot.config import EKF_READY_S, AutopilotConfig, GpsFault, Truth, VaneFault
@@ -23,12 +22,12 @@ from sitl.autopilot.failsafe import Failsafe
 from sitl.autopilot.fence import CHECK_S, Fence
 from sitl.autopilot.ftp import FtpServer
 from sitl.autopilot.helm import Helm
-from sitl.autopilot.items import Item
-from sitl.autopilot.links import FIRST_STREAMS_S, LOOP_S, Link, Router
+from sitl.autopilot.links import LOOP_S, Link
 from sitl.autopilot.parameter_server import ParameterServer
 from sitl.autopilot.parameters import Parameters
+from sitl.autopilot.ports import Ports
 from sitl.autopilot.storage import Storage
-from sitl.autopilot.telemetry import BUILDERS, POSITION_MODES, apparent_wind
+from sitl.autopilot.telemetry import POSITION_MODES
 from sitl.autopilot.traffic import Traffic, Vessel
 from sitl.autopilot.transfer import TransferServer
 from sitl.autopilot.vehicle import Vehicle
@@ -54,7 +53,7 @@ class Autopilot:
     def __init__(self, config: AutopilotConfig, wind: Wind, seed: int) -> None:
         self.config = config
         self.seed = seed
-        self.links: dict[int, Link] = {}
+        self.ports: Ports = Ports(self, config.sysid)
         self.chart = Chart(config.home)
         self.parameters = Parameters(config.parameters, new_names=config.new_parameter_names)
         twd, tws = wind.at(0.0)
@@ -64,7 +63,6 @@ class Autopilot:
         self.vehicle: Vehicle = Vehicle(
             wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed
         )
-        self._router = Router(config.sysid)
         self.battery_v = config.battery_v
         self._gps_fault = GpsFault()
         self._gps_lost_s = math.inf
@@ -100,9 +98,7 @@ class Autopilot:
         self.ftp = FtpServer(self)
         self.traffic = Traffic(self)
         self.failsafe = Failsafe(self)
-        self._parameter_server = ParameterServer(self)
-        self._text_id = 0
-        self._late_texts: list[tuple[int, str]] = []
+        self.parameter_server = ParameterServer(self)
         self._texts = iter(_BOOT_TEXTS)
         self._next_text = next(self._texts, None)
         if self.parameters.flag("FENCE_ENABLE"):
@@ -147,11 +143,9 @@ class Autopilot:
 
     def _due_tick(self) -> int:
         tick = self.vehicle.tick
-        if self._late_texts or self._parameter_server.is_busy or any(link.inbox for link in self.links.values()):
+        if self.parameter_server.is_busy or self.ports.has_work:
             return tick + 1
-        due = min(self.helm.due_s, self.failsafe.due_s, self._reboot_at_s)
-        for link in self.links.values():
-            due = min(due, link.due_s)
+        due = min(self.ports.due_s, self.helm.due_s, self.failsafe.due_s, self._reboot_at_s)
         waiting = self.transfers.due_s
         if waiting is not None:
             due = min(due, waiting)
@@ -181,146 +175,49 @@ class Autopilot:
                 self.announce(mav.MAV_SEVERITY_INFO, "Field Elevation Set: 0m")
         if events:
             self.helm.happened(events)
-        for link in list(self.links.values()):
-            if link.inbox:
-                data = bytes(link.inbox)
-                link.inbox.clear()
-                for m in link.parse(data):
-                    self._message(m, link)
+        self.ports.read()
         self.transfers.update(t_s)
         self.failsafe.update()
         self.helm.update()
         if self.fence.is_enabled and t_s >= self._fence_due_s - 1e-9:
             self._fence_due_s = t_s + CHECK_S
-            self._check_fence()
-        self._parameter_server.update()
-        for link in self.links.values():
-            self._send_streams(link, t_s)
-        late, self._late_texts = self._late_texts, []
-        for severity, text in late:
-            self.announce(severity, text)
+            self.failsafe.watch_fence()
+        self.parameter_server.update()
+        self.ports.send_due()
 
-    # --------------------------------------------------------------------------------------------- bytes
-    def receive(self, link_id: int, data: bytes) -> None:
-        """Take bytes that arrived on a port; they are read at the next loop."""
-        link = self.open_link(link_id)
-        if len(link.inbox) < 1 << 20:
-            link.inbox += data
-
-    def take_outgoing(self, link_id: int) -> bytes:
-        """Return the bytes to send on a port, and forget them."""
-        return self.open_link(link_id).take()
+    # --------------------------------------------------------------------------------------------- ports
+    @property
+    def links(self) -> dict[int, Link]:
+        """The open ports by number."""
+        return self.ports.links
 
     def open_link(self, link_id: int) -> Link:
         """Return a port; a new one sends the default streams from now on."""
-        link = self.links.get(link_id)
-        if link is None:
-            link = self.links[link_id] = Link(link_id, self.config.sysid)
-            link.restart(self.t_s)
-        return link
+        return self.ports.open(link_id)
 
     def close_link(self, link_id: int) -> None:
         """Take a port away."""
-        self.links.pop(link_id, None)
+        self.ports.links.pop(link_id, None)
 
-    def _message(self, m: Any, link: Link) -> None:
-        sender = (m.get_srcSystem(), m.get_srcComponent())
-        link.is_heard = True
-        link.last_heard_s = self.t_s
-        self._router.learn(m, link.number)
-        is_ours, forward = self._router.route(m, link.number, self.links)
-        frame = bytes(m.get_msgbuf())
-        for number in forward:
-            self.links[number].forward(frame)
-        if not is_ours:
-            return
-        name = m.get_type()
-        if name in {"COMMAND_LONG", "COMMAND_INT"}:
-            commands.execute(self, m, link)
-        elif name.startswith("MISSION_"):
-            self._mission_message(m, name, link)
-        elif name.startswith("PARAM_"):
-            self._parameter_server.handle(m, link)
-        elif name in {"SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_GLOBAL_INT", "SET_POSITION_TARGET_LOCAL_NED"}:
-            commands.setpoint(self, m)
-        elif name == "HEARTBEAT":
-            self.failsafe.heard(sender)
-        elif name == "FILE_TRANSFER_PROTOCOL":
-            self.ftp.handle(m, link.number)
-        elif name == "SET_MODE":
-            self.helm.set_mode(m.custom_mode)
-        elif name == "REQUEST_DATA_STREAM":
-            commands.send_group(self, m, link)
-        elif name == "TIMESYNC" and m.tc1 == 0:
-            link.send(mav.MAVLink_timesync_message(self.boot_us * 1000, m.ts1))
+    def receive(self, link_id: int, data: bytes) -> None:
+        """Take bytes that arrived on a port; they are read at the next loop."""
+        self.ports.receive(link_id, data)
 
-    def _mission_message(self, m: Any, name: str, link: Link) -> None:
-        if name == "MISSION_SET_CURRENT":
-            if m.seq < len(self.helm.mission.items) and self.helm.mission.set_current(m.seq):
-                self.send_once(link, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
-        else:
-            self.transfers.handle(m, link.number, self.t_s)
+    def take_outgoing(self, link_id: int) -> bytes:
+        """Return the bytes to send on a port, and forget them."""
+        return self.ports.open(link_id).take()
 
-    def _send_streams(self, link: Link, t_s: float) -> None:
-        if link.due_s > t_s + 1e-9:
-            return
-        due = link.take_due(t_s)
-        if self.boot_s < FIRST_STREAMS_S:
-            due = [i for i in due if i == mav.MAVLINK_MSG_ID_HEARTBEAT]
-        for msgid in due:
-            if msgid == mav.MAVLINK_MSG_ID_AIS_VESSEL:
-                message = self.traffic.next_message(link.number)
-            else:
-                message = BUILDERS[msgid](self)
-            if message is None:
-                continue
-            link.send(message)
-            if msgid == mav.MAVLINK_MSG_ID_WIND:
-                # named floats go out on every port on which somebody was heard, whoever asked for WIND
-                for named in apparent_wind(self):
-                    for other in self.links.values():
-                        if other is link or other.is_heard:
-                            other.send(named)
-
-    # --------------------------------------------------------------------------------------------- voice
     def announce(self, severity: int, text: str) -> None:
-        """STATUSTEXT on every port, in chunks of 50 characters."""
-        pieces = [text[i:i + 50] for i in range(0, len(text), 50)] or [""]
-        ident = 0
-        if len(pieces) > 1:
-            self._text_id = self._text_id % 65535 + 1
-            ident = self._text_id
-        for n, piece in enumerate(pieces):
-            self.broadcast(mav.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), ident, n))
+        """STATUSTEXT on every port."""
+        self.ports.announce(severity, text)
 
     def announce_after_ack(self, severity: int, text: str) -> None:
         """As ``announce``, behind the acknowledgement of the command being carried out."""
-        self._late_texts.append((severity, text))
-
-    def after_ack(self) -> None:
-        """A command was acknowledged: say what belongs behind it."""
-        late, self._late_texts = self._late_texts, []
-        for severity, text in late:
-            self.announce(severity, text)
+        self.ports.announce_after_ack(severity, text)
 
     def broadcast(self, message: Any) -> None:
         """Send on every port."""
-        for link in self.links.values():
-            link.send(message)
-
-    def reply(self, message: Any, link: int) -> None:
-        """Send on one port."""
-        if link in self.links:
-            self.links[link].send(message)
-
-    def send_once(self, link: Link, msgid: int) -> bool:
-        """Send a message now; False if there is none of that kind, or none at this moment."""
-        builder = BUILDERS.get(msgid)
-        message = builder(self) if builder is not None else None
-        if message is None:
-            return False
-        link.send(message)
-        return True
+        self.ports.broadcast(message)
 
     def parameter_changed(self, name: str) -> None:
         """Act on a parameter that somebody set."""
@@ -413,15 +310,6 @@ class Autopilot:
             self.announce_after_ack(mav.MAV_SEVERITY_INFO, "Throttle disarmed")
         return True
 
-    def do_item(self, item: Item) -> None:
-        """Carry out a DO command of the mission."""
-        if item.command == mav.MAV_CMD_DO_FENCE_ENABLE:
-            self.switch_fence(enabled=item.p1 == 1.0)
-        elif item.command == mav.MAV_CMD_DO_SET_HOME:
-            self.set_home(None if item.p1 == 1.0 else self.chart.to_en(item.x, item.y))
-        elif item.command == mav.MAV_CMD_DO_AUX_FUNCTION and int(item.p1) == 63:
-            self.vehicle.ask_tack()
-
     # -------------------------------------------------------------------------------------------- fence
     def switch_fence(self, *, enabled: bool) -> bool:
         """Enable or disable the fence."""
@@ -429,22 +317,6 @@ class Autopilot:
         self.vehicle.avoid(near=False, ease=False)
         self._fence_due_s = self.t_s
         return True
-
-    def _check_fence(self) -> None:
-        if not self.has_origin:
-            return
-        get, fence = self.parameters.get, self.fence
-        clearance = fence.clearance_m(
-            self.vehicle.position, self.home_en, self.parameters.flag("FENCE_TYPE"), get("FENCE_RADIUS")
-        )
-        begins = fence.judge(clearance, self.boot_ms)
-        margin = get("FENCE_MARGIN")
-        reach = margin + get("WP_SPEED") / max(get("PSC_POS_P"), 0.01)
-        avoiding = self.parameters.flag("AVOID_ENABLE") & 1 and not fence.is_breached and self.is_armed
-        fence.is_limiting = bool(avoiding) and clearance <= reach
-        self.vehicle.avoid(near=fence.is_limiting, ease=fence.is_limiting and clearance <= margin)
-        if begins and self.is_armed:
-            self.failsafe.fence_breached()
 
     # ------------------------------------------------------------------------------------ for scenarios
     @property
@@ -472,10 +344,7 @@ class Autopilot:
         self._reboot_at_s = math.inf
         storage, mission, fence = self.storage, list(self.helm.mission.items), self.fence.items
         self._boot_at_s = self.t_s
-        self._router.forget()
-        for link in self.links.values():
-            link.restart(self.t_s)
-            link.take()
+        self.ports.restart(self.t_s)
         self.vehicle.set_armed(armed=False)
         self.vehicle.clear_tack()
         self.vehicle.avoid(near=False, ease=False)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
+from sitl.autopilot.helm import AUX_TACK
 from sitl.autopilot.links import GROUPS, LOOP_S, OPTIONAL_STREAMS, STREAMABLE, Link
 from sitl.autopilot.telemetry import BUILDERS, autopilot_version
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 # MAV_RESULT
 OK, REFUSED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 _FORCE = 21196
-_AUX_TACK = 63
 # the loop runs at 50 Hz and a message may take part in four of five loops
 _FASTEST_S = 1.0 / 40.0
 
@@ -37,7 +37,7 @@ def execute(a: Autopilot, m: Any, link: Link) -> None:
         result = _dispatch(a, m, link, p, place)
     ack = mav.MAVLink_command_ack_message(m.command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent())
     link.send(ack)
-    a.after_ack()
+    a.ports.after_ack()
 
 
 def _dispatch(a: Autopilot, m: Any, link: Link, p: tuple[float, ...], place: tuple[int, int]) -> int:
@@ -49,7 +49,7 @@ def _dispatch(a: Autopilot, m: Any, link: Link, p: tuple[float, ...], place: tup
         link.send(mav.MAVLink_message_interval_message(int(p[0]), round(interval * 1e6) if interval else 0))
         return OK
     if command == mav.MAV_CMD_REQUEST_MESSAGE:
-        return OK if a.send_once(link, int(p[0])) else FAILED
+        return OK if a.ports.send_once(link, int(p[0])) else FAILED
     if command == mav.MAV_CMD_DO_SET_MODE:
         return OK if a.helm.set_mode(int(p[1])) else FAILED
     if command == mav.MAV_CMD_COMPONENT_ARM_DISARM:
@@ -63,14 +63,14 @@ def _dispatch(a: Autopilot, m: Any, link: Link, p: tuple[float, ...], place: tup
         run = p[1] == 1.0 and a.helm.mode is Mode.AUTO
         if not (0 <= p[0] < len(mission.items) and mission.set_current(int(p[0]), run=run)):
             return REFUSED
-        a.send_once(link, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
+        a.ports.send_once(link, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
         return OK
     if command == mav.MAV_CMD_DO_REPOSITION:
         return _reposition(a, m, p, place)
     if command == mav.MAV_CMD_DO_FENCE_ENABLE:
         return OK if a.switch_fence(enabled=p[0] == 1.0) else FAILED
     if command == mav.MAV_CMD_DO_AUX_FUNCTION:
-        if int(p[0]) != _AUX_TACK:
+        if int(p[0]) != AUX_TACK:
             return FAILED
         if int(p[1]) == 2:
             a.vehicle.ask_tack()
@@ -85,7 +85,7 @@ def _dispatch(a: Autopilot, m: Any, link: Link, p: tuple[float, ...], place: tup
     if command == mav.MAV_CMD_DO_SET_HOME:
         return OK if a.set_home(None if p[0] == 1.0 else a.chart.to_en(*place)) else FAILED
     if command == mav.MAV_CMD_GET_HOME_POSITION:
-        return OK if a.send_once(link, mav.MAVLINK_MSG_ID_HOME_POSITION) else FAILED
+        return OK if a.ports.send_once(link, mav.MAVLINK_MSG_ID_HOME_POSITION) else FAILED
     if command == mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES:
         link.send(autopilot_version(a))
         return OK

@@ -110,9 +110,27 @@ class Failsafe:
             helm.set_mode(Mode.HOLD)
         elif action == 5:
             self._a.disarm()
-            self._a.after_ack()
+            self._a.ports.after_ack()
 
-    def fence_breached(self) -> None:
+    def watch_fence(self) -> None:
+        """Compare the position with the fence: avoidance near it, action when a breach begins."""
+        a = self._a
+        if not a.has_origin:
+            return
+        get, fence = a.parameters.get, a.fence
+        clearance = fence.clearance_m(
+            a.vehicle.position, a.home_en, a.parameters.flag("FENCE_TYPE"), get("FENCE_RADIUS")
+        )
+        begins = fence.judge(clearance, a.boot_ms)
+        margin = get("FENCE_MARGIN")
+        reach = margin + get("WP_SPEED") / max(get("PSC_POS_P"), 0.01)
+        avoiding = a.parameters.flag("AVOID_ENABLE") & 1 and not fence.is_breached and a.is_armed
+        fence.is_limiting = bool(avoiding) and clearance <= reach
+        a.vehicle.avoid(near=fence.is_limiting, ease=fence.is_limiting and clearance <= margin)
+        if begins and a.is_armed:
+            self._fence_breached()
+
+    def _fence_breached(self) -> None:
         """A breach began: change mode by FENCE_ACTION, and leave ten seconds to whoever steers then."""
         a = self._a
         if a.t_s < self._recovery_until_s:

@@ -57,7 +57,7 @@ class FtpServer:
             head = _FRAME.pack((seq + 1) & 0xFFFF, self._session, code, len(answer), opcode, 0, 0, at)
             reply = (head + answer).ljust(251, b"\0")
             self._last = (sender, seq, reply)
-        self._a.reply(mav.MAVLink_file_transfer_protocol_message(0, *sender, list(reply)), link)
+        self._a.ports.reply(mav.MAVLink_file_transfer_protocol_message(0, *sender, list(reply)), link)
 
     def _execute(self, opcode: int, session: int, data: bytes, offset: int, size: int) -> tuple[int, bytes, int]:
         t_s = self._a.t_s

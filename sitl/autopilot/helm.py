@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot
 
 GUIDED_TIMEOUT_S = 3.0
+AUX_TACK = 63
 KNOWN = frozenset({
     Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.HOLD, Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED,
 })
@@ -261,7 +262,13 @@ class Helm:
 
     def do(self, index: int, item: Item) -> None:
         """Carry out a DO command."""
-        self._a.do_item(item)
+        a = self._a
+        if item.command == mav.MAV_CMD_DO_FENCE_ENABLE:
+            a.switch_fence(enabled=item.p1 == 1.0)
+        elif item.command == mav.MAV_CMD_DO_SET_HOME:
+            a.set_home(None if item.p1 == 1.0 else a.chart.to_en(item.x, item.y))
+        elif item.command == mav.MAV_CMD_DO_AUX_FUNCTION and int(item.p1) == AUX_TACK:
+            a.vehicle.ask_tack()
         if is_reported(item):
             self._report(index)
 

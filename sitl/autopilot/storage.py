@@ -83,7 +83,7 @@ class Storage:
 
     def reply(self, message: Any, link: int) -> None:
         """Send on one port."""
-        self._a.reply(message, link)
+        self._a.ports.reply(message, link)
 
     def announce(self, severity: int, text: str) -> None:
         """STATUSTEXT on every port."""
