@@ -168,6 +168,9 @@ def _read_log(path: Path) -> Record:
     rows: list[tuple[float, float, float]] = []
     headings: list[tuple[float, float]] = []
     felt: list[tuple[float, float]] = []
+    if path.stat().st_size == 0:
+        raise InputError(str(path), "", "is empty", "name a tlog or .bin")
+    log = None
     try:
         log = mavutil.mavlink_connection(str(path))
         while (message := log.recv_match(type=["WIND", "ATTITUDE", "ATT", "NAMED_VALUE_FLOAT"])) is not None:
@@ -186,6 +189,10 @@ def _read_log(path: Path) -> Record:
                 rows.append((t_s, float(message.direction), float(message.speed)))
     except (OSError, ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
         raise InputError(str(path), "", f"cannot be read as a log ({error})", "name a tlog or .bin") from error
+    finally:
+        for part in ("data_map", "filehandle", "f"):      # DFReader keeps a map and a file, mavlogfile a file
+            if (opened := getattr(log, part, None)) is not None:
+                opened.close()
     kept = [r for i, r in enumerate(rows) if i == 0 or r[0] > rows[i - 1][0]]
     kept = [r for r in kept if all(math.isfinite(v) for v in r) and r[2] >= 0.0]
     if len(kept) < 2:

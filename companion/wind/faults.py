@@ -72,6 +72,7 @@ class Spikes:
         self._sin = self._cos = 0.0
         self._rough_rad = math.radians(8.0)
         self._away_s = 0.0
+        self._share_before = 0.0
         self.share = 0.0
         self.is_spiking = False
 
@@ -85,13 +86,19 @@ class Spikes:
             return False
         off = abs(wrap_pi(direction_rad - math.atan2(self._sin, self._cos)))
         is_far = off > max(_SPIKE_RAD, _SPIKE_ROUGH * self._rough_rad)
+        if is_far and self._away_s == 0.0:
+            self._share_before = self.share
         self._away_s = self._away_s + dt_s if is_far else 0.0
         is_spike = is_far and self._away_s < max(_SHIFT_S, 1.5 * dt_s)
         self.share += gain(dt_s, _SHARE_S) * ((1.0 if is_spike else 0.0) - self.share)
-        self.is_spiking = self.share > (_FEW if self.is_spiking else _MANY)
+        if is_far and not is_spike:    # it stayed: the wind is there now, and those were no spikes
+            self.share = self._share_before
+        # A verdict waits until it is clear that the present departure is no shift.
+        if self._away_s == 0.0 or self.is_spiking:
+            self.is_spiking = self.share > (_FEW if self.is_spiking else _MANY)
         if is_spike:
             return True
-        if is_far:                     # it stayed: the wind is there now
+        if is_far:
             self._sin, self._cos, self._away_s = math.sin(direction_rad), math.cos(direction_rad), 0.0
             return False
         g = gain(dt_s, 5.0)
@@ -104,8 +111,8 @@ class Spikes:
 _SETTLE_S = 10.0                      # after a manoeuvre, before the wind is believed again
 _LEG_S = 40.0                         # averaged on each side of a tack
 _LEG_LEAST_S = 15.0
-_FORGET = 0.9                         # per tack: about ten tacks count
-_PRIOR_RAD = math.radians(6.0)        # expected mounting error, before any tack
+_FORGET = 0.93                        # per tack: about fifteen tacks count
+_PRIOR_RAD = math.radians(9.0)        # expected mounting error, before any tack
 _SURE = 3.0                           # standard errors
 _OFFSET_LEAST_RAD = math.radians(4.0)
 
@@ -133,6 +140,7 @@ class TackOffset:
         self._normal = np.zeros((2, 2))
         self._right = np.zeros(2)
         self.tacks = 0
+        self._solution = (0.0, 0.0, _PRIOR_RAD, _PRIOR_RAD)
 
     def update(
         self, t_s: float, wind_en_mps: tuple[float, float], velocity_en_mps: tuple[float, float], awa_rad: float, *,
@@ -155,8 +163,8 @@ class TackOffset:
         if math.hypot(east, north) < 1.5 or abs(awa_rad) > math.radians(130.0) or abs(awa_rad) < math.radians(12.0):
             return
         ae, an = east + velocity_en_mps[0], north + velocity_en_mps[1]
-        self._leg *= math.exp(-dt_s / _LEG_S)
-        self._leg += dt_s * np.array([1.0, east, north, an, -ae, side * an, -side * ae])
+        keep = math.exp(-dt_s / _LEG_S)
+        self._leg = keep * self._leg + dt_s * np.array([1.0, east, north, an, -ae, side * an, -side * ae])
         if self._before is not None and self._leg[0] >= _LEG_LEAST_S:
             if t_s - self._before_s > 3.0 * _LEG_S:
                 self._before = None
@@ -171,6 +179,7 @@ class TackOffset:
         self._normal = _FORGET * self._normal + matrix.T @ matrix / unrest**2
         self._right = _FORGET * self._right + matrix.T @ step[1:3] / unrest**2
         self.tacks += 1
+        self._solution = self._solve()
 
     def _solve(self) -> tuple[float, float, float, float]:
         normal = self._normal + np.eye(2) / _PRIOR_RAD**2
@@ -181,19 +190,19 @@ class TackOffset:
     @property
     def offset_rad(self) -> float | None:
         """ε, positive clockwise, None before two tacks."""
-        return self._solve()[0] if self.tacks >= 2 else None
+        return self._solution[0] if self.tacks >= 2 else None
 
     @property
     def side_rad(self) -> float | None:
         """κ, positive when the vane reads too wide on both tacks, None before two tacks."""
-        return self._solve()[1] if self.tacks >= 2 else None
+        return self._solution[1] if self.tacks >= 2 else None
 
     @property
     def sure_rad(self) -> float:
         """The part of |ε| + |κ| that is surely there: more than 4 deg and than three standard errors; else 0."""
         if self.tacks < 2:
             return 0.0
-        e, k, se, sk = self._solve()
+        e, k, se, sk = self._solution
         return sum(abs(v) for v, s in ((e, se), (k, sk)) if abs(v) > max(_OFFSET_LEAST_RAD, _SURE * s))
 
     @property

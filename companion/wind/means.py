@@ -32,6 +32,8 @@ class RollingMean(Base):
         self._window_s = window_s
         # (time, sin, cos, speed, weight); readings closer than a 400th of the window share a place.
         self._window: deque[tuple[float, float, float, float, float]] = deque(maxlen=512)
+        self._sums = [0.0, 0.0, 0.0, 0.0]
+        self._appended = 0
         self._clock_s = 0.0
         self._mean, self._speed = 0.0, 0.0
         self._kept: deque[tuple[float, float, float]] = deque(maxlen=int(_KNOTS_S[-1] / _EVERY_S) + 8)
@@ -51,10 +53,16 @@ class RollingMean(Base):
         if len(self._window) > 1 and now - self._window[-2][0] < self._window_s / 400.0:
             _, s, c, v, w = self._window.pop()
             new = (now, new[1] + s, new[2] + c, new[3] + v, new[4] + w)
+            self._sums = [a - b for a, b in zip(self._sums, (s, c, v, w), strict=True)]
         self._window.append(new)
+        self._sums = [a + b for a, b in zip(self._sums, new[1:], strict=True)]
         while len(self._window) > 1 and self._window[0][0] <= now - self._window_s:
-            self._window.popleft()
-        s, c, v, w = (sum(row[i] for row in self._window) for i in range(1, 5))
+            old = self._window.popleft()
+            self._sums = [a - b for a, b in zip(self._sums, old[1:], strict=True)]
+        self._appended += 1
+        if self._appended % 1000 == 0:      # what rounding has left behind
+            self._sums = [sum(row[i] for row in self._window) for i in range(1, 5)]
+        s, c, v, w = self._sums
         self._mean, self._speed = math.atan2(s, c), v / w
         if not self._kept or now - self._kept[-1][0] >= _EVERY_S - 1e-6:
             if len(self._kept) == self._kept.maxlen:
