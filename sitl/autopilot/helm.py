@@ -50,7 +50,7 @@ class Helm:
         self._is_arrival_told = False
         self._told_home = False
         self._setpoint_s = 0.0
-        autopilot.vehicle.hold()
+        autopilot.vehicle.sticks_at_rest()
 
     # ------------------------------------------------------------------------------------------- modes
     def set_mode(self, number: int) -> bool:
@@ -82,6 +82,8 @@ class Helm:
             self.sail_home()
         elif mode in {Mode.LOITER, Mode.GUIDED}:
             self.loiter()
+        elif mode is Mode.MANUAL:
+            self._manual()
         else:
             self._hold()
         return True
@@ -95,6 +97,10 @@ class Helm:
     def _hold(self) -> None:
         self.task = Task.HOLD
         self._a.vehicle.hold()
+
+    def _manual(self) -> None:
+        self.task = Task.HOLD
+        self._a.vehicle.sticks_at_rest()
 
     def loiter(self) -> None:
         """Loiter where the boat could stop."""
@@ -142,7 +148,7 @@ class Helm:
             if self._hold_until_s > self._a.t_s:
                 return self._hold_until_s
             if self.mission.state is RunState.RUNNING and (
-                self.mission.has_do or (self.task is Task.LEG and self._is_reached) or self.mission.is_changed
+                (self.task is Task.LEG and self._is_reached) or self.mission.is_changed
             ):
                 return self._a.t_s
         return math.inf
@@ -200,6 +206,7 @@ class Helm:
             return True
         if item.command == mav.MAV_CMD_NAV_DELAY:
             self._hold_until_s = a.t_s + max(0.0, item.p1)
+            a.announce(mav.MAV_SEVERITY_INFO, f"Delaying {int(item.p1)} sec")
             self.loiter()
             return True
         if item.command in {mav.MAV_CMD_NAV_GUIDED_ENABLE, mav.MAV_CMD_NAV_SET_YAW_SPEED}:
@@ -254,15 +261,22 @@ class Helm:
             return False
         if self._hold_until_s > 0.0 and item.p1 > 0.0 and item.command != mav.MAV_CMD_NAV_LOITER_TURNS:
             self._report(index)
+            if item.command == mav.MAV_CMD_NAV_LOITER_TIME:
+                a.announce(mav.MAV_SEVERITY_WARNING, "Finished active loiter")
         self._corner_passed = a.vehicle.state[k.S_STEER] == k.STEER_LEG
         return True
 
     def _report(self, index: int) -> None:
+        # one message a loop: that of a DO command which is done at once takes the place of the waypoint before it
+        items = self.mission.items
+        if index + 1 < len(items) and is_reported(items[index + 1]):
+            return
         self._a.broadcast(mav.MAVLink_mission_item_reached_message(index))
 
     def do(self, index: int, item: Item) -> None:
         """Carry out a DO command."""
         a = self._a
+        a.announce(mav.MAV_SEVERITY_INFO, f"Mission: {index} {NAMES.get(item.command, 'Cmd')}")
         if item.command == mav.MAV_CMD_DO_FENCE_ENABLE:
             a.switch_fence(enabled=item.p1 == 1.0)
         elif item.command == mav.MAV_CMD_DO_SET_HOME:

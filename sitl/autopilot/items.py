@@ -35,6 +35,8 @@ NAMES = {
     mav.MAV_CMD_NAV_WAYPOINT: "WP", mav.MAV_CMD_NAV_LOITER_UNLIM: "LoitUnlim",
     mav.MAV_CMD_NAV_LOITER_TURNS: "LoitTurns", mav.MAV_CMD_NAV_LOITER_TIME: "LoitTime",
     mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL", mav.MAV_CMD_NAV_GUIDED_ENABLE: "NavGuidedEnable",
+    mav.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed", mav.MAV_CMD_DO_SET_HOME: "SetHome",
+    mav.MAV_CMD_DO_FENCE_ENABLE: "FenceEnable", mav.MAV_CMD_DO_AUX_FUNCTION: "AuxFunction",
     mav.MAV_CMD_NAV_DELAY: "Delay", mav.MAV_CMD_NAV_SET_YAW_SPEED: "NavSetYawSpeed",
 }
 _LOCATION = frozenset({
@@ -98,6 +100,10 @@ def accept(item: Item, kind: int) -> tuple[Item | None, int]:
         # Rover keeps the hold time only, as a 16 bit number; the acceptance radius is WP_RADIUS for all
         p1, p2, p3, p4 = float(max(-32768, min(32767, int(p1)))), 0.0, 0.0, 0.0
     frame = _FRAMES.get(item.frame, item.frame)
+    if kind == MISSION and (item.command not in _LOCATION or not (item.x or item.y)):
+        frame = 0  # what has no place comes back without a frame
+    if kind == MISSION and item.command == mav.MAV_CMD_NAV_LOITER_TIME:
+        p3 = -1.0 if p3 < 0.0 else 1.0  # the sense of turning is all that is kept
     if kind == FENCE:
         frame, p2, p3, p4 = 0, 0.0, 0.0, 0.0
     return item._replace(p1=p1, p2=p2, p3=p3, p4=p4, frame=frame, z=round(item.z * 100.0) / 100.0), 0

@@ -401,7 +401,9 @@ def _control(s: Vector, p: Vector) -> int:
         s[S_THROTTLE] = 0.0
         return 0
     if steer in (STEER_HOLD, STEER_OFF):
-        s[S_RUDDER], s[S_SAIL], s[S_INTEGRAL], s[S_WANT_RATE] = 0.0, p[P_SAIL_MAX], 0.0, 0.0
+        # HOLD eases the sheet; the throttle stick at rest hauls it in
+        sail = p[P_SAIL_MAX] if steer == STEER_HOLD else p[P_SAIL_MIN]
+        s[S_RUDDER], s[S_SAIL], s[S_INTEGRAL], s[S_WANT_RATE] = 0.0, sail, 0.0, 0.0
         s[S_THROTTLE] = 0.0
         return 0
     events = 0

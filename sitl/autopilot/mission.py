@@ -47,7 +47,6 @@ class Mission:
         self.nav_item: Item | None = None
         self.is_loaded = False
         self.is_changed = False
-        self._do_next = 0
         self._jumps: dict[int, int] = {}
 
     # ------------------------------------------------------------------------------------------- list
@@ -83,11 +82,6 @@ class Mission:
     def current_seq(self) -> int:
         """Index of the current navigation command, 0 when there is none."""
         return self.nav_index or 0
-
-    @property
-    def has_do(self) -> bool:
-        """Whether a DO command behind the current navigation command waits for its turn."""
-        return self._do_next > 0
 
     @property
     def mav_state(self) -> int:
@@ -167,7 +161,6 @@ class Mission:
             if not self._advance((self.nav_index or 0) + 1):
                 self._complete()
             return
-        self._run_do()
         if self._crew.verify_nav(self.nav_index, self.nav_item):
             self.is_loaded = False
             if not self._advance(self.nav_index + 1):
@@ -177,15 +170,6 @@ class Mission:
         """Return the navigation command after ``index``, without counting jumps."""
         found = self._next_nav(index + 1)
         return None if found is None else self.items[found]
-
-    def _run_do(self) -> None:
-        # the DO commands after the current navigation command run while it does, one each loop
-        index, self._do_next = self._do_next, 0
-        if 0 < index < len(self.items):
-            item = self.items[index]
-            if item.command not in NAV_COMMANDS and item.command != mav.MAV_CMD_DO_JUMP:
-                self._do_next = index + 1
-                self._crew.do(index, item)
 
     def _advance(self, index: int) -> bool:
         jumps = 0
@@ -204,9 +188,9 @@ class Mission:
             elif item.command in NAV_COMMANDS:
                 self.nav_index, self.nav_item = index, item
                 self.is_loaded = True
-                self._do_next = index + 1
                 return self._crew.start_nav(index, item) or self._advance(index + 1)
             else:
+                # DO commands between two navigation commands run when the second begins
                 self._crew.do(index, item)
                 index += 1
         return False

@@ -134,6 +134,10 @@ class Vehicle:
         """Sheet eased, rudder centred."""
         self._steer(k.STEER_HOLD)
 
+    def sticks_at_rest(self) -> None:
+        """MANUAL with nobody at the sticks: rudder centred, sheet hauled in."""
+        self._steer(k.STEER_OFF)
+
     def sail_leg(
         self, origin: tuple[float, float], destination: tuple[float, float], following: tuple[float, float] | None,
         *, is_corner: bool, goes_on: bool,
