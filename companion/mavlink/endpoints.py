@@ -26,6 +26,9 @@ from companion.mavlink.transport import (
 
 BACKOFF_BASE_S = 0.25
 BACKOFF_CAP_S = 10.0
+# A TCP connection on which nothing came for this long is half open (the other side lost its power): hung up and made
+# anew. An autopilot says something every second [s].
+SILENT_TCP_S = 15.0
 # A peer of udpin that was silent this long gives its place to the next one that speaks (a restarted router).
 PEER_SILENCE_S = 3.0
 
@@ -169,14 +172,27 @@ class StreamEndpoint:
             self._state = TransportState.OPEN
             self._stats.connections += 1
             try:
-                lost = await stream.lost
-                self._stats.last_error = _reason(lost) if lost else "closed by the other side"
+                self._stats.last_error = await self._ended(stream)
             finally:
                 self._wire = self._stream = None
                 _hang_up(wire)
             # a connection that held starts the back-off from its beginning; one that fell at once does not
             attempt = 0 if now_s() - opened_s > BACKOFF_CAP_S else attempt + 1
             await asyncio.sleep(backoff_s(attempt, self._rng))
+
+
+    async def _ended(self, stream: _Stream) -> str:
+        """Wait for the end of a connection, or for a silence that means the same; return the reason."""
+        while True:
+            heard = self._stats.bytes_in
+            try:
+                async with asyncio.timeout(None if self._link.kind == "serial" else SILENT_TCP_S):
+                    lost = await asyncio.shield(stream.lost)
+            except TimeoutError:
+                if self._stats.bytes_in == heard:
+                    return f"silent for {SILENT_TCP_S:g} s"
+                continue
+            return _reason(lost) if lost else "closed by the other side"
 
 
 class _Accepting(_Stream):

@@ -25,7 +25,10 @@ CHUNK_BYTES = 239
 
 TERMINATE, RESET, OPEN_READ, READ, CREATE, WRITE, BURST_READ = 1, 2, 4, 5, 6, 7, 15
 ACK, NAK = 128, 129
-_EOF, _NO_SESSIONS, _UNKNOWN_COMMAND, _NOT_FOUND = 6, 5, 7, 10
+_EOF, _UNKNOWN_COMMAND, _NOT_FOUND = 6, 7, 10
+# What opening a file is refused with while a session of a program that died is still open: ArduRover says 1 (failed),
+# the protocol has 5 (no session free). Then sessions are reset and it is tried once more.
+_PERHAPS_BUSY = frozenset({1, 2, 4, 5, 8})
 ERRORS = {
     1: "failed", 2: "failed (errno)", 3: "wrong size", 4: "no such session", 5: "no session free",
     6: "end of file", 7: "unknown command", 8: "file exists", 9: "file protected", 10: "file not found",
@@ -160,7 +163,7 @@ class FtpWrite(_Ftp):
             return []
         opcode = self._request.opcode
         if packet.opcode == NAK:
-            if opcode == CREATE and self._error(packet) == _NO_SESSIONS and not self._reset_done:
+            if opcode == CREATE and self._error(packet) in _PERHAPS_BUSY and not self._reset_done:
                 self._reset_done = True
                 return self._ask(t_s, RESET)
             return self._refused(packet)
@@ -208,7 +211,7 @@ class FtpRead(_Ftp):
             if opcode == READ and self._error(packet) == _EOF:
                 self._end_at = min(self._request.offset, self._end_at or self._request.offset)
                 return self._next(t_s)
-            if opcode == OPEN_READ and self._error(packet) == _NO_SESSIONS and not self._reset_done:
+            if opcode == OPEN_READ and self._error(packet) in _PERHAPS_BUSY and not self._reset_done:
                 self._reset_done = True
                 return self._ask(t_s, RESET)
             return self._finish() if opcode == TERMINATE else self._refused(packet)

@@ -223,3 +223,24 @@ def test_a_peer_that_stops_reading_costs_frames_not_memory():
         server.close()
 
     run(main())
+
+
+def test_a_half_open_connection_is_made_anew():
+    async def main():
+        port = free_port("tcp")
+        calls = []
+
+        async def silent(_, writer):
+            calls.append(writer)
+
+        server = await asyncio.start_server(silent, "127.0.0.1", port)
+        client = open_link(f"tcp:127.0.0.1:{port}")
+        await client.open(lambda _: None)
+        await until(lambda: client.stats.connections == 2)
+        assert client.stats.last_error == "silent for 15 s"
+        await client.close()
+        for writer in calls:
+            writer.close()
+        server.close()
+
+    run(main(), speedup=20.0)
