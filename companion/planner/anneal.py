@@ -13,8 +13,20 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.planner.kernels import Boat, Floats, Grid, is_free, jit, track, walk, worst_half
-from companion.planner.moves import corner, fit_corners, kind_of
+from companion.planner.kernels import (
+    SLACK_RAD,
+    Boat,
+    Floats,
+    Grid,
+    is_free,
+    jit,
+    meets_target,
+    track,
+    turn_time,
+    walk,
+    worst_half,
+)
+from companion.planner.moves import corner, fit_corners, kind_of, relay
 
 MOST_POINTS = 1200
 
@@ -31,23 +43,14 @@ def uniform(state: NDArray[np.uint64]) -> float:
 
 
 @jit
-def reach(b: Boat, xs: Floats, ys: Floats, m: int, h0: float) -> tuple[float, float]:
-    """Return (time, TWA) on arrival at point m of the path."""
-    t, h = 0.0, h0
-    for i in range(m):
-        dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
-        length = math.hypot(dx, dy)
-        if length < 1e-9:
-            continue
-        a, v = track(b, dx, dy, t)
-        d = a - h
-        d = d - 2.0 * math.pi if d >= math.pi else (d + 2.0 * math.pi if d < -math.pi else d)
-        t += abs(d) / b.omega
-        if h * a < 0.0:
-            t += b.tack_s if abs(h + d - a) < 1e-6 else b.gybe_s
-        t += length / max(v, 1e-9)
-        h = a
-    return t, h
+def arrive(b: Boat, ax: float, ay: float, ex: float, ey: float, t: float, h: float) -> tuple[float, float]:
+    """Return (time, TWA) on arrival at e from a, where the boat is at time t with TWA h."""
+    dx, dy = ex - ax, ey - ay
+    length = math.hypot(dx, dy)
+    if length < 1e-9:
+        return t, h
+    a, v = track(b, dx, dy, t)
+    return t + turn_time(b, h, a) + length / max(v, 1e-9), a
 
 
 @jit
@@ -89,8 +92,8 @@ def _pair(r: float, low: bool) -> tuple[int, int]:
 
 
 @jit
-def collides(g: Grid, xs: Floats, ys: Floats, n: int, ox: Floats, oy: Floats, on: int) -> bool:
-    """Does the path collide, given that the old path (ox, oy, on) does not? Tests only the legs that differ."""
+def shared(xs: Floats, ys: Floats, n: int, ox: Floats, oy: Floats, on: int) -> tuple[int, int]:
+    """Return how many points two paths share at their beginning and, apart from those, at their end."""
     head = 0
     while head < n and head < on and xs[head] == ox[head] and ys[head] == oy[head]:
         head += 1
@@ -99,6 +102,64 @@ def collides(g: Grid, xs: Floats, ys: Floats, n: int, ox: Floats, oy: Floats, on
         ys[n - 1 - tail] == oy[on - 1 - tail]
     ):
         tail += 1
+    return head, tail
+
+
+@jit
+def timetable(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, at: Floats, course: Floats) -> None:
+    """Fill in when the boat is at each point and the TWA that it arrives there with."""
+    t, h = 0.0, h0
+    at[0], course[0] = t, h
+    for i in range(n - 1):
+        dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
+        length = math.hypot(dx, dy)
+        if length >= 1e-9:
+            a, v = track(b, dx, dy, t)
+            t += turn_time(b, h, a) + length / max(v, 1e-9)
+            h = a
+        at[i + 1], course[i + 1] = t, h
+
+
+@jit
+def time_after(
+    b: Boat, xs: Floats, ys: Floats, n: int, head: int, tail: int, at: Floats, course: Floats, on: int
+) -> float:
+    """Return the time of a path that shares ``head`` and ``tail`` points with one whose timetable is known.
+
+    Where nothing depends on the moment, only the legs that differ are walked (and the turn after them).
+    """
+    first = max(0, head - 1)
+    last = n - 1
+    timeless = b.kind == 0 and b.targets.shape[0] == 0
+    if timeless and tail > 1:
+        last = n - tail + 1
+    t, h = float(at[first]), float(course[first])
+    for i in range(first, last):
+        dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
+        length = math.hypot(dx, dy)
+        if length < 1e-9:
+            continue
+        a, v = track(b, dx, dy, t)
+        if v <= 1e-9 or abs(a) > b.max_twa + SLACK_RAD:
+            return math.inf
+        t1 = t + turn_time(b, h, a)
+        t2 = t1 + length / v
+        if abs(a) < worst_half(b, t1, t2) - SLACK_RAD:
+            return math.inf
+        if b.targets.shape[0] > 0 and (
+            meets_target(b, xs[i], ys[i], xs[i], ys[i], t, t1)
+            or meets_target(b, xs[i], ys[i], xs[i + 1], ys[i + 1], t1, t2)
+        ):
+            return math.inf
+        t, h = t2, a
+    if last < n - 1:
+        t += float(at[on - 1] - at[on - tail + 1])
+    return t
+
+
+@jit
+def collides(g: Grid, xs: Floats, ys: Floats, n: int, head: int, tail: int) -> bool:
+    """Does one of the legs that are not shared collide?"""
     for i in range(max(0, head - 1), min(n - 1, n - tail)):
         if not is_free(g, xs[i], ys[i], xs[i + 1], ys[i + 1]):
             return True
@@ -108,12 +169,29 @@ def collides(g: Grid, xs: Floats, ys: Floats, n: int, ox: Floats, oy: Floats, on
 @jit
 def propose(
     b: Boat, xs: Floats, ys: Floats, n: int, h0: float, goal: Floats, size: float, spots: Floats,
-    rng: NDArray[np.uint64],
+    at: Floats, course: Floats, rng: NDArray[np.uint64],
 ) -> int:
-    """Change the path in place by one random move and return its new number of points (0: no such move)."""
+    """Change the path in place by one random move and return its new number of points (0: no such move).
+
+    ``at`` and ``course`` are the path's timetable before the move.
+    """
     u = uniform(rng)
     step = size * math.exp(-14.0 * uniform(rng))
     inner = n - 2
+    if b.kind != 0 and inner > 0 and uniform(rng) < 0.15:                 # lay close-hauled legs again in time
+        i = int(uniform(rng) * (n - 2))
+        j = min(n - 1, i + 2 + int(5.0 * uniform(rng) * uniform(rng)))
+        r, longer = uniform(rng), -1
+        if r < 0.2 and n + 1 < MOST_POINTS:                               # ... one of them in two parts
+            m = i + int(uniform(rng) * (j - i))
+            f = uniform(rng)
+            n = _insert(xs, ys, n, m + 1, xs[m] + f * (xs[m + 1] - xs[m]), ys[m] + f * (ys[m + 1] - ys[m]))
+            j += 1
+        elif r < 0.8:                                                     # ... one of them longer or shorter
+            longer = i + int(uniform(rng) * (j - i))
+        if not relay(b, xs, ys, n, h0, i, j, longer, step if uniform(rng) < 0.5 else -step):
+            return 0
+        return n
     if u < 0.18 and inner > 0:                                            # push a corner anywhere
         i = 1 + int(uniform(rng) * inner)
         xs[i] += step * (2.0 * uniform(rng) - 1.0)
@@ -133,7 +211,7 @@ def propose(
             back = uniform(rng) < 0.5
             m = i - 1 if back else i + 1
             if 0 < m < n - 1:
-                t, h = reach(b, xs, ys, m - 1, h0)
+                t, h = at[m - 1], course[m - 1]
                 if back:
                     k1 = kind_of(math.atan2(xs[m] - xs[m - 1], ys[m] - ys[m - 1]))
                     k2 = kind_of(math.atan2(ax - xs[m], ay - ys[m]))
@@ -142,6 +220,8 @@ def propose(
                     k2 = kind_of(math.atan2(xs[m + 1] - xs[m], ys[m + 1] - ys[m]))
                 if k1 == k2:
                     return 0
+                if not back:
+                    t, h = arrive(b, xs[m - 2], ys[m - 2], xs[m - 1], ys[m - 1], at[m - 2], course[m - 2])
                 x, y, _, ok = corner(b, xs[m - 1], ys[m - 1], h, t, xs[m + 1], ys[m + 1], k1, k2)
                 if not ok:
                     return 0
@@ -161,7 +241,7 @@ def propose(
     if u < 0.56:                                                          # replace a stretch by one corner
         i = int(uniform(rng) * (n - 1))
         j = min(n - 1, i + 1 + int(4.0 * uniform(rng) * uniform(rng) + 0.7))
-        t, h = reach(b, xs, ys, i, h0)
+        t, h = at[i], course[i]
         k1, k2 = _pair(uniform(rng), ys[j] < ys[i])
         x, y, _, ok = corner(b, xs[i], ys[i], h, t, xs[j], ys[j], k1, k2)
         if not ok or n + 1 >= MOST_POINTS:
@@ -257,8 +337,9 @@ def anneal(
     for i in range(n):
         xs[i], ys[i] = points[i, 0], points[i, 1]
         bx[i], by[i] = xs[i], ys[i]
-    cost = walk(b, xs, ys, n, h0)
-    cost += price * n
+    at, course = np.empty(MOST_POINTS + 4), np.empty(MOST_POINTS + 4)
+    timetable(b, xs, ys, n, h0, at, course)
+    cost = walk(b, xs, ys, n, h0) + price * n
     best, bn = cost, n
     ratio = (cold / hot) ** (1.0 / max(1, rounds))
     heat = hot
@@ -266,19 +347,22 @@ def anneal(
         heat *= ratio
         for i in range(n):
             cx[i], cy[i] = xs[i], ys[i]
-        cn = propose(b, cx, cy, n, h0, goal, size, spots, rng)
+        cn = propose(b, cx, cy, n, h0, goal, size, spots, at, course, rng)
         if cn < 2:
             continue
         limit = cost - heat * math.log(1.0 - uniform(rng))
-        new = walk(b, cx, cy, cn, h0) + price * cn
+        head, tail = shared(cx, cy, cn, xs, ys, n)
+        new = time_after(b, cx, cy, cn, head, tail, at, course, n) + price * cn
         if new == math.inf and b.kind != 0:
             fit_corners(b, cx, cy, cn, h0, 1, False)
-            new = walk(b, cx, cy, cn, h0) + price * cn
-        if new > limit or collides(g, cx, cy, cn, xs, ys, n):
+            head, tail = shared(cx, cy, cn, xs, ys, n)
+            new = time_after(b, cx, cy, cn, head, tail, at, course, n) + price * cn
+        if new > limit or collides(g, cx, cy, cn, head, tail):
             continue
         cost, n = new, cn
         for i in range(n):
             xs[i], ys[i] = cx[i], cy[i]
+        timetable(b, xs, ys, n, h0, at, course)
         if cost < best:
             best, bn = cost, n
             for i in range(n):

@@ -133,6 +133,8 @@ def _improve(s: Searcher) -> None:
                       bound_s=1.05 * s.upper_s)
         else:
             s.next_turn()
+            if has_solid and s.turns % 3 == 0 and not s.is_done:
+                s.zoom()
             continue
         spent += s.effort.fraction - before
 

@@ -81,17 +81,19 @@ def _misses(
 
 @jit
 def lattice_search(
-    g: Grid, b: Boat, h0: float, axes: Floats, shape: Ints, steps: Ints, goal: Floats, box: Floats, gauge: Floats,
-    slack: float, bound: float, max_pops: int, shot_m: float,
+    g: Grid, b: Boat, origin: Floats, axes: Floats, shape: Ints, steps: Ints, goal: Floats, box: Floats,
+    gauge: Floats, slack: float, bound: float, max_pops: int, shot_m: float,
 ) -> tuple[float, Floats, int, bool]:
-    """Search; return (cost, points (n, 2), states expanded, exhausted).
+    """Search; return (arrival time, points (n, 2), states expanded, exhausted).
 
+    ``origin``: x, y, TWA and time of the start;
     ``axes`` (2, 2): axis vectors in rows [m]; ``shape``: ni, nj, i0, j0 of the start; ``steps`` (nd, 2): courses as
     lattice steps, sorted by angle; ``goal``: x, y, radius; ``box``: x0, y0, x1, y1 that nodes stay in; ``gauge``:
     least seconds per metre by direction (a table over [-π, π)), ``slack`` what the goal's disc saves; only paths
     below ``bound`` are looked for. Exhausted without a path: there is none on this lattice within the bound.
     """
     ni, nj, i0, j0 = shape[0], shape[1], shape[2], shape[3]
+    ox, oy, h0, t0 = origin[0], origin[1], origin[2], origin[3]
     nd = steps.shape[0]
     dx, dy = np.empty(nd), np.empty(nd)
     angle, duration, turn = np.empty(nd), np.empty(nd), np.empty(nd)
@@ -115,7 +117,7 @@ def lattice_search(
     start = i0 * nj + j0
     for k in range(nd):
         s = start * nd + k
-        cost[s] = turn_time(b, h0, angle[k])
+        cost[s] = t0 + turn_time(b, h0, angle[k])
         came[s] = _START
         keys[size], items[size] = cost[s], s
         size += 1
@@ -138,8 +140,8 @@ def lattice_search(
             break
         node, k = s // nd, s % nd
         i, j = node // nj, node % nj
-        x = (i - i0) * axes[0, 0] + (j - j0) * axes[1, 0]
-        y = (i - i0) * axes[0, 1] + (j - j0) * axes[1, 1]
+        x = ox + (i - i0) * axes[0, 0] + (j - j0) * axes[1, 0]
+        y = oy + (i - i0) * axes[0, 1] + (j - j0) * axes[1, 1]
         t = float(cost[s])
         # ---- the exact end, from near the goal and now and then from afar
         gx, gy = goal[0] - x, goal[1] - y
@@ -233,8 +235,8 @@ def lattice_search(
         i, j = node // nj, node % nj
         label = came[s]
         if (label != _MOVE or last != k) and (last != -2) and count < 4095:
-            px = (i - i0) * axes[0, 0] + (j - j0) * axes[1, 0]
-            py = (i - i0) * axes[0, 1] + (j - j0) * axes[1, 1]
+            px = ox + (i - i0) * axes[0, 0] + (j - j0) * axes[1, 0]
+            py = oy + (i - i0) * axes[0, 1] + (j - j0) * axes[1, 1]
             if abs(px - path[count - 1, 0]) + abs(py - path[count - 1, 1]) > 1e-9:
                 path[count, 0], path[count, 1] = px, py
                 count += 1
@@ -268,13 +270,18 @@ def _steps(reach: int) -> list[tuple[int, int]]:
 def run_lattice(
     world: World, gauge: Gauge, *, cells: int, reach: int, half_rad: float, box: tuple[float, float, float, float],
     bound_s: float = math.inf, max_pops: int = 1 << 60, downwind: bool = False, stretch: float = 1.0,
+    origin: tuple[float, float, float, float] | None = None, goal: tuple[float, float, float] | None = None,
 ) -> LatticeResult:
     """Search a lattice of about ``cells`` nodes whose axes lie at ``half_rad`` from the wind (or from dead down).
 
     ``reach`` 2 gives 16 courses, 3 gives 32. The step is fitted so that the goal is a node where it can be;
-    ``stretch`` scales it, for other lattices of the same kind.
+    ``stretch`` scales it, for other lattices of the same kind. ``origin`` (x, y, TWA, time) and ``goal`` (x, y,
+    radius) are the problem's own unless given.
     """
     b = world.boat
+    origin = origin or (0.0, 0.0, world.h0, 0.0)
+    goal = goal or (*world.goal, world.goal_radius)
+    start = np.array(origin[:2])
     half = min(max(half_rad, math.radians(8.0)), math.radians(82.0))
     u = np.array([[math.sin(half), math.cos(half)], [-math.sin(half), math.cos(half)]])
     if downwind:
@@ -282,10 +289,11 @@ def run_lattice(
     area = max((box[2] - box[0]) * (box[3] - box[1]), 1e-6)
     step = stretch * math.sqrt(area / (cells * abs(u[0, 0] * u[1, 1] - u[0, 1] * u[1, 0])))
     inverse = np.linalg.inv(u)  # (x, y) = (a, c) @ u, so (a, c) = (x, y) @ inverse
-    along = np.array(world.goal) @ inverse
+    along = (np.array(goal[:2]) - start) @ inverse
     sizes = [abs(v) / max(1, round(abs(v) / step)) if abs(v) > 0.6 * step else step for v in along]
     axes = u * np.array(sizes)[:, None]
-    corners = np.array([[box[i], box[j]] for i in (0, 2) for j in (1, 3)]) @ np.linalg.inv(axes)
+    corners = np.array([[box[i], box[j]] for i in (0, 2) for j in (1, 3)])
+    corners = (corners - start) @ np.linalg.inv(axes)
     low, high = np.floor(corners.min(axis=0)).astype(int), np.ceil(corners.max(axis=0)).astype(int)
     low, high = np.minimum(low, 0), np.maximum(high, 0)
     ni, nj = (high - low + 1).tolist()
@@ -299,9 +307,9 @@ def run_lattice(
     if not steps or ni * nj * len(steps) > 24_000_000:
         return LatticeResult(cost_s=math.inf, points=None, pops=0, exhausted=False)
     cost, points, pops, exhausted = lattice_search(
-        world.grid, b, world.h0, axes, np.array([ni, nj, -low[0], -low[1]], np.int32),
-        np.array([(i, j) for _, i, j in steps], np.int32), np.array([*world.goal, world.goal_radius]),
-        np.array(box), gauge.table, world.goal_radius * gauge.table_max, bound_s, max_pops, 6.0 * max(sizes),
+        world.grid, b, np.array(origin), axes, np.array([ni, nj, -low[0], -low[1]], np.int32),
+        np.array([(i, j) for _, i, j in steps], np.int32), np.array(goal),
+        np.array(box), gauge.table, goal[2] * gauge.table_max, bound_s, max_pops, 6.0 * max(sizes),
     )
     found = math.isfinite(cost) and len(points) > 0
     return LatticeResult(cost_s=float(cost) if found else math.inf, points=points if found else None,

@@ -101,3 +101,99 @@ def fit_corners(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, first: int, 
                             continue
             t, h = t2, a
             break
+
+
+@jit
+def _laid(b: Boat, kind: int, t: float, h: float, length: float) -> tuple[float, float]:
+    """Return (TWA, end time) of an edge course of this length begun from TWA h at time t."""
+    a = edge_angle(b, kind, t, t)
+    t2 = t
+    for _ in range(3):
+        if not abs(a) >= 0.0:
+            break
+        t1 = t + turn_time(b, h, a)
+        t2 = t1 + length / max(speed_at(b, a), 1e-9)
+        a = edge_angle(b, kind, t1, t2)
+    return a, t2
+
+
+@jit
+def relay(
+    b: Boat, xs: Floats, ys: Floats, n: int, h0: float, i: int, j: int, longer: int, by: float
+) -> bool:
+    """Lay the close-hauled legs between points i and j again, each at the edge of the no-go zone of its own time.
+
+    Lengths are kept (that of leg ``longer`` grows by ``by`` [m]) except the two at the last tack, which close the
+    gap. Returns False, with the path in disorder, where there is no tack between i and j or it does not close.
+    """
+    if b.cx != 0.0 or b.cy != 0.0 or j - i < 2 or j >= n:
+        return False
+    for _ in range(2):
+        c = -1
+        for k in range(i + 1, j):
+            if (xs[k] - xs[k - 1]) * (xs[k + 1] - xs[k]) < 0.0:
+                c = k
+        if c < 0:
+            return False
+        t, h = 0.0, h0
+        for k in range(j):
+            dx, dy = xs[k + 1] - xs[k], ys[k + 1] - ys[k]
+            length = math.hypot(dx, dy)
+            if length < 1e-9:
+                return False
+            if k >= i and dy <= 0.0:
+                return False
+            a, v = track(b, dx, dy, t)
+            if v <= 1e-9:
+                return False
+            if i <= k < c - 1:
+                if k == longer:
+                    length += by
+                    longer = -1
+                    if length <= 0.0:
+                        return False
+                kind = 0 if a >= 0.0 else 1
+                a, t2 = _laid(b, kind, t, h, length)
+                if not abs(a) >= 0.0:
+                    return False
+                # The rest of the block moves along, so that the lengths of its legs are kept.
+                mx, my = xs[k] + length * math.sin(a) - xs[k + 1], ys[k] + length * math.cos(a) - ys[k + 1]
+                for q in range(k + 1, c):
+                    xs[q] += mx
+                    ys[q] += my
+                t, h = t2, a
+            else:
+                t += turn_time(b, h, a) + length / v
+                h = a
+        end = t
+        for k in range(j - 1, c, -1):
+            dx, dy = xs[k + 1] - xs[k], ys[k + 1] - ys[k]
+            length = math.hypot(dx, dy)
+            kind = 0 if dx >= 0.0 else 1
+            a = math.atan2(dx, dy)
+            begin = end - length / max(speed_at(b, a), 1e-9)
+            a = edge_angle(b, kind, max(0.0, begin), max(0.0, end))
+            if not abs(a) >= 0.0:
+                return False
+            if k == longer:
+                length += by
+                longer = -1
+                if length <= 0.0:
+                    return False
+            mx, my = xs[k + 1] - length * math.sin(a) - xs[k], ys[k + 1] - length * math.cos(a) - ys[k]
+            for q in range(k, c, -1):
+                xs[q] += mx
+                ys[q] += my
+            end = begin
+        t, h = 0.0, h0
+        for k in range(c - 1):
+            dx, dy = xs[k + 1] - xs[k], ys[k + 1] - ys[k]
+            a, v = track(b, dx, dy, t)
+            t += turn_time(b, h, a) + math.hypot(dx, dy) / max(v, 1e-9)
+            h = a
+        k1 = 0 if xs[c] > xs[c - 1] else 1
+        x, y, _, ok = corner(b, xs[c - 1], ys[c - 1], h, t, xs[c + 1], ys[c + 1], k1, 1 - k1)
+        if not ok:
+            return False
+        xs[c], ys[c] = x, y
+    return True

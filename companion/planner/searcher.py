@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.planner.anneal import MOST_POINTS, anneal, check_path, follow, zigzag
+from companion.planner.anneal import MOST_POINTS, anneal, check_path, follow, timetable, uniform, zigzag
 from companion.planner.bound import Bound
 from companion.planner.gauge import Gauge
 from companion.planner.kernels import Floats, is_free
@@ -17,9 +17,9 @@ from companion.planner.solve import Effort
 from companion.planner.visibility import crossings, geodesics, graph_nodes
 from companion.planner.world import World
 
-LEG_PRICE = 2e-5
+LEG_PRICE = 4e-5
 """What a leg must save to be worth sailing, as a share of the path's time."""
-STOP_GAP = 2e-5
+STOP_GAP = 2e-4
 """Stop when the path is this close to the bound."""
 _CHUNK = 4_000
 _FIRST_CYCLE = 8_000
@@ -71,13 +71,13 @@ class Searcher:
         """Is there nothing left to find, or nothing left to spend?"""
         return self.effort.is_over or self.upper_s <= self.bound.tight_s * (1.0 + STOP_GAP)
 
-    def offer(self, points: Floats | None, origin: str) -> Candidate | None:
-        """Take a path as a candidate if it is feasible and new."""
+    def offer(self, points: Floats | None, origin: str, within: float = math.inf) -> Candidate | None:
+        """Take a path as a candidate if it is feasible, new, and not above ``within`` times the best."""
         if points is None or len(points) < 2:
             return None
         points = np.ascontiguousarray(points)
         cost = float(check_path(self.world.grid, self.world.boat, points, self.world.h0))
-        if not math.isfinite(cost):
+        if not math.isfinite(cost) or cost > within * self.upper_s:
             return None
         side = crossings(points, self.world.marks).tobytes()
         if any(abs(c.cost_s - cost) < 1e-6 * cost and c.side == side for c in self.pool):
@@ -267,11 +267,52 @@ class Searcher:
         self.effort.spend(max(1, found.pops // 8))
         return self.offer(found.points, f"lattice {cells}")
 
+    def zoom(self) -> None:
+        """Search a stretch of the best path again on a fine lattice of its own, between two points of the path."""
+        best = self.best
+        if best is None or len(best.points) < 2:
+            return
+        n = len(best.points)
+        at, course = np.empty(n), np.empty(n)
+        timetable(self.world.boat, best.points[:, 0].copy(), best.points[:, 1].copy(), n, self.world.h0, at, course)
+        span = at[-1] * (0.06, 0.12, 0.25, 0.45)[int(4.0 * uniform(self.rng))]
+        begin = uniform(self.rng) * (at[-1] - span)
+        i = int(np.searchsorted(at, begin, side="right")) - 1
+        j = int(np.searchsorted(at, begin + span, side="left"))
+        a, e = self._on_leg(best.points, at, i, begin), self._on_leg(best.points, at, j - 1, begin + span)
+        inside = best.points[i + 1 : j]
+        part = np.vstack([a[None, :], inside, e[None, :]])
+        low, high = part.min(axis=0), part.max(axis=0)
+        margin = 0.25 * float(np.hypot(*(high - low))) + 1e-6
+        moving = (best.points[i + 1] - best.points[i]) if i + 1 < n else part[1] - part[0]
+        h = math.atan2(*moving) if self.world.boat.cx == self.world.boat.cy == 0.0 else float(course[min(i + 1, n - 1)])
+        half = max(self.world.problem.no_go_half_rad(begin + 0.7 * span), self.world.boat.up)
+        downwind = e[1] < a[1] and self.world.boat.down < math.pi - 1e-6
+        found = run_lattice(
+            self.world, self.gauge, cells=(800, 2_000, 5_000)[int(3.0 * uniform(self.rng))],
+            reach=2 + int(2.0 * uniform(self.rng)), half_rad=math.pi - self.world.boat.down if downwind else half,
+            box=(low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin), downwind=downwind,
+            origin=(float(a[0]), float(a[1]), h, begin), goal=(float(e[0]), float(e[1]), 0.0),
+            bound_s=begin + span * 1.01 + 0.5 / self.world.boat.omega, max_pops=60_000,
+        )
+        self.effort.spend(max(20, found.pops // 8))
+        if found.points is None:
+            return
+        joined = np.vstack([best.points[: i + 1], found.points, best.points[j:]])
+        self.offer(joined, f"{best.origin}, zoomed", within=1.01)
+
+    def _on_leg(self, points: Floats, at: Floats, i: int, t: float) -> Floats:
+        """Return about where the boat is at time ``t`` on leg ``i`` (its turn counts as sailing)."""
+        if i + 1 >= len(points):
+            return np.asarray(points[-1])
+        f = min(1.0, max(0.0, (t - at[i]) / max(1e-9, at[i + 1] - at[i])))
+        return np.asarray(points[i] + f * (points[i + 1] - points[i]))
+
     # ------------------------------------------------------------------------------------- annealing
     def refine(self, c: Candidate) -> None:
         """Take the candidate one chunk further through its annealing cycle."""
         moves = max(1, min(_CHUNK, self.effort.remaining(_CHUNK), c.cycle - c.done))
-        cold, price = _COLD, LEG_PRICE * c.cost_s
+        cold, price = _COLD, LEG_PRICE * c.cost_s * max(1, 4 >> c.cycles)
         hot = _HOT * (0.25 ** (c.cycles % 3))
         f0, f1 = c.done / c.cycle, (c.done + moves) / c.cycle
         at = [c.cost_s * hot * (cold / hot) ** f for f in (f0, f1)]

@@ -148,21 +148,21 @@ def plan(
 
 
 def _load(algorithm: str) -> None:
-    """Compile or load the kernels of ``auto`` once in a process, before the budget starts to count."""
-    if algorithm == "auto" and algorithm not in _loaded:
+    """Compile or load an algorithm's kernels once in a process, before the budget starts to count."""
+    if algorithm not in _loaded:
         _loaded.add(algorithm)
         from companion.planner.warm import warm
 
-        warm()
+        warm(algorithm)
 
 
 def _solved(problem: Problem, effort: Effort, empty: Plan) -> Plan:
     module, name = ALGORITHMS[empty.algorithm]
     search: Search = getattr(importlib.import_module(module), name)
-    if problem.risk is None:
-        return _judged(problem, search(problem, effort, empty.seed), effort, empty)
-    from companion.planner.risk import keep_limit, search_within
+    from companion.planner.risk import keep_limit, search_within, with_risk
 
+    if problem.risk is None:
+        return with_risk(problem, _judged(problem, search(problem, effort, empty.seed), effort, empty))
     if empty.algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)
         outcome = search(problem, effort, empty.seed)
     else:

@@ -6,7 +6,7 @@ from companion.planner.problem import Problem
 from companion.planner.solve import plan
 
 
-def warm() -> None:
+def warm(algorithm: str = "auto") -> None:
     """Plan two small problems: a beat round an obstacle, and the same with uncertain wind and a target."""
     base = {
         "id": "warm", "title": "warm", "start": {"x": 0, "y": 0, "heading_deg": 10},
@@ -19,4 +19,4 @@ def warm() -> None:
         "delta_s": 0.6, "targets": [{"x": 500, "y": 500, "radius_m": 1}],
     }
     for problem in (base, base | {"fence": None, "targets": []}):
-        plan(Problem.from_json(problem), expansions=20_000)
+        plan(Problem.from_json(problem), expansions=20_000 if algorithm == "auto" else 2000, algorithm=algorithm)
