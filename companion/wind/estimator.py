@@ -102,6 +102,8 @@ class Base:
 
     def update(self, t_s: float, direction_rad: float, speed_mps: float, *, weight: float = 1.0) -> None:
         """Take one reading of the true wind (see ``Estimator``)."""
+        # Plain floats only: an int would make the compiled estimator compile again, in flight.
+        t_s, direction_rad, speed_mps, weight = float(t_s), float(direction_rad), float(speed_mps), float(weight)
         if not (math.isfinite(t_s) and math.isfinite(direction_rad) and math.isfinite(speed_mps)):
             raise ValueError(f"reading {t_s}, {direction_rad}, {speed_mps} is not finite")
         if self._t_s is None:
@@ -126,7 +128,7 @@ class Base:
         """
         if self._t_s is None:
             raise ValueError("no wind has been seen yet")
-        x, sigma, speed, sigma_speed = self._predict(max(0.0, horizon_s))
+        x, sigma, speed, sigma_speed = self._predict(max(0.0, float(horizon_s)))
         sigma = min(max(sigma, SIGMA_MIN_RAD), SIGMA_MAX_RAD)
         return wrap_pi(x + self._reference_rad), sigma, max(0.0, speed), max(sigma_speed, 1e-3)
 

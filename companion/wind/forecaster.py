@@ -64,7 +64,7 @@ class Forecaster(Base):
         From the tracked quantiles of |error| / sigma, between levels linear in the normal quantile (equation 5).
         """
         sigma = self.forecast(horizon_s)[1]
-        return min(math.pi, sigma * kernel.half_width_ratio(self._state, horizon_s, _Z, normal_half_width(p)))
+        return min(math.pi, sigma * kernel.half_width_ratio(self._state, float(horizon_s), _Z, normal_half_width(p)))
 
     @property
     def correlation_time_s(self) -> float:

@@ -114,3 +114,16 @@ def test_scores_of_the_fit_are_those_of_the_score():
         assert of is not None
         assert of.crps_rad == pytest.approx(fast[a, 0], rel=0.02)
         assert of.coverage == pytest.approx(tuple(fast[a, 1:4]), abs=0.05)
+
+
+def test_nothing_is_compiled_in_flight():
+    """Whatever numbers arrive, every kernel keeps the one signature that the constructor compiled."""
+    f = Forecaster()
+    before = [len(k.signatures) for k in (kernel.update, kernel.predict, kernel.half_width_ratio)]
+    for t in range(20):
+        f.update(t, 1, 5)
+        f.update(np.float64(t + 0.5), np.float32(1.0), np.int64(5))
+    f.forecast(10)
+    f.interval(np.float32(10), 0.9)
+    f.table(20, horizons_s=[1, 2], levels=[0.5])
+    assert [len(k.signatures) for k in (kernel.update, kernel.predict, kernel.half_width_ratio)] == before
