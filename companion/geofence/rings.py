@@ -122,10 +122,10 @@ def _check_range(coordinates: NDArray[np.float64], place: str, findings: Finding
 def _repaired(polygon: Polygon, kind: ZoneKind, place: str, findings: Findings) -> list[Polygon]:
     """Return a safe repair of an invalid polygon, and say what it does."""
     reason = shapely.is_valid_reason(polygon)
-    if kind is ZoneKind.EXCLUSION:
-        fixed = enclosed_faces(polygon)
-    else:
-        fixed = odd_faces(polygon)
+    try:
+        fixed = enclosed_faces(polygon) if kind is ZoneKind.EXCLUSION else odd_faces(polygon)
+    except shapely.errors.GEOSException:  # lines too close together for double precision
+        fixed = Polygon()
     pieces = [p for p in shapely.get_parts(fixed) if isinstance(p, Polygon) and p.area > 0.0]
     effect = (
         f"a repair would make {len(pieces)} polygon{'s' if len(pieces) != 1 else ''} of "

@@ -17,6 +17,7 @@ from companion.geofence.fence_items import MAX_FENCE_ITEMS, items_to_zones, zone
 from companion.geofence.rings import Findings
 from companion.geofence.shapes import unwrapped
 from companion.messages import GeoPoint
+from tests.geofence.strategies import QUIET
 
 MISSIONS = sorted((pathlib.Path(__file__).parents[2] / "missions").glob("*.toml"))
 
@@ -104,7 +105,7 @@ def areas(draw):
     return Area(obstacles=tuple(obstacles), fence=Fence(zones=tuple(zones))), margin_m, origin
 
 
-@settings(deadline=None, max_examples=60, derandomize=True)
+@settings(**QUIET, max_examples=30)
 @given(areas())
 def test_simplified_zones_hold_the_true_ones_within_the_margin(case):
     area, margin_m, origin = case
@@ -123,7 +124,7 @@ def test_most_random_areas_do_fit():
     """The property above would also hold of a function that always refuses."""
     good = []
 
-    @settings(deadline=None, max_examples=40, derandomize=True)
+    @settings(**QUIET, max_examples=20)
     @given(areas())
     def count(case):
         area, margin_m, origin = case
@@ -150,10 +151,10 @@ def test_circles_where_they_are_cheaper():
     assert len(result.items) == 40
 
 
-def test_ten_thousand_vertices_fit():
+def test_thousands_of_vertices_fit():
     rng = np.random.default_rng(3)
-    t = 2.0 * np.pi * np.arange(10_000) / 10_000
-    radii = 800.0 + 60.0 * np.sin(3.0 * t) + rng.uniform(0.0, 3.0, 10_000)
+    t = 2.0 * np.pi * np.arange(3_000) / 3_000
+    radii = 800.0 + 60.0 * np.sin(3.0 * t) + rng.uniform(0.0, 3.0, 3_000)
     result = fence_for_autopilot(Area(obstacles=(island(0.0, 1200.0, radii),)), 15.0, inside=[ORIGIN])
     assert result.status is FenceStatus.OK, result.reason
     assert len(result.items) < 40

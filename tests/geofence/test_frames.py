@@ -12,6 +12,7 @@ from pyproj import Geod
 from companion.geo.flat_earth import flat_en_from_lonlat, flat_lonlat_from_en
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
+from tests.geofence.strategies import QUIET
 
 GEOD = Geod(ellps="WGS84")
 PLACES = [(50.8, -1.3), (0.0, 0.0), (0.01, 179.999), (-0.01, -179.999), (78.2, 15.6), (-77.8, 166.7), (-33.9, 151.2),
@@ -27,7 +28,7 @@ def geodesic_m(a: GeoPoint, b: GeoPoint) -> float:
     return float(GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2])
 
 
-@settings(deadline=None, max_examples=200, derandomize=True)
+@settings(**QUIET, max_examples=100)
 @given(st.sampled_from(PLACES), st.floats(0.0, 360.0), st.floats(0.0, 50_000.0), st.floats(0.0, 360.0),
        st.floats(0.0, 50_000.0))
 def test_below_a_metre_within_50_km(place, bearing_a, far_a_m, bearing_b, far_b_m):
@@ -46,7 +47,7 @@ def test_below_a_metre_within_50_km(place, bearing_a, far_a_m, bearing_b, far_b_
         assert abs(math.remainder(azimuth - bearing_a, 360.0)) < 1e-6 * 50_000.0 / far_a_m
 
 
-@settings(deadline=None, max_examples=200, derandomize=True)
+@settings(**QUIET, max_examples=100)
 @given(st.sampled_from(PLACES), st.floats(-50_000.0, 50_000.0), st.floats(-50_000.0, 50_000.0))
 def test_there_and_back(place, east_m, north_m):
     frame = frame_at(*place)
@@ -92,7 +93,7 @@ def test_the_flat_earth_is_as_wrong_as_the_docs_say(lat_deg, reach_m):
     assert flat_error_m(lat_deg, reach_m) == pytest.approx(FLAT_TABLE[lat_deg, reach_m], rel=0.01)
 
 
-@settings(deadline=None, max_examples=50, derandomize=True)
+@settings(**QUIET, max_examples=50)
 @given(st.floats(-80.0, 80.0), st.floats(-180.0, 180.0), st.floats(-5_000.0, 5_000.0), st.floats(-5_000.0, 5_000.0))
 def test_flat_earth_there_and_back(lat_deg, lon_deg, east_m, north_m):
     origin = GeoPoint(lat_deg=lat_deg, lon_deg=lon_deg)

@@ -13,9 +13,9 @@ from companion.geofence.document import Document
 from companion.geofence.findings import Severity
 from companion.geofence.formats import parse, write
 from companion.geofence.shapes import Circle, ZoneKind
-from tests.geofence.strategies import documents
+from tests.geofence.strategies import QUIET, documents
 
-SETTINGS = settings(deadline=None, max_examples=60, derandomize=True)
+SETTINGS = settings(**QUIET, max_examples=40)
 EXTENSION = {"wkt": ".wkt", "ewkt": ".wkt", "geojson": ".geojson", "plan": ".plan", "waypoints": ".waypoints",
              "fen": ".fen", "poly": ".poly", "gpx": ".gpx", "kml": ".kml", "kmz": ".kmz", "rally": ".rally"}
 
@@ -157,7 +157,7 @@ PAIRS = list(itertools.permutations(["wkt", "geojson", "plan", "waypoints", "gpx
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(deadline=None, max_examples=8, derandomize=True)
+@settings(**QUIET, max_examples=5)
 @given(documents(zone_count=(1, 4), item_count=(0, 0), marks=False, rally=False, tracks=False, extras=False))
 def test_no_pair_of_formats_makes_the_sea_larger(first, second, document):
     options = {"part": "fence"}

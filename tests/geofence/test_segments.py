@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
 from companion.geo.segments import PolygonIndex
+from tests.geofence.strategies import QUIET
 
 
 def archipelago(rng, islands, corners, extent, holes=False):
@@ -26,7 +27,7 @@ def archipelago(rng, islands, corners, extent, holes=False):
     return out
 
 
-@settings(deadline=None, max_examples=60, derandomize=True)
+@settings(**QUIET, max_examples=25)
 @given(st.integers(0, 10_000), st.sampled_from([10.0, 300.0, 8000.0]), st.booleans())
 def test_the_same_answers_as_shapely(seed, extent, holes):
     rng = np.random.default_rng(seed)
