@@ -36,7 +36,6 @@ from companion.messages import (
     MissionState,
     MissionType,
     Mode,
-    StatusText,
 )
 
 Method = Literal["auto", "ftp", "items", "partial"]
@@ -504,8 +503,3 @@ def _without_home(kind: MissionType, items: tuple[MissionItem, ...]) -> ReadResu
         return ReadResult(outcome=Outcome.OK, items=items)
     return ReadResult(outcome=Outcome.OK, items=items[1:], home=items[0] if items else None)
 
-
-def words_of(value: StatusText) -> str:
-    """Return a status text with its severity in words."""
-    names = ("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING", "NOTICE", "INFO", "DEBUG")
-    return f"{names[value.severity]}: {value.text}"

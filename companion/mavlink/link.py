@@ -25,7 +25,7 @@ from companion.mavlink import codec
 from companion.mavlink.commands import CommandAnswer, CommandSend
 from companion.mavlink.frames import Codec, Drop, Message
 from companion.mavlink.machines import Machine, Outcome, Party, ResultT_co
-from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, SigningStore
+from companion.mavlink.signing import TICKS_PER_S, SigningStore
 from companion.mavlink.streams import DEFAULT_STREAMS, Stream, StreamMonitor
 from companion.mavlink.transport import Transport, TransportState
 
@@ -449,11 +449,6 @@ class Link:
             return f"{stats.bytes_in} bytes and no MAVLink frame among them; check the baud rate"
         wanted = f" of system {self._target}" if self._target is not None else ""
         return f"{self.stats.frames_in} frames, but no autopilot's heartbeat{wanted}"
-
-
-def unix_from_signing(timestamp: int) -> float:
-    """Return Unix seconds of a signing timestamp."""
-    return EPOCH_S + timestamp / TICKS_PER_S
 
 
 def describe_drops(dropped: Counter[Drop]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.errors import InputError
 from companion.mavlink.frames import Codec
-from companion.mavlink.ftp import FtpRead, Packet, unpack
+from companion.mavlink.ftp import FtpRead, FtpWrite, Packet, unpack
 from companion.mavlink.lists import ListDownload, ListUpload
 from companion.mavlink.machines import Outcome, Party, Retry
 from companion.mavlink.params import ALIASES, ParamList, names_of
@@ -171,6 +171,32 @@ def test_a_burst_read_fills_its_gaps(lost):
     assert machine.result.outcome is Outcome.OK
     assert machine.result.data == data
     assert sent_reads <= len(lost) + 1
+
+
+@pytest.mark.parametrize("error", [1, 5])
+def test_a_session_left_open_is_reset_once(error):
+    """ArduRover refuses to open a file with error 1 while a dead program's session is open; the protocol has 5."""
+    def answer(request, opcode, data=b""):
+        packet = Packet(request.seq + 1, 0, opcode, 0, request.opcode, 0, 0, data)
+        raw = wire.MAVLink_file_transfer_protocol_message(0, 1, 191, packet.pack())
+        return Codec(1, 191).feed(Codec(1, 1).pack(raw))[0]
+
+    machine = FtpWrite(PARTY, "@MISSION/mission.dat", b"data")
+    opcodes, queue = [], machine.start(0.0)
+    while queue:
+        request = unpack(queue[0].payload)
+        opcodes.append(request.opcode)
+        refused = opcodes == [6]
+        queue = machine.receive(0.1, answer(request, 129 if refused else 128, bytes([error]) if refused else b""))
+    assert opcodes == [6, 2, 6, 7, 1]
+    assert machine.result.outcome is Outcome.OK
+
+    machine = FtpWrite(PARTY, "@MISSION/mission.dat", b"data")
+    queue = machine.start(0.0)
+    for _ in range(3):
+        request = unpack(queue[0].payload)
+        queue = machine.receive(0.1, answer(request, 128 if request.opcode == 2 else 129, bytes([error])))
+    assert machine.result.outcome is Outcome.REFUSED, "once, not for ever"
 
 
 def test_lost_parameters_are_asked_for_by_their_number():
