@@ -15,7 +15,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
@@ -450,7 +450,3 @@ class Link:
         wanted = f" of system {self._target}" if self._target is not None else ""
         return f"{self.stats.frames_in} frames, but no autopilot's heartbeat{wanted}"
 
-
-def describe_drops(dropped: Counter[Drop]) -> dict[str, Any]:
-    """Return the counters with readable keys, for records."""
-    return {reason.name.lower(): count for reason, count in sorted(dropped.items(), key=lambda x: x[0].name)}

@@ -19,8 +19,9 @@ from companion.mavlink.frames import SigningState
 # 2015-01-01T00:00:00Z in Unix seconds: the zero of MAVLink signing timestamps, which count 10 µs.
 EPOCH_S = 1_420_070_400.0
 TICKS_PER_S = 100_000
-# Stored this far ahead, so that a power cut between two stores cannot repeat a timestamp [s].
-AHEAD_S = 60.0
+# Stored this far ahead, so that a power cut between two stores cannot repeat a timestamp [s]. An autopilot refuses a
+# newcomer that is more than 60 s behind the newest stamp it has seen, so we must not run that far ahead of others.
+AHEAD_S = 40.0
 
 
 def read_key(path: Path) -> bytes:
