@@ -64,8 +64,6 @@ class Autopilot:
             wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed
         )
         self.battery_v = config.battery_v
-        self._gps_fault = GpsFault()
-        self._gps_lost_s = math.inf
         self._reboots = 0
         self._boot_at_s = -WARM_BOOT_S if config.is_warm else 0.0
         self._debt_s = 0.0
@@ -258,7 +256,7 @@ class Autopilot:
     @property
     def ekf_ready(self) -> bool:
         """Whether the position can be used."""
-        return self.boot_s >= EKF_READY_S and not self.t_s - self._gps_lost_s > 10.0
+        return self.boot_s >= EKF_READY_S and bool(self.failsafe.ekf_flags & mav.EKF_POS_HORIZ_ABS)
 
     @property
     def ekf_flags(self) -> int:
@@ -267,7 +265,7 @@ class Autopilot:
             return 0x400
         if self.boot_s < 6.5:
             return 0
-        return 0x33F if self.ekf_ready else 0xA7
+        return self.failsafe.ekf_flags if self.boot_s >= EKF_READY_S else 0xA7
 
     @property
     def system_status(self) -> int:
@@ -375,15 +373,13 @@ class Autopilot:
         self.vehicle.set_vane_fault(fault.code, wrap_pi(fault.value_rad) if fault.value_rad else 0.0)
 
     def set_gps(self, fault: GpsFault) -> None:
-        """Break or mend the position: what the autopilot believes jumps by the fault's offset."""
-        self._gps_fault = fault
-        self.vehicle.state[k.S_GPS_E], self.vehicle.state[k.S_GPS_N] = fault.east_m, fault.north_m
-        self._gps_lost_s = self.t_s if fault.is_lost else math.inf
+        """Break or mend the position."""
+        self.failsafe.set_gps(fault)
 
     @property
     def gps_lost(self) -> bool:
         """Whether there is no fix."""
-        return self._gps_fault.is_lost
+        return self.failsafe.gps_lost
 
     def hear_vessel(self, vessel: Vessel) -> None:
         """An AIS receiver at the autopilot heard a vessel."""

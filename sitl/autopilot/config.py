@@ -89,8 +89,14 @@ class VaneFault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GpsFault:
-    """A fault of the position: an offset that the autopilot believes at once, or no fix."""
+    """A fault of the position: an offset, or no fix.
+
+    ``is_resisted``: the EKF does as the real one did with a jump of 30 m: it holds out for 3.8 s, then takes the
+    new position, and its failsafe puts the boat in HOLD one second later. Otherwise the offset is believed at once
+    and in silence, as with a spoofed or slowly drifting receiver.
+    """
 
     east_m: float = 0.0
     north_m: float = 0.0
     is_lost: bool = False
+    is_resisted: bool = False

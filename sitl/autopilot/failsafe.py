@@ -8,13 +8,17 @@ from typing import TYPE_CHECKING
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
+from sitl.autopilot.config import GpsFault
 from sitl.autopilot.telemetry import POSITION_MODES
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot
 
 _CHECK_S = 0.1
-_GPS_PATIENCE_S = 10.0
+# Measured on the real one, with FS_EKF_THRESH 0.8: a jump of 30 m, and a receiver switched off.
+GLITCH_FLAG = 0x8000
+GLITCH_SEEN_S, JUMP_TAKEN_S, JUMP_FAILSAFE_S, JUMP_OVER_S = 1.5, 3.8, 4.8, 11.0
+LOST_FAILSAFE_S, LOST_STOPPED_S = 8.3, 15.3
 
 
 class Failsafe:
@@ -26,14 +30,16 @@ class Failsafe:
         self._gcs_acted = False
         self._battery_since_s: float | None = None
         self._battery_acted = False
-        self._gps_acted = False
+        self._ekf_acted = False
+        self._fault = GpsFault()
+        self._fault_s = -math.inf
         self._due_s = 0.0
         self._recovery_until_s = -math.inf
 
     @property
     def is_active(self) -> bool:
-        """Whether the ground station's failsafe has acted and not cleared."""
-        return self._gcs_acted
+        """Whether a failsafe has acted and not cleared."""
+        return self._gcs_acted or self._ekf_acted
 
     @property
     def due_s(self) -> float:
@@ -41,7 +47,8 @@ class Failsafe:
         a = self._a
         watching = (
             (self._gcs_heard_s is not None and a.parameters.flag("FS_GCS_ENABLE"))
-            or 0.0 < a.battery_v < a.parameters.get("BATT_LOW_VOLT") or a.gps_lost or self._gps_acted
+            or 0.0 < a.battery_v < a.parameters.get("BATT_LOW_VOLT") or self._ekf_acted
+            or self._fault.is_lost or self._is_resisting
         )
         return self._due_s if watching else math.inf
 
@@ -62,14 +69,54 @@ class Failsafe:
         self._due_s = a.t_s + _CHECK_S
         self._watch_gcs()
         self._watch_battery()
-        if a.gps_lost and not self._gps_acted and not a.ekf_ready:
-            self._gps_acted = True
+        self._watch_ekf()
+
+    # ------------------------------------------------------------------------------------------ position
+    @property
+    def gps_lost(self) -> bool:
+        """Whether there is no fix."""
+        return self._fault.is_lost
+
+    @property
+    def _is_resisting(self) -> bool:
+        return self._fault.is_resisted and self._a.t_s - self._fault_s < JUMP_OVER_S + 1.0
+
+    def set_gps(self, fault: GpsFault) -> None:
+        """Break or mend the position."""
+        self._fault, self._fault_s = fault, self._a.t_s
+        self._due_s = self._a.t_s
+        if not fault.is_resisted:
+            self._take_position()
+
+    def _take_position(self) -> None:
+        self._a.vehicle.set_position_error(self._fault.east_m, self._fault.north_m)
+
+    @property
+    def ekf_flags(self) -> int:
+        """EKF_STATUS_REPORT.flags of a boat whose EKF was ready."""
+        age_s = self._a.t_s - self._fault_s
+        if self._fault.is_lost:
+            if age_s >= LOST_STOPPED_S:
+                return 0xA7
+            return 0x8027 if age_s >= LOST_FAILSAFE_S else 0x833F
+        return 0x33F | (GLITCH_FLAG if self._is_resisting and age_s >= GLITCH_SEEN_S else 0)
+
+    def _watch_ekf(self) -> None:
+        a, age_s = self._a, self._a.t_s - self._fault_s
+        bad = self._fault.is_lost and age_s >= LOST_FAILSAFE_S - 1e-9
+        if self._fault.is_resisted:
+            if age_s >= JUMP_TAKEN_S - 1e-9:
+                self._take_position()
+            bad = bad or JUMP_FAILSAFE_S - 1e-9 <= age_s < JUMP_OVER_S
+        if bad and not self._ekf_acted:
+            self._ekf_acted = True
+            a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF variance")
             a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF failsafe")
             if a.is_armed and a.parameters.flag("FS_EKF_ACTION") and a.helm.mode in POSITION_MODES:
                 a.helm.set_mode(Mode.HOLD)
-        elif self._gps_acted and not a.gps_lost:
-            self._gps_acted = False
-            a.announce(mav.MAV_SEVERITY_WARNING, "EKF failsafe cleared")
+        elif self._ekf_acted and not bad:
+            self._ekf_acted = False
+            a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF failsafe cleared")
 
     def _watch_gcs(self) -> None:
         a = self._a

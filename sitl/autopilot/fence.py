@@ -14,9 +14,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from sitl.autopilot.items import Item
 
 CHECK_S = 0.1
-# Avoidance reckons with WP_SPEED 5 m/s and its gain of 0.2: speed is limited from 25 m before the margin.
-AVOID_REACH_M = 25.0
-RECOVERY_S = 10.0
 TYPE_CIRCLE, TYPE_POLYGON = 2, 4
 _POLYGONS = {mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: 1.0, mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: -1.0}
 _CIRCLES = {mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: 1.0, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: -1.0}
@@ -95,7 +92,6 @@ class Fence:
         self.breach_type = 0
         self.breach_ms = 0
         self.is_limiting = False
-        self.recovery_until_s = 0.0
         self._types = TYPE_POLYGON
 
     @property

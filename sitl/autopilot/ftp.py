@@ -25,8 +25,9 @@ _DATA_MAX = 239
 _IDLE_S = 3.0
 _SHOWN_SIZE = 0x100000  # what the real one says before it knows
 _ACK, _NAK = 128, 129
-_FAIL, _NO_SESSION, _BUSY, _END, _UNKNOWN, _NOT_FOUND = 1, 4, 5, 6, 7, 10
-_TERMINATE, _RESET, _OPEN_READ, _READ, _CREATE, _WRITE, _OPEN_WRITE = 1, 2, 4, 5, 6, 7, 11
+_FAIL, _ERRNO, _NO_SESSION, _END, _UNKNOWN, _NOT_FOUND = 1, 2, 4, 6, 7, 10
+_EINVAL = 22
+_TERMINATE, _RESET, _LIST, _OPEN_READ, _READ, _CREATE, _WRITE, _OPEN_WRITE = 1, 2, 3, 4, 5, 6, 7, 11
 FILES = {"@MISSION/mission.dat": MISSION, "@MISSION/fence.dat": FENCE, "@MISSION/rally.dat": RALLY}
 
 
@@ -63,7 +64,7 @@ class FtpServer:
         t_s = self._a.t_s
         if opcode in {_CREATE, _OPEN_WRITE, _OPEN_READ}:
             if self._kind is not None and t_s - self._used_s < _IDLE_S:
-                return _nak(_BUSY)
+                return _nak(_FAIL)
             kind = FILES.get(data.rstrip(b"\0").decode("ascii", "replace"))
             if kind is None:
                 return _nak(_NOT_FOUND)
@@ -74,6 +75,8 @@ class FtpServer:
         if opcode == _RESET:
             self._kind = None
             return _ACK, b"", 0
+        if opcode == _LIST:
+            return _NAK, bytes([_ERRNO, _EINVAL]), 0
         if opcode not in {_TERMINATE, _READ, _WRITE}:
             return _nak(_UNKNOWN)
         if self._kind is None or session != self._session:
@@ -90,8 +93,9 @@ class FtpServer:
             self._data[offset:offset + len(data)] = data
             return _ACK, b"", offset
         kind, self._kind = self._kind, None
-        if self._is_writing and not self._commit(kind, bytes(self._data)):
-            return _nak(_FAIL)
+        if self._is_writing:
+            self._commit(kind, bytes(self._data))
+        # the real one acknowledges whatever became of the file: read back and compare
         return _ACK, b"", 0
 
     def _whole_file(self, kind: int) -> bytes:
@@ -99,30 +103,29 @@ class FtpServer:
         head = HEADER.pack(MAGIC, kind, 0, 0, len(stored))
         return head + b"".join(to_file(item, seq, kind) for seq, item in enumerate(stored))
 
-    def _commit(self, kind: int, data: bytes) -> bool:
+    def _commit(self, kind: int, data: bytes) -> None:
+        """Put the file's items in place: up to the first bad one, behind a list that was cleared if it could be."""
         if len(data) < HEADER.size:
-            return False
+            return
         magic, file_kind, options, start, count = HEADER.unpack_from(data)
-        if magic != MAGIC or file_kind != kind or len(data) < HEADER.size + count * FILE_ITEM.size:
-            return False
-        if start + count > LIMITS[kind]:
-            return False
+        if magic != MAGIC or file_kind != kind or start + count > LIMITS[kind]:
+            return
+        whole = data.ljust(HEADER.size + -(-(len(data) - HEADER.size) // FILE_ITEM.size) * FILE_ITEM.size, b"\0")
         new: list[Item] = []
-        for n in range(count):
-            item, _ = accept(from_file(data, HEADER.size + n * FILE_ITEM.size), kind)
+        for n in range(min(count, (len(whole) - HEADER.size) // FILE_ITEM.size)):
+            item, _ = accept(from_file(whole, HEADER.size + n * FILE_ITEM.size), kind)
             if item is None:
-                return False
+                break
             new.append(item)
         if kind != MISSION:
-            return self._a.storage.replace_list(kind, new)
+            self._a.storage.replace_list(kind, new)
+            return
         mission = self._a.helm.mission
-        if start > len(mission.items):
-            return False
         if not options & NO_CLEAR:
             self._a.storage.clear_list(MISSION)
-        for n, item in enumerate(new):
-            mission.put(start + n, item)
-        return True
+        if start <= len(mission.items):
+            for n, item in enumerate(new):
+                mission.put(start + n, item)
 
 
 def _nak(error: int) -> tuple[int, bytes, int]:

@@ -100,7 +100,7 @@ def accept(item: Item, kind: int) -> tuple[Item | None, int]:
         # Rover keeps the hold time only, as a 16 bit number; the acceptance radius is WP_RADIUS for all
         p1, p2, p3, p4 = float(max(-32768, min(32767, int(p1)))), 0.0, 0.0, 0.0
     frame = _FRAMES.get(item.frame, item.frame)
-    if kind == MISSION and (item.command not in _LOCATION or not (item.x or item.y)):
+    if kind == MISSION and (item.command not in _LOCATION or item.command == mav.MAV_CMD_NAV_RETURN_TO_LAUNCH):
         frame = 0  # what has no place comes back without a frame
     if kind == MISSION and item.command == mav.MAV_CMD_NAV_LOITER_TIME:
         p3 = -1.0 if p3 < 0.0 else 1.0  # the sense of turning is all that is kept

@@ -227,6 +227,10 @@ class Vehicle:
         """Break or mend the wind vane."""
         self.state[k.S_VANE_FAULT], self.state[k.S_VANE_VALUE] = fault, value_rad
 
+    def set_position_error(self, east_m: float, north_m: float) -> None:
+        """Let the autopilot believe that it is so far from where it is."""
+        self.state[k.S_GPS_E], self.state[k.S_GPS_N] = east_m, north_m
+
     def clear_tack(self) -> None:
         """A new mode knows no tack."""
         if self.state[k.S_TACKING]:

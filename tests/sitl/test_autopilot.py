@@ -471,9 +471,33 @@ def test_gps_jump_and_loss() -> None:
         assert en(told.lat, told.lon)[1] == pytest.approx(30.0, abs=4.0)
         assert c.autopilot.truth.north_m == pytest.approx(0.0, abs=4.0)
         c.autopilot.set_gps(GpsFault(is_lost=True))
-        await asyncio.sleep(12.0)
+        start = now_s()
+        await asyncio.sleep(20.0)
+        assert c.text_time("EKF failsafe") - start == pytest.approx(8.3, abs=0.2)
+        assert c.last("EKF_STATUS_REPORT").flags == 0xA7
         assert c.last("GPS_RAW_INT").fix_type == 1
         assert "EKF failsafe" in c.texts()
+        assert c.autopilot.truth.mode is Mode.HOLD
+
+    sail(job, is_moored=True)
+
+
+def test_a_jump_that_the_ekf_resists() -> None:
+    async def job(c: Client) -> None:
+        await c.set_sail(EAST)
+        await asyncio.sleep(10.0)
+        start = now_s()
+        c.autopilot.set_gps(GpsFault(north_m=30.0, is_resisted=True))
+        await asyncio.sleep(3.0)
+        assert abs(c.autopilot.vehicle.position[1]) < 3.0
+        assert c.last("EKF_STATUS_REPORT").flags == 0x833F
+        await asyncio.sleep(1.5)
+        assert c.autopilot.vehicle.position[1] == pytest.approx(30.0, abs=5.0)
+        await asyncio.sleep(1.0)
+        assert c.autopilot.truth.mode is Mode.HOLD
+        assert c.text_time("EKF failsafe") - start == pytest.approx(4.8, abs=0.2)
+        await asyncio.sleep(8.0)
+        assert c.text_time("EKF failsafe cleared") - start == pytest.approx(11.0, abs=0.2)
         assert c.autopilot.truth.mode is Mode.HOLD
 
     sail(job, is_moored=True)

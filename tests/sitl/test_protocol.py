@@ -396,10 +396,21 @@ def test_ftp_refusals() -> None:
         ftp = Ftp(c)
         assert await ftp.ask(4, b"none.dat") == (129, b"\x0a")
         assert (await ftp.ask(7, b"x", 0))[0] == 129
-        for data in (b"", b"abc", mission_file(SEVEN)[:-5], b"\0\0" + mission_file(SEVEN)[2:]):
-            assert await ftp.write("@MISSION/mission.dat", data) == 129
+        # TerminateSession is acknowledged whatever becomes of the file
+        for data in (b"", b"abc", b"\0\0" + mission_file(SEVEN)[2:]):
+            assert await ftp.write("@MISSION/mission.dat", data) == 128
         assert c.autopilot.helm.mission.items == []
+        bad = bytearray(mission_file([(0.0, 0.0), *SEVEN[:3]]))
+        struct.pack_into("<H", bad, 10 + 38 * 2 + 30, 9999)
+        assert await ftp.write("@MISSION/mission.dat", bytes(bad)) == 128
+        assert len(await c.download()) == 2  # up to the bad item
+        assert await ftp.write("@MISSION/mission.dat", mission_file([(0.0, 0.0), *SEVEN[:2]])[:-5]) == 128
+        assert len(await c.download()) == 3
         assert (await ftp.ask(200))[0] == 129
+        assert await ftp.ask(3, b"@MISSION") == (129, b"\x02\x16")
+        assert (await ftp.ask(4, b"@MISSION/mission.dat"))[0] == 128
+        assert await ftp.ask(4, b"@MISSION/mission.dat") == (129, b"\x01")
+        await ftp.ask(1)
         # an answer lost on the way: the same question is answered again, the work is not done twice
         assert (await ftp.ask(6, b"@MISSION/mission.dat"))[0] == 128
         ftp.seq -= 1
