@@ -45,6 +45,7 @@ STEP_S = 1.0
 # Status to the radio: a frame of it every so often [s]; see companion.mavlink.status_wire for its bytes.
 STATUS_EVERY_S = 2.0
 SYNC_EVERY_S = 5.0
+LOOP_WATCH_S = 0.1
 # After arrival the boat loiters; the companion watches it for a moment before it ends [s].
 LINGER_S = 5.0
 # Parameters that the plan and the wind depend on; asked at the start and after a reboot.
@@ -133,6 +134,7 @@ class _Shell:
         self.figures = VoyageFigures()
         self.status: CompanionStatus | None = None
         self.end_reason = "stopped"
+        self.loop_held_s = 0.0
         self._persisted: Persisted | None = None
         self._frames = 0
         self._announced: tuple[str, str] = ("", "")
@@ -167,6 +169,7 @@ class _Shell:
                         group.create_task(self._keep_parameters(autopilot, link), name="parameters"),
                         group.create_task(self._send_status(autopilot), name="radio status"),
                         group.create_task(self._sync(), name="disk sync"),
+                        group.create_task(self._watch_loop(), name="loop watch"),
                     ]
                     await self._steps(executor, link)
                     for task in tasks:
@@ -272,6 +275,13 @@ class _Shell:
                 autopilot.send_status(self.status)
             await asyncio.sleep(STATUS_EVERY_S)
 
+    async def _watch_loop(self) -> None:
+        """Measure how long the event loop was held: a timer that fires late was kept waiting by somebody."""
+        while True:
+            due_s = now_s() + LOOP_WATCH_S
+            await asyncio.sleep(LOOP_WATCH_S)
+            self.loop_held_s = max(self.loop_held_s, now_s() - due_s)
+
     async def _sync(self) -> None:
         while True:
             await asyncio.sleep(SYNC_EVERY_S)
@@ -336,4 +346,5 @@ class _Shell:
             "end_why": state.why,
             "records_dropped": self.recorder.dropped,
             "planner_restarts": self.planner.restarts,
+            "loop_held_max_s": round(self.loop_held_s * self.options.budget_scale, 4),
         }

@@ -32,7 +32,7 @@ from companion.mavlink.transport import open_link
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from companion.telemetry.recorder import write_atomically
 from sitl.ardurover import ArduRover, require
-from sitl.runner import TRUTH_EVERY_S, VERDICT, solid_of
+from sitl.runner import TRUTH_EVERY_S, VERDICT, marks_of, solid_of
 from sitl.scenario import EventSpec, Scenario
 from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
@@ -160,6 +160,7 @@ async def _run(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=truth,
         solid=solid_of(mission.area.local(frame)), goal_en_m=frame.en_from_geo(mission.goals[-1].point),
         summary=summary, status_times_s=None, alerts=summary.get("alerts", {}),
+        marks=marks_of(mission),
     )
     write_atomically(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict

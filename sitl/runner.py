@@ -48,7 +48,7 @@ EPOCH_S = 1_781_000_000.0
 # The simulated boat lies still until it sails, so that every voyage starts where its mission says.
 VERDICT = "verdict.json"
 # Effort of one plan under the virtual clock, where time cannot stop it.
-EXPANSIONS = 60_000
+EXPANSIONS = 15_000
 
 OnStep = Callable[[Step], None]
 
@@ -76,6 +76,13 @@ def solid_of(area: LocalArea) -> BaseGeometry:
         around = shapely.box(x0 - 1e4, y0 - 1e4, x1 + 1e4, y1 + 1e4)
         solid = shapely.union(solid, shapely.difference(around, area.limits))
     return solid
+
+
+def marks_of(mission: Mission) -> list[tuple[tuple[float, float], str]]:
+    """Return the marks to be rounded, all laps written out."""
+    frame = mission.frame()
+    lap = [(frame.en_from_geo(g.point), g.rounding) for g in mission.goals if g.rounding is not None]
+    return lap * mission.skipper.laps
 
 
 def permitted(mission: Mission) -> Mission:
@@ -126,7 +133,7 @@ async def run_embedded(
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
-        status_times_s=world.status_s, alerts=world.alerts, errors=world.errors,
+        status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
     )
     write_atomically(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict
@@ -140,8 +147,8 @@ async def _sail_and_restart(
     kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
     deadline_s = now_s() + scenario.limit_s
     options = SailOptions(
-        seed=seed, epoch_s=EPOCH_S, expansions=expansions, offload=at_once, is_durable=False, state_path=folder / "state.json",
-        command=f"sitl run {scenario.name}",
+        seed=seed, epoch_s=EPOCH_S, expansions=expansions, offload=at_once, is_durable=False,
+        state_path=folder / "state.json", command=f"sitl run {scenario.name}",
     )
 
     def on_status(status: Any, step: Step) -> None:  # noqa: ARG001 - the interface has both

@@ -80,7 +80,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     max_replans_per_hour: float | None = None
     end_phase: str | None = None
     alerts: tuple[str, ...] = ()              # announced at least once, by code
-    laps_rounded: int | None = None
+    marks_rounded: int | None = None           # in order, each on its side
 
 
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -72,8 +72,7 @@ def progress_text(step: Step, next_tack_s: float | None = None) -> str:
         if autopilot is not None and autopilot.cross_track_m is not None:
             parts.append(f"xt {autopilot.cross_track_m:+.1f} m")
     if route is not None:
-        risk = route.risk if route.risk is not None else 1.0 - route.delta_s
-        parts.append(f"risk {100.0 * risk:.0f} %")
+        parts.append(f"risk {100.0 * (1.0 - route.delta_s):.0f} %")
         parts.append(f"replans {state.replans}")
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)

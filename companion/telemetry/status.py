@@ -58,8 +58,8 @@ def companion_status(
 
 
 def risk_of(route: Route) -> float:
-    """Return what the plan promised: its own risk where that was computed, else that of each instant."""
-    return route.risk if route.risk is not None else 1.0 - route.delta_s
+    """Return what the plan promised: the probability, at each instant, of being forced into the no-go zone."""
+    return 1.0 - route.delta_s
 
 
 def next_tack_s(step: Step) -> float | None:

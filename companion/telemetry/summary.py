@@ -22,7 +22,11 @@ DISTANCE_STEP_M = 0.5
 
 @dataclass(slots=True)
 class VoyageFigures:
-    """Accumulates; ``take`` once a step. Time and distance count from the first step under way (armed, AUTO)."""
+    """Accumulates; ``take`` once a step. Time and distance count from the first step under way (armed, AUTO).
+
+    ``promised_risk`` is the largest probability, at any instant of any plan that was sailed, of being forced into
+    the no-go zone (1 - delta_s); ``path_risk`` the largest of a whole plan's, as if nobody replanned on the way.
+    """
 
     first_s: float | None = None
     last_s: float = 0.0
@@ -36,6 +40,7 @@ class VoyageFigures:
     no_go_entries: int = 0
     min_clearance_m: float = math.inf
     promised_risk: float | None = None
+    path_risk: float | None = None
     longest_no_go_s: float = 0.0
     alerts: dict[str, int] = field(default_factory=dict)
     _anchor: tuple[float, float] | None = None
@@ -58,8 +63,9 @@ class VoyageFigures:
                 self.alerts[action.code] = self.alerts.get(action.code, 0) + 1
         route = step.state.route
         if route is not None:
-            risk = route.risk if route.risk is not None else 1.0 - route.delta_s
-            self.promised_risk = risk if self.promised_risk is None else max(self.promised_risk, risk)
+            self.promised_risk = max(self.promised_risk or 0.0, 1.0 - route.delta_s)
+            if route.risk is not None:
+                self.path_risk = max(self.path_risk or 0.0, route.risk)
         autopilot = snapshot.autopilot
         sails = autopilot is not None and autopilot.is_armed and autopilot.mode in {Mode.AUTO, Mode.GUIDED}
         if sails and self.first_s is None:
@@ -130,6 +136,7 @@ class VoyageFigures:
             "uploads": self.uploads,
             "min_clearance_m": self.min_clearance_m if math.isfinite(self.min_clearance_m) else None,
             "promised_risk": self.promised_risk,
+            "path_risk": self.path_risk,
             "no_go_entries": self.no_go_entries,
             "alerts": dict(sorted(self.alerts.items())),
         }

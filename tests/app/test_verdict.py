@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sitl.scenario import ExpectSpec
-from sitl.verdict import Truth, contacts_and_clearance, count_tacks, judge, longest_silence_s
+from sitl.verdict import Truth, contacts_and_clearance, count_roundings, count_tacks, judge, longest_silence_s
 
 ISLAND = shapely.Point(0.0, 0.0).buffer(10.0)
 
@@ -76,3 +76,13 @@ def test_a_verdict_fails_for_each_reason_by_name():
     failed = {c.name for c in verdict.checks if not c.passed}
     assert failed == {"no unhandled error", "arrived", "contacts", "distance to the goal, m", "announced irons"}
     assert not verdict.passed
+
+
+def test_roundings_count_only_on_the_right_side_and_in_order():
+    marks = [((0.0, 0.0), "port"), ((200.0, 0.0), "port")]
+    anticlockwise = np.array([(20 * math.sin(a), 20 * math.cos(a)) for a in np.linspace(2.5, -2.5, 40)])
+    second = anticlockwise + np.array([200.0, 0.0])
+    assert count_roundings(np.vstack([anticlockwise, second]), marks) == 2
+    assert count_roundings(np.vstack([anticlockwise[::-1], second]), marks) == 1
+    assert count_roundings(anticlockwise, marks) == 1
+    assert count_roundings(second, marks) == 0
