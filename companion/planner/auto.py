@@ -29,6 +29,10 @@ _LATTICES = ((6_000, 3), (2_500, 3), (24_000, 2), (12_000, 3), (40_000, 3), (100
              (200_000, 3), (400_000, 2), (800_000, 2))
 
 
+_DRIFTS = ((1_600, 1.45), (6_000, 4.0), (6_000, 2.5), (6_000, 1.45), (12_000, 4.0), (12_000, 2.5), (24_000, 4.0),
+           (24_000, 1.45), (24_000, 2.5), (60_000, 2.5), (60_000, 1.45))
+
+
 def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
     """Return the best path found within ``effort``, or what was proved."""
     reason = no_course(problem)
@@ -92,6 +96,8 @@ def _first_paths(s: Searcher) -> str | None:
 def _lattices(s: Searcher) -> str | None:
     """Run ever finer lattices until there is a path; return why there is none if that is proved."""
     for step, (cells, reach) in enumerate(_LADDER):
+        if s.world.boat.kind != 0 and step < 4:
+            s.drift(2 * cells, 1.45, math.inf)
         late = (1.3, 2.5, 1.0)[step % 3] * s.bound.value_s
         for margin in (0.25, 0.5):
             if s.effort.is_over:
@@ -116,7 +122,8 @@ def _improve(s: Searcher) -> None:
     """Anneal the candidates and look for others until the effort ends."""
     _ = s.world.problem.eval_solid  # made now, so that the exact check at the end takes no time then
     has_solid = len(s.world.grid.edges) > 0
-    lattices = list(_LATTICES)
+    lattices = list(_LATTICES) if has_solid else []
+    drifts = list(_DRIFTS) if s.world.boat.kind != 0 else []
     spent, looked = 0.0, not has_solid
     s.next_turn()
     if has_solid and not s.is_done:
@@ -126,7 +133,9 @@ def _improve(s: Searcher) -> None:
         if not looked and before > 0.08:
             looked = True
             s.other_sides(12)
-        elif lattices and has_solid and spent <= 0.35 * before:
+        elif drifts and spent <= 0.35 * before and len(drifts) >= len(lattices):
+            s.drift(*drifts.pop(0), 1.05 * s.upper_s)
+        elif lattices and spent <= 0.35 * before:
             cells, reach = lattices.pop(0)
             late = s.upper_s * (1.0, 0.5, 0.8)[len(lattices) % 3]
             s.lattice(cells, reach, margin=0.5, half_at_s=late, stretch=1.0 + 0.07 * (len(lattices) % 4),

@@ -35,7 +35,8 @@ _START, _CLOCKWISE, _COUNTER, _MOVE = 1, 2, 3, 4
 
 
 @jit
-def _sift_up(keys: Floats, items: Ints, i: int) -> None:
+def sift_up(keys: Floats, items: Ints, i: int) -> None:
+    """Restore the heap after its item ``i`` was put there."""
     key, item = keys[i], items[i]
     while i > 0:
         p = (i - 1) >> 1
@@ -47,7 +48,8 @@ def _sift_up(keys: Floats, items: Ints, i: int) -> None:
 
 
 @jit
-def _sift_down(keys: Floats, items: Ints, n: int) -> None:
+def sift_down(keys: Floats, items: Ints, n: int) -> None:
+    """Restore the heap of ``n`` after its top was taken; item ``n`` moves there."""
     key, item = keys[n], items[n]
     i = 0
     while True:
@@ -121,14 +123,14 @@ def lattice_search(
         came[s] = _START
         keys[size], items[size] = cost[s], s
         size += 1
-        _sift_up(keys, items, size - 1)
+        sift_up(keys, items, size - 1)
     pops = 0
     exhausted = True
     while size > 0:
         f, s = keys[0], items[0]
         size -= 1
         if size > 0:
-            _sift_down(keys, items, size)
+            sift_down(keys, items, size)
         if f >= best:
             break
         if done[s]:
@@ -220,7 +222,7 @@ def lattice_search(
                 capacity *= 2
             keys[size], items[size] = f1, s1
             size += 1
-            _sift_up(keys, items, size - 1)
+            sift_up(keys, items, size - 1)
     if best_state < 0:
         return math.inf, np.empty((0, 2)), pops, exhausted
     # ---- back along the parents; only the points where the course changes are kept

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from companion.planner.anneal import MOST_POINTS, anneal, check_path, follow, timetable, uniform, zigzag
 from companion.planner.bound import Bound
+from companion.planner.drift import run_drift
 from companion.planner.gauge import Gauge
 from companion.planner.kernels import Floats, is_free
 from companion.planner.lattice import run_lattice
@@ -266,6 +267,18 @@ class Searcher:
             self.pops_per_s = found.pops / max(1e-6, self.effort.elapsed_s - began_s)
         self.effort.spend(max(1, found.pops // 8))
         return self.offer(found.points, f"lattice {cells}")
+
+    def drift(self, cells: int, stride: float, bound_s: float) -> Candidate | None:
+        """Run one search whose courses follow the no-go zone in time and offer its path."""
+        began_s = self.effort.elapsed_s
+        most = 1e9 if self.effort.limit is None else 2.0 * (self.effort.limit - self.effort.used)
+        most = min(most, max(500.0, 0.2 * self.pops_per_s * self.effort.remaining_s))
+        found = run_drift(self.world, self.gauge, cells=cells, box=self.inner_box(0.5), bound_s=bound_s,
+                          max_pops=int(most), stride=stride)
+        self.effort.spend(max(1, found.pops // 2))
+        if found.pops > 5_000:
+            self.pops_per_s = 4.0 * found.pops / max(1e-6, self.effort.elapsed_s - began_s)
+        return self.offer(found.points, f"drift {cells}")
 
     def zoom(self) -> None:
         """Search a stretch of the best path again on a fine lattice of its own, between two points of the path."""
