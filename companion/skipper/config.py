@@ -90,5 +90,6 @@ class SkipperConfig:
     backoff_max_s: float = 300.0
     announce_interval_s: float = 30.0          # the same sentence is not said again sooner
     wind_settle_s: float = 30.0                # wind is believed after this long at the start
-    # a heading setpoint times out after 3 s in GUIDED
-    steer_interval_s: float = 1.0
+    # Büsser's own interface: headings sent in GUIDED instead of a mission sailed in AUTO. The mission is on board all
+    # the same, its count kept in step; but a companion that dies in GUIDED leaves a boat that loiters where it is.
+    steer_by_heading: bool = False

@@ -26,7 +26,8 @@ class Gate:
     """A place to pass: within ``radius_m`` of ``en_m``, coming from ``from_en_m`` (None: wherever the boat is).
 
     ``goal`` is the index into ``Voyage.legs``. ``keep_out`` are WKT polygons for the way here. For buoys
-    ``buoy_en_m`` is the buoy and ``side`` where it is left. ``ends_goal`` marks the goal's last gate.
+    ``buoy_en_m`` is the buoy and ``side`` where it is left. ``is_first`` and ``ends_goal`` mark the goal's first and
+    last gate.
     """
 
     en_m: PointEn
@@ -38,6 +39,7 @@ class Gate:
     bandwidth_m: float | None = None
     buoy_en_m: PointEn | None = None
     side: Side = Side.NONE
+    is_first: bool = True
     keep_out: tuple[str, ...] = ()
 
 
@@ -96,7 +98,7 @@ def _round(goal: Goal, index: int, name: str, before: PointEn | None, after: Poi
             length = BARRIER_M
         gates.append(Gate(
             en_m=moved(buoy, place, goal.rounding_m), radius_m=max(goal.radius_m, 0.4 * goal.rounding_m), goal=index,
-            ends_goal=n == len(places) - 1, name=name, from_en_m=before if n == 0 else None,
+            is_first=n == 0, ends_goal=n == len(places) - 1, name=name, from_en_m=before if n == 0 else None,
             bandwidth_m=goal.bandwidth_m if n == 0 else None, buoy_en_m=buoy, side=goal.side,
             keep_out=(barrier_wkt(buoy, wrong, length),),
         ))

@@ -83,3 +83,15 @@ def repair(turn: Turn) -> bool:
         turn.update(repair=False)
         upload(turn, route, index + 1, "an upload was cut short: the whole mission again", whole=True)
     return True
+
+
+def hand_back(turn: Turn) -> None:
+    """Give the helm back to AUTO at the item that the boat has come to."""
+    status, route = turn.autopilot, turn.state.route
+    if status is None or route is None or turn.state.own_mode is None or status.mode is not turn.state.own_mode:
+        return
+    own, seq = turn.state.own_mode, min(turn.state.index + 1, len(route.items))
+    if status.mission_seq != seq:
+        make_current(turn, seq)
+    elif set_mode(turn, Mode.AUTO, "back to the mission"):
+        turn.update(own_mode=own)

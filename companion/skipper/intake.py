@@ -99,7 +99,8 @@ def locate(turn: Turn) -> None:
     """Say where the boat is on its route: the autopilot's count, our own count, gates passed, way made good."""
     state, status = turn.state, turn.autopilot
     route = state.route
-    if route is not None and status is not None and status.mission_seq is not None and _counts(turn):
+    guided = turn.steers and state.sailing and status is not None and status.mode is Mode.GUIDED
+    if route is not None and status is not None and status.mission_seq is not None and _counts(turn) and not guided:
         index = min(max(status.mission_seq - 1, 0), len(route.items) - 1)
         # Right after we made an item current the stream may still carry the old number.
         settled = turn.t_s - state.current_asked_s > turn.config.settle_s
@@ -108,6 +109,8 @@ def locate(turn: Turn) -> None:
     boat = turn.boat_en
     if route is not None and boat is not None and state.sailing:
         _own_count(turn)
+        if guided:
+            turn.update(index=min(turn.state.own_index, len(route.items) - 1), passed_since_s=None)
         _pass_gates(turn)
         _remember(turn)
 

@@ -15,6 +15,7 @@ from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m, moved
 from companion.skipper.judge import half_width_rad, judge
 from companion.skipper.ladder import Rung, rungs
+from companion.skipper.manoeuvre import gybe_round
 from companion.skipper.problem import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.route import Tail, common_prefix, loiter_place, path_length_m, splice
 from companion.skipper.snapshot import PlanOutcome, UploadOutcome, UploadResult
@@ -27,6 +28,9 @@ SAME_M = 1.0             # a new waypoint this near to the old one is the old on
 SPARE_SHARE = 0.001      # a path may get this much slower ...
 SPARE_S = 0.3            # ... and this much more, to have a waypoint less
 SIMPLIFIED_AT_MOST = 60  # waypoints: each costs a check of the whole path
+GYBE_AFTER = 2           # times in irons within IRONS_MEMORY_S before tacks are no longer tried
+IRONS_MEMORY_S = 600.0
+GYBE_RADIUS_M = 8.0      # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
 SLOW_MPS = 0.5           # slower than this the course over ground says nothing about the heading
 
 
@@ -188,6 +192,8 @@ def _place(turn: Turn, pending: PendingPlan) -> tuple[int | None, int | None]:
 def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     """Keep the old plan when it is sound under the new forecast and the new one is not clearly better."""
     route = turn.state.route
+    if tacks_fail(turn):
+        return False
     if route is None or pending.reason in {ReplanReason.START, ReplanReason.OPERATOR_BACK, ReplanReason.RETRY}:
         return False
     first = turn.state.index if pending.from_index is None else pending.from_index + 1
@@ -213,9 +219,21 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     return True
 
 
+def tacks_fail(turn: Turn) -> bool:
+    """Return whether the boat has been in irons so often of late that tacks are not tried."""
+    recent = [t for t in turn.state.irons_s if turn.t_s - t < IRONS_MEMORY_S]
+    return len(recent) >= GYBE_AFTER
+
+
 def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
     """Splice a plan into the route and ask for its upload."""
     points = simplified(pending.problem, _apart([(float(e), float(n)) for e, n in plan.waypoints_en]))[1:]
+    if tacks_fail(turn):
+        # Tacks have failed: turn the other way round where there is room.
+        points = list(gybe_round(
+            pending.start_en_m, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
+            area=turn.voyage.area, floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m)))
+        turn.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
     tail = Tail(start_en=pending.start_en_m, points_en=(*pending.lead_in, *points), gate=pending.gate)
     if pending.lead_in:
         boat = turn.boat_en

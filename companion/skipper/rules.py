@@ -14,7 +14,7 @@ from companion.skipper.actions import Action, CancelPlan, ReadMission, ReplanRea
 from companion.skipper.config import SkipperConfig
 from companion.skipper.gates import Gate, gates_of
 from companion.skipper.geometry import distance_m, leg_distance_m
-from companion.skipper.helm import arm, make_current, repair, set_mode
+from companion.skipper.helm import arm, hand_back, make_current, repair, set_mode
 from companion.skipper.intake import (
     locate,
     mode_is_ours,
@@ -100,7 +100,8 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
     if not _mission_is_known(turn):
         return
     if turn.state.phase is Phase.DONE:
-        repair(turn)
+        if not repair(turn):
+            hand_back(turn)
         return
     if turn.state.wish is OperatorWish.HOLD and not turn.state.sailing:
         turn.phase(Phase.WAITING, "the operator asked to hold")
@@ -132,7 +133,8 @@ def _operator_has_it(turn: Turn) -> bool:
     gone = not mode_is_ours(turn) or not status.is_armed
     if state.phase is not Phase.OPERATOR:
         if not gone:
-            if status.mode is Mode.AUTO and state.own_mode is not None and state.steering_until_s is None:
+            held = state.steering_until_s is not None or turn.steers
+            if status.mode is Mode.AUTO and state.own_mode is not None and not held:
                 turn.update(own_mode=None)
             return False
         if state.pending_plan is not None:

@@ -11,10 +11,11 @@ from companion.skipper.actions import CancelPlan, ReplanReason, Severity, SteerH
 from companion.skipper.config import ReplanPolicy
 from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m
-from companion.skipper.helm import check_current, is_busy, make_current, repair, set_mode
+from companion.skipper.headings import desired_heading_rad
+from companion.skipper.helm import check_current, hand_back, is_busy, make_current, repair, set_mode
 from companion.skipper.judge import predicted_beat
 from companion.skipper.manoeuvre import bear_away_rad
-from companion.skipper.planning import hold, request, seeks_refuge
+from companion.skipper.planning import IRONS_MEMORY_S, hold, request, seeks_refuge
 from companion.skipper.route import path_length_m
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase
@@ -23,7 +24,6 @@ from companion.skipper.turn import Turn
 STEER_S = 25.0               # bearing away longer than this has failed
 SAILS_MPS = 0.8              # out of irons
 SAILS_TWA_RAD = math.radians(60.0)
-IRONS_MEMORY_S = 600.0
 TOO_LATE_S = 2.0             # a plan asked for this shortly before the waypoint cannot be there in time
 FORECAST_SHARE = 0.5         # of the interval that the plan used: a smaller change of the mean does not matter
 FORECAST_RAD = math.radians(5.0)
@@ -48,15 +48,17 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         return
     if _steer(turn, fresh):
         return
-    if turn.state.own_mode is not None and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:
-        own = turn.state.own_mode
-        if set_mode(turn, Mode.AUTO, "back to the mission"):
-            turn.update(own_mode=own)
+    own = turn.state.own_mode
+    if own is not None and turn.autopilot is not None and turn.autopilot.mode is own and not turn.steers:
+        hand_back(turn)
         turn.phase(turn.state.phase, "waiting for AUTO after steering")
         return
     if repair(turn):
         return
-    check_current(turn)
+    if turn.steers:
+        _send_heading(turn)
+    else:
+        check_current(turn)
     if turn.is_raised("stuck waypoint") and turn.state.own_index > turn.state.index:
         make_current(turn, turn.state.own_index + 1)
     if turn.state.wish is OperatorWish.HOLD:
@@ -67,6 +69,22 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     if turn.state.pending_upload is None:
         _consider(turn, fresh)
     _name(turn)
+
+
+def _send_heading(turn: Turn) -> None:
+    """Steer by Büsser's headings under GUIDED, and keep the autopilot's count in step for the moment we are gone."""
+    status = turn.autopilot
+    if status is None:
+        return
+    if status.mode is not Mode.GUIDED:
+        set_mode(turn, Mode.GUIDED, "steering by headings")
+        return
+    turn.update(own_mode=Mode.GUIDED)
+    heading = desired_heading_rad(turn)
+    if heading is not None:
+        turn.act(SteerHeading(heading_rad=heading, text="leg"))
+    if status.mission_seq is not None and status.mission_seq < turn.state.index + 1:
+        make_current(turn, turn.state.index + 1)
 
 
 def _finish(turn: Turn) -> None:

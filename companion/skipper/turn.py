@@ -177,6 +177,12 @@ class Turn:
         """Return whether a watchdog is raised."""
         return any(r.name == name for r in self.state.raised)
 
+    @property
+    def steers(self) -> bool:
+        """Whether the boat is steered by headings (and may be)."""
+        may = self.snapshot.permissions
+        return self.config.steer_by_heading and may.may_steer and may.may_set_mode
+
     def leg(self) -> tuple[PointEn, PointEn] | None:
         """Return the planned leg being sailed (from, to), None without a route."""
         route, i = self.state.route, self.state.index

@@ -1,6 +1,8 @@
 """Whole voyages in the tiny world: the main job, and each way in which it can go wrong."""
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from companion.messages import MissionItem, Mode, StatusText
 from companion.skipper import actions as act
 from companion.skipper.config import DRY_RUN, Permissions, ReplanPolicy
 from companion.skipper.geometry import bearing_rad, distance_m
+from companion.skipper.manoeuvre import is_tack
 from companion.skipper.route import effective, ends_safely, is_same_mission
 from companion.skipper.snapshot import AutopilotRebooted, OperatorWish, UploadResult, WindHealth
 from companion.skipper.state import Phase
@@ -146,7 +149,7 @@ def test_five_laps_of_the_regatta_course_without_missing_a_buoy(side):
     for number, place in enumerate(places[:2]):
         turned = sum(
             difference_rad(bearing_rad(place, b), bearing_rad(place, a))
-            for a, b in zip(world.track[:-1], world.track[1:], strict=True))
+            for a, b in pairwise(world.track))
         assert -hand * turned / (2 * math.pi) == pytest.approx(5.0, abs=0.25), number
         assert min(distance_m(place, p) for p in world.track) > 3.0
 
@@ -450,6 +453,22 @@ def test_the_boat_in_irons_bears_away_and_sails_on():
     assert world.run(1500, is_done)
 
 
+def test_after_two_failed_tacks_it_gybes_round():
+    world = make(obstacles=(), wind=lambda t: (0.0, 5.0), config={"no_go_patience_s": 1e9})
+    assert world.run(60, is_sailing)
+    world.state = replace(world.state, irons_s=(world.t - 60.0, world.t - 5.0))
+    world.events.append(OperatorWish.REPLAN)
+    assert world.run(30, lambda w: said(w, "gybing round"))
+    world.run(3)
+    points = world.state.route.points_en_m[world.state.index:-1]
+    courses = [bearing_rad(a, b) for a, b in pairwise([world.position, *points])]
+    assert len(points) >= 5
+    assert not any(is_tack(a, b, 0.0) for a, b in pairwise(courses[1:]))
+    tacks = world.tacks
+    assert world.run(1500, is_done)
+    assert world.tacks == tacks
+
+
 def test_becalmed_it_waits_without_plans_and_sails_on():
     world = make(wind=lambda t: (0.0, 5.0 if t < 60.0 or t > 600.0 else 0.2))
     world.run(200)
@@ -514,8 +533,6 @@ def test_without_a_next_plan_it_loiters_and_goes_on_when_there_is_one():
 
 
 def test_a_critical_battery_goes_to_the_refuge():
-    from dataclasses import replace
-
     world = make(obstacles=(), voyage={"refuges": ((120.0, 60.0),)})
     world.run(60)
     snapshot = world.snapshot
@@ -528,3 +545,41 @@ def test_a_critical_battery_goes_to_the_refuge():
     assert world.run(300, lambda w: distance_m(w.position, (120.0, 60.0)) < 12.0)
     world.run(60)
     assert distance_m(world.position, (120.0, 60.0)) < 25.0
+
+
+# ------------------------------------------------------------------------------------------- headings
+def test_by_headings_under_guided_it_arrives_and_hands_back():
+    world = make(Goal(en_m=(250.0, 120.0), radius_m=8.0), Goal(en_m=(0.0, 200.0), radius_m=8.0), obstacles=(),
+                 config={"steer_by_heading": True}, wind=lambda t: (0.0, 5.0))
+    assert world.run(40, lambda w: w.mode is Mode.GUIDED)
+    assert world.run(1500, is_done)
+    assert world.state.reached == (0, 1)
+    assert world.count(act.SteerHeading) > 100
+    world.run(20)
+    assert world.mode is Mode.AUTO
+    assert world.seq == len(effective(world.mission))
+    assert distance_m(world.position, (0.0, 200.0)) < 25.0
+
+
+def test_by_headings_the_operator_is_still_the_operator():
+    world = make(config={"steer_by_heading": True}, obstacles=())
+    assert world.run(60, lambda w: w.mode is Mode.GUIDED)
+    world.run(20)
+    world.set_mode(Mode.HOLD)
+    sent = world.count(act.SteerHeading)
+    world.run(30)
+    assert world.state.phase is Phase.OPERATOR
+    assert world.count(act.SteerHeading) == sent
+    world.set_mode(Mode.AUTO)
+    assert world.run(1500, is_done)
+
+
+@pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
+def test_by_headings_it_rounds_buoys(side):
+    hand = 1.0 if side is Side.PORT else -1.0
+    places = [(0.0, 150.0), (-90.0 * hand, 75.0), (0.0, 0.0)]
+    world = make(*(Goal(en_m=p, side=side) for p in places), obstacles=(), config={"steer_by_heading": True},
+                 voyage={"laps": 2, "home": (20.0 * hand, -40.0)}, position=(20.0 * hand, -40.0), expansions=600)
+    assert world.run(3000, is_done)
+    assert len(world.state.reached) == 6
+    assert min(distance_m(places[0], p) for p in world.track) > 3.0
