@@ -35,7 +35,7 @@ class PolygonIndex:
         self._edges = edges
         if edges.shape[0] == 0:
             self._grid = np.array([0.0, 0.0, 1.0, 1.0, 1.0])
-            self._start, self._members = np.zeros(2, dtype=np.int64), np.zeros(0, dtype=np.int64)
+            self._start, self._packed = np.zeros(2, dtype=np.int64), np.zeros((0, 4))
             self._middle_inside = np.zeros(1, dtype=np.bool_)
             return
         low = np.minimum(edges[:, :2], edges[:, 2:]).min(axis=0)
@@ -47,7 +47,8 @@ class PolygonIndex:
         columns, rows = (math.ceil(float(s) / cell) + 1 for s in size)
         origin = low - 0.5 * (np.array([columns, rows]) * cell - size)
         self._grid = np.array([origin[0], origin[1], cell, float(columns), float(rows)])
-        self._start, self._members = _sort_into_cells(edges, self._grid)
+        self._start, members = _sort_into_cells(edges, self._grid)
+        self._packed = np.ascontiguousarray(edges[members])  # each cell's edges side by side
         middles = np.stack(np.meshgrid(
             origin[0] + (np.arange(columns) + 0.5) * cell, origin[1] + (np.arange(rows) + 0.5) * cell,
         ), axis=-1).reshape(-1, 2)
@@ -62,19 +63,19 @@ class PolygonIndex:
     def intersects(self, segments: ArrayLike) -> NDArray[np.bool_]:
         """Return which segments, an (n, 4) array of x0, y0, x1, y1 [m], touch or enter a polygon."""
         wanted = np.ascontiguousarray(np.asarray(segments, dtype=np.float64).reshape(-1, 4))
-        return _intersects(wanted, self._edges, self._start, self._members, self._grid, self._middle_inside)
+        return _intersects(wanted, self._packed, self._start, self._grid, self._middle_inside)
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Return which points, an (n, 2) array [m], lie inside a polygon."""
         wanted = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 2))
-        return _contains(wanted, self._edges, self._start, self._members, self._grid, self._middle_inside)
+        return _contains(wanted, self._packed, self._start, self._grid, self._middle_inside)
 
     def distance_m(self, points: ArrayLike) -> Floats:
         """Return each point's distance to the nearest boundary [m], negative inside; inf without polygons."""
         wanted = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 2))
         if self.edge_count == 0:
             return np.full(wanted.shape[0], np.inf)
-        return _signed_distance(wanted, self._edges, self._start, self._members, self._grid, self._middle_inside)
+        return _signed_distance(wanted, self._packed, self._start, self._grid, self._middle_inside)
 
 
 def _edges(union: BaseGeometry) -> Floats:
@@ -128,9 +129,9 @@ def _side(ax: float, ay: float, bx: float, by: float, px: float, py: float) -> f
 
 
 @njit(nogil=True, cache=True)
-def _meet(ax: float, ay: float, bx: float, by: float, edge: Floats) -> bool:
-    """Whether two closed segments share a point."""
-    cx, cy, dx, dy = edge
+def _meet(ax: float, ay: float, bx: float, by: float, edge: Floats, k: int) -> bool:
+    """Whether a closed segment shares a point with edge ``k``."""
+    cx, cy, dx, dy = edge[k, 0], edge[k, 1], edge[k, 2], edge[k, 3]
     if max(ax, bx) < min(cx, dx) or max(cx, dx) < min(ax, bx):
         return False
     if max(ay, by) < min(cy, dy) or max(cy, dy) < min(ay, by):
@@ -144,7 +145,7 @@ def _meet(ax: float, ay: float, bx: float, by: float, edge: Floats) -> bool:
 
 @njit(nogil=True, cache=True)
 def _inside(
-    px: float, py: float, edges: Floats, start: Ints, members: Ints, grid: Floats, middle: NDArray[np.bool_],
+    px: float, py: float, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
 ) -> bool:
     """Whether a point lies inside: the state of its cell's middle, turned by each edge on the way there."""
     columns, rows = int(grid[3]), int(grid[4])
@@ -156,7 +157,7 @@ def _inside(
     inside = bool(middle[cell])
     mx, my = grid[0] + (c + 0.5) * grid[2], grid[1] + (r + 0.5) * grid[2]
     for k in range(start[cell], start[cell + 1]):
-        ax, ay, bx, by = edges[members[k]]
+        ax, ay, bx, by = edges[k, 0], edges[k, 1], edges[k, 2], edges[k, 3]
         # Half-open on both lines, so that a vertex on the way counts once.
         sa = _side(px, py, mx, my, ax, ay) > 0.0
         sb = _side(px, py, mx, my, bx, by) > 0.0
@@ -170,17 +171,17 @@ def _inside(
 
 @njit(nogil=True, cache=True)
 def _contains(
-    points: Floats, edges: Floats, start: Ints, members: Ints, grid: Floats, middle: NDArray[np.bool_],
+    points: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     out = np.zeros(points.shape[0], dtype=np.bool_)
     for i in range(points.shape[0]):
-        out[i] = _inside(points[i, 0], points[i, 1], edges, start, members, grid, middle)
+        out[i] = _inside(points[i, 0], points[i, 1], edges, start, grid, middle)
     return out
 
 
 @njit(nogil=True, cache=True)
 def _intersects(
-    segments: Floats, edges: Floats, start: Ints, members: Ints, grid: Floats, middle: NDArray[np.bool_],
+    segments: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     out = np.zeros(segments.shape[0], dtype=np.bool_)
     columns, rows, cell_m = int(grid[3]), int(grid[4]), grid[2]
@@ -225,7 +226,7 @@ def _intersects(
         for _ in range(abs(ce - c) + abs(re - r) + 1):
             cell = r * columns + c
             for k in range(start[cell], start[cell + 1]):
-                if _meet(ax, ay, bx, by, edges[members[k]]):
+                if _meet(ax, ay, bx, by, edges, k):
                     hit = True
                     break
             if hit:
@@ -239,13 +240,13 @@ def _intersects(
             if c < 0 or r < 0 or c >= columns or r >= rows:
                 break
         # No edge met: the whole segment is inside or outside.
-        out[i] = hit or _inside(ax, ay, edges, start, members, grid, middle)
+        out[i] = hit or _inside(ax, ay, edges, start, grid, middle)
     return out
 
 
 @njit(nogil=True, cache=True)
-def _distance2(px: float, py: float, edge: Floats) -> float:
-    ax, ay, bx, by = edge
+def _distance2(px: float, py: float, edge: Floats, k: int) -> float:
+    ax, ay, bx, by = edge[k, 0], edge[k, 1], edge[k, 2], edge[k, 3]
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
     t = 0.0 if length2 == 0.0 else min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / length2))
@@ -255,7 +256,7 @@ def _distance2(px: float, py: float, edge: Floats) -> float:
 
 @njit(nogil=True, cache=True)
 def _signed_distance(
-    points: Floats, edges: Floats, start: Ints, members: Ints, grid: Floats, middle: NDArray[np.bool_],
+    points: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
 ) -> Floats:
     """Search rings of cells round each point until no nearer edge is possible."""
     columns, rows, cell_m = int(grid[3]), int(grid[4]), grid[2]
@@ -276,7 +277,7 @@ def _signed_distance(
                     if whole or c in (low_c, high_c):
                         cell = r * columns + c
                         for k in range(start[cell], start[cell + 1]):
-                            best = min(best, _distance2(px, py, edges[members[k]]))
+                            best = min(best, _distance2(px, py, edges, k))
                         c += 1
                     else:  # inside the ring: on to its far side
                         c = max(c + 1, high_c)
@@ -289,5 +290,5 @@ def _signed_distance(
                 break
             ring += 1
         distance = math.sqrt(best)
-        out[i] = -distance if _inside(px, py, edges, start, members, grid, middle) else distance
+        out[i] = -distance if _inside(px, py, edges, start, grid, middle) else distance
     return out
