@@ -197,7 +197,11 @@ def main(argv=None):
     parser.add_argument("--planners", nargs="+", choices=every, default=every if has_ompl else list(OURS))
     parser.add_argument("--scaling", action="store_true", help="only the scaling tables")
     parser.add_argument("--json", metavar="FILE", help="write all rows")
+    parser.add_argument("--table", nargs="+", metavar="FILE", help="only print the table of rows written before")
     args = parser.parse_args(argv)
+    if args.table:
+        show(summary([row for name in args.table for row in json.loads(Path(name).read_text())["rows"]]))
+        return 0
     if not has_ompl and any(p.startswith("ompl-") for p in args.planners):
         print("bench: OMPL is not installed: install requirements-bench.lock or leave it out", file=sys.stderr)
         return 2

@@ -75,3 +75,47 @@ def test_a_budget_of_expansions_and_a_seed_give_the_same_plan_twice(algorithm):
     a, b = (plan(p, algorithm=algorithm, expansions=20_000, seed=11) for _ in range(2))
     assert np.array_equal(a.waypoints_en, b.waypoints_en)
     assert a.expansions == b.expansions
+
+
+def square(x, y, half=20):
+    a, b, c, d = x - half, x + half, y - half, y + half
+    return f"POLYGON(({a} {c},{b} {c},{b} {d},{a} {d},{a} {c}))"
+
+
+NASTY = {
+    "goal radius zero": {"goal": {"x": 0, "y": 200, "radius": 0}},
+    "a million metres": {"goal": {"x": 1e6, "y": 1e6, "radius": 10}},
+    "self-intersecting": {"obstacles": ["POLYGON((-50 50,50 150,50 50,-50 150,-50 50))"]},
+    "overlapping": {"obstacles": [square(-20 + i, 100) for i in range(40)]},
+    "slivers": {"obstacles": [f"POLYGON((-90 {y},90 {y},90 {y + 0.001},-90 {y}))" for y in range(50, 150)] * 15},
+    "a millimetre off": {"obstacles": ["POLYGON((0.001 -50,50 -50,50 50,0.001 50,0.001 -50))"]},
+    "touching": {"obstacles": ["POLYGON((0 -50,50 -50,50 50,0 50,0 -50))"]},
+    "fence without room": {"fence": "POLYGON((-1 -1,1 -1,1 201,-1 201,-1 -1))"},
+    "no-go of 180": {"boat": {"no_go_half_deg": 180, "max_twa_deg": 180, "turn_rate_rad_s": 1,
+                              "speed": {"model": "constant", "v_mps": 1}}},
+    "polar of zeros": {"boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 1,
+                                "speed": {"model": "polar", "twa_deg": [0, 180], "v_mps": [0, 0]}}},
+    "current above speed": {"current": {"set_deg": 180, "drift_mps": 9}},
+    "risk of nothing": {"risk": {"max_path_risk": 1e-9}},
+    "start is goal": {"goal": {"x": 0, "y": 0, "radius": 5}},
+}
+
+
+@pytest.mark.parametrize("name", NASTY)
+@pytest.mark.parametrize("algorithm", ["rrtstar", "astar"])
+def test_bad_input_is_a_plan_or_a_reason_within_the_budget(algorithm, name):
+    p = Problem.from_json({
+        "id": "n", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 0}, "goal": {"x": 0, "y": 200, "radius": 5},
+        "obstacles": [], "fence": None, "delta_s": 0.7,
+        "wind": {"from_deg": 60, "speed_mps": 5,
+                 "sigma": {"model": "ar1", "sigma0_deg": 2, "sigma_inf_deg": 8, "rho_hz": 0.03}},
+        "boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
+                 "speed": {"model": "constant", "v_mps": 1.5}},
+        **NASTY[name],
+    })
+    answer = plan(p, algorithm=algorithm, expansions=2000 if algorithm == "rrtstar" else 200_000)
+    assert answer.reason
+    if answer.has_path:
+        assert p.evaluate(answer.waypoints_en).is_feasible
+    if name == "polar of zeros":
+        assert answer.status is PlanStatus.INVALID
