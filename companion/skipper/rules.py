@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from companion.boat import required_margin
 from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, MissionState, Mode
 from companion.skipper.actions import Action, CancelPlan, ReadMission, ReplanReason, Severity
@@ -316,6 +317,7 @@ def _launch(turn: Turn) -> None:
         turn.update(sailing=True, history=(), own_index=state.index)
         turn.phase(Phase.STANDARD, "under way")
         turn.say(Severity.NOTICE, "under way", "AUTO and armed: under way", every_s=0.0)
+        _look_at_margin(turn)
         if status.mission_state in {MissionState.COMPLETE, MissionState.NOT_STARTED, MissionState.PAUSED}:
             make_current(turn, state.index + 1)
         return
@@ -336,6 +338,18 @@ def _launch(turn: Turn) -> None:
     else:
         turn.phase(Phase.WAITING, "arming" if may.may_arm else "ready: waiting for the operator to arm")
         arm(turn)
+
+
+def _look_at_margin(turn: Turn) -> None:
+    """Say so when the autopilot's own corridor is wider than the margin that plans keep."""
+    limits, wind = turn.snapshot.limits, turn.wind_mean
+    if limits is None or wind is None:
+        return
+    boat = turn.voyage.boat
+    asked = required_margin(limits, speed_mps=boat.polar.max_speed_mps(wind[1]), hull=boat.hull)
+    if asked.total_m > turn.config.margin_m + 0.5:
+        turn.say(Severity.WARNING, "margin",
+                 f"the margin is {turn.config.margin_m:g} m; the autopilot's habits ask for {asked.describe()}")
 
 
 def _is_stale(turn: Turn) -> bool:
