@@ -298,11 +298,12 @@ def _download(args: argparse.Namespace) -> int:
     kind = MissionType.RALLY if args.part == "rally" else MissionType.MISSION
     with Shore(args.link, timeout_s=args.timeout) as shore:
         items = download_list(shore, kind)
+        home = shore.home if kind is MissionType.MISSION else None
     if not items:
         print(f"the autopilot holds no {args.part}; nothing is written", file=sys.stderr)
         return 1
     document = Document(source="autopilot", format="autopilot", items=items if args.part == "mission" else (),
-                        rally=items if args.part == "rally" else ())
+                        rally=items if args.part == "rally" else (), home=home)
     write_out(write(document, args.out, part=args.part), args.out, lossy=False)
     print(f"{args.out}: written: {summary(document)}, hash {mission_hash(items)}")
     return 0

@@ -56,6 +56,7 @@ class Shore:
         self._count: int | None = None
         self._total = 0
         self._on_progress: OnProgress | None = None
+        self.home: GeoPoint | None = None  # item 0 of the mission last downloaded
 
     def __enter__(self) -> Self:
         url = mavsdk_url(self._link)
@@ -197,7 +198,10 @@ class Shore:
             told = "never said how many items it holds" if count is None else f"announced {count} items"
             raise TransferError(f"{what}: the autopilot {told} and {len(listed)} arrived: is the link dead?")
         items = tuple(_from_mavsdk(item) for item in listed)
-        return items[1:] if kind is MissionType.MISSION else items
+        if kind is not MissionType.MISSION:
+            return items
+        self.home = items[0].point if items and (items[0].lat_e7 or items[0].lon_e7) else None
+        return items[1:]
 
     def clear(self, kind: MissionType) -> None:
         """Empty a list. Raises TransferError."""

@@ -8,6 +8,7 @@ import pathlib
 import subprocess
 import sys
 import textwrap
+import time
 
 import pytest
 from pymavlink import mavwp
@@ -116,34 +117,64 @@ def companion(*argv) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-def test_shore_tools_against_the_simulated_autopilot(tmp_path):
+def check_shore_tools(tmp_path, link, other_link):
     """Fence, mission and rally list: up, read back, hash, down again, and into force."""
     (tmp_path / "m.waypoints").write_text(WPL)
-    (tmp_path / "r.rally").write_text("RALLY\t51.1005\t-1.3005\t0\t0\t0\t0\n")
+    (tmp_path / "r.rally").write_text("RALLY\t50.8172\t-1.3101\t0\t0\t0\t0\n")
+    code, out, err = companion("fence", "upload", DEMO, "--link", link, "--enable")
+    assert code == 0, out + err
+    assert "uploaded and read back the same, hash " in out
+    assert "FENCE_TYPE 4" in out
+    sent_hash = out.split("hash ")[1].split()[0]
+
+    code, out, err = companion("fence", "download", tmp_path / "down.waypoints", "--link", other_link)
+    assert code == 0, out + err
+    assert sent_hash in out
+    assert mission_hash(_fence_items(tmp_path / "down.waypoints")) == sent_hash
+
+    code, out, err = companion("mission", "upload", tmp_path / "m.waypoints", "--link", link)
+    assert code == 0, out + err
+    assert mission_hash(parse(WPL.encode(), "m").items) in out
+    code, out, err = companion("mission", "download", tmp_path / "down.plan", "--link", link)
+    assert code == 0, out + err
+    assert [i.command for i in read(tmp_path / "down.plan").items] == [16, 19, 177, 17]
+
+    assert companion("mission", "upload", tmp_path / "r.rally", "--part", "rally", "--link", link)[0] == 0
+    code, out, err = companion("mission", "download", tmp_path / "down.rally", "--part", "rally", "--link", link)
+    assert code == 0, out + err
+    assert read(tmp_path / "down.rally").rally[0].lat_e7 == 508172000
+
+
+def test_shore_tools_against_the_simulated_autopilot(tmp_path):
     with boat_process("--warm", "--moored", "--speedup", "4", "--home", "50.817,-1.31") as (host, tcp, udp):
-        link = f"udpout:{host}:{udp}"
-        code, out, err = companion("fence", "upload", DEMO, "--link", link, "--enable")
-        assert code == 0, out + err
-        assert "uploaded and read back the same, hash " in out
-        assert "FENCE_TYPE 4" in out
-        sent_hash = out.split("hash ")[1].split()[0]
+        check_shore_tools(tmp_path, f"udpout:{host}:{udp}", f"tcp:{host}:{tcp}")
 
-        code, out, err = companion("fence", "download", tmp_path / "down.waypoints", "--link", f"tcp:{host}:{tcp}")
-        assert code == 0, out + err
-        assert sent_hash in out
-        assert mission_hash(_fence_items(tmp_path / "down.waypoints")) == sent_hash
 
-        code, out, err = companion("mission", "upload", tmp_path / "m.waypoints", "--link", link)
-        assert code == 0, out + err
-        assert mission_hash(parse(WPL.encode(), "m").items) in out
-        code, out, err = companion("mission", "download", tmp_path / "down.plan", "--link", link)
-        assert code == 0, out + err
-        assert [i.command for i in read(tmp_path / "down.plan").items] == [16, 19, 177, 17]
+@pytest.mark.ardurover
+def test_shore_tools_against_the_real_ardurover(tmp_path):
+    from sitl.ardurover import DEFAULTS, find, free_instance
 
-        assert companion("mission", "upload", tmp_path / "r.rally", "--part", "rally", "--link", link)[0] == 0
-        code, out, err = companion("mission", "download", tmp_path / "down.rally", "--part", "rally", "--link", link)
-        assert code == 0, out + err
-        assert read(tmp_path / "down.rally").rally[0].lat_e7 == 511005000
+    program = find()
+    if program is None:
+        pytest.skip("no ArduRover program: set $ARDUROVER or run 'sitl fetch'")
+    instance = free_instance()
+    folder = tmp_path / "ardurover"
+    folder.mkdir()
+    with (folder / "log").open("w") as log:
+        boat = subprocess.Popen(
+            [str(program), "--model", "sailboat", "--speedup", "4", f"-I{instance}", "--home", "50.817,-1.31,0,0",
+             "--defaults", str(DEFAULTS), "-w", "--serial0", "tcp:0"], cwd=folder, stdout=log, stderr=log,
+        )
+    try:
+        link = f"tcp:127.0.0.1:{5760 + 10 * instance}"
+        deadline = time.monotonic() + 60.0
+        while companion("mission", "download", tmp_path / "none.plan", "--link", link)[2].count("no heartbeat"):
+            assert time.monotonic() < deadline, "ArduRover does not speak"
+        time.sleep(12.0)  # 48 simulated seconds: home is set once the EKF has a position
+        check_shore_tools(tmp_path, link, link)
+    finally:
+        boat.terminate()
+        boat.wait(10.0)
 
 
 def _fence_items(path):
