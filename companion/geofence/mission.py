@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import difflib
 import re
 import tomllib
@@ -166,6 +167,8 @@ def parse_options(text: str, source: str) -> MissionOptions:
         raise InputError(source, where.rstrip(")") or "", f"is not TOML: {what[:1].lower()}{what[1:]}") from None
     except RecursionError:
         raise InputError(source, "", "is nested too deeply") from None
+    except ValueError as error:  # a number of thousands of digits
+        raise InputError(source, "", f"is not TOML: {str(error)[:60]}") from None
     _refuse_odd_numbers(raw, source, "")
     try:
         return msgspec.convert(raw, MissionOptions)
@@ -246,11 +249,16 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
         remedy = "add [[goal]] with lat and lon" if key == "goal" else "add it"
         return InputError(source, f"{place} {key}".strip(), "is missing", remedy)
     value = _value_at(raw, path)
-    shown = f"{value!r} is wrong: " if value is not None and not isinstance(value, dict | list) else ""
+    shown = f"{_short(value)} is wrong: " if value is not None and not isinstance(value, dict | list) else ""
     swap = ""
     if place.endswith(" lat") and isinstance(value, int | float) and abs(value) > 90.0:
         swap = "are lat and lon swapped? write degrees within ±90"
     return InputError(source, place, shown + problem[:1].lower() + problem[1:], swap)
+
+
+def _short(value: object) -> str:
+    text = str(value) if isinstance(value, datetime.date | datetime.time) else repr(value)
+    return text if len(text) <= 40 else text[:40] + "..."
 
 
 def _value_at(raw: dict[str, Any], path: str) -> object:

@@ -4,10 +4,14 @@ import pathlib
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.geofence.mission import dump_options, parse_options
+from companion.geofence.text import decode
+from tests.geofence.strategies import QUIET
 
 MISSIONS = sorted((pathlib.Path(__file__).parents[2] / "missions").glob("*.toml"))
 ROCK = "POLYGON ((-1.301 50.801, -1.300 50.801, -1.300 50.802, -1.301 50.802, -1.301 50.801))"
@@ -117,3 +121,23 @@ def test_points_become_circles_of_the_configured_radius(tmp_path):
     local = mission.area.local(mission.frame())
     center = np.array(local.polygons[0].centroid.coords[0])
     assert local.obstacle_clearance_m(center + np.array([100.0, 0.0]))[0] == pytest.approx(75.0, abs=0.1)
+
+
+WORDS = [b"nan", b"-inf", b"1e999", b"true", b"[]", b"{}", b"1979-05-27", b"'x'", b"9" * 400, b"9" * 5000, b"-1", b"\x00",
+         b"[[goal]]", b"[area]", b"#", b'"""', b"=", b"\xff", b"lat = 1", b"." * 5, b"[" * 300]
+
+
+@settings(**QUIET, max_examples=250)
+@given(st.data())
+def test_a_damaged_mission_is_refused_in_one_line_or_read(data):
+    good = (MISSIONS[0].parent / "archipelago.toml").read_bytes()
+    at = data.draw(st.integers(0, len(good)))
+    word = data.draw(st.sampled_from(WORDS) | st.binary(max_size=4))
+    bad = good[:at] + word + good[at + data.draw(st.integers(0, 6)):]
+    refusal = ""
+    try:
+        parse_options(decode(bad, "m.toml"), "m.toml")
+    except InputError as error:
+        refusal = str(error)
+    assert "\n" not in refusal
+    assert not refusal or refusal.startswith("m.toml")
