@@ -37,10 +37,10 @@ class Motion:
     """
 
     position_m: float = 5.0
-    speed_mps: float = 0.3
-    course_rad: float = math.radians(2.0)
-    accel_mps2: float = 0.01
-    turn_radps: float = math.radians(0.05)
+    speed_mps: float = 0.2
+    course_rad: float = math.radians(1.2)
+    accel_mps2: float = 0.005
+    turn_radps: float = math.radians(0.03)
     hold_s: float = TURN_HOLD_S
     unknown_mps: float = 4.0
 

@@ -178,8 +178,8 @@ class Targets:
         nearest = min(known, key=lambda v: (_surprise_m(v, t_s, en), v.branch), default=None)
         if nearest is not None and _surprise_m(nearest, t_s, en) > _reach_m(nearest, t_s):
             nearest = None
-        if nearest is not None and t_s <= nearest.t_s:
-            # ArduPilot repeats a silent vessel every 30 s with a growing age: nothing new, but it was heard.
+        if nearest is not None and (t_s <= nearest.t_s or _is_repeat(nearest, report, en, t_s)):
+            # ArduPilot repeats a silent vessel every 30 s with a growing age in whole seconds: nothing new.
             return self.counted(counts, now_s, late=1)
         vessels = dict(self.vessels)
         if nearest is None:
@@ -232,6 +232,10 @@ def _surprise_m(vessel: Vessel, t_s: float, en: tuple[float, float]) -> float:
     there = predict(vessel, t_s).mean_en_m
     shift = (vessel.centre_en_m[0] - vessel.antenna_en_m[0], vessel.centre_en_m[1] - vessel.antenna_en_m[1])
     return math.hypot(there[0] - shift[0] - en[0], there[1] - shift[1] - en[1])
+
+
+def _is_repeat(vessel: Vessel, report: AisReport, en: tuple[float, float], t_s: float) -> bool:
+    return report.age_s >= 1.0 and t_s - vessel.t_s < 1.5 and math.dist(en, vessel.antenna_en_m) < 0.5
 
 
 def _reach_m(vessel: Vessel, t_s: float) -> float:

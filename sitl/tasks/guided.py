@@ -25,6 +25,7 @@ import numpy as np
 from companion import clock
 from companion.boat import ardurover_sitl
 from companion.clock import now_s
+from companion.errors import LinkError
 from companion.field.guidance import RESEND_S, Habits, Situation
 from companion.field.station import Station, StationState, keep
 from companion.geo.frame import LocalFrame
@@ -87,11 +88,14 @@ class Steering:
             LinkError: the autopilot refuses; the text has its words.
 
         """
-        from companion.errors import LinkError
-
-        for answer in (await self._facade.arm(), await self._facade.set_mode(Mode.GUIDED)):
-            if not answer.is_ok:
-                raise LinkError(f"the autopilot refuses GUIDED: {answer}")
+        for attempt in range(4):
+            # A simulator in a hurry on a busy machine may show its new mode later than the facade waits for it.
+            armed, guided = await self._facade.arm(), await self._facade.set_mode(Mode.GUIDED)
+            status = self._facade.status
+            if (armed.is_ok and guided.is_ok) or (status and status.is_armed and status.mode is Mode.GUIDED):
+                return
+            if attempt == 3:
+                raise LinkError(f"the autopilot refuses GUIDED: {armed.text} {guided.text}")
 
     async def run(self, decide: Decide, is_over: Callable[[], bool], zero_s: float) -> None:
         """Decide and send once a second until it is over; then hand back (the caller's mode)."""
