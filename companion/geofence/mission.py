@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
+import datetime as dt
 import difflib
 import re
 import tomllib
@@ -257,7 +257,7 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
 
 
 def _short(value: object) -> str:
-    text = str(value) if isinstance(value, datetime.date | datetime.time) else repr(value)
+    text = str(value) if isinstance(value, dt.date | dt.time) else repr(value)
     return text if len(text) <= 40 else text[:40] + "..."
 
 

@@ -123,8 +123,8 @@ def test_points_become_circles_of_the_configured_radius(tmp_path):
     assert local.obstacle_clearance_m(center + np.array([100.0, 0.0]))[0] == pytest.approx(75.0, abs=0.1)
 
 
-WORDS = [b"nan", b"-inf", b"1e999", b"true", b"[]", b"{}", b"1979-05-27", b"'x'", b"9" * 400, b"9" * 5000, b"-1", b"\x00",
-         b"[[goal]]", b"[area]", b"#", b'"""', b"=", b"\xff", b"lat = 1", b"." * 5, b"[" * 300]
+WORDS = [b"nan", b"-inf", b"1e999", b"true", b"[]", b"{}", b"1979-05-27", b"'x'", b"9" * 400, b"9" * 5000,
+         b"-1", b"\x00", b"[[goal]]", b"[area]", b"#", b'"""', b"=", b"\xff", b"lat = 1", b"." * 5, b"[" * 300]
 
 
 @settings(**QUIET, max_examples=250)
