@@ -5,9 +5,9 @@ the Adriatic; docs/wind.md says which). They are shapes, not climates: how long 
 survives, how errors grow with the horizon, how heavy their tails are. Everything about today's wind is learned
 on board.
 
-Rounded from the fit (110 to 170 evaluations); on records left out it loses less than 1 % of CRPS. ``memory`` and ``tail`` were
-chosen by hand: seconds of own errors, pool, quantiles, roughness, shown spread; pull of the quantiles to their prior;
-shrinkage of the pool.
+Rounded from the fit (110 to 170 evaluations); on records left out it loses less than 1 % of CRPS. ``memory`` and
+``tail`` were chosen by hand: seconds of own errors, pool, quantiles, roughness, shown spread; pull of the quantiles to
+their prior; shrinkage of the pool.
 """
 
 from __future__ import annotations
