@@ -407,16 +407,21 @@ def _parse_speed(speed: _Reader) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(math.radians(a) for a in twa), mps
 
 
+def _spread(deg: float) -> float:
+    """Return a sigma or growth in radians; what is below any meaning (1e-12) is 0, lest its square underflow."""
+    return 0.0 if abs(deg) < 1e-12 else math.radians(deg)
+
+
 def _parse_sigma(sigma: _Reader) -> Sigma:
     model = sigma.text("model")
     if model == "none":
         return Sigma()
     if model == "kalman":
-        return Sigma(model=model, sigma0_rad=math.radians(sigma.number("sigma0_deg")),
-                     growth_rad_per_sqrt_s=math.radians(sigma.number("growth_deg_per_sqrt_s")))
+        return Sigma(model=model, sigma0_rad=_spread(sigma.number("sigma0_deg")),
+                     growth_rad_per_sqrt_s=_spread(sigma.number("growth_deg_per_sqrt_s")))
     if model == "ar1":
-        return Sigma(model=model, sigma0_rad=math.radians(sigma.number("sigma0_deg")),
-                     sigma_inf_rad=math.radians(sigma.number("sigma_inf_deg")), rho_hz=sigma.number("rho_hz"))
+        return Sigma(model=model, sigma0_rad=_spread(sigma.number("sigma0_deg")),
+                     sigma_inf_rad=_spread(sigma.number("sigma_inf_deg")), rho_hz=sigma.number("rho_hz"))
     if model != "forecast":
         raise InputError(sigma.source, f"{sigma.place}.model", f"{model!r} is unknown",
                          "write one of " + ", ".join(SIGMA_MODELS))
@@ -428,8 +433,8 @@ def _parse_sigma(sigma: _Reader) -> Sigma:
                          "give one sigma for each horizon")
     if any(not b > a for a, b in itertools.pairwise(horizon)):
         raise InputError(sigma.source, f"{sigma.place}.horizon_s", "does not increase", "sort the table by horizon")
-    return Sigma(model=model, horizon_s=horizon, sigma_rad=tuple(math.radians(d) for d in degrees),
-                 half_width_rad=None if half is None else tuple(math.radians(d) for d in half))
+    return Sigma(model=model, horizon_s=horizon, sigma_rad=tuple(map(_spread, degrees)),
+                 half_width_rad=None if half is None else tuple(map(_spread, half)))
 
 
 def _parse_target(target: _Reader) -> Target:

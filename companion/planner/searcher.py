@@ -324,7 +324,8 @@ class Searcher:
     # ------------------------------------------------------------------------------------- annealing
     def refine(self, c: Candidate) -> None:
         """Take the candidate one chunk further through its annealing cycle."""
-        moves = max(1, min(_CHUNK, self.effort.remaining(_CHUNK), c.cycle - c.done))
+        chunk = max(400, min(_CHUNK, 60_000 // len(c.last)))
+        moves = max(1, min(chunk, self.effort.remaining(chunk), c.cycle - c.done))
         cold, price = _COLD, LEG_PRICE * c.cost_s * max(1, 4 >> c.cycles)
         hot = _HOT * (0.25 ** (c.cycles % 3))
         f0, f1 = c.done / c.cycle, (c.done + moves) / c.cycle
