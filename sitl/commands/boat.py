@@ -64,6 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
     from companion import clock
     from companion.errors import LinkError
+    from companion.mavlink.transport import parse_link
     from companion.messages import GeoPoint
     from sitl.autopilot import Autopilot, AutopilotConfig, serve
     from sitl.autopilot.parameters import check_parameters
@@ -91,7 +92,12 @@ def run(args: argparse.Namespace) -> int:
     autopilot = Autopilot(config, parse_wind(args.wind, seed=args.seed), args.seed)
     endpoints = [f"tcpin:{args.host}:{args.port}"] if args.port else []
     endpoints += [f"udpin:{args.host}:{args.udp}"] if args.udp else []
-    endpoints += [f"udpout:{target}" for target in args.udp_out]
+    for target in args.udp_out:
+        endpoints.append(f"udpout:{target}")
+        try:
+            parse_link(endpoints[-1])
+        except InputError as error:
+            raise InputError("--udp-out", target, error.problem, "write HOST:PORT") from None
     if not endpoints:
         raise InputError("--port", "0", "nobody could reach the boat", "leave a port open or give --udp-out")
 
