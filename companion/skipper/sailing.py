@@ -18,13 +18,15 @@ from companion.skipper.manoeuvre import bear_away_rad
 from companion.skipper.planning import IRONS_MEMORY_S, hold, request, seeks_refuge
 from companion.skipper.route import path_length_m
 from companion.skipper.snapshot import OperatorWish
-from companion.skipper.state import Phase
+from companion.skipper.state import Phase, Route
 from companion.skipper.turn import Turn
 
 STEER_S = 25.0               # bearing away longer than this has failed
 SAILS_MPS = 0.8              # out of irons
 SAILS_TWA_RAD = math.radians(60.0)
 TOO_LATE_S = 2.0             # a plan asked for this shortly before the waypoint cannot be there in time
+BEND_RAD = math.radians(6.0)     # a smaller change of course at a waypoint is not worth a plan of its own ...
+BEND_PLAN_AGE_S = 60.0           # ... unless the last one is this old
 FORECAST_SHARE = 0.5         # of the interval that the plan used: a smaller change of the mean does not matter
 FORECAST_RAD = math.radians(5.0)
 FORECAST_SPEED = 0.3         # share of the wind speed
@@ -226,6 +228,8 @@ def _waypoint(turn: Turn) -> Trigger | None:
     left_s = distance_m(boat, leg[1]) / max(turn.speed_mps, 0.3)
     if not TOO_LATE_S < left_s <= turn.config.lead_s or turn.is_raised("wind untrusted"):
         return None
+    if _is_bend(route, state.index) and turn.t_s - state.last_plan_s < BEND_PLAN_AGE_S:
+        return None
     if turn.config.replan_policy is ReplanPolicy.FORECAST and not forecast_matters(turn):
         turn.update(replanned_index=state.index)
         return None
@@ -233,6 +237,15 @@ def _waypoint(turn: Turn) -> Trigger | None:
     return Trigger(
         reason=reason, text=f"waypoint {state.index + 1} in {left_s:.0f} s", from_index=state.index,
         interval_s=turn.config.min_replan_interval_s)
+
+
+def _is_bend(route: Route, index: int) -> bool:
+    """Return whether the course hardly changes at a waypoint: a leg bent as the no-go zone widens, no manoeuvre."""
+    if index + 1 >= len(route.points_en_m) or distance_m(*route.points_en_m[index:index + 2]) < 1.0:
+        return False
+    before = bearing_rad(route.leg_from_en_m[index], route.points_en_m[index])
+    after = bearing_rad(route.points_en_m[index], route.points_en_m[index + 1])
+    return abs(difference_rad(after, before)) < BEND_RAD
 
 
 def forecast_matters(turn: Turn) -> bool:
