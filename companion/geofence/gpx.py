@@ -22,7 +22,7 @@ from companion.geofence.findings import Code, Severity
 from companion.geofence.losses import Losses, Written, as_polygon, leave_out, without_holes
 from companion.geofence.rings import Findings
 from companion.geofence.routes import RoutePoint, items_of, line_as_area, route_of
-from companion.geofence.shapes import Zone, ZoneKind
+from companion.geofence.shapes import Zone, ZoneKind, wrap_lon_deg
 from companion.geofence.text import MAX_POSITIONS, printable
 from companion.geofence.xml_safe import parse_xml
 from companion.messages import Command, GeoPoint, MissionItem
@@ -172,11 +172,12 @@ def write_gpx(document: Document) -> Written:
         gpx.routes.append(route)
     for danger in document.marks:
         if isinstance(danger.geometry, Point):
-            mark(GeoPoint(lat_deg=danger.geometry.y, lon_deg=danger.geometry.x), danger.kind.value, danger.name)
+            x, y = danger.geometry.coords[0][:2]
+            mark(GeoPoint(lat_deg=y, lon_deg=wrap_lon_deg(x)), danger.kind.value, danger.name)
         else:
             route = gpxpy.gpx.GPXRoute(name=printable(danger.name) or None)
             route.type = danger.kind.value
-            route.points.extend(gpxpy.gpx.GPXRoutePoint(c[1], c[0]) for c in danger.geometry.coords)
+            route.points.extend(gpxpy.gpx.GPXRoutePoint(c[1], wrap_lon_deg(c[0])) for c in danger.geometry.coords)
             gpx.routes.append(route)
     if document.home is not None:
         mark(document.home, "home")

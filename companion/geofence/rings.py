@@ -87,7 +87,8 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
             "draw an area, or a POINT or LINESTRING with a radius",
         )
         return np.empty((0, 2))
-    _check_range(coordinates, place, findings)
+    if not _on_globe(coordinates, place, findings):
+        return np.empty((0, 2))
     if float(np.ptp(coordinates[:, 0])) > 180.0:
         findings.add(
             Severity.WARNING, Code.ANTIMERIDIAN, place,
@@ -100,7 +101,8 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
     return coordinates
 
 
-def _check_range(coordinates: NDArray[np.float64], place: str, findings: Findings) -> None:
+def _on_globe(coordinates: NDArray[np.float64], place: str, findings: Findings) -> bool:
+    """Return whether every position exists, with a finding if not."""
     lat_bad = np.abs(coordinates[:, 1]) > 90.0
     if lat_bad.any():
         vertex = coordinates[int(np.argmax(lat_bad))]
@@ -110,13 +112,14 @@ def _check_range(coordinates: NDArray[np.float64], place: str, findings: Finding
             'latitude and longitude look swapped: try --axis latlon (or axis = "latlon")'
             if abs(vertex[0]) <= 90.0 else "write WGS 84 degrees",
         )
-        return
+        return False
     lon_bad = np.abs(coordinates[:, 0]) > 360.0
     if lon_bad.any():
         findings.add(
             Severity.ERROR, Code.OUT_OF_RANGE, place,
             f"longitude {coordinates[int(np.argmax(lon_bad)), 0]:g} is outside ±180 degrees", "write WGS 84 degrees",
         )
+    return not lon_bad.any()
 
 
 def _repaired(polygon: Polygon, kind: ZoneKind, place: str, findings: Findings) -> list[Polygon]:

@@ -87,10 +87,10 @@ def _collect(
         return
     if name in {"POINT", "LINESTRING"}:
         coordinates = [tuple(c) for c in body] if isinstance(body, list) else []
-        if any(abs(y) > 90.0 for _, y in coordinates):
+        if any(abs(y) > 90.0 or abs(x) > 360.0 for x, y in coordinates):
             findings.add(
-                Severity.ERROR, Code.SWAPPED_AXES, place, "a latitude is outside ±90 degrees",
-                "latitude and longitude look swapped: try --axis latlon",
+                Severity.ERROR, Code.SWAPPED_AXES, place, "a position is not on the globe (lat ±90, lon ±180)",
+                "are they swapped? try --axis latlon",
             )
             return
         geometry = Point(coordinates[0]) if name == "POINT" or len(set(coordinates)) == 1 else LineString(coordinates)

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
 from companion.errors import InputError
+from companion.geofence.area import Area, Fence
+from companion.geofence.check import Conditions, check_area
 from companion.geofence.findings import Code, Severity
-from companion.geofence.formats import check_place, parse
+from companion.geofence.formats import check_place, parse, write
 from companion.geofence.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import ZoneKind
 from companion.messages import GeoPoint
@@ -280,6 +282,11 @@ def test_fuzzed_files_are_refused_in_one_line_or_read(extension, data):
         if hasattr(zone.shape, "is_valid"):
             assert zone.shape.is_valid
             assert not zone.shape.is_empty
+    for name in ("wkt", "geojson", "plan", "waypoints", "gpx", "kml", "fen", "poly"):
+        write(document, "", format_name=name)
+    if not any(f.severity is Severity.ERROR for f in document.findings):
+        inside = tuple(z for z in document.zones if z.kind is ZoneKind.INCLUSION)
+        check_area(Area(obstacles=document.as_obstacles(10.0), fence=Fence(inside)), Conditions(margin_m=12.0))
 
 
 @settings(**QUIET, max_examples=200)
