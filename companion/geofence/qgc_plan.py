@@ -39,6 +39,8 @@ def read_plan(text: str, source: str) -> Document:
     if mission is not None:
         home_node = mission.get("plannedHomePosition")
         home = _point(home_node, findings) if home_node is not None else None
+        if home == GeoPoint(lat_deg=0.0, lon_deg=0.0):
+            home = None  # that is how "not set" is written
         items = _items(mission, findings)
     fence = root.get("geoFence")
     if fence is not None:

@@ -74,7 +74,8 @@ def save_mission(
     _draw_marks(axes, mission, start, goals)
     _finish(axes, extent, twd_from_rad, tws_mps, handles)
     words = _words(mission, plans)
-    axes.set_title(f"{mission.name}\n{words[0] if words else mission.options.description}", fontsize=10, loc="left")
+    subtitle = words[0] if words else mission.options.description
+    figure.suptitle(f"{mission.name}\n{subtitle}", fontsize=10, x=0.1, ha="left")
     _save(figure, path)
     return words
 
@@ -100,7 +101,7 @@ def save_area(
         is_start = start is not None and index == 0
         axes.plot(*place, "o", color=START if is_start else GOAL, ms=8, mec="black", mew=0.6, zorder=8)
     _finish(axes, extent, twd_from_rad, None, handles)
-    axes.set_title(title, fontsize=10, loc="left")
+    figure.suptitle(title, fontsize=10, x=0.1, ha="left")
     _save(figure, path)
 
 
