@@ -67,7 +67,8 @@ def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
     waypoints = world.to_en(points)
     waypoints[0] = problem.start_en
     return Outcome(waypoints_en=waypoints, lower_bound_s=bound.value_s,
-                   trace={"origin": searcher.best.origin, "candidates": len(searcher.pool)})
+                   trace={"origin": searcher.best.origin, "candidates": len(searcher.pool),
+                          "paths": tuple(world.to_en(c.points) for c in searcher.pool)})
 
 
 def _endpoint_in_solid(world: World) -> str | None:

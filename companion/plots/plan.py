@@ -55,6 +55,9 @@ def draw_plan(axes: Axes, problem: Problem, plan: Plan, *, title: str | None = N
     if tree is not None and len(tree):
         segments = np.asarray(tree, dtype=np.float64).reshape(-1, 2, 2)
         axes.add_collection(LineCollection(list(segments), colors=TREE, linewidths=0.35, alpha=0.8, zorder=1))
+    for other in plan.trace.get("paths", ()) if plan.trace else ():  # the candidates that auto weighed
+        way = np.asarray(other)
+        axes.plot(way[:, 0], way[:, 1], "-", color=TREE, lw=1.0, zorder=2)
     axes.plot([problem.start_en[0], problem.goal_en[0]], [problem.start_en[1], problem.goal_en[1]], ls=":", lw=0.8,
               color="#777777", zorder=2)
     if plan.has_path:
