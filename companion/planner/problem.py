@@ -15,12 +15,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import erfinv
 
 from companion.errors import InputError
 
@@ -180,7 +180,8 @@ class Problem:
     @cached_property
     def k_delta(self) -> float:
         """Multiplier of sigma, sqrt(2) erfinv(2 delta_s - 1) >= 0 (Wolsieffer eq. 15 with its sign put right)."""
-        return math.sqrt(2.0) * float(erfinv(2.0 * self.delta_s - 1.0))
+        # sqrt(2) erfinv(2 p - 1) is the standard normal quantile of p
+        return NormalDist().inv_cdf(self.delta_s) if 0.5 <= self.delta_s < 1.0 else math.nan
 
     def widening_rad(self, t_s: float) -> float:
         """Return b(t): how much the no-go half angle is widened at ``t_s`` [rad]."""

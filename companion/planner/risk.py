@@ -24,11 +24,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erfcinv
 
 from companion.geo.angles import wrap_pi
 from companion.planner import risk_kernels as kernels
@@ -269,7 +269,7 @@ def _hazard(promised: float) -> float:
 def _step_for(k: float, over: float) -> float:
     """Return by how many sigmas to go from k so that the normal tail falls by the factor e^over, and a little more."""
     tail = 0.5 * math.erfc(k / math.sqrt(2.0)) * math.exp(-over)
-    return max(0.1, 1.1 * (math.sqrt(2.0) * float(erfcinv(max(2.0 * tail, 1e-30))) - k))
+    return max(0.1, 1.1 * (-NormalDist().inv_cdf(max(tail, 5e-31)) - k))
 
 
 def widened(problem: Problem, extra: float) -> Problem:

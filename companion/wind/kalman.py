@@ -17,7 +17,6 @@ import math
 from collections import deque
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi
@@ -31,6 +30,9 @@ class AdaptiveKalman(Base):
 
     def __init__(self, *, n: int = 100, r_deg: float = 3.0, r_mps: float = 0.5) -> None:
         super().__init__()
+        # filterpy brings scipy.stats: 60 MB that only this estimator needs
+        from filterpy.kalman import KalmanFilter
+
         self._filter = KalmanFilter(dim_x=2, dim_z=2)
         self._filter.F, self._filter.H = np.eye(2), np.eye(2)
         self._filter.R = np.diag([r_mps**2, math.radians(r_deg) ** 2])

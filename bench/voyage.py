@@ -1,0 +1,124 @@
+"""What the companion costs: processor, memory, start, event loop, and how fast a voyage runs under the virtual clock.
+
+    python -m bench.voyage            about two minutes
+
+The companion sails the demo mission in real time (1x) beside the simulated autopilot for a minute; its processes
+are measured from outside (/proc). Then a whole demo voyage runs under the virtual clock in this process. Figures
+of a busy machine are too high: run it on a quiet one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from sitl.live import free_port
+
+SCENARIO = Path("sitl/scenarios/demo.toml")
+MISSION = Path("missions/archipelago.toml")
+TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+
+
+def children(pid: int) -> list[int]:
+    found = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        text = (task / "children").read_text()
+        for child in map(int, text.split()):
+            found += [child, *children(child)]
+    return found
+
+
+def cpu_s(pid: int) -> float:
+    """Return the processor time of one process [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
+
+
+def memory_mb(pid: int) -> float:
+    """Return what one process takes of the memory [MB]: pages shared with others count by their share (PSS)."""
+    for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
+        if line.startswith("Pss:"):
+            return int(line.split()[1]) / 1e3
+    return 0.0
+
+
+def live(seconds: float) -> dict[str, float]:
+    port = free_port()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "voyage"
+        boat = subprocess.Popen([
+            sys.executable, "-m", "sitl.live_boat", str(SCENARIO), "--endpoint", f"udpout:127.0.0.1:{port}"])
+        began = time.monotonic()
+        companion = subprocess.Popen(
+            [sys.executable, "-m", "companion.cli", "run", str(MISSION), "--link", f"udpin:127.0.0.1:{port}",
+             "--out", str(folder), "--state", str(Path(scratch) / "state.json")], stdout=subprocess.DEVNULL)
+        try:
+            while not (folder / "track.csv").is_file() or (folder / "track.csv").read_bytes().count(b"\n") < 2:
+                time.sleep(0.02)
+            start_s = time.monotonic() - began
+            # The wind settles for half a minute; then plan and sail. Planning is left out of the idle figure.
+            time.sleep(45.0)
+            main, workers = companion.pid, children(companion.pid)
+            cpu0 = cpu_s(main)
+            loads, worst = [], 0.0
+            began = time.monotonic()
+            while time.monotonic() - began < seconds:
+                before, at = cpu_s(main), time.monotonic()
+                time.sleep(5.0)
+                loads.append((cpu_s(main) - before) / (time.monotonic() - at))
+                worst = max(worst, sum(memory_mb(p) for p in (main, *workers) if Path(f"/proc/{p}").exists()))
+            mean_load = (cpu_s(main) - cpu0) / (time.monotonic() - began)
+        finally:
+            companion.send_signal(signal.SIGINT)
+            companion.wait(30)
+            boat.terminate()
+            boat.wait(30)
+        summary = json.loads((folder / "summary.json").read_text())
+    return {
+        "start_s": start_s, "cpu_core_mean": mean_load, "cpu_core_median": sorted(loads)[len(loads) // 2],
+        "memory_mb": worst, "loop_held_max_s": summary["loop_held_max_s"],
+    }
+
+
+def virtual() -> dict[str, float]:
+    from companion.clock import run_virtual
+    from sitl.runner import run_embedded
+    from sitl.scenario import load_scenario
+
+    scenario = load_scenario(SCENARIO)
+    ratios = []
+    with tempfile.TemporaryDirectory() as scratch:
+        for seed in range(4):  # the first one loads the kernels
+            began = time.perf_counter()
+            verdict = run_virtual(run_embedded(scenario, SCENARIO, seed, Path(scratch) / str(seed)))
+            if seed:
+                ratios.append((verdict.figures["time_s"] + 33.0) / (time.perf_counter() - began))
+    return {"times_real_time": sorted(ratios)[1]}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m bench.voyage", description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=60.0, help="of sailing that is measured (default: 60)")
+    parser.add_argument("--json", type=Path)
+    args = parser.parse_args()
+    figures = live(args.seconds) | virtual()
+    print(f"start, kernels cached            {figures['start_s']:.1f} s")
+    print(f"companion while sailing          {100 * figures['cpu_core_median']:.1f} % of a core "
+          f"(mean {100 * figures['cpu_core_mean']:.1f} %)")
+    print(f"memory with the planner's worker {figures['memory_mb']:.0f} MB")
+    print(f"event loop held at most          {1000 * figures['loop_held_max_s']:.0f} ms")
+    print(f"demo under the virtual clock     {figures['times_real_time']:.0f} times real time")
+    if args.json:
+        args.json.write_text(json.dumps(figures, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
