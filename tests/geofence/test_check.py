@@ -85,7 +85,8 @@ def test_no_way_through_names_the_margin_that_opens_one():
     area = Area(obstacles=wall, fence=Fence((keep_in(box(-300, -100, 300, 300)),)))
     fault = found(area, start=ORIGIN, goals=(goal(0, 200),), margin_m=15.0)[Code.UNREACHABLE, Severity.ERROR]
     assert "at a margin of 15 m" in fault.text
-    assert fault.remedy in {"there is one at 11.8 m", "there is one at 11.7 m", "there is one at 11.9 m"}
+    # the gap of 24 m holds twice 12 m; margins are drawn up to 5 % wide, and the search stops at 0.1 m
+    assert 11.3 <= float(fault.remedy.removeprefix("there is one at ").removesuffix(" m")) <= 12.0
     shut = Area(obstacles=(rock(-600, 50, 600, 80, "bar"),), fence=area.fence)
     fault = found(shut, start=ORIGIN, goals=(goal(0, 200),), margin_m=15.0)[Code.UNREACHABLE, Severity.ERROR]
     assert "no water between" in fault.text
