@@ -251,9 +251,3 @@ def _remember(turn: Turn) -> None:
         history = ()
     plan_id = turn.state.route.plan_id if turn.state.route is not None else -1
     turn.update(history=(*history, (turn.t_s, boat[0], boat[1], left))[-HISTORY_KEPT:], history_plan=plan_id)
-
-
-def mode_is_ours(turn: Turn) -> bool:
-    """Return whether the mode is AUTO or one that we asked for."""
-    status = turn.autopilot
-    return status is None or status.mode in {None, Mode.AUTO, Mode.INITIALISING, turn.state.own_mode}

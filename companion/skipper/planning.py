@@ -156,7 +156,9 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
     if pending is None or pending.request_id != outcome.request_id:
         return
     turn.update(pending_plan=None)
-    if turn.state.phase in {Phase.OPERATOR, Phase.DONE} or (turn.state.sailing and not turn.state.checked_mission):
+    if turn.state.phase in {Phase.OPERATOR, Phase.DONE} or turn.is_taken:
+        return   # the operator may have taken the boat in this very step
+    if turn.state.sailing and not turn.state.checked_mission:
         return
     plan = outcome.plan
     if plan is None or not plan.has_path:

@@ -18,7 +18,6 @@ from companion.skipper.geometry import distance_m, leg_distance_m
 from companion.skipper.helm import arm, hand_back, make_current, repair, set_mode
 from companion.skipper.intake import (
     locate,
-    mode_is_ours,
     notice_truncation,
     remember_fix,
     take_events,
@@ -131,7 +130,7 @@ def _operator_has_it(turn: Turn) -> bool:
     status, state = turn.autopilot, turn.state
     if status is None or not state.sailing:
         return False
-    gone = not mode_is_ours(turn) or not status.is_armed
+    gone = turn.is_taken
     if state.phase is not Phase.OPERATOR:
         if not gone:
             held = state.steering_until_s is not None or turn.steers

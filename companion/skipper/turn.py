@@ -178,6 +178,14 @@ class Turn:
         return any(r.name == name for r in self.state.raised)
 
     @property
+    def is_taken(self) -> bool:
+        """Whether somebody else has the boat: under way, and disarmed or in a mode that we did not ask for."""
+        status = self.autopilot
+        if status is None or not self.state.sailing:
+            return False
+        return not status.is_armed or status.mode not in {None, Mode.AUTO, Mode.INITIALISING, self.state.own_mode}
+
+    @property
     def steers(self) -> bool:
         """Whether the boat is steered by headings (and may be)."""
         may = self.snapshot.permissions

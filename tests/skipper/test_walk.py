@@ -9,6 +9,7 @@ from functools import cache
 import pytest
 
 from companion.messages import Mode, StatusText
+from companion.planner import plan
 from companion.skipper import actions as act
 from companion.skipper.config import ALL_PERMITTED, DRY_RUN, Permissions
 from companion.skipper.document import markdown
@@ -238,6 +239,14 @@ def test_any_mode_that_we_did_not_ask_for_is_the_operator(name, mode):
     after, _ = skipper.step(state, status(mode=mode)(snapshot))
     assert after.phase is Phase.OPERATOR
     assert mode.name in after.why
+
+
+def test_a_plan_that_comes_with_the_takeover_is_not_uploaded():
+    skipper, state, snapshot = states()["planning under way"]
+    problem = state.pending_plan.problem
+    outcome = PlanOutcome(request_id=state.pending_plan.request_id, plan=plan(problem, expansions=800))
+    _, actions = skipper.step(state, replace(status(mode=Mode.HOLD)(snapshot), outcomes=(outcome,)))
+    assert not any(isinstance(a, act.UploadMission) for a in actions)
 
 
 # ------------------------------------------------------------------------------------------ watchdogs
