@@ -180,14 +180,25 @@ def propose(
     inner = n - 2
     if b.kind != 0 and inner > 0 and uniform(rng) < 0.15:                 # lay close-hauled legs again in time
         i = int(uniform(rng) * (n - 2))
-        j = min(n - 1, i + 2 + int(5.0 * uniform(rng) * uniform(rng)))
+        j = min(n - 1, i + 2 + int(8.0 * uniform(rng) * uniform(rng)))
+        if uniform(rng) < 0.25:                                           # (sometimes to the end, or from the start)
+            j = n - 1
+        if uniform(rng) < 0.25:
+            i = 0
         r, longer = uniform(rng), -1
         if r < 0.2 and n + 1 < MOST_POINTS:                               # ... one of them in two parts
             m = i + int(uniform(rng) * (j - i))
             f = uniform(rng)
             n = _insert(xs, ys, n, m + 1, xs[m] + f * (xs[m + 1] - xs[m]), ys[m] + f * (ys[m + 1] - ys[m]))
             j += 1
-        elif r < 0.8:                                                     # ... one of them longer or shorter
+        elif r < 0.45 and j - i > 2:                                      # ... without some of the points between
+            m = i + 1 + int(uniform(rng) * (j - i - 1))
+            count = min(j - m, 1 + int(3.0 * uniform(rng) * uniform(rng)))
+            if j - count - i < 2:
+                return 0
+            n = _delete(xs, ys, n, m, count)
+            j -= count
+        elif r < 0.85:                                                    # ... one of them longer or shorter
             longer = i + int(uniform(rng) * (j - i))
         if not relay(b, xs, ys, n, h0, i, j, longer, step if uniform(rng) < 0.5 else -step):
             return 0

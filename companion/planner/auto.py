@@ -125,7 +125,7 @@ def _improve(s: Searcher) -> None:
     has_solid = len(s.world.grid.edges) > 0
     lattices = list(_LATTICES) if has_solid else []
     drifts = list(_DRIFTS) if s.world.boat.kind != 0 else []
-    spent, looked = 0.0, not has_solid
+    spent, looked, turned = 0.0, not has_solid, False
     s.next_turn()
     if has_solid and not s.is_done:
         s.geodesic(40_000)
@@ -134,6 +134,9 @@ def _improve(s: Searcher) -> None:
         if not looked and before > 0.08:
             looked = True
             s.other_sides(12)
+        elif not turned and before > 0.15:
+            turned = True
+            s.other_tack()
         elif drifts and spent <= 0.35 * before and len(drifts) >= len(lattices):
             s.drift(*drifts.pop(0), 1.05 * s.upper_s)
         elif lattices and spent <= 0.35 * before:

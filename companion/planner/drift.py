@@ -37,7 +37,7 @@ _FIXED = 16
 @jit
 def drift_search(
     g: Grid, b: Boat, h0: float, goal: Floats, box: Floats, shape: Ints, step: float, gauge: Floats, slack: float,
-    bound: float, max_pops: int,
+    bound: float, max_pops: int, side: int,
 ) -> tuple[float, Floats, int]:
     """Search from the origin; return (time, points (n, 2), states expanded). Arguments as ``lattice_search``."""
     nx, ny = shape[0], shape[1]
@@ -83,7 +83,7 @@ def drift_search(
         # ---- one step on every course
         for k in range(kinds):
             a = edge_angle(b, k, t, t) if k < 4 else -math.pi + 2.0 * math.pi * (k - 3.5) / _FIXED
-            if not abs(a) <= b.max_twa:
+            if not abs(a) <= b.max_twa or (pops == 0 and side * a < 0.0):
                 continue
             v = speed_at(b, a)
             if v <= 1e-6:
@@ -164,7 +164,7 @@ def drift_search(
 
 def run_drift(
     world: World, gauge: Gauge, *, cells: int, box: tuple[float, float, float, float], bound_s: float, max_pops: int,
-    stride: float = 1.45,
+    stride: float = 1.45, side: int = 0,
 ) -> LatticeResult:
     """Search a grid of about ``cells`` cells within ``box``, with steps ``stride`` cells long."""
     width, height = max(box[2] - box[0], 1e-3), max(box[3] - box[1], 1e-3)
@@ -173,7 +173,7 @@ def run_drift(
     time_s, points, pops = drift_search(
         world.grid, world.boat, world.h0, np.array([*world.goal, world.goal_radius]), np.array(box),
         np.array([nx, ny], np.int32), stride * size, gauge.table, world.goal_radius * gauge.table_max, bound_s,
-        max_pops,
+        max_pops, side,
     )
     found = math.isfinite(time_s) and len(points) > 1
     return LatticeResult(cost_s=float(time_s) if found else math.inf, points=points if found else None,

@@ -84,7 +84,7 @@ def _misses(
 @jit
 def lattice_search(
     g: Grid, b: Boat, origin: Floats, axes: Floats, shape: Ints, steps: Ints, goal: Floats, box: Floats,
-    gauge: Floats, slack: float, bound: float, max_pops: int, shot_m: float,
+    gauge: Floats, slack: float, bound: float, max_pops: int, shot_m: float, side: int,
 ) -> tuple[float, Floats, int, bool]:
     """Search; return (arrival time, points (n, 2), states expanded, exhausted).
 
@@ -92,7 +92,8 @@ def lattice_search(
     ``axes`` (2, 2): axis vectors in rows [m]; ``shape``: ni, nj, i0, j0 of the start; ``steps`` (nd, 2): courses as
     lattice steps, sorted by angle; ``goal``: x, y, radius; ``box``: x0, y0, x1, y1 that nodes stay in; ``gauge``:
     least seconds per metre by direction (a table over [-π, π)), ``slack`` what the goal's disc saves; only paths
-    below ``bound`` are looked for. Exhausted without a path: there is none on this lattice within the bound.
+    below ``bound`` are looked for; ``side`` 1 or -1 starts on courses with that sign of TWA only. Exhausted without a
+    path: there is none on this lattice within the bound.
     """
     ni, nj, i0, j0 = shape[0], shape[1], shape[2], shape[3]
     ox, oy, h0, t0 = origin[0], origin[1], origin[2], origin[3]
@@ -118,6 +119,8 @@ def lattice_search(
 
     start = i0 * nj + j0
     for k in range(nd):
+        if side * angle[k] < 0.0:
+            continue
         s = start * nd + k
         cost[s] = t0 + turn_time(b, h0, angle[k])
         came[s] = _START
@@ -273,6 +276,7 @@ def run_lattice(
     world: World, gauge: Gauge, *, cells: int, reach: int, half_rad: float, box: tuple[float, float, float, float],
     bound_s: float = math.inf, max_pops: int = 1 << 60, downwind: bool = False, stretch: float = 1.0,
     origin: tuple[float, float, float, float] | None = None, goal: tuple[float, float, float] | None = None,
+    side: int = 0,
 ) -> LatticeResult:
     """Search a lattice of about ``cells`` nodes whose axes lie at ``half_rad`` from the wind (or from dead down).
 
@@ -311,7 +315,7 @@ def run_lattice(
     cost, points, pops, exhausted = lattice_search(
         world.grid, b, np.array(origin), axes, np.array([ni, nj, -low[0], -low[1]], np.int32),
         np.array([(i, j) for _, i, j in steps], np.int32), np.array(goal),
-        np.array(box), gauge.table, goal[2] * gauge.table_max, bound_s, max_pops, 6.0 * max(sizes),
+        np.array(box), gauge.table, goal[2] * gauge.table_max, bound_s, max_pops, 6.0 * max(sizes), side,
     )
     found = math.isfinite(cost) and len(points) > 0
     return LatticeResult(cost_s=float(cost) if found else math.inf, points=points if found else None,

@@ -18,7 +18,7 @@ from companion.planner.solve import Effort
 from companion.planner.visibility import crossings, geodesics, graph_nodes
 from companion.planner.world import World
 
-LEG_PRICE = 4e-5
+LEG_PRICE = 8e-5
 """What a leg must save to be worth sailing, as a share of the path's time."""
 STOP_GAP = 2e-4
 """Stop when the path is this close to the bound."""
@@ -249,7 +249,7 @@ class Searcher:
         return np.asarray(table[cell] * np.hypot(d[:, 0], d[:, 1]), np.float64)
 
     def lattice(self, cells: int, reach: int, *, margin: float, half_at_s: float, stretch: float = 1.0,
-                bound_s: float | None = None) -> Candidate | None:
+                bound_s: float | None = None, side: int = 0) -> Candidate | None:
         """Run one lattice whose axes fit the no-go zone at ``half_at_s`` and offer its path."""
         b = self.world.boat
         half = self.world.problem.no_go_half_rad(half_at_s)
@@ -261,24 +261,33 @@ class Searcher:
             self.world, self.gauge, cells=cells, reach=reach,
             half_rad=math.pi - b.down if downwind else max(half, b.up),
             box=self.inner_box(margin), downwind=downwind, stretch=stretch,
-            bound_s=self.upper_s if bound_s is None else bound_s, max_pops=int(most),
+            bound_s=self.upper_s if bound_s is None else bound_s, max_pops=int(most), side=side,
         )
         if found.pops > 20_000:
             self.pops_per_s = found.pops / max(1e-6, self.effort.elapsed_s - began_s)
         self.effort.spend(max(1, found.pops // 8))
         return self.offer(found.points, f"lattice {cells}")
 
-    def drift(self, cells: int, stride: float, bound_s: float) -> Candidate | None:
+    def drift(self, cells: int, stride: float, bound_s: float, side: int = 0) -> Candidate | None:
         """Run one search whose courses follow the no-go zone in time and offer its path."""
         began_s = self.effort.elapsed_s
         most = 1e9 if self.effort.limit is None else 2.0 * (self.effort.limit - self.effort.used)
         most = min(most, max(500.0, 0.2 * self.pops_per_s * self.effort.remaining_s))
         found = run_drift(self.world, self.gauge, cells=cells, box=self.inner_box(0.5), bound_s=bound_s,
-                          max_pops=int(most), stride=stride)
+                          max_pops=int(most), stride=stride, side=side)
         self.effort.spend(max(1, found.pops // 2))
         if found.pops > 5_000:
             self.pops_per_s = 4.0 * found.pops / max(1e-6, self.effort.elapsed_s - began_s)
         return self.offer(found.points, f"drift {cells}")
+
+    def other_tack(self) -> None:
+        """Search again with the first leg on the tack that the best path does not begin on."""
+        if self.best is None or len(self.best.points) < 2:
+            return
+        side = -1 if self.best.points[1, 0] > 0.0 else 1
+        if self.world.boat.kind != 0:
+            self.drift(3_000, 2.0, 1.04 * self.upper_s, side)
+        self.lattice(6_000, 2, margin=0.5, half_at_s=self.upper_s, bound_s=1.04 * self.upper_s, side=side)
 
     def zoom(self) -> None:
         """Search a stretch of the best path again on a fine lattice of its own, between two points of the path."""
@@ -326,7 +335,7 @@ class Searcher:
         """Take the candidate one chunk further through its annealing cycle."""
         chunk = max(400, min(_CHUNK, 60_000 // len(c.last)))
         moves = max(1, min(chunk, self.effort.remaining(chunk), c.cycle - c.done))
-        cold, price = _COLD, LEG_PRICE * c.cost_s * max(1, 4 >> c.cycles)
+        cold, price = _COLD, LEG_PRICE * c.cost_s * (2 if c.cycles == 0 else 1)
         hot = _HOT * (0.25 ** (c.cycles % 3))
         f0, f1 = c.done / c.cycle, (c.done + moves) / c.cycle
         at = [c.cost_s * hot * (cold / hot) ** f for f in (f0, f1)]
