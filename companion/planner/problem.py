@@ -453,6 +453,21 @@ def _parse_risk(risk: _Reader) -> RiskLimit:
 
 
 # ---------------------------------------------------------------------------------------------- writing
+def _wkt(geometry: shapely.Geometry) -> str:
+    """Return WKT with every digit (shapely's own writer rounds the last): reading it gives the same numbers."""
+    if geometry.is_empty:
+        return "POLYGON EMPTY"
+
+    def rings(polygon: shapely.Geometry) -> str:
+        loops = (polygon.exterior, *polygon.interiors)
+        return "(" + ", ".join("(" + ", ".join(f"{x!r} {y!r}" for x, y in shapely.get_coordinates(r).tolist()) + ")"
+                               for r in loops) + ")"
+
+    if geometry.geom_type == "Polygon":
+        return "POLYGON " + rings(geometry)
+    return "MULTIPOLYGON (" + ", ".join(rings(g) for g in geometry.geoms) + ")"
+
+
 def _unparse(p: Problem) -> dict[str, Any]:
     deg = math.degrees
     s = p.wind.sigma
@@ -469,8 +484,8 @@ def _unparse(p: Problem) -> dict[str, Any]:
         "id": p.id, "title": p.title,
         "start": {"x": p.start_en[0], "y": p.start_en[1], "heading_deg": deg(p.start_heading_rad)},
         "goal": {"x": p.goal_en[0], "y": p.goal_en[1], "radius": p.goal_radius_m},
-        "obstacles": [shapely.to_wkt(g, rounding_precision=-1) for g in p.obstacles],
-        "fence": None if p.fence is None else shapely.to_wkt(p.fence, rounding_precision=-1),
+        "obstacles": [_wkt(g) for g in p.obstacles],
+        "fence": None if p.fence is None else _wkt(p.fence),
         "wind": {"from_deg": deg(p.wind.twd_from_rad), "speed_mps": p.wind.tws_mps, "sigma": sigma},
         "boat": {
             "no_go_half_deg": deg(p.boat.no_go_half_rad), "max_twa_deg": deg(p.boat.max_twa_rad),
