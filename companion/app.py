@@ -26,6 +26,7 @@ from companion.compose import config_of, estimator_of, permissions_of, voyage_of
 from companion.executor import Executor, Planner
 from companion.fold import Step, VoyageFold
 from companion.geofence import Mission
+from companion.geofence.autopilot_fence import fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.signing import SigningStore
@@ -148,6 +149,8 @@ class _Shell:
             permissions_of(self.mission, dry_run=self.options.dry_run),
             persisted,
         )
+        # Growing a jagged coast takes seconds; under way the loop must not wait for it.
+        self.fold.skipper.prepare()
         self._write_description(transport.name)
         self.recorder.decision(self._stamped(self._quantised(now_s())[1], {
             "kind": "start", "persisted": None if persisted is None else persisted.to_dict(),
@@ -158,11 +161,13 @@ class _Shell:
                 contextlib.AsyncExitStack() as stack,
             ):
                 link.subscribe(self._on_message)
-                await link.wait_autopilot(self.options.wait_s)
+                await self._wait_autopilot(link)
                 autopilot = await stack.enter_async_context(Autopilot(link))
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
                                     expansions=self.options.expansions,
                                     budget_scale=self.options.budget_scale)
+                if self.fold.permissions.may_upload_fence:
+                    await self._upload_fence(autopilot)
                 async with asyncio.TaskGroup() as group:
                     tasks = [
                         group.create_task(executor.run(), name="executor"),
@@ -227,6 +232,17 @@ class _Shell:
                 self.end_reason = "stopped"
                 return
 
+    async def _wait_autopilot(self, link: Link) -> None:
+        """Wait for the first heartbeat, and say meanwhile that nobody is heard."""
+        waiting = asyncio.create_task(link.wait_autopilot(self.options.wait_s), name="first heartbeat")
+        try:
+            while not (await asyncio.wait([waiting], timeout=STEP_S))[0]:
+                step = self.fold.tick(self._quantised(now_s())[1])
+                await self._after_step(step, link)
+            await waiting
+        finally:
+            waiting.cancel()
+
     async def _after_step(self, step: Step, link: Link) -> None:
         """Record the step; nothing of it is carried out before what a restart needs is on the disk."""
         snapshot = step.snapshot
@@ -268,6 +284,19 @@ class _Shell:
                 for name in PARAMETERS:
                     await autopilot.get_parameter(name)
             await asyncio.sleep(STEP_S)
+
+    async def _upload_fence(self, autopilot: Autopilot) -> None:
+        """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
+        mission = self.mission
+        places = [g.point for g in mission.goals] + ([mission.start] if mission.start else [])
+        fence = fence_for_autopilot(mission.area, mission.margin_m, inside=places)
+        record: dict[str, Any] = {"kind": "fence", "status": fence.status.name, "text": fence.reason}
+        if fence.items:
+            done = await autopilot.upload_fence(fence.items)
+            record |= {"outcome": done.outcome.value, "text": done.text, "count": len(fence.items)}
+            if done.is_ok:
+                record["enabled"] = (await autopilot.enable_fence()).outcome.value
+        self.recorder.decision(self._stamped(self._quantised(now_s())[1], record))
 
     async def _send_status(self, autopilot: Autopilot) -> None:
         while True:

@@ -20,7 +20,10 @@ def polar_of(mission: Mission) -> Polar:
     """Return the mission's polar."""
     path = mission.polar_path
     if path is not None:
-        return read_polar(path).polar
+        file = read_polar(path)
+        if file.warnings:
+            raise InputError(str(path), "", file.warnings[0], "fill it in: a guessed polar is not sailed")
+        return file.polar
     polar = mission.boat.polar
     if isinstance(polar, str):
         if polar != "ardurover":

@@ -40,15 +40,16 @@ from companion.skipper.snapshot import (
     WindView,
 )
 from companion.skipper.state import Persisted, SkipperState
-from companion.wind import NAMES, Estimator, Verdict, WindRoom, make
+from companion.wind import Estimator, Verdict, WindRoom, make
 
 # A boot time that goes back by more than this is a reboot, not a reordered frame [s].
 REBOOT_BACK_S = 5.0
 # Wind is believed after this long a record [s]; until then its spread is a guess.
 SETTLED_S = 20.0
 
+# A spiking vane is not among them: its spikes are not fed, and what is left is widened.
 _UNTRUSTED = frozenset({
-    Verdict.FROZEN, Verdict.SPIKING, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR,
+    Verdict.FROZEN, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR,
 })
 
 # Parameters without which the autopilot's limits are not known.
@@ -76,8 +77,8 @@ class VoyageFold:
         self.state: SkipperState = skipper.initial(persisted)
         self.assembler = VehicleAssembler()
         self._parameters: dict[str, float] = {}
-        self._mean90: Estimator = make("mean90" if "mean90" in NAMES else "ou")
-        self._mean5: Estimator = make("mean5" if "mean5" in NAMES else "ou")
+        self._mean90: Estimator = make("mean90")
+        self._mean5: Estimator = make("mean5")
         self._vehicle: VehicleState | None = None
         self._autopilot: AutopilotStatus | None = None
         self._heartbeat_s: float | None = None
