@@ -21,16 +21,17 @@ class Station:
 
     A board at ``board_twa_rad`` ends when the boat is ``board_m`` beyond the point on its side and ``height_m`` to
     windward of it, or ``board_max_m`` beyond. At ``far_m`` the field takes over. ``thrust`` eases the sail in light
-    need: 1 is full. With ``tacks`` boards end by tacking, for a boat that tacks within seconds.
+    need: 1 is full. ``bear_off_deg_per_m`` is how much lower she sails for each metre too far to windward. With ``tacks`` boards end by tacking, for a boat that tacks within seconds.
     """
 
     at_en: tuple[float, float]
     board_m: float = 0.0
-    board_max_m: float = 8.0
-    height_m: float = 3.0
+    board_max_m: float = 3.0
+    height_m: float = 6.0
     far_m: float = 20.0
     board_twa_rad: float = math.radians(55.0)
     thrust: float = 1.0
+    bear_off_deg_per_m: float = 10.0
     tacks: bool = False
 
 
@@ -88,7 +89,10 @@ def keep(
             state = replace(state, phase=Phase.BOARD, since_s=t)
         elif t - state.since_s > 45.0:
             state = replace(state, phase=Phase.RETURN, since_s=t)
-    wanted = twd - state.side * station.board_twa_rad
+    # To windward of the point she bears off, up to a broad reach: that is how she loses height on purpose.
+    height = max(0.0, up - station.height_m + 1.0)
+    angle = min(math.radians(125.0), station.board_twa_rad + math.radians(station.bear_off_deg_per_m) * height)
+    wanted = twd - state.side * angle
     if not station.tacks:
         habits = replace(habits, tack_min_mps=math.inf)
     steering, heading, why = helm(state.steering, situation, wanted, habits)

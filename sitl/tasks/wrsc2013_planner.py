@@ -22,6 +22,7 @@ from sitl.tasks.wrsc2013_skippers import HALF_M, KEEP, SHUTTLE_M, FieldSkipper
 
 EXPANSIONS = 4000
 CHECK_S = 2.0
+RETRY_S = 10.0
 # Where to leave: two places on each side of the square, 30 m outside it.
 _OUT_M = HALF_M + 30.0
 _GOALS = tuple(
@@ -133,6 +134,8 @@ class PlanSkipper(FieldSkipper):
             legs = problem_for(seen, habits, self._goal, ()).evaluate(rest).legs
             conflicts = check_legs(legs, discs)
             verdict = decide(conflicts, since_replan_s=seen.t_s - self._planned_s)
+        if self._way is None and seen.t_s - self._planned_s < RETRY_S:
+            verdict = Decision.WAIT          # nothing was found a moment ago: the field has the helm meanwhile
         is_out = max(abs(seen.en_m[0]), abs(seen.en_m[1])) > HALF_M + 10.0
         if verdict is Decision.REPLAN and not near and not (is_out and not conflicts):
             self._plan(seen, habits, discs)

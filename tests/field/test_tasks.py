@@ -1,0 +1,127 @@
+"""The tasks: scorers on tracks made by hand, the draw, and short campaigns in the loop."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sitl.tasks.guided import run_station, run_wrsc
+from sitl.tasks.station import sailbot_points, station_score
+from sitl.tasks.wrsc2013 import HALF_M, campaign, draw, run, score, table
+
+EARLY = (66, 154)
+
+
+def tracks(leave_s: float | None, *, miss_m: float = 40.0) -> tuple[np.ndarray, np.ndarray]:
+    """Ours stays in the middle and leaves eastwards at 2 m/s; the intruder comes from north at 1 m/s after 100 s."""
+    t = np.arange(0.0, 1200.0)
+    x = np.zeros_like(t) if leave_s is None else np.maximum(0.0, 2.0 * (t - leave_s))
+    it = np.column_stack([np.full_like(t, -miss_m), 200.0 - t])
+    return np.column_stack([t, x, np.zeros_like(t)]), it
+
+
+def test_a_clean_run() -> None:
+    s = score(*tracks(110.0))
+    assert s.complete
+    assert s.left_after_s == pytest.approx(61.0)
+
+
+def test_each_fault_is_seen_alone() -> None:
+    early = score(*tracks(20.0))
+    assert (early.stayed, early.kept_clear, early.crossed) == (False, True, True)
+    never = score(*tracks(None))
+    assert (never.stayed, never.left_in_time, never.left_after_s) == (True, False, None)
+    late = score(*tracks(1000.0))
+    assert (late.left_in_time, late.left_after_s) == (False, pytest.approx(951.0))
+    near = score(*tracks(300.0, miss_m=6.0))
+    assert (near.kept_clear, near.left_in_time) == (False, True)
+    assert near.least_m == pytest.approx(6.0 - 0.5 * (3.65 + 4.0))
+    track, it = tracks(110.0)
+    assert not score(track, it + 1000.0).crossed
+
+
+def test_the_least_distance_is_found_between_samples() -> None:
+    t = np.array([0.0, 10.0])
+    track = np.column_stack([t, [-50.0, 50.0], [0.0, 0.0]])
+    assert score(track, np.array([[0.0, 10.0], [0.0, 10.0]])).least_m == pytest.approx(10.0 - 3.825)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.integers(0, 10_000))
+def test_the_draw_is_the_task(seed: int) -> None:
+    c = draw(seed)
+    assert 3.0 <= c.tws_mps <= 10.0
+    assert 0.5 <= c.speed_mps <= 3.0
+    assert 0.0 <= c.entry_s <= 2700.0
+    x, y = c.at(c.entry_s)
+    assert max(abs(x), abs(y)) == pytest.approx(HALF_M)
+    x, y = c.at(c.entry_s - 1.0)
+    assert max(abs(x), abs(y)) > HALF_M
+    x, y = c.at(c.entry_s + 0.5 * c.crossing_s)
+    assert max(abs(x), abs(y)) < HALF_M
+    x, y = c.at(c.entry_s + c.crossing_s + 1.0)
+    assert max(abs(x), abs(y)) > HALF_M
+
+
+@pytest.mark.parametrize("method", ["field", "plan", "schmitt"])
+def test_early_intruders(method: str) -> None:
+    for seed in EARLY:
+        result = run(seed, method)
+        assert result.score.complete, result.score
+
+
+def test_a_run_repeats_bit_for_bit() -> None:
+    a, b = run(EARLY[1], "plan"), run(EARLY[1], "plan")
+    assert np.array_equal(a.track, b.track)
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("method", ["field", "plan"])
+def test_five_hundred_seeds(method: str) -> None:
+    t = table(campaign(range(500), method, 2), method)
+    assert t["share_complete"] >= 0.99
+    assert t["least_m"] >= 5.0
+
+
+def test_guided_over_mavlink_in_virtual_time() -> None:
+    """Heading setpoints through the companion's link to the simulated autopilot; the whole task is done."""
+    assert run_wrsc(EARLY[0]).complete
+
+
+def test_station_keeping_over_mavlink() -> None:
+    result = run_station(0)
+    assert result["kept"]
+    assert result["radius95_m"] < 9.4      # the best of WRSC 2018
+
+
+# ------------------------------------------------------------------------------------- station scorers
+def circle(radius: float, seconds: float = 400.0, centre: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    t = np.arange(0.0, seconds)
+    a = t * 2.0 * math.pi / 60.0
+    return np.column_stack([t, centre[0] + radius * np.cos(a), centre[1] + radius * np.sin(a)])
+
+
+def test_station_scores_of_a_circle() -> None:
+    s = station_score(circle(8.0), (0.0, 0.0), length_m=2.0)
+    assert s.kept
+    assert s.radius95_m == pytest.approx(8.0, abs=0.3)
+    assert s.lengths == pytest.approx(4.0, abs=0.2)
+    assert s.mean_m == pytest.approx(8.0, abs=0.1)
+
+
+def test_station_lost_and_cut_short() -> None:
+    assert not station_score(circle(8.0, 200.0), (0.0, 0.0)).kept
+    assert not station_score(circle(8.0), (500.0, 0.0)).kept
+    assert math.isinf(station_score(circle(8.0), (500.0, 0.0)).radius95_m)
+
+
+def test_sailbot_points_by_hand() -> None:
+    assert sailbot_points(circle(5.0, 330.0), (0.0, 0.0)) == pytest.approx(10.0)
+    assert sailbot_points(circle(5.0, 390.0), (0.0, 0.0)) == pytest.approx(8.0, abs=0.05)      # a minute too long
+    assert sailbot_points(circle(5.0, 120.0), (0.0, 0.0)) == pytest.approx(4.0, abs=0.05)
+    assert sailbot_points(circle(5.0), (500.0, 0.0)) == 0.0
