@@ -126,7 +126,7 @@ def describe(problem: Problem, answer: Plan) -> str:
     for i, leg in enumerate(answer.legs, start=1):
         clear = "-" if leg.clearance_m is None else f"{leg.clearance_m:.0f} m"
         risk = "-" if leg.risk is None else f"{100.0 * leg.risk:.2f} %"
-        tack = "port" if leg.twa_rad > 0.0 else "stbd"  # the side the wind comes over
+        tack = "stbd" if leg.twa_rad > 0.0 else "port"  # the side the wind comes over
         lines.append(
             f"  {i:3d}  {math.degrees(leg.heading_rad):6.1f}°  {math.degrees(abs(leg.twa_rad)):5.1f}°  {tack}"
             f"  {leg.length_m:4.0f} m  {leg.start_s:5.0f} s  {leg.end_s:5.0f} s"

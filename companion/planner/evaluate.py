@@ -100,6 +100,7 @@ def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
         h, v = ground_track(p, dx, dy, t)
         turn = wrap_pi(h - heading)
         spent = abs(turn) / p.boat.turn_rate_radps
+        # heading less wind, as the format has it; a Leg carries the house's angle, positive to starboard
         before, twa = wrap_pi(heading - twd), wrap_pi(h - twd)
         if before * twa < 0.0:
             if abs(before + turn - twa) < 1e-6:
@@ -126,7 +127,7 @@ def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
         hit = target_hit(p, a, b, t, t1) if hit is None else hit
         if hit is not None:
             reasons.append(f"leg {i}: meets target {hit}")
-        legs.append(Leg(from_en=a, to_en=b, heading_rad=wrap_two_pi(h), twa_rad=twa, turn_rad=turn, length_m=length,
+        legs.append(Leg(from_en=a, to_en=b, heading_rad=wrap_two_pi(h), twa_rad=wrap_pi(-twa), turn_rad=turn, length_m=length,
                         speed_mps=v, start_s=t, end_s=t1, sigma_rad=sigma, no_go_half_rad=half))
         sail_s += t1 - t
         length_m += length

@@ -149,7 +149,7 @@ def _legs_in_words(plan: Plan, legs: list[dict[str, Any]]) -> str:
             if bind["by"] != "no_go":
                 numbers.setdefault(_bind_in_words(bind), []).append(i)
             else:
-                tack = "starboard" if leg.twa_rad < 0.0 else "port"
+                tack = "starboard" if leg.twa_rad > 0.0 else "port"
                 numbers.setdefault(f"close-hauled on {tack} tack", []).append(i)
     sentences = [f"{_legs_of(which)} {text}." for text, which in numbers.items()]
     zones = [bind for bound in legs for bind in bound["binds"] if bind["by"] == "no_go"]

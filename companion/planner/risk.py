@@ -125,7 +125,7 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
     half = problem.boat.no_go_half_rad
     start = np.array([leg.start_s for leg in legs], dtype=np.float64)
     end = np.array([leg.end_s for leg in legs], dtype=np.float64)
-    twa = np.array([wrap_pi(leg.twa_rad) for leg in legs], dtype=np.float64)
+    twa = np.array([wrap_pi(-leg.twa_rad) for leg in legs], dtype=np.float64)
     first = np.zeros(len(legs))
     if legs and process.model != kernels.NONE:
         _first_passage((start, end), twa, half, process, first)
@@ -188,7 +188,7 @@ def simulate_entries(
         kernels.simulate(
             np.array([leg.start_s for leg in legs], dtype=np.float64),
             np.array([leg.end_s for leg in legs], dtype=np.float64),
-            np.array([leg.twa_rad for leg in legs], dtype=np.float64), float(problem.boat.no_go_half_rad),
+            np.array([-leg.twa_rad for leg in legs], dtype=np.float64), float(problem.boat.no_go_half_rad),
             p.model, float(p.s0), float(p.s1), float(p.rho), float(p.tau), p.table_t, p.table_s, float(step_s),
             np.random.default_rng(seed), winds, hits,
         )

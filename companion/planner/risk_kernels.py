@@ -129,7 +129,7 @@ def first_passage(  # type: ignore[no-untyped-def]
 ):
     """Fill out[k]: the probability that the wind first forces the boat into the no-go zone on leg k.
 
-    start_s, end_s, twa_rad: (n,) legs in order of time, |TWA| about the forecast mean signed to starboard [rad].
+    start_s, end_s, twa_rad: (n,) legs in order of time, heading less mean wind [rad], positive on port tack.
     half_rad: the boat's own no-go half angle, not widened [rad]. Returns the steps taken, or -1 when they ran out.
     """
     n = Z_CELLS

@@ -120,3 +120,17 @@ def test_agrees_with_the_definition_on_plans(name):
     theirs = scorer.evaluate(scorer.Problem.load(FOLDER / f"{name}.json"), answer.waypoints_en)
     assert theirs["feasible"], theirs["reasons"]
     assert answer.cost_s == pytest.approx(theirs["time_s"], rel=1e-12)
+
+
+def test_a_leg_with_the_wind_over_the_starboard_side_has_a_positive_twa():
+    """Wind from north, heading north-west: the wind comes over the starboard side (house rule 2)."""
+    from companion.planner import Problem
+
+    p = Problem.from_json({
+        "start": {"x": 0, "y": 0, "heading_deg": 0}, "goal": {"x": -100, "y": 100, "radius": 1}, "obstacles": [],
+        "fence": None, "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}}, "delta_s": 0.5,
+        "boat": {"no_go_half_deg": 40, "max_twa_deg": 180, "turn_rate_rad_s": 1,
+                 "speed": {"model": "constant", "v_mps": 1}},
+    })
+    assert math.degrees(p.evaluate([[0, 0], [-100, 100]]).legs[0].twa_rad) == pytest.approx(45.0)
+    assert math.degrees(p.evaluate([[0, 0], [100, 100]]).legs[0].twa_rad) == pytest.approx(-45.0)

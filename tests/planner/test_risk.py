@@ -33,7 +33,7 @@ def problem(sigma=AR1, **change):
 def legs(*rows):
     """Legs from (start s, end s, TWA deg)."""
     return tuple(
-        Leg(from_en=(0, 0), to_en=(0, 1), heading_rad=math.radians(a) % (2 * math.pi), twa_rad=math.radians(a),
+        Leg(from_en=(0, 0), to_en=(0, 1), heading_rad=math.radians(a) % (2 * math.pi), twa_rad=-math.radians(a),
             turn_rad=0.0, length_m=1.0, speed_mps=1.0, start_s=t0, end_s=t1, sigma_rad=0.0, no_go_half_rad=0.0)
         for t0, t1, a in rows)
 
