@@ -125,7 +125,7 @@ def _improve(s: Searcher) -> None:
     has_solid = len(s.world.grid.edges) > 0
     lattices = list(_LATTICES) if has_solid else []
     drifts = list(_DRIFTS) if s.world.boat.kind != 0 else []
-    spent, looked, turned = 0.0, not has_solid, False
+    spent, looked, turned, sharpened = 0.0, not has_solid, False, False
     s.next_turn()
     if has_solid and not s.is_done:
         s.geodesic(40_000)
@@ -137,6 +137,10 @@ def _improve(s: Searcher) -> None:
         elif not turned and before > 0.15:
             turned = True
             s.other_tack()
+        elif has_solid and not sharpened and before > 0.4:
+            sharpened = True
+            left = 8.0 * (s.effort.limit - s.effort.used) if s.effort.limit is not None else 2e6 * s.effort.remaining_s
+            s.geodesic(int(0.25 * left))
         elif drifts and spent <= 0.35 * before and len(drifts) >= len(lattices):
             s.drift(*drifts.pop(0), 1.05 * s.upper_s)
         elif lattices and spent <= 0.35 * before:

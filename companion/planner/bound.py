@@ -16,7 +16,7 @@ import shapely
 from companion.planner.gauge import Gauge, velocities
 from companion.planner.kernels import Floats
 from companion.planner.problem import NO_GO_SLACK_RAD, TOUCH_M, Problem
-from companion.planner.visibility import geodesics, graph_nodes
+from companion.planner.visibility import circle_cuts, geodesics, graph_nodes
 from companion.planner.world import World
 
 _NORMALS = 48
@@ -110,6 +110,7 @@ class Bound:
         self.turning_s = turning_s(world)
         self.progress_s = progress_s(world.problem, world.goal, world.goal_radius)
         self.metric_s = gauge.disc(gx, gy, world.goal_radius) if gauge.can_move else math.inf
+        self.ends = circle_cuts(world.grid.edges, np.array([gx, gy, world.goal_radius]))
         self.path: Floats | None = None
         self.is_exact = False
 
@@ -133,7 +134,8 @@ class Bound:
         limit = upper_s - self.turning_s if math.isfinite(upper_s) else math.inf
         nodes = graph_nodes(world.corners, gauge, (*world.goal, world.goal_radius), limit)
         _, parent, low, end, made = geodesics(
-            world.grid, nodes, gauge.normals, gauge.blocked, gauge.table, goal, 0, limit, tests
+            world.grid, nodes, gauge.normals, gauge.blocked, gauge.table, goal, 0, limit, tests,
+            self.ends,
         )
         found = end >= 0 and made <= tests
         if end >= 0:
@@ -142,26 +144,11 @@ class Bound:
                 end = int(parent[end])
                 points.append(nodes[end])
             self.path = np.array(points[::-1])
-        if not _disc_is_clear(world):
-            return int(made)  # which part of the disc can be seen is not decided exactly: keep the plain bound
         if math.isfinite(low):
             cut = 4.0 * TOUCH_M * gauge.table_max * (2 + (len(self.path) if self.path is not None else len(nodes)))
             self.metric_s = max(self.metric_s, low - cut)
             self.is_exact = found
         return int(made)
-
-
-def _disc_is_clear(world: World) -> bool:
-    """Is the goal's disc clear of every boundary segment?"""
-    e = world.grid.edges
-    if len(e) == 0:
-        return True
-    gx, gy = world.goal
-    d = e[:, 2:] - e[:, :2]
-    f = ((gx - e[:, 0]) * d[:, 0] + (gy - e[:, 1]) * d[:, 1]) / np.maximum(np.sum(d * d, axis=1), 1e-18)
-    f = np.clip(f, 0.0, 1.0)
-    near = np.hypot(e[:, 0] + f * d[:, 0] - gx, e[:, 1] + f * d[:, 1] - gy)
-    return bool(np.min(near) > world.goal_radius + TOUCH_M)
 
 
 def cut_off(problem: Problem) -> str | None:

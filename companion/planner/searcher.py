@@ -185,8 +185,8 @@ class Searcher:
         if len(nodes) < 2 or len(nodes) > 900:
             return 0
         args = (world.grid, nodes, gauge.normals, gauge.blocked, gauge.table, self.goal)
-        to, before, _, _, n1 = geodesics(*args, 1, limit, 200_000)
-        back, after, _, _, n2 = geodesics(*args, 2, limit, 200_000)
+        to, before, _, _, n1 = geodesics(*args, 1, limit, 200_000, self.bound.ends)
+        back, after, _, _, n2 = geodesics(*args, 2, limit, 200_000, self.bound.ends)
         self.effort.spend((n1 + n2) // 8 + 1)
         through = to + back
         known = {c.side for c in self.pool}

@@ -27,13 +27,14 @@ def _time(normals: Floats, dx: float, dy: float) -> float:
 @jit
 def geodesics(
     g: Grid, nodes: Floats, normals: Floats, blocked: Floats, table: Floats, goal: Floats, mode: int,
-    bound: float, budget: int,
+    bound: float, budget: int, ends: Floats,
 ) -> tuple[Floats, Ints, float, int, int]:
     """Search the visibility graph over ``nodes`` (node 0 is the start) with the gauge as the cost.
 
     Mode 0: from the start until the goal's disc is reached, with the distance to it as heuristic. Mode 1: from the
     start to every node. Mode 2: from every node to the goal's disc. Corners whose least time through them exceeds
-    ``bound`` are left out; ``budget`` counts visibility tests. Returns (cost to each node, parent of each node,
+    ``bound`` are left out; ``budget`` counts visibility tests; ``ends`` are the points where boundaries cut the disc's
+    circle. Returns (cost to each node, parent of each node,
     -1 for the root, lower bound on the shortest path, the node before the goal or -1, tests made).
     """
     backward = mode == 2
@@ -84,7 +85,7 @@ def geodesics(
             # The least-time end may lie elsewhere on the disc than the nearest: blocked ends keep the bound only.
             if best < end_cost and (
                 is_free(g, nodes[k, 0], nodes[k, 1], nodes[k, 0] + f * gx, nodes[k, 1] + f * gy)
-                or disc_open(g, nodes[k, 0], nodes[k, 1], goal)
+                or disc_open(g, nodes[k, 0], nodes[k, 1], goal, ends)
             ):
                 end, end_cost = k, best
                 limit = min(bound, end_cost)
@@ -108,13 +109,58 @@ def geodesics(
 
 
 @jit
-def disc_open(g: Grid, x: float, y: float, goal: Floats) -> bool:
-    """Can any of 64 points on the goal's disc be seen from (x, y)?"""
-    for i in range(64):
-        a = 2.0 * math.pi * i / 64.0
-        if is_free(g, x, y, goal[0] + goal[2] * math.sin(a), goal[1] + goal[2] * math.cos(a)):
+def _entry_free(g: Grid, x: float, y: float, px: float, py: float, goal: Floats) -> bool:
+    """Is the segment from (x, y) to p free up to where it enters the goal's disc?"""
+    dx, dy = px - x, py - y
+    a = dx * dx + dy * dy
+    if a <= 0.0:
+        return True
+    b = dx * (x - goal[0]) + dy * (y - goal[1])
+    c = (x - goal[0]) ** 2 + (y - goal[1]) ** 2 - goal[2] * goal[2]
+    root = b * b - a * c
+    f = 1.0 if root <= 0.0 else min(1.0, max(0.0, (-b - math.sqrt(root)) / a))
+    return is_free(g, x, y, x + f * dx, y + f * dy)
+
+
+@jit
+def disc_open(g: Grid, x: float, y: float, goal: Floats, ends: Floats) -> bool:
+    """Can any part of the goal's disc be seen from (x, y)?
+
+    A sight line can be turned until it touches a corner (then that corner sees the disc too and takes its place),
+    the disc's side, or the end of an open arc: so the two tangents and ``ends`` decide. Samples find most sooner.
+    """
+    dx, dy = goal[0] - x, goal[1] - y
+    d = math.hypot(dx, dy)
+    if d <= goal[2]:
+        return True
+    spread = math.asin(goal[2] / d) * (1.0 - 1e-9)
+    towards = math.atan2(dx, dy)
+    far = math.sqrt(max(0.0, d * d - goal[2] * goal[2]))
+    for i in range(-4, 5):
+        a = towards + spread * i / 4.0
+        reach = far if abs(i) == 4 else d
+        if _entry_free(g, x, y, x + reach * math.sin(a), y + reach * math.cos(a), goal):
+            return True
+    for i in range(ends.shape[0]):  # noqa: SIM110 - compiled
+        if _entry_free(g, x, y, ends[i, 0], ends[i, 1], goal):
             return True
     return False
+
+
+def circle_cuts(edges: Floats, goal: Floats) -> Floats:
+    """Return the points where boundary segments cut the goal's circle, (k, 2)."""
+    if len(edges) == 0 or goal[2] <= 0.0:
+        return np.empty((0, 2))
+    p, d = edges[:, :2] - goal[:2], edges[:, 2:] - edges[:, :2]
+    a, b = np.sum(d * d, axis=1), np.sum(p * d, axis=1)
+    root = b * b - a * (np.sum(p * p, axis=1) - goal[2] ** 2)
+    hit = (root >= 0.0) & (a > 0.0)
+    out = []
+    for sign in (-1.0, 1.0):
+        f = (-b[hit] + sign * np.sqrt(root[hit])) / a[hit]
+        inside = (f >= 0.0) & (f <= 1.0)
+        out.append(edges[hit][inside, :2] + f[inside, None] * d[hit][inside])
+    return np.ascontiguousarray(np.vstack(out))
 
 
 def graph_nodes(corners: Floats, gauge: Gauge, goal: tuple[float, float, float], bound_s: float) -> Floats:
