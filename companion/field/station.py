@@ -20,8 +20,9 @@ class Station:
     """Where and how to stay.
 
     A board at ``board_twa_rad`` ends when the boat is ``board_m`` beyond the point on its side and ``height_m`` to
-    windward of it, or ``board_max_m`` beyond. At ``far_m`` the field takes over. ``thrust`` eases the sail in light
-    need: 1 is full. ``bear_off_deg_per_m`` is how much lower she sails for each metre too far to windward. With ``tacks`` boards end by tacking, for a boat that tacks within seconds.
+    windward of it, or ``board_max_m`` beyond. At ``far_m`` the field takes over. ``thrust`` eases the sail: 1 is
+    full. ``bear_off_deg_per_m`` is how much lower she sails for each metre too far to windward. With ``tacks``
+    boards end by tacking, for a boat that tacks within seconds.
     """
 
     at_en: tuple[float, float]
