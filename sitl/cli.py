@@ -19,6 +19,7 @@ COMMANDS = {
     "boat": "the simulated autopilot alone, for any MAVLink client",
     "run": "sail a scenario: autopilot, weather, companion, verdict",
     "campaign": "a scenario over many seeds: success, risk, time",
+    "faults": "a short voyage a thousand times, each with trouble of its own",
     "fetch": "download the official ArduRover simulator",
 }
 

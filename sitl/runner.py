@@ -13,19 +13,21 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from companion.app import SailOptions, at_once, sail
 from companion.clock import now_s
+from companion.errors import LinkError
 from companion.fold import Step
 from companion.geofence import LocalArea, Mission, load_mission
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link, LinkIdentity
 from companion.messages import MissionItem, Mode, waypoint
-from companion.planner.worker import InlinePlanner
+from companion.planner import Plan, Problem
+from companion.planner.worker import DEFAULT_GRACE_S, InlinePlanner, failed
 from companion.telemetry.recorder import write_atomically
 from sitl.autopilot import (
     Autopilot,
@@ -50,7 +52,58 @@ VERDICT = "verdict.json"
 # Effort of one plan under the virtual clock, where time cannot stop it.
 EXPANSIONS = 15_000
 
+# A companion that ended for want of an autopilot is started again after this long, as its service does [s].
+SERVICE_RESTART_S = 5.0
+PLANNER_START_S = 1.5
+
 OnStep = Callable[[Step], None]
+
+
+class Observer(Protocol):
+    """Whoever looks at a run from the outside, beside its judge."""
+
+    def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:
+        """Look at the autopilot; called every ``TRUTH_EVERY_S`` of a run, from its first moment."""
+
+    def life(self, start_s: float, end_s: float) -> None:
+        """Take one life of the companion's process."""
+
+
+class FragilePlanner(InlinePlanner):
+    """The planner under the virtual clock, with the fates of the worker process: it dies, is replaced, and hangs."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._hangs_until_s = -math.inf
+        self._deaths = 0
+
+    def die(self) -> None:
+        """Kill it, in the middle of whatever it computes."""
+        self.is_alive = False
+        self._deaths += 1
+
+    def hang(self, until_s: float) -> None:
+        """Answer nothing until ``until_s``."""
+        self._hangs_until_s = until_s
+
+    async def plan(
+        self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
+        algorithm: str = "auto",
+    ) -> Plan:
+        """Plan as the worker would: a dead one is replaced first, a hung one when its time is over."""
+        if not self.is_alive:
+            await asyncio.sleep(PLANNER_START_S)
+            self.is_alive, self.restarts = True, self.restarts + 1
+        if now_s() < self._hangs_until_s:
+            await asyncio.sleep((budget_s or 0.0) + DEFAULT_GRACE_S)
+            self.restarts += 1
+            return failed("the planner's worker did not answer in time", seed=seed, algorithm=algorithm)
+        deaths = self._deaths
+        answer = await super().plan(
+            problem, budget_s=budget_s, expansions=expansions, seed=seed, algorithm=algorithm)
+        if deaths != self._deaths:
+            return failed("the planner's worker died", seed=seed, algorithm=algorithm)
+        return answer
 
 
 @dataclass(slots=True)
@@ -66,6 +119,8 @@ class _World:
     errors: list[str] = field(default_factory=list)
     summary: dict[str, Any] = field(default_factory=dict)
     set_sail_s: float | None = None
+    planner: FragilePlanner = field(default_factory=FragilePlanner)
+    observer: Observer | None = None
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -100,7 +155,7 @@ def replace_struct(struct: Any, **changes: Any) -> Any:
 
 async def run_embedded(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, on_step: OnStep | None = None,
-    expansions: int | None = EXPANSIONS,
+    expansions: int | None = EXPANSIONS, observer: Observer | None = None,
 ) -> Verdict:
     """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json."""
     mission = permitted(load_mission(scenario.mission_path(source)))
@@ -111,11 +166,11 @@ async def run_embedded(
         heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     autopilot = Autopilot(
         AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
-                        parameters=scenario.parameters),
+                        parameters=scenario.parameters, has_ftp=scenario.has_ftp),
         wind, seed=seed,
     )
     link = MemoryLink("companion", seed=seed)
-    world = _World(autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1))
+    world = _World(autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1), observer=observer)
     frame = mission.frame()
     folder.mkdir(parents=True, exist_ok=True)
     async with serve(autopilot, [link.far, world.shore.far]):
@@ -160,8 +215,11 @@ async def _sail_and_restart(
         left_s = deadline_s - now_s()
         if left_s <= 0.0:
             return
+        born_s = now_s()
+        # the planner's process lives and dies with the companion's
+        world.planner = FragilePlanner()
         task = asyncio.create_task(
-            sail(mission, world.link.near, InlinePlanner(), folder, replace(options, limit_s=left_s),
+            sail(mission, world.link.near, world.planner, folder, replace(options, limit_s=left_s),
                  on_status=on_status),
             name="companion",
         )
@@ -169,14 +227,24 @@ async def _sail_and_restart(
         done, _ = await asyncio.wait([task], timeout=None if kill is None else max(0.0, kill.at_s - now_s()))
         if task not in done:
             task.cancel()
+        gave_up = False
         try:
             world.summary = await task
         except asyncio.CancelledError:
             pass
         except Exception as error:
-            world.errors.append("".join(traceback.format_exception(error)))
-            return
+            if not (scenario.is_service and isinstance(error, LinkError)):
+                world.errors.append("".join(traceback.format_exception(error)))
+                return
+            gave_up = True
+        if world.observer is not None:
+            world.observer.life(born_s, now_s())
         _collect_alerts(world, folder)
+        if gave_up:
+            if kill is not None:
+                kills.insert(0, kill)
+            await asyncio.sleep(SERVICE_RESTART_S)
+            continue
         if task in done and not task.cancelled():
             return
         if kill is None or kill.restart_after_s is None:
@@ -202,6 +270,8 @@ async def _watch_truth(world: _World, frame: Any) -> None:
         if world.set_sail_s is not None:
             world.truth.add(now_s(), frame.en_from_geo(t.position), t.heading_rad, t.speed_mps,
                             (t.twd_from_rad, t.tws_mps))
+        if world.observer is not None:
+            world.observer.truth(now_s(), world.autopilot, world.link)
         await asyncio.sleep(TRUTH_EVERY_S)
 
 
@@ -225,10 +295,19 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
             await asyncio.sleep(event.for_s)
             link.impairment = Impairment()
     elif event.kind == "gps_jump":
-        autopilot.set_gps(GpsFault(east_m=event.east_m, north_m=event.north_m))
+        autopilot.set_gps(GpsFault(east_m=event.east_m, north_m=event.north_m, is_resisted=event.is_resisted))
         if event.for_s is not None:
             await asyncio.sleep(event.for_s)
             autopilot.set_gps(GpsFault())
+    elif event.kind == "gps_lost":
+        autopilot.set_gps(GpsFault(is_lost=True))
+        if event.for_s is not None:
+            await asyncio.sleep(event.for_s)
+            autopilot.set_gps(GpsFault())
+    elif event.kind == "kill_planner":
+        world.planner.die()
+    elif event.kind == "planner_hang":
+        world.planner.hang(math.inf if event.for_s is None else now_s() + event.for_s)
     elif event.kind == "vane":
         autopilot.set_vane(vane_fault(event))
         if event.for_s is not None:

@@ -21,10 +21,12 @@ EventKind = Literal[
     "reboot",            # the autopilot restarts
     "link_cut",          # for_s (none: for good)
     "link_quality",      # loss, duplicate, reorder, delay_s, corrupt
-    "gps_jump",          # east_m, north_m, for_s
+    "gps_jump",          # east_m, north_m, for_s, is_resisted (noticed by the EKF, as on the real one)
+    "gps_lost",          # for_s
     "vane",              # state: frozen | offset | spikes | ok; value_deg
     "kill_companion",    # restart_after_s: SIGKILL in the middle of whatever it does
-    "kill_planner",
+    "kill_planner",      # its process dies; the next request starts another
+    "planner_hang",      # for_s: requests are not answered in time
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
     "current",           # set_deg, drift_mps
@@ -60,6 +62,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     delay_s: float = 0.0
     east_m: float = 0.0
     north_m: float = 0.0
+    is_resisted: bool = False
     state: str | None = None
     value_deg: float = 0.0
     restart_after_s: float | None = None
@@ -92,6 +95,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     limit_s: float = 3600.0
     speedup: float = 8.0                      # when it runs in real time, separate processes
     start_heading_deg: float | None = None
+    has_ftp: bool = True                      # the embedded autopilot offers MAVFTP; else items go one by one
+    is_service: bool = False                  # a companion that heard no autopilot is started again
     wind: WindSpec = msgspec.field(default_factory=WindSpec)
     parameters: dict[str, float] = {}
     events: tuple[EventSpec, ...] = ()

@@ -26,6 +26,7 @@ class AutopilotConfig:
         sysid: MAVLink system id.
         parameters: values other than the fresh boat's, by name.
         battery_v: at the start; ``Autopilot.set_battery`` changes it.
+        has_ftp: offer MAVFTP; small boards are built without it.
         new_parameter_names: answer to ArduPilot 4.7's names (MAV_SYSID) instead of the older ones.
     """
 
@@ -37,6 +38,7 @@ class AutopilotConfig:
     parameters: Mapping[str, float] = field(default_factory=dict)
     battery_v: float = 12.6
     new_parameter_names: bool = False
+    has_ftp: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

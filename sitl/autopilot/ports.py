@@ -94,7 +94,7 @@ class Ports:
             commands.setpoint(a, m)
         elif name == "HEARTBEAT":
             a.failsafe.heard((m.get_srcSystem(), m.get_srcComponent()))
-        elif name == "FILE_TRANSFER_PROTOCOL":
+        elif name == "FILE_TRANSFER_PROTOCOL" and a.config.has_ftp:
             a.ftp.handle(m, link.number)
         elif name == "SET_MODE":
             a.helm.set_mode(m.custom_mode)

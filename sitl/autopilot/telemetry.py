@@ -212,8 +212,9 @@ def _quaternion(a: Autopilot) -> Any:
 def autopilot_version(a: Autopilot) -> Any:
     """AUTOPILOT_VERSION of 4.7."""
     custom = b"simulate"
+    capabilities = _CAPABILITIES if a.config.has_ftp else _CAPABILITIES & ~mav.MAV_PROTOCOL_CAPABILITY_FTP
     return mav.MAVLink_autopilot_version_message(
-        _CAPABILITIES, _VERSION, 0, 0, 0, custom, custom, custom, 0, 0, a.config.sysid
+        capabilities, _VERSION, 0, 0, 0, custom, custom, custom, 0, 0, a.config.sysid
     )
 
 

@@ -1,0 +1,37 @@
+"""``sitl faults``: random but repeatable trouble by the thousand."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "faults", help=summary,
+        description="Sail a short voyage many times, each with faults drawn from its seed: bad and cut links, broken "
+        "vanes, false positions, wind shifts and calms, a planner that dies or hangs, a companion that is killed, an "
+        "autopilot that reboots, an operator, a stranger's mission. None may end in contact, in a mission that is a "
+        "mixture, in silence or in an unhandled error. A failing seed is printed and repeats exactly.",
+        epilog="Example: sitl faults --runs 1000, then sitl faults --first-seed 17 --keep v",
+    )
+    parser.add_argument("--runs", type=int, default=1000, metavar="N", help="seeds to sail (default: 1000)")
+    parser.add_argument("--first-seed", type=int, default=0, metavar="S", help="the first of them (default: 0)")
+    parser.add_argument("--workers", type=int, default=None, metavar="W", help="processes (default: one per core)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write figures and voyages")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="sail only the first seed and keep its voyage folder")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from sitl.faults import run_faults, sail_seed
+
+    if args.keep is not None:
+        record = sail_seed(args.first_seed, keep=args.keep)
+        for key, value in record.items():
+            print(f"{key}: {value}")
+        return 0 if record["passed"] else 1
+    return run_faults(runs=args.runs, first_seed=args.first_seed, workers=args.workers, json_path=args.json)

@@ -1,0 +1,171 @@
+"""Faults by the thousand: random but repeatable trouble on a short voyage, and what may never come of it.
+
+A seed gives the weather and one to five faults of link, sensors, wind, process and people (``sitl.fault_draw``). Each
+voyage is sailed on the embedded autopilot under the virtual clock and judged on four points (``sitl.fault_watch``):
+no contact, no mission that is a mixture of two, no silence without a status, no unhandled exception. Arriving is
+counted, not required: a boat that the operator put in HOLD for half the voyage has done nothing wrong by being late.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from companion.fold import Step
+from sitl.fault_draw import draw
+from sitl.fault_watch import MAX_MIXTURE_S, MAX_SILENCE_S, Watch, mission_key
+from sitl.scenario import load_scenario
+
+BASE = Path(__file__).parent / "scenarios" / "faults" / "rocks.toml"
+# Effort of one plan: the voyage is short and its water simple.
+EXPANSIONS = 4_000
+
+
+def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[str, Any]:
+    """Sail one seed and return how it went; a voyage folder is left in ``keep``."""
+    from companion.clock import run_virtual
+    from companion.geofence import load_mission
+    from companion.messages import waypoint
+    from sitl.runner import run_embedded, solid_of
+
+    began_s = time.process_time()
+    scenario = draw(seed, load_scenario(base))
+    mission = load_mission(scenario.mission_path(base))
+    frame = mission.frame()
+    watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame)
+    for event in scenario.events:
+        if event.kind == "foreign_mission":
+            item = waypoint(frame.geo_from_en(event.east_m, event.north_m))
+            watch.foreign.add(mission_key([(item.command, item.lat_e7, item.lon_e7)]))
+    status_s: list[float] = []
+
+    def on_step(step: Step) -> None:
+        status_s.append(step.snapshot.t_s)
+        watch.step(step)
+
+    figures: dict[str, Any] = {}
+    errors: list[str] = []
+    with tempfile.TemporaryDirectory(prefix="faults-") as scratch:
+        folder = keep if keep is not None else Path(scratch) / "voyage"
+        try:
+            verdict = run_virtual(run_embedded(
+                scenario, base, seed, folder, on_step=on_step, expansions=EXPANSIONS, observer=watch))
+            figures = verdict.figures
+            errors = [str(e) for c in verdict.checks if c.name == "no unhandled error" for e in c.figure]
+        except Exception as error:
+            errors = [repr(error)]
+    contacts = watch.contacts()
+    mixture_s, is_mixed_at_last = watch.mixture_s()
+    silence_s = watch.silence_s(status_s)
+    faults = []
+    if contacts["unexcused"]:
+        faults.append("contact")
+    if mixture_s > MAX_MIXTURE_S:
+        faults.append(f"a mixture for {mixture_s:.0f} s")
+    elif is_mixed_at_last and _could_act_at_last(watch):
+        faults.append("a mixture at last")
+    if silence_s > MAX_SILENCE_S:
+        faults.append(f"silent for {silence_s:.0f} s")
+    if errors:
+        faults.append(f"unhandled: {errors[0].strip().splitlines()[-1]}")
+    return {
+        "seed": seed, "passed": not faults, "faults": faults,
+        "events": [f"{e.kind} at {e.at_s:.0f} s" for e in scenario.events],
+        "kinds": sorted({e.kind for e in scenario.events}),
+        "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
+        "contacts": dict(contacts), "clearance_m": watch.clearance_m(), "mixture_s": mixture_s,
+        "silence_s": silence_s, "sailed": watch.has_sailed, "errors": errors,
+        "simulated_s": watch.t_s[-1] if watch.t_s else 0.0, "cpu_s": time.process_time() - began_s,
+    }
+
+
+def _could_act_at_last(watch: Watch) -> bool:
+    """Return whether the companion lived and was connected for long enough before the end to put things right."""
+    since_s = watch.t_s[-1] - MAX_MIXTURE_S
+    return all(up for t, up in zip(watch.t_s, watch.link_up, strict=True) if t >= since_s) and any(
+        a <= since_s and b >= watch.t_s[-1] - 1.0 for a, b in watch.lives)
+
+
+def run_seeds(seeds: Sequence[int], workers: int | None) -> Iterator[dict[str, Any]]:
+    """Yield the records of ``seeds`` as they come."""
+    count = workers or os.cpu_count() or 1
+    if count == 1:
+        yield from map(sail_seed, seeds)
+        return
+    # spawn: workers must not inherit a loop, threads or the kernels' locks
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(sail_seed, seed) for seed in seeds]):
+            yield future.result()
+
+
+def run_faults(
+    *, runs: int, first_seed: int = 0, workers: int | None = None, json_path: Path | None = None,
+) -> int:
+    """Sail ``runs`` seeds, print those that failed and what was counted; return the exit code."""
+    began_s = time.perf_counter()
+    records: list[dict[str, Any]] = []
+    for record in run_seeds(range(first_seed, first_seed + runs), workers):
+        records.append(record)
+        if not record["passed"]:
+            print(f"\rFAILED seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(record['events'])})",
+                  flush=True)
+        left_s = (time.perf_counter() - began_s) / len(records) * (runs - len(records))
+        failed = sum(not r["passed"] for r in records)
+        sys.stderr.write(f"\r{len(records)}/{runs} sailed, {failed} failed, {left_s:.0f} s left   ")
+        sys.stderr.flush()
+    sys.stderr.write("\n")
+    records.sort(key=lambda r: int(r["seed"]))
+    table = figures_of(records, time.perf_counter() - began_s)
+    print_figures(table)
+    for record in records:
+        if not record["passed"]:
+            print(f"again: sitl faults --first-seed {record['seed']} --keep DIR")
+    if json_path is not None:
+        json_path.write_text(json.dumps({"figures": table, "voyages": records}, indent=1) + "\n", encoding="utf-8")
+    return 0 if all(r["passed"] for r in records) else 1
+
+
+def figures_of(records: Sequence[dict[str, Any]], wall_s: float) -> dict[str, Any]:
+    """Return what was counted over all voyages."""
+    excused: Counter[str] = Counter()
+    kinds: Counter[str] = Counter()
+    for record in records:
+        excused.update(record["contacts"])
+        kinds.update(record["kinds"])
+    times = [r["time_s"] for r in records if r["arrived"]]
+    return {
+        "voyages": len(records), "passed": sum(r["passed"] for r in records),
+        "failed_seeds": [r["seed"] for r in records if not r["passed"]],
+        "arrived": sum(r["arrived"] for r in records),
+        "contacts_unexcused": excused.pop("unexcused", 0), "contacts_excused": dict(sorted(excused.items())),
+        "mixture_max_s": max((r["mixture_s"] for r in records), default=0.0),
+        "silence_max_s": max((r["silence_s"] for r in records), default=0.0),
+        "unhandled": sum(bool(r["errors"]) for r in records),
+        "time_median_s": statistics.median(times) if times else None,
+        "faults": dict(sorted(kinds.items())),
+        "simulated_s": sum(r["simulated_s"] for r in records), "cpu_s": sum(r["cpu_s"] for r in records),
+        "wall_s": wall_s,
+    }
+
+
+def print_figures(table: dict[str, Any]) -> None:
+    """Print what was counted."""
+    n = max(1, table["voyages"])
+    print(f"{table['voyages']} voyages, {table['passed']} passed, {table['arrived']} arrived in time")
+    excused = ", ".join(f"{k} {v}" for k, v in table["contacts_excused"].items()) or "none"
+    print(f"contacts {table['contacts_unexcused']} (excused: {excused}); "
+          f"longest mixture {table['mixture_max_s']:.1f} s; "
+          f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}")
+    print("voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items()))
+    print(f"{table['simulated_s'] / 3600.0:.1f} h simulated in {table['wall_s']:.0f} s, "
+          f"{table['cpu_s'] / n:.2f} CPU s per voyage")
