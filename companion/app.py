@@ -35,6 +35,7 @@ from companion.mavlink.transport import Transport
 from companion.messages import CompanionStatus
 from companion.plots.voyage import AREA
 from companion.skipper import Skipper
+from companion.skipper.actions import Severity
 from companion.skipper.state import Persisted, Phase
 from companion.telemetry.recorder import STATE, Recorder, write_atomically
 from companion.telemetry.records import action_record, outcome_record, track_row
@@ -139,6 +140,7 @@ class _Shell:
         self._persisted: Persisted | None = None
         self._frames = 0
         self._announced: tuple[str, str] = ("", "")
+        self._refusals: list[str] = []
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
@@ -151,6 +153,8 @@ class _Shell:
         )
         # Growing a jagged coast takes seconds; under way the loop must not wait for it.
         self.fold.skipper.prepare()
+        if persisted is not None and self.fold.state.adoptable is None:
+            self._refuse_state(self.fold.state.why)
         self._write_description(transport.name)
         self.recorder.decision(self._stamped(self._quantised(now_s())[1], {
             "kind": "start", "persisted": None if persisted is None else persisted.to_dict(),
@@ -163,6 +167,8 @@ class _Shell:
                 link.subscribe(self._on_message)
                 await self._wait_autopilot(link)
                 autopilot = await stack.enter_async_context(Autopilot(link))
+                for text in self._refusals:
+                    autopilot.say(int(Severity.WARNING), text)
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
                                     expansions=self.options.expansions,
                                     budget_scale=self.options.budget_scale)
@@ -324,9 +330,14 @@ class _Shell:
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
-            self.recorder.decision(self._stamped(now_s(), {
-                "kind": "refusal", "what": "saved state", "text": f"{self.state_path.name} is not used: {error}"}))
+            self._refuse_state(str(error))
             return None
+
+    def _refuse_state(self, why: str) -> None:
+        """Record that the saved state is not resumed, and keep the sentence for the radio."""
+        text = f"{self.state_path.name} is not used: {why}"
+        self.recorder.decision(self._stamped(now_s(), {"kind": "refusal", "what": "saved state", "text": text}))
+        self._refusals.append(text)
 
     def _write_description(self, link: str) -> None:
         area, options = self.voyage.area, self.options

@@ -83,6 +83,8 @@ class Recorder:
             self.folder.mkdir(parents=True, exist_ok=True)
             for name in (DECISIONS, TRACK, TLOG):
                 path = self.folder / name
+                if name != TLOG:  # whose readers find the next frame by themselves
+                    _cut_torn_line(path)
                 self._fds[name] = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
         except OSError as error:
             raise JobError(f"cannot write the voyage to {self.folder}: {error.strerror}") from error
@@ -147,6 +149,17 @@ class Recorder:
     def state(self, values: Mapping[str, Any]) -> None:
         """Write what a restarted companion needs."""
         write_atomically(self.folder / STATE, json.dumps(jsonable(values)).encode())
+
+
+def _cut_torn_line(path: Path) -> None:
+    """Cut off the half line that a power cut left: what is appended must not join it."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return
+    whole = data.rfind(b"\n") + 1
+    if whole < len(data):
+        os.truncate(path, whole)
 
 
 def _without_none(value: Any) -> Any:
