@@ -127,8 +127,8 @@ def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
         hit = target_hit(p, a, b, t, t1) if hit is None else hit
         if hit is not None:
             reasons.append(f"leg {i}: meets target {hit}")
-        legs.append(Leg(from_en=a, to_en=b, heading_rad=wrap_two_pi(h), twa_rad=wrap_pi(-twa), turn_rad=turn, length_m=length,
-                        speed_mps=v, start_s=t, end_s=t1, sigma_rad=sigma, no_go_half_rad=half))
+        legs.append(Leg(from_en=a, to_en=b, heading_rad=wrap_two_pi(h), twa_rad=wrap_pi(-twa), turn_rad=turn,
+                        length_m=length, speed_mps=v, start_s=t, end_s=t1, sigma_rad=sigma, no_go_half_rad=half))
         sail_s += t1 - t
         length_m += length
         t, heading = t1, h
