@@ -13,7 +13,7 @@ import math
 import numpy as np
 import shapely
 
-from companion.planner.anneal import check_path
+from companion.planner.beating import check_path
 from companion.planner.bound import Bound, cut_off, no_course
 from companion.planner.evaluate import target_hit
 from companion.planner.gauge import make_gauge

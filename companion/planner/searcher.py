@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.planner.anneal import MOST_POINTS, anneal, check_path, follow, timetable, uniform, zigzag
+from companion.planner.anneal import MOST_POINTS, anneal, timetable, uniform
+from companion.planner.beating import check_path, follow, zigzag
 from companion.planner.bound import Bound
 from companion.planner.drift import run_drift
 from companion.planner.gauge import Gauge
