@@ -50,6 +50,7 @@ SYNC_EVERY_S = 5.0
 LOOP_WATCH_S = 0.1
 # After arrival the boat loiters; the companion watches it for a moment before it ends [s].
 LINGER_S = 5.0
+LINGER_BUSY_S = 60.0
 # Parameters that the plan and the wind depend on; asked at the start and after a reboot.
 PARAMETERS = (
     "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "SAIL_LOIT_RADIUS", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE",
@@ -223,7 +224,9 @@ class _Shell:
             executor.submit(step.actions)
             if step.state.phase is Phase.DONE:
                 done_s = t_s if done_s is None else done_s
-                if t_s - done_s >= LINGER_S:
+                # an upload under way is brought to its end: what stays on the autopilot is one plan
+                is_busy = step.state.pending_upload is not None
+                if t_s - done_s >= (LINGER_BUSY_S if is_busy else LINGER_S):
                     self.end_reason = "arrived"
                     return
             else:

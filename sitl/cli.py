@@ -20,6 +20,7 @@ COMMANDS = {
     "run": "sail a scenario: autopilot, weather, companion, verdict",
     "campaign": "a scenario over many seeds: success, risk, time",
     "faults": "a short voyage a thousand times, each with trouble of its own",
+    "baselines": "the companion against ArduRover alone and with its own path planning",
     "fetch": "download the official ArduRover simulator",
 }
 

@@ -4,14 +4,17 @@ What counts as contact. An entry into what is solid fails the voyage unless one 
 then it is counted under that name:
 
 - ``position``: an injected position error was in force and the boat was clear of everything where its receiver
-  put it: nobody on board could know better;
+  put it: nobody on board could know better; or one had ended less than 30 s ago: the boat was sailed there by it,
+  a position that jumps is not believed for 20 s, in whichever direction it jumped, and a boat takes time to turn;
 - ``operator``: the boat was not in AUTO or GUIDED, or not armed (an operator's mode, a failsafe of the autopilot
-  that stops it, a reboot that leaves it disarmed): a sailboat that nobody steers drifts;
+  that stops it, a reboot that leaves it disarmed): a sailboat that nobody steers drifts; or it was given back less
+  than 10 s ago, which is what a tack away from a rock takes;
 - ``foreign``: the boat followed a mission that somebody else put on board, which the companion may not replace.
 
 What counts as a mixture. The list on the autopilot, up to the item that ends it, is at every moment one that somebody
-uploaded as a whole, or there is none. It may be otherwise while an upload is under way, and while nobody can mend it:
-with the link cut or the companion dead.
+uploaded as a whole, or there is none. It may be otherwise while an upload is under way (without MAVFTP items are
+written in place, one by one, for as long as a bad link makes it), and while nobody can mend it: with the link cut
+or the companion dead. How long that was is a figure of its own.
 """
 
 from __future__ import annotations
@@ -33,9 +36,12 @@ from companion.skipper.actions import UploadMission
 from sitl.autopilot import Autopilot, MemoryLink
 
 MAX_SILENCE_S = 10.0
-# A mission under way to the autopilot may be half there for this long while the link works [s]: the item protocol
-# writes in place, and putting a torn upload right takes a read and another upload.
+# A mission may be half there for this long with no upload under way and a link that works [s]: putting a torn upload
+# right takes a read, item by item, before the next upload.
 MAX_MIXTURE_S = 20.0
+# A position error excuses a contact for this long after its end [s]: the watchdog's 20 s, and ten to turn the boat.
+AFTER_ERROR_S = 30.0
+AFTER_OPERATOR_S = 10.0
 # Where a mission stops being read.
 _ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
 
@@ -57,11 +63,14 @@ class Watch:
     lives: list[tuple[float, float]] = field(default_factory=list)
     ours: set[MissionKey] = field(default_factory=set)
     foreign: set[MissionKey] = field(default_factory=set)
+    uploading: list[bool] = field(default_factory=list)
     has_sailed: bool = False
+    _uploads: bool = False
     _last: tuple[Any, MissionKey] = ((), ())
 
     def step(self, step: Step) -> None:
         """Note what the companion uploads."""
+        self._uploads = step.state.pending_upload is not None
         for action in step.actions:
             if isinstance(action, UploadMission):
                 self.ours.add(mission_key((i.command, i.lat_e7, i.lon_e7) for i in action.items))
@@ -79,9 +88,11 @@ class Watch:
             self._last = (items, mission_key((i.command, i.x, i.y) for i in items))
         self.missions.append(self._last[1])
         self.link_up.append(not link.is_cut)
+        self.uploading.append(self._uploads)
 
     def life(self, start_s: float, end_s: float) -> None:
         """Note one life of the companion."""
+        self._uploads = False
         self.lives.append((start_s, end_s))
 
     def contacts(self) -> Counter[str]:
@@ -91,14 +102,17 @@ class Watch:
             return counts
         shapely.prepare(self.solid)
         positions, believed = np.asarray(self.en_m), np.asarray(self.believed_en_m)
+        wrong = np.hypot(*(positions - believed).T) > 1.0
+        times, steered = np.asarray(self.t_s), np.asarray(self.steered)
+        begun = np.logical_or.accumulate(steered) | ~steered.any()
         inside = shapely.intersects(self.solid, shapely.points(positions))
         believed_inside = shapely.intersects(self.solid, shapely.points(believed))
         entries = np.flatnonzero(inside & ~np.concatenate([[False], inside[:-1]]))
         for i in entries:
-            wrong_m = float(np.hypot(*(positions[i] - believed[i])))
-            if wrong_m > 1.0 and not believed_inside[i]:
+            recent = wrong & (times > times[i] - AFTER_ERROR_S) & (times < times[i])
+            if (wrong[i] and not believed_inside[i]) or (not wrong[i] and recent.any()):
                 counts["position"] += 1
-            elif not self.steered[i]:
+            elif not steered[i] or (~steered & begun & (times > times[i] - AFTER_OPERATOR_S) & (times < times[i])).any():
                 counts["operator"] += 1
             elif self.missions[i] in self.foreign:
                 counts["foreign"] += 1
@@ -115,22 +129,33 @@ class Watch:
     def mixture_s(self) -> tuple[float, bool]:
         """Return how long the mission on board was no whole one while it could be put right, and if it is so at last.
 
-        Only while the link is up and the companion lives can anybody do something about it.
+        Only while the link is up and the companion lives can anybody do something about it; a mission on its way is
+        none yet.
         """
-        longest = since = 0.0
-        was = False
-        for i, t_s in enumerate(self.t_s):
-            key = self.missions[i]
-            is_mixed = bool(key) and key not in self.ours and key not in self.foreign
-            can_act = self.link_up[i] and any(a <= t_s <= b for a, b in self.lives)
-            if not is_mixed or not can_act:
-                was = False
-            elif not was:
-                was, since = True, t_s
-            else:
-                longest = max(longest, t_s - since)
+        free = [
+            up and not uploads and any(a <= t <= b for a, b in self.lives)
+            for t, up, uploads in zip(self.t_s, self.link_up, self.uploading, strict=True)
+        ]
         last = self.missions[-1] if self.missions else ()
-        return longest, bool(last) and last not in self.ours and last not in self.foreign
+        return self._longest_mixed_s(free), self._is_mixed(last)
+
+    def half_written_s(self) -> float:
+        """Return how long the mission on board was no whole one, for whatever reason [s]."""
+        return self._longest_mixed_s([True] * len(self.t_s))
+
+    def _is_mixed(self, key: MissionKey) -> bool:
+        return bool(key) and key not in self.ours and key not in self.foreign
+
+    def _longest_mixed_s(self, counts: Sequence[bool]) -> float:
+        longest = 0.0
+        since_s: float | None = None
+        for t_s, key, is_counted in zip(self.t_s, self.missions, counts, strict=True):
+            if not is_counted or not self._is_mixed(key):
+                since_s = None
+                continue
+            since_s = t_s if since_s is None else since_s
+            longest = max(longest, t_s - since_s)
+        return longest
 
     def silence_s(self, status_s: Sequence[float]) -> float:
         """Return the longest time without a status within a life of the companion [s]."""

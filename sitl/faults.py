@@ -21,6 +21,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from companion.errors import InputError
 from companion.fold import Step
 from sitl.fault_draw import draw
 from sitl.fault_watch import MAX_MIXTURE_S, MAX_SILENCE_S, Watch, mission_key
@@ -38,6 +39,8 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
     from companion.messages import waypoint
     from sitl.runner import run_embedded, solid_of
 
+    if keep is not None and keep.is_dir() and any(keep.iterdir()):
+        raise InputError("--keep", str(keep), "is not empty", "a voyage's folder is taken up where it was left")
     began_s = time.process_time()
     scenario = draw(seed, load_scenario(base))
     mission = load_mission(scenario.mission_path(base))
@@ -84,6 +87,7 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
         "kinds": sorted({e.kind for e in scenario.events}),
         "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
         "contacts": dict(contacts), "clearance_m": watch.clearance_m(), "mixture_s": mixture_s,
+        "half_written_s": watch.half_written_s(),
         "silence_s": silence_s, "sailed": watch.has_sailed, "errors": errors,
         "simulated_s": watch.t_s[-1] if watch.t_s else 0.0, "cpu_s": time.process_time() - began_s,
     }
@@ -149,6 +153,7 @@ def figures_of(records: Sequence[dict[str, Any]], wall_s: float) -> dict[str, An
         "arrived": sum(r["arrived"] for r in records),
         "contacts_unexcused": excused.pop("unexcused", 0), "contacts_excused": dict(sorted(excused.items())),
         "mixture_max_s": max((r["mixture_s"] for r in records), default=0.0),
+        "half_written_max_s": max((r["half_written_s"] for r in records), default=0.0),
         "silence_max_s": max((r["silence_s"] for r in records), default=0.0),
         "unhandled": sum(bool(r["errors"]) for r in records),
         "time_median_s": statistics.median(times) if times else None,
@@ -164,7 +169,8 @@ def print_figures(table: dict[str, Any]) -> None:
     print(f"{table['voyages']} voyages, {table['passed']} passed, {table['arrived']} arrived in time")
     excused = ", ".join(f"{k} {v}" for k, v in table["contacts_excused"].items()) or "none"
     print(f"contacts {table['contacts_unexcused']} (excused: {excused}); "
-          f"longest mixture {table['mixture_max_s']:.1f} s; "
+          f"longest mixture {table['mixture_max_s']:.1f} s (half written, with its reasons, "
+          f"{table['half_written_max_s']:.1f} s); "
           f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}")
     print("voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items()))
     print(f"{table['simulated_s'] / 3600.0:.1f} h simulated in {table['wall_s']:.0f} s, "

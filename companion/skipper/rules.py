@@ -329,6 +329,9 @@ def _launch(turn: Turn) -> None:
     mode = status.mode.name if status.mode is not None else "unknown"
     if not status.ekf_ok:
         turn.phase(Phase.WAITING, "waiting for the autopilot's position filter (EKF)")
+    elif turn.boat_en is None:
+        # its first leg would start wherever the autopilot believes to be
+        turn.phase(Phase.WAITING, "waiting for a position that can be believed")
     elif status.is_armed and status.mode is not Mode.AUTO:
         turn.phase(Phase.WAITING, f"armed in {mode}: waiting for the operator to give AUTO")
     elif status.mode is not Mode.AUTO:

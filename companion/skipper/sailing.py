@@ -176,13 +176,23 @@ def _position(turn: Turn) -> Trigger | None:
     """The boat is not where the plan has it, or is nowhere on it."""
     config = turn.config
     if turn.is_raised("off the corridor"):
-        return Trigger(reason=ReplanReason.OFF_LEG, text="off the leg", interval_s=config.min_replan_interval_s)
+        return Trigger(reason=ReplanReason.OFF_LEG, text="off the leg", interval_s=_patience_off_leg_s(turn))
     if turn.is_raised("no progress"):
         return Trigger(reason=ReplanReason.NO_PROGRESS, text="no progress", interval_s=120.0)
     if (turn.is_raised("mission ended") or not turn.ahead()) and not seeks_refuge(turn):
         reason = ReplanReason.RETRY if turn.state.phase is Phase.HOLDING else ReplanReason.NEXT_GOAL
         return Trigger(reason=reason, text="at the end of the mission with goals left", interval_s=config.settle_s)
     return None
+
+
+def _patience_off_leg_s(turn: Turn) -> float:
+    """Return how long after the last plan the next may be made; less when something stands before the waypoint."""
+    boat, leg, config = turn.boat_en, turn.leg(), turn.config
+    blocked = boat is not None and leg is not None and (
+        turn.voyage.area.path_clearance_m([boat, leg[1]]) < config.margin_floor_m)
+    if blocked:
+        return config.no_go_replan_interval_s
+    return config.min_replan_interval_s
 
 
 def _wind(turn: Turn) -> Trigger | None:

@@ -191,9 +191,13 @@ def _corridor(turn: Turn) -> float | None:
     boat, leg = turn.boat_en, turn.leg()
     if boat is None or leg is None or not turn.ahead():
         return None
-    if along_m(boat, *leg) < 0.0 or distance_m(*leg) < 1.0:
+    if distance_m(*leg) < 1.0:
         return 0.0
-    off = abs(cross_track_m(boat, *leg))
+    if along_m(boat, *leg) < 0.0:
+        # Before its leg begins: by a little wherever a waypoint is announced early, by more after a jump.
+        off = max(0.0, distance_m(boat, leg[0]) - 2.0 * turn.config.announce_m)
+    else:
+        off = abs(cross_track_m(boat, *leg))
     clearance = turn.voyage.area.path_clearance_m([boat, leg[1]])
     allowed = turn.config.grid_size_m
     if clearance < turn.config.margin_floor_m:

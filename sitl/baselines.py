@@ -1,0 +1,339 @@
+"""What the companion is worth: the same water and weather sailed by ArduRover alone.
+
+Two baselines beside the companion. ``alone``: ArduRover with nothing but a waypoint at each goal, in AUTO.
+``dijkstra``: the same with ArduRover's own path planning round the obstacles as exclusion fences, set at boot as
+well as we know how. Both sail on the real ArduRover; ``alone`` on the embedded autopilot too, which has no path
+planning. The companion sails on the embedded one. Everybody is timed alike, on the true track: from sailing in AUTO
+to being within the radius of the last goal, all goals reached in order; a contact is an entry into an obstacle or
+over the limits.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from companion.clock import now_s, run, run_virtual
+from companion.errors import JobError, LinkError
+from companion.geofence import Mission, load_mission
+from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
+from companion.mavlink.autopilot import Autopilot as Pilot
+from companion.mavlink.link import Link, LinkIdentity
+from companion.mavlink.machines import Outcome
+from companion.mavlink.transport import open_link
+from companion.messages import Command, MissionItem, Mode, waypoint
+from sitl.ardurover import ArduRover, require
+from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot.config import Truth as Now
+from sitl.runner import TRUTH_EVERY_S, run_embedded, solid_of
+from sitl.scenario import load_scenario
+from sitl.verdict import Truth, contacts_and_clearance, count_tacks
+from sitl.weather import scenario_wind
+from sitl.wind import Wind
+
+HERE = Path(__file__).parent / "scenarios"
+SCENARIOS = (
+    HERE / "figures" / "block.toml", HERE / "two-channels.toml", HERE / "demo.toml", HERE / "lee-shore.toml",
+    HERE / "figures" / "slalom.toml", HERE / "upwind.toml",
+)
+# Measured to be its best (ArduPilot 4.7): margins that a tacking boat needs, the fence itself without action.
+DIJKSTRA = {
+    "OA_TYPE": 2.0, "OA_MARGIN_MAX": 15.0, "AVOID_ENABLE": 0.0, "FENCE_MARGIN": 2.0, "FENCE_TYPE": 4.0,
+    "FENCE_ACTION": 0.0, "FENCE_ENABLE": 1.0, "SAIL_XTRACK_MAX": 8.0,
+}
+# Its fence holds 84 points: the obstacles' outlines are made simpler by at most this [m].
+FENCE_PLAY_M = 4.0
+# A voyage of ArduRover alone that takes this long is stuck [s].
+LIMIT_S = 900.0
+# The companion has watched the wind for about this long when it sets sail: everybody meets the same weather [s].
+WEATHER_FROM_S = 35.0
+
+
+class Held:
+    """No wind until ``release``; from then on the weather. The real simulator's boat drifts as soon as there is any."""
+
+    def __init__(self, wind: Wind) -> None:
+        self._wind = wind
+        self._last_s = 0.0
+        self._from_s: float | None = None
+
+    def release(self) -> None:
+        """Let it blow."""
+        self._from_s = self._last_s
+
+    def at(self, t_s: float) -> tuple[float, float]:
+        """Return the wind."""
+        self._last_s = max(self._last_s, t_s)
+        if self._from_s is None:
+            return self._wind.at(WEATHER_FROM_S)[0], 0.0
+        return self._wind.at(WEATHER_FROM_S + max(0.0, t_s - self._from_s))
+
+
+@dataclass(slots=True)
+class Track:
+    """The true track of a voyage, and when it reached its goals."""
+
+    mission: Mission
+    truth: Truth = field(default_factory=Truth)
+    goals_s: list[float] = field(default_factory=list)
+
+    def add(self, t_s: float, now: Now) -> None:
+        """Take one look; before the boat sails in AUTO nothing is noted, nor after the last goal."""
+        if self.is_done or (not self.truth.t_s and not (now.is_armed and now.mode in {Mode.AUTO, Mode.GUIDED})):
+            return
+        en = self.mission.frame().en_from_geo(now.position)
+        self.truth.add(t_s, en, now.heading_rad, now.speed_mps, (now.twd_from_rad, now.tws_mps))
+        goal = self.mission.goals[len(self.goals_s)]
+        radius_m = goal.radius_m if goal.radius_m is not None else 10.0
+        if math.dist(en, self.mission.frame().en_from_geo(goal.point)) <= radius_m:
+            self.goals_s.append(t_s)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all goals were reached."""
+        return len(self.goals_s) == len(self.mission.goals)
+
+    def record(self, who: str, scenario: str, seed: int) -> dict[str, Any]:
+        """Return how it went."""
+        contacts, clearance_m = contacts_and_clearance(
+            self.truth.positions_m(), solid_of(self.mission.area.local(self.mission.frame())))
+        tacks, gybes = count_tacks(self.truth)
+        return {
+            "who": who, "scenario": scenario, "seed": seed, "arrived": self.is_done, "contacts": contacts,
+            "time_s": self.goals_s[-1] - self.truth.t_s[0] if self.is_done else None, "tacks": tacks, "gybes": gybes,
+            "clearance_m": clearance_m if math.isfinite(clearance_m) else None,
+        }
+
+    # as an observer of run_embedded
+    def observe(self) -> _Observer:
+        """Return an observer that fills this track."""
+        return _Observer(self)
+
+
+@dataclass(frozen=True, slots=True)
+class _Observer:
+    track: Track
+
+    def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:  # noqa: ARG002 - the interface has it
+        self.track.add(t_s, autopilot.truth)
+
+    def life(self, start_s: float, end_s: float) -> None:
+        pass
+
+
+# ------------------------------------------------------------------------------------------- voyages
+def sail_companion(path: Path, seed: int) -> dict[str, Any]:
+    """Sail with the companion on the embedded autopilot."""
+    scenario = load_scenario(path)
+    track = Track(load_mission(scenario.mission_path(path)))
+    with tempfile.TemporaryDirectory(prefix="figures-") as folder:
+        verdict = run_virtual(run_embedded(scenario, path, seed, Path(folder) / "voyage", observer=track.observe()))
+    figures = verdict.figures
+    return {
+        **track.record("companion", scenario.name, seed), "promised_risk": figures.get("promised_risk"),
+        "no_go_entries": figures.get("no_go_entries"), "replans": figures.get("replans"),
+    }
+
+
+def sail_alone(path: Path, seed: int) -> dict[str, Any]:
+    """Sail with one waypoint per goal on the embedded autopilot."""
+    scenario = load_scenario(path)
+    track = Track(load_mission(scenario.mission_path(path)))
+
+    async def voyage() -> None:
+        mission, wind = track.mission, Held(scenario_wind(scenario, path, seed))
+        autopilot = Autopilot(
+            AutopilotConfig(home=mission.start or mission.origin, heading_rad=_heading_rad(mission), is_warm=True,
+                            is_moored=True, parameters=scenario.parameters), wind, seed=seed)
+        wires = MemoryLink("shore", seed=seed)
+        async with (
+            serve(autopilot, [wires.far]),
+            Link(wires.near, identity=LinkIdentity(system=255, component=190), streams=()) as link,
+            Pilot(link) as pilot,
+        ):
+            wind.release()
+            await _sail(pilot, track, lambda: autopilot.truth)
+
+    run_virtual(voyage())
+    return track.record("alone, embedded", scenario.name, seed)
+
+
+def sail_ardurover(path: Path, seed: int, who: str, speedup: float) -> dict[str, Any]:
+    """Sail with the real ArduRover, "alone" or with its own "dijkstra"."""
+    scenario = load_scenario(path)
+    mission = load_mission(scenario.mission_path(path))
+    track = Track(mission)
+    has_obstacles = bool(mission.area.solids or mission.area.fence.inclusions)
+    parameters = {**scenario.parameters, **(DIJKSTRA if who == "dijkstra" and has_obstacles else {})}
+
+    async def voyage() -> None:
+        start = mission.start or mission.origin
+        wind = Held(scenario_wind(scenario, path, seed))
+        async with (
+            ArduRover(require(), start, wind, heading_rad=_heading_rad(mission), speedup=speedup,
+                      parameters=parameters) as rover,
+            Link(open_link(rover.link), identity=LinkIdentity(system=255, component=190), streams=()) as link,
+            Pilot(link, timeout_s=30.0 * speedup) as pilot,
+        ):
+            if who == "dijkstra" and has_obstacles:
+                fence = fence_for_autopilot(
+                    mission.area, FENCE_PLAY_M, inside=[start, *(g.point for g in mission.goals)])
+                if fence.status is not FenceStatus.OK:
+                    raise JobError(f"{scenario.name} does not fit in ArduRover's fence: {fence.reason}")
+                done = await pilot.upload_fence(fence.items)
+                if done.outcome is not Outcome.OK:
+                    raise JobError(f"the fence was not taken: {done.text}")
+
+            def now() -> Now | None:
+                try:
+                    return rover.truth
+                except LinkError:
+                    return None
+
+            wind.release()
+            await _sail(pilot, track, now)
+
+    run(voyage(), speedup=speedup)
+    return track.record(f"{who}, ArduRover", scenario.name, seed)
+
+
+def _heading_rad(mission: Mission) -> float:
+    return math.radians(mission.options.start.heading_deg) if mission.options.start else 0.0
+
+
+async def _sail(pilot: Pilot, track: Track, now: Callable[[], Now | None]) -> None:
+    """Upload a waypoint per goal, arm, set AUTO, and watch until the last goal or the limit.
+
+    The last waypoint is there twice: the mission then ends beyond the goal's radius for nobody.
+    """
+    points: list[MissionItem] = [waypoint(g.point) for g in track.mission.goals]
+    done = await pilot.upload_mission([*points, waypoint(track.mission.goals[-1].point,
+                                                         command=Command.NAV_LOITER_UNLIM)])
+    if done.outcome is not Outcome.OK:
+        raise JobError(f"the mission was not taken: {done.text}")
+    for _ in range(30):
+        await pilot.arm()
+        await pilot.set_mode(Mode.AUTO)
+        look = now()
+        if look is not None and look.is_armed and look.mode is Mode.AUTO:
+            break
+        await asyncio.sleep(1.0)
+    until_s = now_s() + LIMIT_S
+    while now_s() < until_s and not track.is_done:
+        look = now()
+        if look is not None:
+            track.add(look.t_s, look)
+        await asyncio.sleep(TRUTH_EVERY_S)
+    if not track.truth.t_s:
+        raise JobError("it never sailed in AUTO")
+
+
+# ------------------------------------------------------------------------------------------- running
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One voyage."""
+
+    who: str
+    scenario: Path
+    seed: int
+    speedup: float
+
+
+def sail(job: Job) -> dict[str, Any]:
+    """Sail a job; what went wrong with the harness is in ``error``."""
+    began = time.perf_counter()
+    try:
+        if job.who == "companion":
+            record = sail_companion(job.scenario, job.seed)
+        elif job.who == "alone-embedded":
+            record = sail_alone(job.scenario, job.seed)
+        else:
+            record = sail_ardurover(job.scenario, job.seed, job.who, job.speedup)
+    except (JobError, LinkError) as error:
+        record = {"who": job.who, "scenario": load_scenario(job.scenario).name, "seed": job.seed, "error": str(error)}
+    return {**record, "wall_s": time.perf_counter() - began}
+
+
+def _jobs_done(jobs: Sequence[Job], workers: int) -> Iterator[dict[str, Any]]:
+    if workers == 1:
+        yield from map(sail, jobs)
+        return
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(sail, job) for job in jobs]):
+            yield future.result()
+
+
+def run_baselines(
+    *, who: Sequence[str], scenarios: Sequence[Path], seeds: int, workers: int, speedup: float, out: Path,
+) -> int:
+    """Sail everything, append each voyage to ``out`` as it ends, print the table of all that ``out`` holds."""
+    jobs = [Job(who=w, scenario=p, seed=s, speedup=speedup) for w in who for s in range(seeds) for p in scenarios]
+    with out.open("a", encoding="utf-8") as file:
+        for n, record in enumerate(_jobs_done(jobs, workers), 1):
+            file.write(json.dumps(record, separators=(",", ":")) + "\n")
+            file.flush()
+            sys.stderr.write(f"\r{n}/{len(jobs)} sailed   ")
+            sys.stderr.flush()
+    sys.stderr.write("\n")
+    print(table(read(out)))
+    return 0
+
+
+def read(path: Path) -> list[dict[str, Any]]:
+    """Return the newest record of every voyage in a file."""
+    newest = {}
+    for line in path.read_text(encoding="utf-8").splitlines():
+        record = json.loads(line)
+        newest[record["who"], record["scenario"], record["seed"]] = record
+    return list(newest.values())
+
+
+def table(records: Sequence[dict[str, Any]]) -> str:
+    """Return the figures as a Markdown table: a row for each scenario and sailor, losses included.
+
+    Times are of voyages that arrived without contact; "forced" is how many of the companion's voyages met a wind shift
+    into the no-go zone on a leg, to be held against the risk that the plan promised.
+    """
+    lines = [
+        "| scenario | sailor | runs | arrived | touched | clean | median s | 90 % | tacks | least m | risk | forced |",
+        "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|",
+    ]
+    names = list(dict.fromkeys(load_scenario(p).name for p in SCENARIOS))
+    sailed = [r for r in records if "error" not in r]
+    for name in [*names, *sorted({r["scenario"] for r in sailed} - set(names))]:
+        for who in ("companion", "alone, embedded", "alone, ArduRover", "dijkstra, ArduRover"):
+            rows = [r for r in sailed if r["scenario"] == name and r["who"] == who]
+            if rows:
+                lines.append(_row(name, who, rows))
+    lost = len(records) - len(sailed)
+    if lost:
+        lines.append(f"\n{lost} voyages could not be sailed (harness): " + "; ".join(
+            sorted({str(r["error"]) for r in records if "error" in r})))
+    return "\n".join(lines)
+
+
+def _row(name: str, who: str, rows: Sequence[dict[str, Any]]) -> str:
+    clean = sorted(r["time_s"] for r in rows if r["arrived"] and not r["contacts"])
+    clearances = [r["clearance_m"] for r in rows if r["clearance_m"] is not None]
+    risks = [r["promised_risk"] for r in rows if r.get("promised_risk") is not None]
+    entered = [r["no_go_entries"] for r in rows if r.get("no_go_entries") is not None]
+    cells = [
+        name, who, str(len(rows)), str(sum(r["arrived"] for r in rows)), str(sum(r["contacts"] > 0 for r in rows)),
+        str(len(clean)), f"{statistics.median(clean):.0f}" if clean else "-",
+        f"{clean[math.ceil(0.9 * len(clean)) - 1]:.0f}" if clean else "-",
+        f"{statistics.median(r['tacks'] for r in rows):g}", f"{min(clearances):.1f}" if clearances else "-",
+        f"{statistics.median(risks):.2f}" if risks else "-",
+        f"{sum(n > 0 for n in entered)} of {len(entered)}" if entered else "-",
+    ]
+    return "| " + " | ".join(cells) + " |"

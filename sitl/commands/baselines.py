@@ -1,0 +1,38 @@
+"""``sitl baselines``: the companion against ArduRover alone and ArduRover with its own path planning."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+SAILORS = ("companion", "alone-embedded", "alone", "dijkstra")
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "baselines", help=summary,
+        description="Sail six scenarios with the companion and with ArduRover alone, in the same weather, and print "
+        "the table of arrivals, contacts, times, tacks and clearances. 'companion' and 'alone-embedded' use the "
+        "embedded autopilot; 'alone' (a waypoint per goal) and 'dijkstra' (its own path planning) the real ArduRover. "
+        "Voyages are appended to FILE, and the table is of everything in it.",
+        epilog="Example: sitl baselines --who alone dijkstra --seeds 5 --out figures.jsonl",
+    )
+    parser.add_argument("--who", nargs="+", choices=SAILORS, default=list(SAILORS), help="sailors (default: all)")
+    parser.add_argument("--scenarios", type=Path, nargs="+", metavar="FILE", help="scenario files (default: the six)")
+    parser.add_argument("--seeds", type=int, default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
+    parser.add_argument("--workers", type=int, default=1, metavar="W", help="voyages at a time (default: 1)")
+    parser.add_argument("--speedup", type=float, default=20.0, metavar="X", help="of the real ArduRover (default: 20)")
+    parser.add_argument("--out", type=Path, default=Path("baselines.jsonl"), metavar="FILE", help="voyages, appended")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from sitl.baselines import SCENARIOS, run_baselines
+
+    return run_baselines(
+        who=args.who, scenarios=args.scenarios or SCENARIOS, seeds=args.seeds, workers=args.workers,
+        speedup=args.speedup, out=args.out,
+    )
