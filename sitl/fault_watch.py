@@ -104,7 +104,7 @@ class Watch:
         positions, believed = np.asarray(self.en_m), np.asarray(self.believed_en_m)
         wrong = np.hypot(*(positions - believed).T) > 1.0
         times, steered = np.asarray(self.t_s), np.asarray(self.steered)
-        begun = np.logical_or.accumulate(steered) | ~steered.any()
+        taken = ~steered & np.logical_or.accumulate(steered)
         inside = shapely.intersects(self.solid, shapely.points(positions))
         believed_inside = shapely.intersects(self.solid, shapely.points(believed))
         entries = np.flatnonzero(inside & ~np.concatenate([[False], inside[:-1]]))
@@ -112,7 +112,7 @@ class Watch:
             recent = wrong & (times > times[i] - AFTER_ERROR_S) & (times < times[i])
             if (wrong[i] and not believed_inside[i]) or (not wrong[i] and recent.any()):
                 counts["position"] += 1
-            elif not steered[i] or (~steered & begun & (times > times[i] - AFTER_OPERATOR_S) & (times < times[i])).any():
+            elif not steered[i] or (taken & (times > times[i] - AFTER_OPERATOR_S) & (times < times[i])).any():
                 counts["operator"] += 1
             elif self.missions[i] in self.foreign:
                 counts["foreign"] += 1

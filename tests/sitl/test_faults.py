@@ -44,7 +44,7 @@ def test_a_voyage_with_faults_repeats_exactly(seed, tmp_path):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
-# What the campaign found: setting sail on a position that had just jumped (362), leaving with an upload half done (602).
+# What the campaign found: sails set on a position that had just jumped (362), an upload left half done (602).
 @pytest.mark.parametrize("seed", [362, 602])
 def test_a_seed_that_failed_once_does_not_again(seed):
     record = sail_seed(seed)
