@@ -52,8 +52,8 @@ DIJKSTRA = {
     "OA_TYPE": 2.0, "OA_MARGIN_MAX": 15.0, "AVOID_ENABLE": 0.0, "FENCE_MARGIN": 2.0, "FENCE_TYPE": 4.0,
     "FENCE_ACTION": 0.0, "FENCE_ENABLE": 1.0, "SAIL_XTRACK_MAX": 8.0,
 }
-# Its fence holds 84 points: the obstacles' outlines are made simpler by at most this [m].
-FENCE_PLAY_M = 4.0
+# Its fence holds 84 points: the obstacles' outlines are made simpler by at most the first of these that fits [m].
+FENCE_PLAYS_M = (4.0, 6.0, 8.0)
 # A voyage of ArduRover alone that takes this long is stuck [s].
 LIMIT_S = 900.0
 # The companion has watched the wind for about this long when it sets sail: everybody meets the same weather [s].
@@ -187,8 +187,11 @@ def sail_ardurover(path: Path, seed: int, who: str, speedup: float) -> dict[str,
             Pilot(link, timeout_s=30.0 * speedup) as pilot,
         ):
             if who == "dijkstra" and has_obstacles:
-                fence = fence_for_autopilot(
-                    mission.area, FENCE_PLAY_M, inside=[start, *(g.point for g in mission.goals)])
+                places = [start, *(g.point for g in mission.goals)]
+                for play_m in FENCE_PLAYS_M:
+                    fence = fence_for_autopilot(mission.area, play_m, inside=places)
+                    if fence.status is FenceStatus.OK:
+                        break
                 if fence.status is not FenceStatus.OK:
                     raise JobError(f"{scenario.name} does not fit in ArduRover's fence: {fence.reason}")
                 done = await pilot.upload_fence(fence.items)
