@@ -45,6 +45,7 @@ from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
 
 TRUTH_EVERY_S = 0.25
+MAX_TRUTH_SAMPLES = 20_000
 # Unix time of every simulated voyage's start: stamps must not depend on when it was run.
 EPOCH_S = 1_781_000_000.0
 # The simulated boat lies still until it sails, so that every voyage starts where its mission says.
@@ -175,7 +176,7 @@ async def run_embedded(
     folder.mkdir(parents=True, exist_ok=True)
     async with serve(autopilot, [link.far, world.shore.far]):
         side_tasks = [
-            asyncio.create_task(_watch_truth(world, frame), name="truth"),
+            asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
             *(asyncio.create_task(_event(world, e, mission), name=f"event {e.kind}") for e in scenario.events),
         ]
         await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions)
@@ -262,7 +263,9 @@ def _collect_alerts(world: _World, folder: Path) -> None:
         world.alerts[code] = world.alerts.get(code, 0) + count
 
 
-async def _watch_truth(world: _World, frame: Any) -> None:
+async def _watch_truth(world: _World, frame: Any, limit_s: float) -> None:
+    # A day is watched once in four seconds: the judge looks between samples too, and its memory is bounded.
+    every_s = max(TRUTH_EVERY_S, limit_s / MAX_TRUTH_SAMPLES)
     while True:
         t = world.autopilot.truth
         if world.set_sail_s is None and t.is_armed and t.mode in {Mode.AUTO, Mode.GUIDED}:
@@ -272,7 +275,7 @@ async def _watch_truth(world: _World, frame: Any) -> None:
                             (t.twd_from_rad, t.tws_mps))
         if world.observer is not None:
             world.observer.truth(now_s(), world.autopilot, world.link)
-        await asyncio.sleep(TRUTH_EVERY_S)
+        await asyncio.sleep(every_s)
 
 
 async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
