@@ -22,7 +22,8 @@ import numpy as np
 
 from companion import __version__
 from companion.clock import now_s
-from companion.compose import config_of, estimator_of, permissions_of, voyage_of
+from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
+from companion.errors import LinkError
 from companion.executor import Executor, Planner
 from companion.fold import Step, VoyageFold
 from companion.geofence import Mission
@@ -32,15 +33,16 @@ from companion.mavlink.link import Link
 from companion.mavlink.signing import SigningStore
 from companion.mavlink.tlog import stamp
 from companion.mavlink.transport import Transport
-from companion.messages import CompanionStatus
+from companion.messages import AisReport, CompanionStatus
 from companion.plots.voyage import AREA
 from companion.skipper import Skipper
 from companion.skipper.actions import Severity
 from companion.skipper.state import Persisted, Phase
 from companion.telemetry.recorder import STATE, Recorder, write_atomically
-from companion.telemetry.records import action_record, outcome_record, track_row
+from companion.telemetry.records import action_record, ais_record, outcome_record, track_row
 from companion.telemetry.status import companion_status
 from companion.telemetry.summary import VoyageFigures
+from companion.traffic.feeds import AisFeed, open_feed
 from companion.wind import WindRoom
 
 STEP_S = 1.0
@@ -48,6 +50,8 @@ STEP_S = 1.0
 STATUS_EVERY_S = 2.0
 SYNC_EVERY_S = 5.0
 LOOP_WATCH_S = 0.1
+# More AIS reports than this between two steps are noise or an attack: the rest of them is dropped.
+FED_AT_MOST = 500
 # After arrival the boat loiters; the companion watches it for a moment before it ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
@@ -142,6 +146,9 @@ class _Shell:
         self._frames = 0
         self._announced: tuple[str, str] = ("", "")
         self._refusals: list[str] = []
+        self._feed_names = feeds_of(mission)
+        self._feeds: list[AisFeed] = []
+        self._fed: list[AisReport] = []
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
@@ -150,7 +157,7 @@ class _Shell:
             Skipper(voyage=self.voyage, config=self.config),
             WindRoom(estimator=estimator_of(self.mission)),
             permissions_of(self.mission, dry_run=self.options.dry_run),
-            persisted,
+            persisted, traffic=target_limits_of(self.mission),
         )
         # Growing a jagged coast takes seconds; under way the loop must not wait for it.
         self.fold.skipper.prepare()
@@ -168,6 +175,7 @@ class _Shell:
                 link.subscribe(self._on_message)
                 await self._wait_autopilot(link)
                 autopilot = await stack.enter_async_context(Autopilot(link))
+                await self._open_feeds(stack)
                 for text in self._refusals:
                     autopilot.say(int(Severity.WARNING), text)
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
@@ -212,14 +220,37 @@ class _Shell:
         self.recorder.decision(self._stamped(t_s, outcome_record(outcome)))
         self.fold.take_outcome(t_s, outcome)
 
+    async def _open_feeds(self, stack: contextlib.AsyncExitStack) -> None:
+        """Listen to the mission's AIS feeds; a feed that cannot be opened is told and does not stop the voyage."""
+        for number, name in enumerate(self._feed_names):
+            try:
+                feed = await stack.enter_async_context(
+                    open_feed(name, self._on_ais, seed=self.options.seed + number))
+            except LinkError as error:
+                self._refuse("AIS feed", str(error))
+            else:
+                self._feeds.append(feed)
+
+    def _on_ais(self, report: AisReport) -> None:
+        if len(self._fed) < FED_AT_MOST:
+            self._fed.append(report)
+
     # --------------------------------------------------------------------------------------- steps
+    def _tick(self, t_s: float) -> Step:
+        """Fold what the feeds heard, after this step's messages as a replay does, and step."""
+        for report in self._fed:
+            self.recorder.decision(self._stamped(t_s, ais_record(report)))
+            self.fold.take(report)
+        self._fed.clear()
+        return self.fold.tick(t_s)
+
     async def _steps(self, executor: Executor, link: Link) -> None:
         started_s = next_s = now_s()
         done_s: float | None = None
         while True:
             t_s = self._quantised(now_s())[1]
             self.fold.planner_alive(self.planner.is_alive)
-            step = self.fold.tick(t_s)
+            step = self._tick(t_s)
             await self._after_step(step, link)
             executor.submit(step.actions)
             if step.state.phase is Phase.DONE:
@@ -246,7 +277,7 @@ class _Shell:
         waiting = asyncio.create_task(link.wait_autopilot(self.options.wait_s), name="first heartbeat")
         try:
             while not (await asyncio.wait([waiting], timeout=STEP_S))[0]:
-                step = self.fold.tick(self._quantised(now_s())[1])
+                step = self._tick(self._quantised(now_s())[1])
                 await self._after_step(step, link)
             await waiting
         finally:
@@ -338,8 +369,10 @@ class _Shell:
 
     def _refuse_state(self, why: str) -> None:
         """Record that the saved state is not resumed, and keep the sentence for the radio."""
-        text = f"{self.state_path.name} is not used: {why}"
-        self.recorder.decision(self._stamped(now_s(), {"kind": "refusal", "what": "saved state", "text": text}))
+        self._refuse("saved state", f"{self.state_path.name} is not used: {why}")
+
+    def _refuse(self, what: str, text: str) -> None:
+        self.recorder.decision(self._stamped(now_s(), {"kind": "refusal", "what": what, "text": text}))
         self._refusals.append(text)
 
     def _write_description(self, link: str) -> None:
@@ -387,6 +420,7 @@ class _Shell:
             "end_phase": state.phase.value,
             "end_reason": self.end_reason,
             "end_why": state.why,
+            "ais_feeds": [feed.sentence() for feed in self._feeds],
             "records_dropped": self.recorder.dropped,
             "planner_restarts": self.planner.restarts,
             "loop_held_max_s": round(self.loop_held_s * self.options.budget_scale, 4),

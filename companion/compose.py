@@ -11,6 +11,8 @@ from companion.errors import InputError
 from companion.geofence import Mission
 from companion.skipper.config import Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.voyage import Goal, Side, Voyage
+from companion.traffic import TargetLimits
+from companion.traffic.feeds import parse_feed
 from companion.wind import Estimator, make
 
 _SIDES = {None: Side.NONE, "port": Side.PORT, "starboard": Side.STARBOARD}
@@ -73,6 +75,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "first_plan_budget_s": options.planning_budget_s,
         "replan_policy": ReplanPolicy(options.replan),
         "min_replan_interval_s": options.min_replan_s,
+        "traffic_clearance_m": mission.traffic.safe_distance_m,
         "wind_change_rad": math.radians(options.wind_shift_deg),
         "grid_size_m": options.off_track_m,
         "safe_end": SafeEnd.RETURN if options.end == "home" else SafeEnd.LOITER,
@@ -96,3 +99,23 @@ def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
 def estimator_of(mission: Mission) -> Estimator:
     """Return the mission's wind estimator."""
     return make(mission.wind.estimator)
+
+
+def target_limits_of(mission: Mission) -> TargetLimits:
+    """Return how long an unheard vessel is remembered."""
+    return TargetLimits(expire_s=mission.traffic.drop_after_s)
+
+
+def feeds_of(mission: Mission) -> tuple[str, ...]:
+    """Return the names of the AIS feeds to open; the autopilot's own AIS ("mavlink") needs none.
+
+    Raises:
+        InputError: a name is not a feed.
+    """
+    names = tuple(name for name in mission.traffic.feeds if name != "mavlink")
+    for name in names:
+        try:
+            parse_feed(name)
+        except InputError as error:
+            raise InputError(str(mission.path), "[traffic] feeds", f"{name!r} is not a feed", error.remedy) from error
+    return names

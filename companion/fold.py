@@ -40,6 +40,7 @@ from companion.skipper.snapshot import (
     WindView,
 )
 from companion.skipper.state import Persisted, SkipperState
+from companion.traffic import TargetLimits, Targets
 from companion.wind import Estimator, Verdict, WindRoom, make
 
 # A boot time that goes back by more than this is a reboot, not a reordered frame [s].
@@ -71,12 +72,14 @@ class VoyageFold:
     """The fold. ``skipper`` holds the rules, ``wind`` the forecaster; everything else here is bookkeeping."""
 
     def __init__(
-        self, skipper: Skipper, wind: WindRoom, permissions: Permissions, persisted: Persisted | None = None
+        self, skipper: Skipper, wind: WindRoom, permissions: Permissions, persisted: Persisted | None = None,
+        *, traffic: TargetLimits | None = None,
     ) -> None:
         self.skipper, self.wind, self.permissions = skipper, wind, permissions
         self.state: SkipperState = skipper.initial(persisted)
         self.assembler = VehicleAssembler()
         self._parameters: dict[str, float] = {}
+        self._targets = Targets.empty(skipper.voyage.frame, traffic)
         self._mean90: Estimator = make("mean90")
         self._mean5: Estimator = make("mean5")
         self._vehicle: VehicleState | None = None
@@ -117,6 +120,8 @@ class VoyageFold:
             self._take_status(value)
         elif isinstance(value, StatusText):
             self._events.append(value)
+        elif isinstance(value, AisReport):
+            self._targets = self._targets.heard(value)
 
     def take_outcome(self, t_s: float, outcome: Outcome) -> None:
         """Take the outcome of an earlier action, known at ``t_s``."""
@@ -186,6 +191,7 @@ class VoyageFold:
             limits=self._limits,
             permissions=self.permissions,
             planner_alive=self._planner_alive,
+            traffic=self._targets.picture(t_s) if self._targets.last_heard_s is not None else None,
             events=tuple(self._events),
             outcomes=tuple(self._outcomes),
         )

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from companion.compose import config_of, estimator_of, voyage_of
+from companion.compose import config_of, estimator_of, target_limits_of, voyage_of
 from companion.errors import InputError
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
@@ -37,7 +37,7 @@ from companion.skipper.snapshot import (
 )
 from companion.skipper.state import Persisted
 from companion.telemetry.recorder import DECISIONS, TLOG, TRACK, VOYAGE, jsonable, read_jsonl
-from companion.telemetry.records import action_record
+from companion.telemetry.records import action_record, ais_of
 from companion.wind import WindRoom
 
 TOLERANCE = 1e-6
@@ -91,10 +91,14 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
     for (start_s, persisted), end_s in zip(starts, ends, strict=True):
         fold = VoyageFold(
             skipper, WindRoom(estimator=estimator_of(mission)), Permissions(**description["permissions"]),
-            None if persisted is None else Persisted.from_dict(persisted),
+            None if persisted is None else Persisted.from_dict(persisted), traffic=target_limits_of(mission),
         )
         heard = _messages(folder / TLOG, epoch_s, start_s, end_s)
         outcomes = iter([d for d in decisions if start_s <= d["t_s"] < end_s and d["kind"] in {"plan", "outcome"}])
+        fed: dict[float, list[dict[str, Any]]] = {}
+        for record in decisions:
+            if record["kind"] == "ais":
+                fed.setdefault(float(record["t_s"]), []).append(record)
         recorded = _actions_by_time([d for d in decisions if start_s <= d["t_s"] < end_s])
         for t_s, n_messages, n_outcomes in rows:
             if not start_s <= t_s < end_s:
@@ -105,6 +109,8 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             for _ in range(n_outcomes):
                 record = next(outcomes)
                 fold.take_outcome(float(record["t_s"]), _outcome(record))
+            for record in fed.get(t_s, ()):
+                fold.take(ais_of(record))
             step = fold.tick(t_s)
             mine = [
                 _plain(action_record(a, step.snapshot, skipper.config)) for a in step.actions

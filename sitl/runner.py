@@ -41,6 +41,7 @@ from sitl.autopilot import (
 )
 from sitl.autopilot.memory import MemoryEnd
 from sitl.scenario import EventSpec, Scenario
+from sitl.ships import Ship, ship_of
 from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
 
@@ -122,6 +123,7 @@ class _World:
     set_sail_s: float | None = None
     planner: FragilePlanner = field(default_factory=FragilePlanner)
     observer: Observer | None = None
+    ships: list[Ship] = field(default_factory=list)
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -271,8 +273,11 @@ async def _watch_truth(world: _World, frame: Any, limit_s: float) -> None:
         if world.set_sail_s is None and t.is_armed and t.mode in {Mode.AUTO, Mode.GUIDED}:
             world.set_sail_s = now_s()
         if world.set_sail_s is not None:
-            world.truth.add(now_s(), frame.en_from_geo(t.position), t.heading_rad, t.speed_mps,
-                            (t.twd_from_rad, t.tws_mps))
+            here = frame.en_from_geo(t.position)
+            world.truth.add(now_s(), here, t.heading_rad, t.speed_mps, (t.twd_from_rad, t.tws_mps))
+            for ship in world.ships:
+                nearest = min(world.truth.vessels_m.get(str(ship.mmsi), math.inf), ship.distance_m(here, now_s()))
+                world.truth.vessels_m[str(ship.mmsi)] = round(nearest, 2)
         if world.observer is not None:
             world.observer.truth(now_s(), world.autopilot, world.link)
         await asyncio.sleep(every_s)
@@ -320,6 +325,12 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
         autopilot.set_battery(event.volts or 0.0)
     elif event.kind == "current":
         autopilot.set_current(math.radians(event.set_deg), event.drift_mps)
+    elif event.kind == "vessel":
+        ship = ship_of(event, len(world.ships))
+        world.ships.append(ship)
+        while event.is_on_ais:
+            autopilot.hear_vessel(ship.report(mission.frame(), now_s()))
+            await asyncio.sleep(event.every_s)
     elif event.kind == "foreign_mission":
         away = mission.frame().geo_from_en(event.east_m, event.north_m)
         await _upload_foreign(world.shore.near, [waypoint(away)])

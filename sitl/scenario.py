@@ -30,6 +30,7 @@ EventKind = Literal[
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
     "current",           # set_deg, drift_mps
+    "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais: a ship of 100 m passes
 ]
 
 
@@ -69,6 +70,10 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     volts: float | None = None
     set_deg: float = 0.0
     drift_mps: float = 0.0
+    course_deg: float = 0.0
+    sog_mps: float = 0.0
+    every_s: float = 10.0        # between its AIS reports
+    is_on_ais: bool = True
 
 
 class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -79,6 +84,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     within_m: float | None = None             # last position to the last goal
     max_time_s: float | None = None
     min_clearance_m: float | None = None
+    min_vessel_distance_m: float | None = None  # from the boat to each vessel's hull
     max_silence_s: float | None = 10.0        # without a status from the companion that says why
     max_replans_per_hour: float | None = None
     end_phase: str | None = None

@@ -32,6 +32,7 @@ class Truth:
     speed_mps: list[float] = field(default_factory=list)
     twd_from_rad: list[float] = field(default_factory=list)
     tws_mps: list[float] = field(default_factory=list)
+    vessels_m: dict[str, float] = field(default_factory=dict)   # the least distance to each vessel's hull
 
     def add(
         self, t_s: float, en_m: tuple[float, float], heading_rad: float, speed_mps: float, wind: tuple[float, float]
@@ -207,6 +208,10 @@ def judge(
         check("time, s", duration_s <= expect.max_time_s, duration_s, f"at most {expect.max_time_s}")
     if expect.min_clearance_m is not None:
         check("clearance, m", clearance >= expect.min_clearance_m, clearance, f"at least {expect.min_clearance_m}")
+    if expect.min_vessel_distance_m is not None:
+        nearest = min(truth.vessels_m.values(), default=math.inf)
+        check("distance to vessels, m", nearest >= expect.min_vessel_distance_m, truth.vessels_m,
+              f"at least {expect.min_vessel_distance_m}")
     if expect.max_silence_s is not None and silence_s is not None:
         check("silence, s", silence_s <= expect.max_silence_s, silence_s, f"at most {expect.max_silence_s}")
     if expect.max_replans_per_hour is not None and duration_s > 0.0:
@@ -232,6 +237,7 @@ def judge(
             "tacks": tacks,
             "gybes": gybes,
             "min_clearance_m": clearance if math.isfinite(clearance) else None,
+            "vessel_distances_m": truth.vessels_m,
             "end_distance_m": end_distance,
             "silence_s": silence_s,
             "replans": summary.get("replans"),

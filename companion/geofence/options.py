@@ -114,7 +114,8 @@ class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """``[traffic]``: where other vessels are heard, and how far to stay away."""
 
     feeds: tuple[str, ...] = ()
-    """``mavlink``, ``udp:HOST:PORT``, a serial port or an NMEA file."""
+    """``udpin:HOST:PORT`` (NMEA or JSON), ``tcp:HOST:PORT`` (NMEA), ``/dev/NAME:BAUD``. What the autopilot hears is
+    taken without a feed; ``mavlink`` may stand for it."""
     safe_distance_m: Positive = 50.0
     safe_time_s: Positive = 90.0
     drop_after_s: Positive = 600.0

@@ -20,6 +20,7 @@ from companion.skipper.problem import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.route import Tail, common_prefix, loiter_place, path_length_m, splice
 from companion.skipper.snapshot import PlanOutcome, UploadOutcome, UploadResult
 from companion.skipper.state import PendingPlan, PendingUpload, Phase, Retry, Route
+from companion.skipper.traffic import meetings, targets
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import PointEn
 
@@ -67,6 +68,7 @@ def request(
         turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
         turn.update(plan_retry=turn.failed(turn.state.plan_retry))
         return False
+    problem = replace(problem, targets=targets(turn, start.en_m, start.after_s, rung))
     facts = replace(
         turn.blank_facts(number, step.margin_m, step.delta_s, name),
         plan_twd_from_rad=problem.wind.twd_from_rad,
@@ -368,7 +370,8 @@ def _not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
     steps = rungs(turn.config)
     state = turn.state
     where = steps[min(pending.rung, len(steps) - 1)].name or "as configured"
-    if pending.rung == 0 and state.route is not None and is_old_plan_sound(turn):
+    met = meetings(turn) if state.route is not None else ()
+    if pending.rung == 0 and state.route is not None and not met and is_old_plan_sound(turn):
         turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
         turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
         return
@@ -381,6 +384,12 @@ def _not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
         if request(turn, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
             return
     turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
+    if met and is_old_plan_sound(turn):
+        # Loitering in a vessel's way is no better than sailing on through it: the operator must know.
+        turn.say(
+            Severity.CRITICAL, "no way clear",
+            f"no plan keeps clear of {met[0].name}, met in {met[0].time_s:.0f} s: the old plan stays", every_s=0.0)
+        return
     wait = turn.state.plan_retry.not_before_s - turn.t_s
     turn.say(
         Severity.CRITICAL, "no plan at all",

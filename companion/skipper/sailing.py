@@ -19,7 +19,10 @@ from companion.skipper.planning import IRONS_MEMORY_S, hold, request, seeks_refu
 from companion.skipper.route import path_length_m
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase, Route
+from companion.skipper.traffic import meetings
 from companion.skipper.turn import Turn
+from companion.traffic import Decision, decide
+from companion.traffic.plans import MIN_INTERVAL_S
 
 STEER_S = 25.0               # bearing away longer than this has failed
 SAILS_MPS = 0.8              # out of irons
@@ -135,13 +138,28 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
-    trigger = None
-    if not turn.is_raised("wind untrusted"):
+    trigger = _traffic(turn)
+    if trigger is None and not turn.is_raised("wind untrusted"):
         trigger = _no_go(turn)
     trigger = trigger or _position(turn)
     if seeks_refuge(turn):
         return trigger
     return trigger or _extension(turn) or _wind(turn) or _waypoint(turn)
+
+
+def _traffic(turn: Turn) -> Trigger | None:
+    """The route meets another vessel (Büsser 5.2: planned again at most every 20 s)."""
+    met = meetings(turn)
+    if not met:
+        return None
+    first = met[0]
+    text = f"{first.name}: in {first.time_s:.0f} s {first.depth_m:.0f} m inside the distance to keep"
+    turn.say(Severity.WARNING, "traffic", text)
+    since_s = turn.t_s - turn.state.last_plan_s
+    interval_s = max(MIN_INTERVAL_S, turn.config.min_replan_interval_s)
+    if since_s < interval_s or decide(met, since_replan_s=since_s, urgent_s=0.0) is not Decision.REPLAN:
+        return None
+    return Trigger(reason=ReplanReason.OBSTACLE, text=text, interval_s=interval_s, urgent=True)
 
 
 def _no_go(turn: Turn) -> Trigger | None:

@@ -14,6 +14,7 @@ from companion.boat import AutopilotLimits
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
 from companion.skipper.config import DRY_RUN, Permissions
 from companion.skipper.voyage import PointEn
+from companion.traffic import TrafficPicture
 
 
 class WindHealth(enum.Enum):
@@ -156,6 +157,6 @@ class Snapshot:
     limits: AutopilotLimits | None = None  # None: not read yet
     permissions: Permissions = DRY_RUN
     planner_alive: bool = True
-    traffic: object | None = None
+    traffic: TrafficPicture | None = None  # None: no vessel was ever heard
     events: tuple[Event, ...] = ()
     outcomes: tuple[Outcome, ...] = ()

@@ -12,6 +12,7 @@ from typing import Any
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.mavlink.items import mission_hash
+from companion.messages import AisReport, GeoPoint
 from companion.skipper.actions import Action, RequestPlan, SteerHeading, UploadFence, UploadMission
 from companion.skipper.config import SkipperConfig
 from companion.skipper.snapshot import Outcome, PlanOutcome, ReadOutcome, Snapshot
@@ -37,6 +38,7 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
             "widening": [[t, math.degrees(problem.no_go_half_rad(t))] for t in WIDENING_S],
             "cross_track_m": snapshot.autopilot.cross_track_m if snapshot.autopilot else None,
             "margin_m": config.margin_m,
+            **({"vessels": sorted({t.name for t in problem.targets})} if problem.targets else {}),
         }
     if isinstance(action, UploadMission | UploadFence):
         fields = {f.name: getattr(action, f.name) for f in dataclasses.fields(action) if f.name != "items"}
@@ -47,6 +49,19 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
         return {"kind": "action", "action": kind, "heading_deg": math.degrees(action.heading_rad), "text": action.text}
     values = {f.name: jsonable(getattr(action, f.name)) for f in dataclasses.fields(action)}
     return {"kind": "action", "action": kind, **values}
+
+
+def ais_record(report: AisReport) -> dict[str, Any]:
+    """Return a report of a feed as it is, in the units of AisReport: a replay takes it back with ``ais_of``."""
+    return {"kind": "ais", "report": {k: v for k, v in dataclasses.asdict(report).items() if v is not None}}
+
+
+def ais_of(record: dict[str, Any]) -> AisReport:
+    """Return the report in a record."""
+    values = dict(record["report"])
+    if "position" in values:
+        values["position"] = GeoPoint(**values["position"])
+    return AisReport(**values)
 
 
 def outcome_record(outcome: Outcome) -> dict[str, Any]:
