@@ -209,7 +209,7 @@ def judge(
     if expect.min_clearance_m is not None:
         check("clearance, m", clearance >= expect.min_clearance_m, clearance, f"at least {expect.min_clearance_m}")
     if expect.min_vessel_distance_m is not None:
-        nearest = min(truth.vessels_m.values(), default=math.inf)
+        nearest = min(truth.vessels_m.values(), default=-math.inf)   # nothing measured does not pass
         check("distance to vessels, m", nearest >= expect.min_vessel_distance_m, truth.vessels_m,
               f"at least {expect.min_vessel_distance_m}")
     if expect.max_silence_s is not None and silence_s is not None:

@@ -1,0 +1,160 @@
+"""The skipper among vessels: the route is given up when it meets one, and only then, and at most every 20 s."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from companion.planner import plan
+from companion.planner.worker import failed
+from companion.skipper import actions as act
+from companion.skipper.actions import ReplanReason
+from companion.skipper.geometry import distance_m
+from companion.skipper.state import Phase
+from companion.skipper.traffic import HORIZON_S, UNKNOWN_S, meetings, near, targets
+from companion.skipper.turn import Turn
+from companion.skipper.voyage import Goal
+from companion.traffic import Targets, TrafficPicture
+from tests.skipper.world import FRAME, World, skipper, voyage
+from tests.traffic.conftest import report, vessel
+
+GOAL = Goal(en_m=(900.0, 0.0), radius_m=6.0, name="the goal")     # a reach: the wind is from the north
+HALF_M = 20.0
+
+
+def make(**world):
+    return World(skipper=skipper(voyage(GOAL)), expansions=1500, sigma=0.05, heading=math.pi / 2, **world)
+
+
+class Ship:
+    """A ship of 40 m on a straight course, at ``en`` at t = 0."""
+
+    def __init__(self, en, course_deg, speed_mps, name="Ship"):
+        self.en, self.course, self.speed, self.name = en, math.radians(course_deg), speed_mps, name
+
+    def at(self, t):
+        run = self.speed * t
+        return self.en[0] + run * math.sin(self.course), self.en[1] + run * math.cos(self.course)
+
+    def heard(self, t, **more):
+        values = {"course_rad": self.course, "speed_mps": self.speed, "heading_rad": self.course}
+        return report(t, self.at(t), name=self.name, bow_m=HALF_M, stern_m=HALF_M, port_m=3.0, starboard_m=3.0,
+                      **(values | more))
+
+
+def sail(world, ship, seconds=900.0, every_s=10.0):
+    """Sail until done; return the least distance to the ship's middle."""
+    heard, least = Targets.empty(FRAME), math.inf
+    while world.t < seconds and world.state.phase is not Phase.DONE:
+        if world.t % every_s == 0.0:
+            heard = heard.heard(ship.heard(world.t))
+        world.extra = {"traffic": heard.picture(world.t)}
+        world.step()
+        least = min(least, distance_m(world.position, ship.at(world.t)))
+    return least
+
+
+def asked(world):
+    return [(t, a) for t, a in world.actions if isinstance(a, act.RequestPlan)]
+
+
+def for_traffic(world):
+    return [(t, a) for t, a in asked(world) if a.reason is ReplanReason.OBSTACLE]
+
+
+@pytest.mark.parametrize(("course_deg", "speed_mps"), [(180.0, 4.0), (0.0, 4.0), (270.0, 4.0), (90.0, 20.0)])
+def test_a_route_that_meets_a_ship_is_given_up(course_deg, speed_mps):
+    c, when = math.radians(course_deg), 170.0
+    ship = Ship((450.0 - when * speed_mps * math.sin(c), -when * speed_mps * math.cos(c)), course_deg, speed_mps)
+    world = make()
+    least = sail(world, ship)
+    assert world.state.phase is Phase.DONE
+    assert least > HALF_M + 50.0
+    assert for_traffic(world) or any(a.problem.targets for _, a in asked(world))
+    for (before, _), (t, a) in pairwise(asked(world)):
+        assert a.reason is not ReplanReason.OBSTACLE or a.rung or t - before >= 20.0
+
+
+def test_the_same_ship_unheard_comes_near():
+    assert sail_unheard(Ship((450.0, 170.0 * 4.0), 180.0, 4.0)) < HALF_M + 50.0
+
+
+def sail_unheard(ship):
+    world, least = make(), math.inf
+    while world.t < 900.0 and world.state.phase is not Phase.DONE:
+        world.step()
+        least = min(least, distance_m(world.position, ship.at(world.t)))
+    return least
+
+
+def test_a_ship_that_turns_late_is_announced_by_name():
+    """It appears 250 m ahead, after the boat has set sail."""
+    world = make()
+    world.run(120)
+    ship = Ship((world.position[0] + 250.0 + 3.0 * 120.0, 0.0), 270.0, 3.0, name="Nellie")
+    sail(world, ship)
+    said = [text for _, code, text in world.log if code == "traffic"]
+    assert said
+    assert "Nellie" in said[0]
+    assert for_traffic(world)
+    assert "Nellie" in for_traffic(world)[0][1].text
+
+
+def test_a_ship_that_passes_clear_changes_nothing():
+    world, alone = make(), make()
+    sail(world, Ship((-200.0, 1500.0), 90.0, 5.0))
+    sail_alone = alone.run(900, lambda w: w.state.phase is Phase.DONE)
+    assert sail_alone
+    assert not for_traffic(world)
+    assert [a.reason for _, a in asked(world)] == [a.reason for _, a in asked(alone)]
+    assert np.allclose(world.position, alone.position)
+
+
+def test_without_a_way_clear_the_old_plan_stays_and_the_operator_is_told():
+    world = make(planner=lambda p, seed: failed("none", seed=seed, algorithm="auto") if p.targets else plan(
+        p, expansions=1500, seed=seed))
+    world.run(60)
+    before = world.mission
+    sail(world, Ship((world.position[0] + 400.0 + 3.0 * 60.0, 0.0), 270.0, 3.0, name="Nellie"), seconds=140.0)
+    assert for_traffic(world)
+    assert any(code == "no way clear" and "Nellie" in text for _, code, text in world.log)
+    assert world.mission == before
+
+
+# ------------------------------------------------------------------------------------------- the discs
+def turn_among(*vessels):
+    world = make()
+    world.run(60)
+    world.extra = {"traffic": TrafficPicture(t_s=world.t, vessels=vessels)}
+    return Turn(world.skipper.voyage, world.skipper.config, world.skipper.gates, world.state, world.snapshot())
+
+
+def test_a_plan_that_starts_within_a_disc_may_leave_it():
+    turn = turn_among()
+    here = turn.boat_en
+    turn = turn_among(vessel((here[0] + 80.0, here[1]), 0.0, 2.0, t_s=turn.t_s, heard_s=turn.t_s))
+    assert meetings(turn)
+    found = targets(turn, here, 0.0, 0)
+    assert found
+    assert all(distance_m(here, (t.x_m, t.y_m)) > t.radius_m for t in found if t.from_s == 0.0)
+
+
+def test_a_vessel_of_unknown_course_blocks_the_next_moments_only():
+    turn = turn_among(vessel((300.0, 200.0), None, None, t_s=60.0, heard_s=60.0))
+    found = targets(turn, turn.boat_en, 0.0, 0)
+    assert found
+    assert max(t.until_s for t in found) == pytest.approx(UNKNOWN_S)
+
+
+def test_only_vessels_that_can_be_met_within_the_horizon_count():
+    there = vessel((4.0 * HORIZON_S + 5000.0, 0.0), 0.0, 1.0, t_s=60.0, heard_s=60.0)
+    assert near(turn_among(there)) == ()
+    assert meetings(turn_among(there)) == ()
+
+
+def test_later_rungs_take_more_risk():
+    turn = turn_among(vessel((400.0, 300.0), 180.0, 3.0, t_s=60.0, heard_s=60.0))
+    first, later = (targets(turn, turn.boat_en, 0.0, rung) for rung in (0, 2))
+    assert all(a.radius_m + a.growth_mps * a.from_s > b.radius_m + b.growth_mps * b.from_s
+               for a, b in zip(first, later, strict=True))
