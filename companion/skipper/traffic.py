@@ -23,6 +23,7 @@ from companion.traffic.occupancy import Keep
 RISKS = (1e-2, 5e-2, 2e-1)   # that a vessel is outside its disc, by the ladder's rung
 GIVE_UP_RISK = 1e-1          # the active route is given up for a likelier meeting only
 HORIZON_S = 300.0            # the plan is made again long before; later discs would close a lake
+SETTLED_S = 120.0            # discs of later windows grow no more: by then there are new reports, and each step checks
 UNKNOWN_S = 30.0             # a vessel of unknown course could be anywhere soon: only the next moments count
 NEAREST = 12                 # vessels that a plan looks at: those that could be met soonest
 OWN_MPS = 4.0                # no boat of ours closes faster by itself
@@ -63,7 +64,18 @@ def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, risk: float) -> tup
     )
     known = [v for v in vessels if v.is_moving_known]
     unknown = [v for v in vessels if not v.is_moving_known]
-    return (*planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
+    found = (*planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
+    return tuple(_settled(disc) for disc in found)
+
+
+def _settled(disc: Disc) -> Disc:
+    """Return the disc with the radius that it has at its window's begin, if that is late.
+
+    A route that had to keep out of everywhere that a vessel might be in five minutes would flee from all of them.
+    """
+    if disc.from_s < SETTLED_S - 1e-6:
+        return disc
+    return replace(disc, radius_m=disc.radius_at_m(disc.from_s), growth_mps=0.0)
 
 
 def targets(turn: Turn, start_en: PointEn, after_s: float, rung: int) -> tuple[Target, ...]:
