@@ -9,6 +9,7 @@ import re
 import signal
 import sys
 import time
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,6 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.app import SailOptions
     from companion.clock import run as run_loop
     from companion.errors import InputError
     from companion.geofence import load_mission
@@ -62,13 +62,19 @@ def run(args: argparse.Namespace) -> int:
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{name}"
     state_path = args.state or (folder.parent / f"{name}.state.json")
     state_path.parent.mkdir(parents=True, exist_ok=True)
-    options = SailOptions(
-        seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
-        expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
-        wait_s=args.wait * args.speedup, signing=_signing(args.signing_key), budget_scale=1.0 / args.speedup,
-        command=" ".join(sys.argv),
-    )
-    summary = run_loop(_sail(mission, transport, folder, options), speedup=args.speedup)
+    signing = _signing(args.signing_key)
+
+    def options() -> Any:
+        from companion.app import SailOptions
+
+        return SailOptions(
+            seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
+            expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
+            wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
+            command=" ".join(sys.argv),
+        )
+
+    summary = run_loop(_sail(mission, transport, folder, options, args.speedup), speedup=args.speedup)
     _report(folder)
     arrived = bool(summary.get("arrived"))
     end = "arrived" if arrived else f"not arrived: {summary.get('end_reason')}, {summary.get('end_why')}"
@@ -77,11 +83,11 @@ def run(args: argparse.Namespace) -> int:
     return 0 if arrived else 1
 
 
-async def _sail(mission: Any, transport: Any, folder: Path, options: Any) -> dict[str, Any]:
-    from companion.app import sail
+async def _sail(
+    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], speedup: float
+) -> dict[str, Any]:
     from companion.errors import JobError
     from companion.planner.worker import PlannerWorker
-    from companion.telemetry.progress import ProgressLine
 
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -89,16 +95,19 @@ async def _sail(mission: Any, transport: Any, folder: Path, options: Any) -> dic
         with contextlib.suppress(NotImplementedError):
             loop.add_signal_handler(number, stop.set)
     async with PlannerWorker() as planner:
+        # The child loads its kernels while this process imports the rest.
+        from companion.app import sail
+        from companion.telemetry.progress import ProgressLine
+
         ready = asyncio.ensure_future(planner.ready())
-        if not (await asyncio.wait({ready}, timeout=PATIENCE_S / options.budget_scale))[0]:
+        if not (await asyncio.wait({ready}, timeout=PATIENCE_S * speedup))[0]:
             print("preparing the planner: its kernels are compiled once on each machine", flush=True)
         try:
             await ready
         except (TimeoutError, EOFError, OSError) as error:
             raise JobError(f"the planner's process did not start: {error!r}") from error
         with ProgressLine(sys.stdout) as progress:
-            return await sail(mission, transport, planner, folder, options,
-                              on_status=progress.show, stop=stop)
+            return await sail(mission, transport, planner, folder, options(), on_status=progress.show, stop=stop)
 
 
 def _signing(path: Path | None) -> Any:
