@@ -247,7 +247,7 @@ def _convert(args: argparse.Namespace) -> int:
 
 def _upload(args: argparse.Namespace) -> int:
     from companion.commands.shore import Shore, upload_and_compare
-    from companion.geofence.fence_items import MAX_FENCE_ITEMS, zones_to_items
+    from companion.geofence.fence_items import MAX_FENCE_ITEMS, STORAGE_BYTES, storage_bytes, zones_to_items
     from companion.geofence.mission_files import zones_only
     from companion.messages import MissionType
 
@@ -258,9 +258,10 @@ def _upload(args: argparse.Namespace) -> int:
     start, _, margin_m = places(args)
     if not args.exact and start is not None and margin_m is not None:
         items = simplified(args, document).items
-    elif len(items) > MAX_FENCE_ITEMS:
+    elif len(items) > MAX_FENCE_ITEMS or storage_bytes(items) > STORAGE_BYTES:
         raise JobError(
-            f"{args.file}: takes {len(items)} fence items, the autopilot holds {MAX_FENCE_ITEMS}: simplify it with "
+            f"{args.file}: takes {len(items)} fence items of {storage_bytes(items)} bytes, the autopilot holds "
+            f"{MAX_FENCE_ITEMS} in {STORAGE_BYTES} bytes: simplify it with "
             "--margin and --start"
         )
     else:

@@ -20,7 +20,14 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.geofence.area import Area, parts
-from companion.geofence.fence_items import MAX_FENCE_ITEMS, MAX_RING, items_to_zones, zones_to_items
+from companion.geofence.fence_items import (
+    MAX_FENCE_ITEMS,
+    MAX_RING,
+    STORAGE_BYTES,
+    items_to_zones,
+    storage_bytes,
+    zones_to_items,
+)
 from companion.geofence.findings import Severity
 from companion.geofence.rings import Findings
 from companion.geofence.shapes import Circle, Obstacle, Shape, Zone, ZoneKind, center_of, wrap_lon_deg
@@ -161,11 +168,13 @@ def fence_for_autopilot(
             status = FenceStatus.NO_MARGIN
             continue
         items, _ = zones_to_items(zones)
-        if len(items) > max_items or any(_sides(z) > MAX_RING for z in zones):
+        stored = storage_bytes(items)
+        if len(items) > max_items or stored > STORAGE_BYTES or any(_sides(z) > MAX_RING for z in zones):
             status = FenceStatus.TOO_MANY_ITEMS
             worst = sorted(((_sides(z), z.name or z.kind.value) for z in zones), reverse=True)[:3]
             last = (
-                f"{len(items)} items are needed where the autopilot holds {max_items}, even with "
+                f"{len(items)} items of {stored} bytes are needed where the autopilot holds {max_items} items in "
+                f"{STORAGE_BYTES} bytes, even with "
                 f"{step * margin_m:.1f} m of the {margin_m:g} m margin used; most go to "
                 + ", ".join(f"{name} ({n})" for n, name in worst) + "; raise margin_m, merge or drop obstacles"
             )

@@ -21,6 +21,7 @@ from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 
 MAX_FENCE_ITEMS = 84   # ArduRover 4.7: "Only 84 items are supported" (672 bytes of storage, 8 a piece)
+STORAGE_BYTES = 672    # ... and "Fence exceeds storage size": see ``storage_bytes``
 MAX_RING = 255         # vertices of one polygon
 
 _VERTEX = {
@@ -66,6 +67,27 @@ def zones_to_items(
     if moved:
         losses.add(Severity.NOTE, "coordinates are rounded to 1e-7 degrees (at most 6 mm) and radii to float32")
     return tuple(items), losses
+
+
+def storage_bytes(items: Sequence[MissionItem]) -> int:
+    """Return what ArduRover needs to keep the items [bytes].
+
+    A header of 4, then for each polygon 2 and 8 a vertex, for a circle 13, for the return point 9; an end mark of 1.
+    Many small zones therefore fill the storage before there are 84 items.
+    """
+    size, index = 5, 0
+    while index < len(items):
+        item = items[index]
+        if item.command in _CIRCLE:
+            size += 13
+        elif item.command in _VERTEX:
+            count = max(1, int(item.params[0]))
+            size += 2 + 8 * count
+            index += count - 1
+        else:
+            size += 9
+        index += 1
+    return size
 
 
 def _exact(degrees: float) -> bool:

@@ -209,3 +209,15 @@ def _scaled(shape, factor):
     if isinstance(shape, Circle):
         return Circle(shape.center, shape.radius_m * factor)
     return shapely.affinity.scale(shape, factor, factor)
+
+
+def test_many_small_zones_fill_the_storage_before_there_are_84_items():
+    """ArduRover: "Fence exceeds storage size", although every list of 84 items was announced as supported."""
+    from companion.geofence.fence_items import STORAGE_BYTES, storage_bytes
+    from companion.messages import Command, MissionItem
+
+    circles = [MissionItem(command=Command.NAV_FENCE_CIRCLE_EXCLUSION, params=(5.0, 0, 0, 0)) for _ in range(60)]
+    assert storage_bytes(circles) == 5 + 60 * 13 > STORAGE_BYTES
+    polygon = [MissionItem(command=Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION, params=(83.0, 0, 0, 0))] * 83
+    assert storage_bytes(polygon) == 5 + 2 + 83 * 8
+    assert storage_bytes(polygon) <= STORAGE_BYTES
