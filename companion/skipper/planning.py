@@ -322,7 +322,8 @@ def upload(turn: Turn, route: Route, set_current: int | None, text: str, *, whol
         turn.update(ready_route=route)
         turn.say(Severity.WARNING, "upload not permitted", "a plan is ready; uploading is not permitted")
         return
-    turn.update(ready_route=None, pending_upload=PendingUpload(
+    # A read that is still under way will tell of the mission before this upload: its answer is not wanted.
+    turn.update(pending_read=None, ready_route=None, pending_upload=PendingUpload(
         upload_id=number, t_s=turn.t_s, route=route, set_current=set_current, keep_first=action.keep_first))
 
 

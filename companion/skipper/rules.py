@@ -128,8 +128,8 @@ def _rebooted(turn: Turn) -> None:
 def _operator_has_it(turn: Turn) -> bool:
     """Notice that somebody else has the boat, and that it is given back. Nothing is asked of it meanwhile."""
     status, state = turn.autopilot, turn.state
-    if status is None or not state.sailing:
-        return False
+    if status is None or not state.sailing or state.foreign:
+        return False  # a stranger's mission is not an operator's mode: ``_mission_is_known`` stands by it
     gone = turn.is_taken
     if state.phase is not Phase.OPERATOR:
         if not gone:

@@ -34,3 +34,15 @@ def test_scenario(name, tmp_path):
 @pytest.mark.parametrize("name", ALL)
 def test_scenario_over_seeds(name, seed, tmp_path):
     sail(name, seed, tmp_path)
+
+
+def test_a_read_under_way_when_an_upload_is_asked_for_is_void(tmp_path):
+    """Demo seed 6: the look at the mission on board crossed an upload, and our own mission was taken for foreign."""
+    sail("demo", 6, tmp_path)
+
+
+def test_a_foreign_mission_is_said_once_in_a_while_not_each_second(tmp_path):
+    sail("foreign-mission", 0, tmp_path)
+    text = (tmp_path / "decisions.jsonl").read_text()
+    assert text.count('"code":"foreign mission"') <= 30
+    assert text.count('"code":"operator back"') == 0
