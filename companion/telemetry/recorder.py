@@ -27,8 +27,6 @@ SUMMARY = "summary.json"
 VOYAGE = "voyage.toml"
 STATE = "state.json"
 
-# Below this much free space the voyage goes on and its telemetry is no longer recorded.
-MIN_FREE_BYTES = 50_000_000
 # A telemetry log of one voyage ends here (24 h at the companion's rates is about 250 MB).
 MAX_TLOG_BYTES = 1_000_000_000
 
@@ -132,11 +130,6 @@ class Recorder:
             except OSError:
                 self.dropped += 1
 
-    def has_room(self) -> bool:
-        """Tell whether the disk has room for more telemetry."""
-        stat = os.statvfs(self.folder)
-        return stat.f_bavail * stat.f_frsize > MIN_FREE_BYTES
-
     def voyage(self, description: Mapping[str, Any]) -> None:
         """Write voyage.toml: what ran, with which versions and seed."""
         write_atomically(self.folder / VOYAGE, tomli_w.dumps(_without_none(description)).encode())
@@ -145,10 +138,6 @@ class Recorder:
         """Write summary.json."""
         text = json.dumps(jsonable(values), indent=1, ensure_ascii=False)
         write_atomically(self.folder / SUMMARY, text.encode() + b"\n")
-
-    def state(self, values: Mapping[str, Any]) -> None:
-        """Write what a restarted companion needs."""
-        write_atomically(self.folder / STATE, json.dumps(jsonable(values)).encode())
 
 
 def _cut_torn_line(path: Path) -> None:
