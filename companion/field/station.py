@@ -11,7 +11,8 @@ import enum
 import math
 from dataclasses import dataclass, field, replace
 
-from companion.field.guidance import GuidanceState, Habits, Manoeuvre, Setpoint, Situation, go_to, helm, step
+from companion.field.guidance import go_to, helm, step
+from companion.field.values import GuidanceState, Habits, Manoeuvre, Setpoint, Situation
 from companion.geo.angles import wrap_pi
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.field.guidance import Habits, Obstacle, Situation
+from companion.field.values import Habits, Obstacle, Situation
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from sitl.vaimos import STEP_S, VaimosParameters, polar, sail_heading, state_at
 from sitl.wind import AR1

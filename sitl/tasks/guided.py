@@ -26,8 +26,8 @@ from companion import clock
 from companion.boat import ardurover_sitl
 from companion.clock import now_s
 from companion.errors import LinkError
-from companion.field.guidance import RESEND_S, Habits, Situation
 from companion.field.station import Station, StationState, keep
+from companion.field.values import RESEND_S, Habits, Situation
 from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Facade
 from companion.mavlink.link import Link

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.field.controllers import line_following
-from companion.field.guidance import GuidanceState, Habits, LastResort, Situation, helm
+from companion.field.guidance import LastResort, helm
+from companion.field.values import GuidanceState, Habits, Situation
 from companion.geo.frame import LocalFrame
 from companion.planner import Problem, plan
 from companion.planner.problem import BoatLimits, Sigma, Target, Wind

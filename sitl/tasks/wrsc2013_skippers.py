@@ -13,18 +13,9 @@ from typing import Protocol
 import numpy as np
 
 from companion.field.algebra import Uniform
-from companion.field.guidance import (
-    GuidanceState,
-    Habits,
-    Intent,
-    Obstacle,
-    Situation,
-    crosses_ahead,
-    foresee,
-    go_to,
-    margins,
-    step,
-)
+from companion.field.guidance import go_to, step
+from companion.field.look_ahead import crosses_ahead, foresee, margins
+from companion.field.values import GuidanceState, Habits, Intent, Obstacle, Situation
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.traffic import TargetLimits, Targets, Vessel, decode_json, predict

@@ -10,22 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.field.guidance import (
-    GuidanceState,
-    Habits,
-    Intent,
-    LastResort,
-    Manoeuvre,
-    Obstacle,
-    Situation,
-    follow_line,
-    foresee,
-    go_to,
-    helm,
-    hold_heading,
-    margins,
-    step,
-)
+from companion.field.guidance import LastResort, follow_line, go_to, helm, hold_heading, step
+from companion.field.look_ahead import foresee, margins
+from companion.field.values import GuidanceState, Habits, Intent, Manoeuvre, Obstacle, Situation
 from companion.geo.angles import wrap_pi
 from sitl.tasks.afloat import Afloat, habits_for, wind_for
 from sitl.wind import AR1

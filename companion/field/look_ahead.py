@@ -1,0 +1,149 @@
+"""Look-ahead: a fan of sailable headings, where each would take the boat, and what it would cost.
+
+The cheapest is the one nearest to the field's that keeps its distance from vessels for the next minute and a half
+and from the shore for the next forty seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.field.values import Clearance, GuidanceState, Habits, Intent, Obstacle, Situation
+from companion.geo.angles import wrap_pi
+
+_FAN_TWA = np.radians(np.arange(0.0, 181.0, 6.0))
+_STEP_S = 2.5
+
+
+def choose(
+    wanted_rad: float, twd: float | None, situation: Situation, intent: Intent, habits: Habits, state: GuidanceState
+) -> tuple[float, float | None]:
+    """Return the heading of the fan with the least cost, and its margin [m]."""
+    if not situation.obstacles and intent.stay_in is None and intent.clearance is None:
+        return wanted_rad, None
+    if twd is None:
+        headings = np.concatenate([[wanted_rad], wanted_rad + np.radians(np.arange(6.0, 360.0, 6.0))])
+    else:
+        open_twa = _FAN_TWA[habits.no_go_half_rad < _FAN_TWA]
+        edges = np.concatenate([[habits.no_go_half_rad], open_twa])
+        headings = np.concatenate([[wanted_rad], twd - edges, twd + edges])
+    track, lost_s = foresee(headings, twd, situation, habits)
+    cost = 1.0 - np.cos(headings - wanted_rad) + 0.02 * lost_s
+    last = state.wanted_rad
+    if last is not None:
+        cost += 0.1 * (1.0 - np.cos(headings - last))
+    margin = margins(track, situation.obstacles)
+    if situation.obstacles:
+        cost += np.where(margin < 0.0, 10.0 - 0.2 * margin, 0.0)
+        cost += np.maximum(0.0, 1.0 - np.maximum(margin, 0.0) / habits.comfort_m)
+        cost += habits.ahead_cost * crosses_ahead(track, situation.obstacles)
+    if intent.stay_in is not None:
+        cost += 4.0 * _leaving(track, intent.stay_in, habits)
+    if intent.clearance is not None:
+        cost += _ashore(track, intent.clearance, habits)
+    best = int(np.argmin(cost))
+    return wrap_pi(float(headings[best])), float(margin[best]) if situation.obstacles else None
+
+
+def foresee(
+    headings: NDArray[np.float64], twd: float | None, situation: Situation, habits: Habits
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where each heading (k,) takes the boat: (k, t, 2) [m], and the time each loses by turning (k,) [s].
+
+    The present velocity dies away while the boat turns, that of the new heading grows after it.
+    """
+    t = np.arange(0.0, habits.horizon_s + 1e-9, _STEP_S)
+    if twd is None:
+        speed = np.full(len(headings), habits.polar_mps[-1])
+        lost = np.abs(_wrap(headings - situation.heading_rad)) / habits.turn_rate_radps
+        leeway = np.zeros(2)
+    else:
+        twa = _wrap(twd - headings)
+        now = wrap_pi(twd - situation.heading_rad)
+        speed = np.interp(np.abs(twa), habits.polar_twa_rad, habits.polar_mps)
+        turn = np.abs(twa - now)
+        tacks = (twa * now < 0.0) & (turn < math.pi)
+        turn = np.where(turn > math.pi, 2.0 * math.pi - turn, turn)
+        lost = turn / habits.turn_rate_radps + np.where(tacks, habits.tack_s, 0.0)
+        drift = habits.leeway_share * situation.tws_mps
+        leeway = -drift * np.array([math.sin(twd), math.cos(twd)])
+    unit = np.column_stack([np.sin(headings), np.cos(headings)])
+    velocity = speed[:, None] * unit + leeway
+    lag = max(habits.lag_s, 0.1)
+    coast = lag * (1.0 - np.exp(-t / lag))
+    after = np.maximum(0.0, t[None, :] - 0.5 * lost[:, None])
+    go = after - lag * (1.0 - np.exp(-after / lag))
+    present = np.asarray(situation.velocity_en_mps)
+    track = np.asarray(situation.en_m) + coast[None, :, None] * present + go[:, :, None] * velocity[:, None, :]
+    return track, lost
+
+
+def margins(track: NDArray[np.float64], obstacles: Sequence[Obstacle]) -> NDArray[np.float64]:
+    """Return the least distance outside all discs along each track (k,) [m]; inf without obstacles."""
+    t = np.arange(track.shape[1]) * _STEP_S
+    least = np.full(track.shape[0], math.inf)
+    for o in obstacles:
+        x, y = o.en_m[0] + o.velocity_en_mps[0] * t, o.en_m[1] + o.velocity_en_mps[1] * t
+        # Between samples the closest approach is that of straight motion: use the segment's minimum.
+        dx, dy = track[:, :, 0] - x, track[:, :, 1] - y
+        ex, ey = np.diff(dx, axis=1), np.diff(dy, axis=1)
+        share = np.clip(-(dx[:, :-1] * ex + dy[:, :-1] * ey) / np.maximum(ex * ex + ey * ey, 1e-9), 0.0, 1.0)
+        d = np.hypot(dx[:, :-1] + share * ex, dy[:, :-1] + share * ey) - (o.keep_m + o.growth_mps * t[:-1])
+        least = np.minimum(least, d.min(axis=1))
+    return least
+
+
+def crosses_ahead(track: NDArray[np.float64], obstacles: Sequence[Obstacle]) -> NDArray[np.float64]:
+    """Return how near ahead of a moving obstacle each track crosses its course line, (k,): 0 not, to 1 at the bow.
+
+    A crossing ahead at a minute's run or more of the other counts nothing: a cost, not a veto (COLREGs 15, by habit).
+    """
+    t = np.arange(track.shape[1]) * _STEP_S
+    worst = np.zeros(track.shape[0])
+    for o in obstacles:
+        speed = math.hypot(*o.velocity_en_mps)
+        if speed < 0.3:
+            continue
+        ux, uy = o.velocity_en_mps[0] / speed, o.velocity_en_mps[1] / speed
+        dx = track[:, :, 0] - o.en_m[0] - o.velocity_en_mps[0] * t
+        dy = track[:, :, 1] - o.en_m[1] - o.velocity_en_mps[1] * t
+        ahead, right = dx * ux + dy * uy, dx * uy - dy * ux
+        crossing = (right[:, :-1] * right[:, 1:] < 0.0) & (ahead[:, :-1] > 0.0)
+        near = np.maximum(0.0, 1.0 - ahead[:, :-1] / (60.0 * speed + o.keep_m))
+        worst = np.maximum(worst, np.where(crossing, near, 0.0).max(axis=1))
+    return worst
+
+
+def _leaving(
+    track: NDArray[np.float64], box: tuple[float, float, float, float], habits: Habits
+) -> NDArray[np.float64]:
+    """Return how soon each track leaves the box, 0 (not within half the horizon) to 1 (now)."""
+    x, y = track[:, :, 0], track[:, :, 1]
+    inside = (x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])
+    steps = np.where(inside.all(axis=1), track.shape[1], np.argmin(inside, axis=1)) * _STEP_S
+    return np.asarray(np.maximum(0.0, 1.0 - steps / (0.5 * habits.horizon_s)), dtype=np.float64)
+
+
+def _ashore(track: NDArray[np.float64], clearance: Clearance, habits: Habits) -> NDArray[np.float64]:
+    """Return what each track's way towards what stands still costs, (k,): 0 clear, to 24 where it touches now.
+
+    Nearer than ``keep_m`` counts by how soon, and so does touching, again. A boat that is within that distance already
+    is let out of it: what counts then is coming nearer still.
+    """
+    near = track[:, : int(habits.shore_s / _STEP_S) + 1]
+    clear = clearance(near.reshape(-1, 2)).reshape(near.shape[:2])
+    now = float(clear[:, 0].min())
+    cost = np.zeros(len(track))
+    for keep in (min(habits.keep_m, now - 0.5), min(0.5, now - 0.5)):
+        hit = clear < keep
+        first = np.where(hit.any(axis=1), np.argmax(hit, axis=1), near.shape[1]) * _STEP_S
+        cost += 12.0 * np.maximum(0.0, 1.0 - first / habits.shore_s)
+    return cost
+
+
+def _wrap(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    return (angles + math.pi) % (2.0 * math.pi) - math.pi
