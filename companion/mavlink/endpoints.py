@@ -56,20 +56,14 @@ class _Stream(asyncio.Protocol):
             self.lost.set_result(exc)
 
 
-class StreamEndpoint:
-    """Serial port, TCP client or TCP server of one client."""
+class _Endpoint:
+    """What every transport here has: its name, its counters, its state, and who takes the bytes."""
 
-    def __init__(self, link: LinkName, seed: int) -> None:
+    def __init__(self, link: LinkName) -> None:
         self._link = link
-        self._rng = random.Random(seed)
         self._stats = TransportStats()
         self._state = TransportState.CLOSED
         self._on_bytes: OnBytes | None = None
-        self._wire: Any = None
-        self._stream: _Stream | None = None
-        self._server: asyncio.Server | None = None
-        self._accepted: asyncio.Queue[tuple[Any, _Stream]] = asyncio.Queue(maxsize=1)
-        self._task: asyncio.Task[None] | None = None
 
     @property
     def name(self) -> str:
@@ -83,8 +77,21 @@ class StreamEndpoint:
 
     @property
     def state(self) -> TransportState:
-        """Closed, connecting or open."""
+        """Closed, connecting or open; a UDP socket that is bound is open whether or not anybody is there."""
         return self._state
+
+
+class StreamEndpoint(_Endpoint):
+    """Serial port, TCP client or TCP server of one client."""
+
+    def __init__(self, link: LinkName, seed: int) -> None:
+        super().__init__(link)
+        self._rng = random.Random(seed)
+        self._wire: Any = None
+        self._stream: _Stream | None = None
+        self._server: asyncio.Server | None = None
+        self._accepted: asyncio.Queue[tuple[Any, _Stream]] = asyncio.Queue(maxsize=1)
+        self._task: asyncio.Task[None] | None = None
 
     async def open(self, on_bytes: OnBytes) -> None:
         """Start connecting; a TCP server is bound on return."""
@@ -180,7 +187,6 @@ class StreamEndpoint:
             attempt = 0 if now_s() - opened_s > BACKOFF_CAP_S else attempt + 1
             await asyncio.sleep(backoff_s(attempt, self._rng))
 
-
     async def _ended(self, stream: _Stream) -> str:
         """Wait for the end of a connection, or for a silence that means the same; return the reason."""
         while True:
@@ -203,32 +209,14 @@ class _Accepting(_Stream):
         self._owner.accepted(transport, self)
 
 
-class DatagramEndpoint:
+class DatagramEndpoint(_Endpoint):
     """UDP: ``udpin`` answers whoever speaks first, ``udpout`` speaks first."""
 
     def __init__(self, link: LinkName) -> None:
-        self._link = link
-        self._stats = TransportStats()
-        self._state = TransportState.CLOSED
-        self._on_bytes: OnBytes | None = None
+        super().__init__(link)
         self._wire: Any = None  # DatagramTransport; typeshed leaves out its get_write_buffer_size
         self._peer: tuple[Any, ...] | None = None
         self._heard_s = 0.0
-
-    @property
-    def name(self) -> str:
-        """The LINK text."""
-        return self._link.text
-
-    @property
-    def stats(self) -> TransportStats:
-        """Live counters."""
-        return self._stats
-
-    @property
-    def state(self) -> TransportState:
-        """Closed, or open (a socket that is bound is open whether or not anybody is there)."""
-        return self._state
 
     async def open(self, on_bytes: OnBytes) -> None:
         """Bind (udpin) or aim (udpout)."""
