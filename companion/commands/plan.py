@@ -137,11 +137,14 @@ def describe(problem: Problem, answer: Plan) -> str:
 
 
 def _risk_text(problem: Problem, answer: Plan) -> str:
-    if problem.wind.sigma.model == "none":
+    if problem.wind.sigma.model == "none" and not problem.is_shared:
         return "risk: none, the wind is taken as certain"
     from companion.planner.risk import path_risk
 
     risk = path_risk(problem, answer)
+    if problem.is_shared:
+        # the words of the plan have the parts
+        return f"risk: at most {100.0 * risk.total:.1f} % of such voyages meet the no-go zone or a vessel"
     limit = f" (limit {100.0 * problem.risk.max_path_risk:.1f} %)" if problem.risk is not None else ""
     return (f"risk: the wind forces the boat into the no-go zone on at most {100.0 * risk.total:.1f} % of such "
             f"voyages{limit}; {100.0 * (1.0 - problem.delta_s):.0f} % is allowed at each instant")

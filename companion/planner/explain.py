@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from companion.clock import effort_s
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem import Problem
+from companion.planner.risk import path_risk, with_parts
 
 TOUCH_M = 0.5                      # nearer than this a leg is said to touch
 NO_GO_TOUCH_RAD = math.radians(0.5)
@@ -84,7 +85,8 @@ def explain(problem: Problem, plan: Plan, budget_s: float = 5.0, *, expansions: 
     if side is not None:
         more, other = _other_side(problem, plan, side, again)
         text, data = f"{text} {more}", data | {"other_side": other}
-    return replace(plan, why=Why(text=text, data=data | {"replans": again.count}))
+    why = Why(text=text, data=data | {"replans": again.count})
+    return replace(plan, why=with_parts(why, problem, path_risk(problem, plan)) if problem.is_shared else why)
 
 
 # -------------------------------------------------------------------------------------- each leg

@@ -35,7 +35,8 @@ class Leg:
     heading change into the leg. ``start_s``..``end_s`` is the sailing itself, after the turn. ``sigma_rad`` and
     ``no_go_half_rad`` are the worst over that time and what the leg was checked against; ``margin_rad`` is
     |TWA| minus it. ``clearance_m`` is the distance to the nearest obstacle or fence (None: there is none).
-    ``risk`` is the probability that the wind forces the leg into the no-go zone at some instant of it (None: not
+    ``risk`` is the probability that the wind forces the leg into the no-go zone at some instant of it, and that the
+    boat comes too near to an uncertain vessel (None: not
     computed).
     """
 
@@ -73,7 +74,8 @@ class Plan:
 
     ``cost_s`` is the time of the path (inf without one), ``lower_bound_s`` a proved bound from below (inf when
     INFEASIBLE). ``expansions`` is the effort spent, ``elapsed_s`` the computing time, ``first_s`` the computing
-    time to the first path (None without one).
+    time to the first path (None without one). ``risk`` is what is promised of the whole path, wind and vessels added;
+    ``vessel_risk`` is the vessels' part of it (0 where none is uncertain).
     """
 
     status: PlanStatus
@@ -88,6 +90,7 @@ class Plan:
     elapsed_s: float = 0.0
     first_s: float | None = None
     risk: float | None = None
+    vessel_risk: float = 0.0
     why: Why = Why()
     trace: Mapping[str, Any] = field(default_factory=dict)
 
@@ -118,6 +121,7 @@ class Plan:
             "elapsed_s": self.elapsed_s,
             "first_s": self.first_s,
             "risk": self.risk,
+            "vessel_risk": self.vessel_risk,
             "legs": [_leg_dict(leg) for leg in self.legs],
             "why": {"text": self.why.text, "data": dict(self.why.data)},
         }
@@ -141,6 +145,7 @@ class Plan:
             elapsed_s=float(raw["elapsed_s"]),
             first_s=raw["first_s"],
             risk=raw["risk"],
+            vessel_risk=float(raw.get("vessel_risk", 0.0)),
             why=Why(text=raw["why"]["text"], data=raw["why"]["data"]),
         )
 

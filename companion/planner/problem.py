@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from statistics import NormalDist
@@ -25,6 +25,7 @@ from companion.errors import InputError
 
 if TYPE_CHECKING:
     from companion.planner.evaluate import Evaluation
+    from companion.traffic.occupancy import Spread
 
 TOUCH_M = 1e-3
 """A path may be this deep in an obstacle [m]: numerical slack for touching."""
@@ -104,7 +105,11 @@ class Current:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """A moving disc to keep out of: at (x + vx t, y + vy t), radius ``radius_m + growth_mps t``, in its window."""
+    """A moving disc to keep out of: at (x + vx t, y + vy t), radius ``radius_m + growth_mps t``, in its window.
+
+    With a ``spread`` it is a vessel's prediction: the radius is that without any doubt, and how much doubt is added
+    follows from the promise (``companion.planner.vessels``).
+    """
 
     x_m: float
     y_m: float
@@ -115,6 +120,7 @@ class Target:
     from_s: float = 0.0
     until_s: float = math.inf
     name: str = ""
+    spread: Spread | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +133,10 @@ class RiskLimit:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
-    """One planning problem (see the module's text). Times count from the start of the plan, t = 0."""
+    """One planning problem (see the module's text). Times count from the start of the plan, t = 0.
+
+    ``vessels_part`` is what uncertain targets get of 1 - delta_s, at each instant and together; None: a tenth of it.
+    """
 
     id: str = ""
     title: str = ""
@@ -142,6 +151,7 @@ class Problem:
     delta_s: float = 0.5
     current: Current = Current()
     targets: tuple[Target, ...] = ()
+    vessels_part: float | None = None
     risk: RiskLimit | None = None
     clearance_floor_m: float = 0.0
     notes: str = ""
@@ -179,10 +189,34 @@ class Problem:
 
     # ----------------------------------------------------------------------------------------- no-go
     @cached_property
+    def wind_delta_s(self) -> float:
+        """The wind's own delta_s: 1 - delta_s less the part of uncertain targets; delta_s without them."""
+        if not self.is_shared:
+            return self.delta_s
+        from companion.planner.vessels import part_of
+
+        return self.delta_s + part_of(self)
+
+    @property
+    def is_shared(self) -> bool:
+        """Do uncertain targets share the promise with the wind?"""
+        return any(t.spread is not None for t in self.targets)
+
+    @cached_property
+    def resolved(self) -> Problem:
+        """The same with its promise shared out: the wind's delta_s, and uncertain targets as discs of their size."""
+        if not self.is_shared:
+            return self
+        from companion.planner.vessels import part_of, sigmas_for, sized, vessel_count
+
+        sigmas = sigmas_for(part_of(self), vessel_count(self.targets))
+        return replace(self, delta_s=self.wind_delta_s, targets=sized(self.targets, sigmas), vessels_part=None)
+
+    @cached_property
     def k_delta(self) -> float:
         """Multiplier of sigma, sqrt(2) erfinv(2 delta_s - 1) >= 0 (Wolsieffer eq. 15 with its sign put right)."""
         # sqrt(2) erfinv(2 p - 1) is the standard normal quantile of p
-        return NormalDist().inv_cdf(self.delta_s) if 0.5 <= self.delta_s < 1.0 else math.nan
+        return NormalDist().inv_cdf(self.wind_delta_s) if 0.5 <= self.wind_delta_s < 1.0 else math.nan
 
     def widening_rad(self, t_s: float) -> float:
         """Return b(t): how much the no-go half angle is widened at ``t_s`` [rad]."""
@@ -267,7 +301,7 @@ class Problem:
         """Return cost, legs and every reason why the path (n, 2) is not feasible: the exact scorer."""
         from companion.planner.evaluate import evaluate
 
-        return evaluate(self, np.asarray(waypoints_en, dtype=np.float64))
+        return evaluate(self.resolved, np.asarray(waypoints_en, dtype=np.float64))
 
 
 # ---------------------------------------------------------------------------------------------- judging
@@ -292,7 +326,8 @@ def _defect(p: Problem) -> str | None:
         "boat.speed": sum((*b.polar_twa_rad, *b.polar_mps)),
     }
     for t in p.targets:
-        named["targets"] = sum((t.x_m, t.y_m, t.vx_mps, t.vy_mps, t.radius_m, t.growth_mps, t.from_s))
+        numbers = (t.x_m, t.y_m, t.vx_mps, t.vy_mps, t.radius_m, t.growth_mps, t.from_s)
+        named["targets"] = named.get("targets", 0.0) + sum(numbers) + (sum(t.spread.numbers) if t.spread else 0.0)
     for name, value in named.items():
         if not math.isfinite(value):
             return f"{name} is not a finite number"
@@ -320,6 +355,8 @@ def _defect(p: Problem) -> str | None:
         (p.risk is None or (0.0 < p.risk.max_path_risk <= 1.0 and p.risk.correlation_time_s > 0.0),
          "risk needs 0 < max_path_risk <= 1 and correlation_time_s > 0"),
         (p.fence is None or not p.fence.is_empty, "the fence is empty"),
+        (p.vessels_part is None or 0.0 < p.vessels_part < 1.0 - p.delta_s,
+         "allocation.vessels is not between 0 and 1 - delta_s"),
     )
     for holds, text in checks:
         if not holds:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import shapely
 
@@ -20,6 +20,9 @@ from companion.planner.problem import (
     Target,
     Wind,
 )
+
+if TYPE_CHECKING:
+    from companion.traffic.occupancy import Spread
 
 T = TypeVar("T")
 
@@ -52,6 +55,10 @@ class _Reader:
         """Return a float (may be NaN: that is for ``defect`` to say)."""
         return self._get(key, default, _as_float)
 
+    def whole(self, key: str) -> int:
+        """Return an integer."""
+        return self._get(key, ..., _as_int)
+
     def numbers(self, key: str, default: Any = ...) -> tuple[float, ...]:
         """Return a list of floats."""
         return self._get(key, default, lambda v: tuple(_as_float(x) for x in _as_list(v)))
@@ -75,6 +82,12 @@ def _as_float(value: Any) -> float:
         return float(value)
     except OverflowError:
         return math.inf if value > 0 else -math.inf
+
+
+def _as_int(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TypeError("a whole number is needed")
+    return value
 
 
 def _as_list(value: Any) -> Sequence[Any]:
@@ -113,7 +126,7 @@ def parse(raw: Mapping[str, Any], source: str) -> Problem:
         raise InputError(source, "targets", "is not a list", "write a list of objects")
     twa, mps = _parse_speed(boat.child("speed"))
     known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
-             "targets", "risk", "clearance_floor_m"}
+             "targets", "allocation", "risk", "clearance_floor_m"}
     return Problem(
         id=top.text("id", ""),
         title=top.text("title", ""),
@@ -142,6 +155,7 @@ def parse(raw: Mapping[str, Any], source: str) -> Problem:
         current=Current(set_rad=math.radians(current.number("set_deg", 0.0)),
                         drift_mps=current.number("drift_mps", 0.0)),
         targets=tuple(_parse_target(_Reader(t, source, f"targets[{i}]")) for i, t in enumerate(targets)),
+        vessels_part=_parse_allocation(top.child("allocation")) if raw.get("allocation") is not None else None,
         risk=_parse_risk(_Reader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,
         clearance_floor_m=top.number("clearance_floor_m", 0.0),
         extra={k: v for k, v in raw.items() if k not in known},
@@ -200,7 +214,25 @@ def _parse_target(target: _Reader) -> Target:
         vy_mps=target.number("vy", 0.0), radius_m=target.number("radius_m"),
         growth_mps=target.number("growth_mps", 0.0), from_s=target.number("from_s", 0.0),
         until_s=target.number("until_s", math.inf), name=target.text("name", ""),
+        spread=_parse_spread(target.child("spread")) if target.raw.get("spread") is not None else None,
     )
+
+
+def _parse_spread(spread: _Reader) -> Spread:
+    from companion.traffic.occupancy import Spread
+
+    return Spread(
+        vessel=spread.whole("vessel"), x_m=spread.number("x"), y_m=spread.number("y"),
+        course_rad=math.radians(spread.number("course_deg")), keep_m=spread.number("keep_m"),
+        along_m=spread.number("along_m"), along_mps=spread.number("along_mps", 0.0),
+        across_m=spread.number("across_m"), across_mps=spread.number("across_mps", 0.0),
+        own_mps=spread.number("own_mps", 0.0), sigma_m=spread.number("sigma_m"),
+        sigma_mps=spread.number("sigma_mps", 0.0),
+    )
+
+
+def _parse_allocation(allocation: _Reader) -> float:
+    return allocation.number("vessels")
 
 
 def _parse_risk(risk: _Reader) -> RiskLimit:
@@ -222,6 +254,14 @@ def _wkt(geometry: shapely.Geometry) -> str:
     if geometry.geom_type == "Polygon":
         return "POLYGON " + rings(geometry)
     return "MULTIPOLYGON (" + ", ".join(rings(g) for g in geometry.geoms) + ")"
+
+
+def _spread_dict(s: Spread) -> dict[str, Any]:
+    return {
+        "vessel": s.vessel, "x": s.x_m, "y": s.y_m, "course_deg": math.degrees(s.course_rad), "keep_m": s.keep_m,
+        "along_m": s.along_m, "along_mps": s.along_mps, "across_m": s.across_m, "across_mps": s.across_mps,
+        "own_mps": s.own_mps, "sigma_m": s.sigma_m, "sigma_mps": s.sigma_mps,
+    }
 
 
 def unparse(p: Problem) -> dict[str, Any]:
@@ -262,9 +302,12 @@ def unparse(p: Problem) -> dict[str, Any]:
         out["targets"] = [
             {"x": t.x_m, "y": t.y_m, "vx": t.vx_mps, "vy": t.vy_mps, "radius_m": t.radius_m,
              "growth_mps": t.growth_mps, "from_s": t.from_s, "name": t.name,
-             **({"until_s": t.until_s} if math.isfinite(t.until_s) else {})}
+             **({"until_s": t.until_s} if math.isfinite(t.until_s) else {}),
+             **({"spread": _spread_dict(t.spread)} if t.spread is not None else {})}
             for t in p.targets
         ]
+    if p.vessels_part is not None:
+        out["allocation"] = {"vessels": p.vessels_part}
     if p.risk is not None:
         out["risk"] = {"max_path_risk": p.risk.max_path_risk, "correlation_time_s": p.risk.correlation_time_s}
     if p.clearance_floor_m:

@@ -34,6 +34,7 @@ from companion.geo.angles import wrap_pi
 from companion.planner import risk_kernels as kernels
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem import Problem
+from companion.planner.vessels import LEAST_PART, VesselRisk, part_of, sigmas_for, vessel_count, vessel_risk
 
 if TYPE_CHECKING:
     from companion.planner.solve import Effort, Outcome, Search
@@ -83,12 +84,14 @@ class LegRisk:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathRisk:
-    """The risk of a path.
+    """The risk of a path: of the wind, and of the vessels that the problem calls uncertain.
 
     Attributes:
-        legs: For each leg.
-        computed: First-passage probability of the whole path.
-        total: What is promised: ``computed`` times ``PROMISE_FACTOR``, at most 1.
+        legs: For each leg; the wind's.
+        computed: First-passage probability of the whole path, by the wind.
+        wind: What is promised of the wind: ``computed`` times ``PROMISE_FACTOR``, at most 1.
+        vessels: What vessels add (``companion.planner.vessels``).
+        total: What is promised: wind and vessels together by the union bound, at most 1.
         boole: The union bound over entries and up-crossings, at most 1.
         assumption: What is assumed of the wind, in words.
         correlation_time_s: Of the wind [s].
@@ -96,6 +99,8 @@ class PathRisk:
 
     legs: tuple[LegRisk, ...]
     computed: float
+    wind: float
+    vessels: VesselRisk
     total: float
     boole: float
     assumption: str
@@ -142,8 +147,10 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
         )
         out.append(LegRisk(first_entry=float(first[i]), worst_instant=worst))
     computed = float(min(1.0, first.sum()))
+    wind, vessels = min(1.0, PROMISE_FACTOR * computed), vessel_risk(problem, legs)
     return PathRisk(
-        legs=tuple(out), computed=computed, total=min(1.0, PROMISE_FACTOR * computed), boole=float(min(1.0, boole)),
+        legs=tuple(out), computed=computed, wind=wind, vessels=vessels, total=min(1.0, wind + vessels.total),
+        boole=float(min(1.0, boole)),
         assumption=ASSUMPTION[process.model], correlation_time_s=process.correlation_time_s,
     )
 
@@ -170,8 +177,28 @@ def with_risk(problem: Problem, plan: Plan) -> Plan:
     if not plan.has_path:
         return plan
     risk = path_risk(problem, plan)
-    legs = tuple(replace(leg, risk=r.first_entry) for leg, r in zip(plan.legs, risk.legs, strict=True))
-    return replace(plan, legs=legs, risk=risk.total)
+    legs = tuple(
+        replace(leg, risk=min(1.0, wind.first_entry + vessels))
+        for leg, wind, vessels in zip(plan.legs, risk.legs, risk.vessels.legs, strict=True))
+    plan = replace(plan, legs=legs, risk=risk.total, vessel_risk=risk.vessels.total)
+    return replace(plan, why=with_parts(plan.why, problem, risk)) if problem.is_shared else plan
+
+
+def with_parts(why: Why, problem: Problem, risk: PathRisk) -> Why:
+    """Return the words and data of a plan with what its promise is made of."""
+    part = part_of(problem)
+    named = ", ".join(f"{name} {100.0 * value:.2g} %" for name, value in risk.vessels.by_name[:3])
+    text = (f"Risk of the whole path {100.0 * risk.total:.2g} %: wind {100.0 * risk.wind:.2g} %, vessels "
+            f"{100.0 * risk.vessels.total:.2g} % ({named}). At each instant {100.0 * (1.0 - problem.delta_s):.2g} %: "
+            f"wind {100.0 * (1.0 - problem.wind_delta_s):.2g} %, vessels {100.0 * part:.2g} %.")
+    data = {
+        "risk": {
+            "wind": risk.wind, "vessels": risk.vessels.total, "by_vessel": dict(risk.vessels.by_name),
+            "instant_wind": 1.0 - problem.wind_delta_s, "instant_vessels": part,
+            "instant_vessels_worst": risk.vessels.worst_instant, "count": vessel_count(problem.targets),
+        },
+    }
+    return Why(text=f"{why.text} {text}".strip(), data={**why.data, **data})
 
 
 def simulate_entries(
@@ -279,7 +306,18 @@ def widened(problem: Problem, extra: float) -> Problem:
         return replace(problem, risk=None)
     if sigma.model == "forecast" and sigma.half_width_rad is not None:
         half = tuple(h + extra * s for h, s in zip(sigma.half_width_rad, sigma.sigma_rad, strict=True))
-        return replace(problem, risk=None, wind=replace(problem.wind, sigma=replace(sigma, half_width_rad=half)))
+        table = replace(problem.wind, sigma=replace(sigma, half_width_rad=half))
+        return _shared(replace(problem, risk=None, wind=table), problem.wind_delta_s, extra)
     k = problem.k_delta + extra
     delta_s = 1.0 - 0.5 * math.erfc(k / math.sqrt(2.0))
-    return replace(problem, risk=None, delta_s=min(delta_s, 1.0 - 1e-12))
+    return _shared(replace(problem, risk=None), min(delta_s, 1.0 - 1e-12), extra)
+
+
+def _shared(problem: Problem, wind_delta_s: float, extra: float) -> Problem:
+    """Return the problem with the wind's own delta_s given, and vessels kept ``extra`` more sigmas away."""
+    if not problem.is_shared:
+        return replace(problem, delta_s=wind_delta_s)
+    count = vessel_count(problem.targets)
+    k = sigmas_for(part_of(problem), count) + extra
+    part = count * max(0.5 * math.erfc(k / math.sqrt(2.0)), LEAST_PART)
+    return replace(problem, delta_s=wind_delta_s - part, vessels_part=part)

@@ -161,12 +161,15 @@ def _solved(problem: Problem, effort: Effort, empty: Plan) -> Plan:
     search: Search = getattr(importlib.import_module(module), name)
     from companion.planner.risk import keep_limit, search_within, with_risk
 
+    def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
+        return search(problem.resolved, effort, seed)
+
     if problem.risk is None:
-        return with_risk(problem, _judged(problem, search(problem, effort, empty.seed), effort, empty))
+        return with_risk(problem, _judged(problem, search_resolved(problem, effort, empty.seed), effort, empty))
     if empty.algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)
-        outcome = search(problem, effort, empty.seed)
+        outcome = search_resolved(problem, effort, empty.seed)
     else:
-        outcome = search_within(search, problem, effort, empty.seed)
+        outcome = search_within(search_resolved, problem, effort, empty.seed)
     return keep_limit(problem, _judged(problem, outcome, effort, empty))
 
 

@@ -20,7 +20,6 @@ from companion.traffic.predict import (
     Prediction,
     motion_of,
     predict,
-    risk_factor,
     turn_rate,
 )
 from companion.traffic.vessel import Vessel
@@ -33,10 +32,50 @@ BUSSER_WINDOW_S = 20.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """The vessel behind a disc, as predicted: a Gaussian about a mean that goes the disc's way at the disc's velocity.
+
+    The standard deviations are linear in time through the disc's window, chords of the convex prediction and so never
+    less than it. Errors persist: a vessel that is one sigma ahead of its mean stays one sigma ahead of it.
+
+    Attributes:
+        vessel: whose; the windows of one vessel share it.
+        x_m, y_m: the mean at t = 0 [m].
+        course_rad: of the axis "along".
+        keep_m: our boat's middle nearer than this to the hull's middle is what must not happen: both hulls and the
+            clearance asked for.
+        along_m, along_mps: standard deviation along the course at t = 0 and its growth.
+        across_m, across_mps: the same across it.
+        own_mps: how fast our own place along the plan becomes uncertain, one standard deviation.
+        sigma_m, sigma_mps: the chord of the larger of both with our own: what the disc is sized by.
+
+    """
+
+    vessel: int
+    x_m: float
+    y_m: float
+    course_rad: float
+    keep_m: float
+    along_m: float
+    along_mps: float
+    across_m: float
+    across_mps: float
+    own_mps: float
+    sigma_m: float
+    sigma_mps: float
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """All figures, for a check that they are finite."""
+        return (self.x_m, self.y_m, self.course_rad, self.keep_m, self.along_m, self.along_mps, self.across_m,
+                self.across_mps, self.own_mps, self.sigma_m, self.sigma_mps)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Disc:
     """A moving disc: at (x + vx t, y + vy t), radius ``radius_m + growth_mps t``, for from_s <= t <= until_s.
 
-    Times count from the moment for which the disc was made. ``mmsi`` says whose it is.
+    Times count from the moment for which the disc was made. ``mmsi`` says whose it is; ``spread`` how surely.
     """
 
     x_m: float
@@ -49,6 +88,7 @@ class Disc:
     until_s: float
     name: str
     mmsi: int
+    spread: Spread | None = None
 
     def centre_en_m(self, t_s: float) -> tuple[float, float]:
         """Return the centre at ``t_s``."""
@@ -64,7 +104,9 @@ class Keep:
     """How far to keep away.
 
     Attributes:
-        risk: probability, per vessel and instant, that its hull is outside its disc.
+        sigmas: the disc's radius is hulls and clearance and this many standard deviations of the larger axis.
+            ``risk_factor(r)``: the hull is outside its disc with probability r at most. ``tail_factor(r)``: a boat
+            outside the disc meets the vessel with probability r at most. 0: the disc that uncertainty is added to.
         clearance_m: between hulls, beyond that.
         own_radius_m: half our length.
         own_timing_mps: how fast our own place along the plan becomes uncertain [m/s]: speed error, tacks.
@@ -74,7 +116,7 @@ class Keep:
 
     """
 
-    risk: float = 1e-3
+    sigmas: float = 3.717
     clearance_m: float = 5.0
     own_radius_m: float = 1.0
     own_timing_mps: float = 0.1
@@ -84,8 +126,12 @@ class Keep:
 
 def needed_radius_m(there: Prediction, t_s: float, keep: Keep) -> float:
     """Return the radius to keep out of about the predicted centre, ``t_s`` into the plan [m]."""
-    sigma = math.hypot(max(there.sigma_along_m, there.sigma_across_m), keep.own_timing_mps * t_s)
-    return there.reach_m + keep.own_radius_m + keep.clearance_m + risk_factor(keep.risk) * sigma
+    sigma = _sigma_m(there, t_s, keep)
+    return there.reach_m + keep.own_radius_m + keep.clearance_m + keep.sigmas * sigma
+
+
+def _sigma_m(there: Prediction, t_s: float, keep: Keep) -> float:
+    return math.hypot(max(there.sigma_along_m, there.sigma_across_m), keep.own_timing_mps * t_s)
 
 
 def planning_discs(
@@ -133,13 +179,25 @@ def _disc(
     ra, rb = needed_radius_m(a, begin, keep) + sagitta, needed_radius_m(b, end, keep) + sagitta
     growth = (rb - ra) / span
     x, y = a.mean_en_m
+
+    def line(first: float, last: float) -> tuple[float, float]:
+        slope = (last - first) / span
+        return first - slope * begin, slope
+
+    along, across = line(a.sigma_along_m, b.sigma_along_m), line(a.sigma_across_m, b.sigma_across_m)
+    sigma = line(_sigma_m(a, begin, keep), _sigma_m(b, end, keep))
+    spread = Spread(
+        vessel=10 * vessel.mmsi + vessel.branch, x_m=x - vx * begin, y_m=y - vy * begin, course_rad=b.course_rad,
+        keep_m=a.reach_m + keep.own_radius_m + keep.clearance_m + sagitta, along_m=along[0], along_mps=along[1],
+        across_m=across[0], across_mps=across[1], own_mps=keep.own_timing_mps, sigma_m=sigma[0], sigma_mps=sigma[1],
+    )
     if keep.ahead_m > 0.0 and math.hypot(vx, vy) > 0.3:
         ahead = 0.5 * keep.ahead_m
         x, y = x + ahead * vx / math.hypot(vx, vy), y + ahead * vy / math.hypot(vx, vy)
         ra += ahead
     return Disc(
         x_m=x - vx * begin, y_m=y - vy * begin, vx_mps=vx, vy_mps=vy, radius_m=ra - growth * begin, growth_mps=growth,
-        from_s=begin, until_s=end, name=vessel.label, mmsi=vessel.mmsi,
+        from_s=begin, until_s=end, name=vessel.label, mmsi=vessel.mmsi, spread=spread,
     )
 
 

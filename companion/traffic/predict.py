@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +116,22 @@ def risk_factor(risk: float) -> float:
     if not 0.0 < risk < 1.0:
         raise ValueError(f"risk {risk} is not between 0 and 1")
     return math.sqrt(-2.0 * math.log(risk))
+
+
+def tail_factor(risk: float) -> float:
+    """Return k with P(N(0, 1) > k) = ``risk``, 0 at least.
+
+    A boat that is k sigma and the hulls away from a vessel's mean is met only if the vessel is off by more than k
+    sigma towards the boat, and no direction has more than the larger sigma: one tail bounds the risk (the half-plane
+    of Luders, Kothari and How 2010 and of Wolsieffer 2020). ``risk_factor`` asks that it be off in any direction.
+
+    Raises:
+        ValueError: ``risk`` is not in (0, 1).
+
+    """
+    if not 0.0 < risk < 1.0:
+        raise ValueError(f"risk {risk} is not between 0 and 1")
+    return max(0.0, -NormalDist().inv_cdf(risk))
 
 
 def predict(vessel: Vessel, t_s: float, motion: Motion | None = None) -> Prediction:

@@ -29,8 +29,8 @@ WAIT_BOX_M = 85.0
 AHEAD_S = 25.0        # what crossing ahead of the intruder is held to cost, at its bow
 FAR_M = 600.0         # beyond what both can run in a minute and a half
 CLEARANCE_M = 12.0    # between hulls; the task asks for 5
-KEEP = Keep(risk=1e-4, clearance_m=CLEARANCE_M, own_radius_m=0.5 * LENGTH_M, own_timing_mps=0.05, ahead_m=25.0,
-            horizon_s=180.0)
+KEEP = Keep(sigmas=risk_factor(1e-4), clearance_m=CLEARANCE_M, own_radius_m=0.5 * LENGTH_M, own_timing_mps=0.05,
+            ahead_m=25.0, horizon_s=180.0)
 
 
 class Skipper(Protocol):
@@ -128,14 +128,14 @@ class FieldSkipper:
 
 
 def obstacles_of(vessels: tuple[Vessel, ...], seen: Situation) -> tuple[Obstacle, ...]:
-    """Return the discs of the vessels as obstacles of the guidance, at the risk and clearance of ``KEEP``."""
+    """Return the discs of the vessels as obstacles of the guidance, at the sigmas and clearance of ``KEEP``."""
     out = []
     for vessel in vessels:
         now = predict(vessel, seen.t_s, STEADY)
         if math.dist(now.mean_en_m, seen.en_m) > FAR_M:
             continue
         later = predict(vessel, seen.t_s + 90.0, STEADY)
-        k = risk_factor(KEEP.risk)
+        k = KEEP.sigmas
         sigma_now = max(now.sigma_along_m, now.sigma_across_m)
         sigma_later = max(later.sigma_along_m, later.sigma_across_m)
         keep = now.reach_m + KEEP.own_radius_m + KEEP.clearance_m + k * sigma_now

@@ -131,7 +131,7 @@ def test_the_discs_hold_the_region_at_every_moment(course: float, speed: float, 
                                                    class_b: bool, timing: float, risk: float) -> None:
     """What a planner keeps out of contains hull, clearance and k sigma about the predicted centre, at all times."""
     ship = vessel((50.0, -20.0), course, speed, turn_rate_radps=turn, is_class_b=class_b, t_s=heard)
-    keep = Keep(risk=risk, own_timing_mps=timing)
+    keep = Keep(sigmas=risk_factor(risk), own_timing_mps=timing)
     discs = [d for d in planning_discs([ship], 0.0, keep) if d.from_s - 1e-9 <= at <= d.until_s + 1e-9]
     assert discs
     there = predict(ship, at, motion_of(ship))
