@@ -16,7 +16,7 @@ from sitl.live import free_port
 GOOD = Path("missions/archipelago.toml").read_text()
 
 
-@pytest.mark.parametrize("command", sorted(cli.COMMANDS))
+@pytest.mark.parametrize("command", sorted(cli.PROGRAM.commands))
 def test_every_companion_command_has_help(command, capsys):
     with pytest.raises(SystemExit) as end:
         cli.main([command, "--help"])
