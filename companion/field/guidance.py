@@ -38,7 +38,7 @@ def step(
     """Return the next state and the heading to send."""
     field = avoiding(intent.field, situation, habits)
     if intent.clearance is not None:
-        field = field + RepulsiveShore(intent.clearance, sigma_m=2.0 * habits.keep_m)
+        field = field + RepulsiveShore(intent.clearance, sigma_m=habits.keep_m)
     if not habits.is_sailing or situation.twd_from_rad is None:
         v = field(situation.en_m)[0]
         wanted = math.atan2(v[0], v[1])
@@ -54,7 +54,12 @@ def step(
     margin = None
     state = replace(state, q=q)
     if habits.look_ahead:
-        wanted, margin = choose(wanted, twd, situation, intent, habits, state)
+        chosen, margin = choose(wanted, twd, situation, intent, habits, state)
+        off = wrap_pi(chosen - twd)
+        if abs(wrap_pi(wanted - twd)) < habits.no_go_half_rad + 1e-6 and abs(off) < math.pi / 2.0:
+            # Beating: the tack that something in the way made her take is kept, else she would tack back at once.
+            state = replace(state, q=1 if off > 0.0 else -1)
+        wanted = chosen
     state, heading, reason = helm(state, situation, wanted, habits)
     return state, Setpoint(t_s=situation.t_s, heading_rad=wrap_pi(heading), reason=reason, margin_m=margin)
 

@@ -1,7 +1,7 @@
 """Look-ahead: a fan of sailable headings, where each would take the boat, and what it would cost.
 
 The cheapest is the one nearest to the field's that keeps its distance from vessels for the next minute and a half
-and from the shore for the next forty seconds.
+and from the shore for as long as she needs to turn away from it.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from companion.field.algebra import REPULSIVE, Field, Vectors
 from companion.field.values import Clearance
 
 STEP_M = 0.5   # of the difference quotient
+FAR_M = 1e5
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +28,9 @@ class RepulsiveShore(Field):
         """Return the vectors (n, 2)."""
         n = len(p)
         east, north = np.array([STEP_M, 0.0]), np.array([0.0, STEP_M])
-        c = self.clearance(np.vstack([p, p + east, p - east, p + north, p - north])).reshape(5, n)
+        # Open water has no shore and an endless clearance.
+        places = np.vstack([p, p + east, p - east, p + north, p - north])
+        c = np.minimum(self.clearance(places), FAR_M).reshape(5, n)
         slope = np.column_stack([c[1] - c[2], c[3] - c[4]]) / (2.0 * STEP_M)
-        slope = np.where(np.isfinite(slope), slope, 0.0)
         force = REPULSIVE * np.exp(-((np.maximum(c[0], 0.0) / self.sigma_m) ** 2))
         return np.asarray(force[:, None] * slope, dtype=np.float64)

@@ -82,7 +82,11 @@ class Habits:
     repulsive_sigma_m: float = 100.0
     near_m: float = 300.0
     keep_m: float = 8.0       # from what stands still
-    shore_s: float = 40.0     # what stands still is looked at for this long ahead: later she can still turn
+
+    @property
+    def shore_s(self) -> float:
+        """How far ahead [s] what stands still is looked at: a tack, half a turn, and a little; later she can turn."""
+        return 8.0 + self.tack_s + math.pi / self.turn_rate_radps
 
 
 class Manoeuvre(enum.Enum):

@@ -96,14 +96,14 @@ def test_out_of_irons_on_the_boat_model(tws: float) -> None:
     assert max(times) < 90.0
 
 
-def test_without_the_recovery_she_stays_in_irons() -> None:
-    """The danger is real in the model: asking for a reach from a standstill head to wind does not get her out."""
+def test_without_the_recovery_she_stays_in_irons_for_long() -> None:
+    """The danger is real in the model: asking for a reach from a standstill head to wind does not soon get her out."""
     boat = Afloat.launch(AR1(0.0, 5.0, seed=1, sd_rad=0.0), np.random.default_rng(1), (0.0, 0.0), 0.0)
     boat.state[5] = 0.0
-    for _ in range(60):
+    for _ in range(20):
         boat.sail(math.radians(90.0))
-    assert abs(float(boat.state[2])) < math.radians(40.0)
-    assert abs(float(boat.state[5])) < 0.3
+        assert abs(float(boat.state[2])) < math.radians(40.0)
+        assert abs(float(boat.state[5])) < 0.3
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
