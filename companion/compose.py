@@ -76,6 +76,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "replan_policy": ReplanPolicy(options.replan),
         "min_replan_interval_s": options.min_replan_s,
         "traffic_clearance_m": mission.traffic.safe_distance_m,
+        "traffic_time_s": mission.traffic.safe_time_s,
         "wind_change_rad": math.radians(options.wind_shift_deg),
         "grid_size_m": options.off_track_m,
         "safe_end": SafeEnd.RETURN if options.end == "home" else SafeEnd.LOITER,

@@ -117,6 +117,7 @@ class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """``udpin:HOST:PORT`` (NMEA or JSON), ``tcp:HOST:PORT`` (NMEA), ``/dev/NAME:BAUD``. What the autopilot hears is
     taken without a feed; ``mavlink`` may stand for it."""
     safe_distance_m: Positive = 50.0
+    """Plans keep this clear between hulls; an approach nearer than it within ``safe_time_s`` is an alarm."""
     safe_time_s: Positive = 90.0
     drop_after_s: Positive = 600.0
 

@@ -67,6 +67,18 @@ class CancelPlan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """What a new route is to the one before: how far apart they look, and the vessel that made the old one unsafe.
+
+    ``apart_m`` is the Fréchet distance of the next five minutes of both (``companion.traffic.path_distance_m``), None
+    without an old route; ``unsafe`` is empty when the old route met nobody.
+    """
+
+    apart_m: float | None = None
+    unsafe: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class UploadMission:
     """Put ``items`` (without home; items[0] has seq 1) on the autopilot; answered by UploadOutcome.
 
@@ -81,6 +93,7 @@ class UploadMission:
     set_current: int | None
     plan_id: int
     text: str = ""
+    change: Change = Change()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

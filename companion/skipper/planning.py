@@ -10,7 +10,7 @@ import numpy as np
 from companion.errors import InputError
 from companion.messages import Command, waypoint
 from companion.planner import Plan, Problem
-from companion.skipper.actions import CancelPlan, ReplanReason, RequestPlan, Severity, UploadMission
+from companion.skipper.actions import CancelPlan, Change, ReplanReason, RequestPlan, Severity, UploadMission
 from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m, moved
 from companion.skipper.judge import half_width_rad, judge
@@ -20,9 +20,10 @@ from companion.skipper.problem import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.route import Tail, common_prefix, loiter_place, path_length_m, splice
 from companion.skipper.snapshot import PlanOutcome, UploadOutcome, UploadResult
 from companion.skipper.state import PendingPlan, PendingUpload, Phase, Retry, Route
-from companion.skipper.traffic import meetings, targets
+from companion.skipper.traffic import apart_m, meetings, shares
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import PointEn
+from companion.traffic import Decision, decide
 
 UPLOAD_LATENCY_S = 1.5   # item protocol, a few dozen items, and the read-back
 SAME_M = 1.0             # a new waypoint this near to the old one is the old one
@@ -58,19 +59,20 @@ def request(
         turn.voyage, start, margin_m=step.margin_m, floor_m=floor_m, twd_from_rad=wind[0] if wind else None)
     aim = _aim(turn, gate, start, step)
     number = turn.new_id()
+    shared = shares(turn, start.en_m, start.after_s, rung, step.delta_s)
     name = ", ".join(part for part in (step.name, "start repaired" if start.text else "") if part)
     try:
         problem = Problem.from_json(problem_dict(
             turn.voyage, turn.gates[gate], start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
-            delta_s=step.delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
+            delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
         ))
     except (ValueError, InputError) as error:
         turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
         turn.update(plan_retry=turn.failed(turn.state.plan_retry))
         return False
-    problem = replace(problem, targets=targets(turn, start.en_m, start.after_s, rung))
+    problem = replace(problem, delta_s=shared.delta_s, targets=shared.targets, vessels_part=shared.part)
     facts = replace(
-        turn.blank_facts(number, step.margin_m, step.delta_s, name),
+        turn.blank_facts(number, step.margin_m, shared.delta_s, name),
         plan_twd_from_rad=problem.wind.twd_from_rad,
         plan_half_width_rad=half_width_rad(forecast, start.after_s + 60.0, turn.config.wind_change_level),
     )
@@ -206,9 +208,20 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     if not points or pending.gate < 0 or not ends or pending.lead_in:
         return False
     points = route.points_en_m[first:ends[0] + 1]
-    old = pending.problem.evaluate(np.asarray([pending.start_en_m, *points]))
+    problem = pending.problem
+    # A vessel that the old route was planned clear of need not be kept so far from; it is held against its own discs.
+    old = replace(problem.resolved, targets=()).evaluate(np.asarray([pending.start_en_m, *points]))
     gain = old.time_s - plan.cost_s
-    if not old.is_feasible or gain > max(turn.config.keep_gain_s, turn.config.keep_gain * old.time_s):
+    if not old.is_feasible:
+        return False
+    if problem.targets:
+        tail = [(float(e), float(n)) for e, n in plan.waypoints_en]
+        way = [*route.points_en_m[turn.state.index:first], *tail]
+        verdict = decide(meetings(turn), since_replan_s=0.0, active_cost_s=old.time_s, new_cost_s=plan.cost_s,
+                         apart_m=apart_m(turn, way))
+        if verdict is not Decision.KEEP:
+            return False
+    elif gain > max(turn.config.keep_gain_s, turn.config.keep_gain * old.time_s):
         return False
     facts = pending.facts
     turn.update(route=replace(
@@ -260,7 +273,11 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
         turn.update(route=replace(route, items=turn.state.route.items, points_en_m=turn.state.route.points_en_m))
         turn.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
         return
-    upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}")
+    way = route.points_en_m[turn.state.index if set_current is None else set_current - 1:-1]
+    met = meetings(turn)
+    unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
+    change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
+    upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}", change=change)
 
 
 def _apart(points: list[PointEn]) -> list[PointEn]:
@@ -308,7 +325,9 @@ def _is_same(a: Route, b: Route) -> bool:
     )
 
 
-def upload(turn: Turn, route: Route, set_current: int | None, text: str, *, whole: bool = False) -> None:
+def upload(
+    turn: Turn, route: Route, set_current: int | None, text: str, *, whole: bool = False, change: Change | None = None,
+) -> None:
     """Ask for the upload of a route; without permission it stays ready and the status says so."""
     old = turn.state.route
     known = old is not None and not turn.state.foreign and turn.state.checked_mission and not whole
@@ -316,7 +335,7 @@ def upload(turn: Turn, route: Route, set_current: int | None, text: str, *, whol
     number = turn.new_id()
     action = UploadMission(
         upload_id=number, items=route.items, keep_first=common_prefix(on_board, route.items),
-        set_current=set_current, plan_id=route.plan_id, text=text,
+        set_current=set_current, plan_id=route.plan_id, text=text, change=change or Change(),
     )
     if not turn.act(action):
         turn.update(ready_route=route)

@@ -24,6 +24,7 @@ from companion.skipper.intake import (
     take_outcomes,
 )
 from companion.skipper.ladder import rungs
+from companion.skipper.lookout import look_out
 from companion.skipper.planning import request, upload
 from companion.skipper.route import is_mixture, is_same_mission
 from companion.skipper.sailing import sail
@@ -59,6 +60,7 @@ class Skipper:
         take_events(turn)
         take_outcomes(turn)
         locate(turn)
+        look_out(turn)
         fresh = watch(turn)
         _decide(turn, fresh)
         remember_fix(turn)

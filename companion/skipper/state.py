@@ -10,6 +10,7 @@ from companion.messages import MissionItem, Mode
 from companion.skipper.actions import ReplanReason
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.voyage import PointEn
+from companion.traffic import Assessment
 
 
 class Phase(enum.Enum):
@@ -158,6 +159,7 @@ class SkipperState:
     steering_until_s: float | None = None          # bearing away in GUIDED until
     steering_heading_rad: float | None = None
     irons_s: tuple[float, ...] = ()                # when the boat was in irons
+    watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
     announced: tuple[tuple[str, float], ...] = ()  # code, last said
     reached: tuple[int, ...] = ()                  # goals reached, in order
     missed: int = 0                                # buoys passed on the wrong side and sailed again

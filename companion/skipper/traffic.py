@@ -1,7 +1,8 @@
-"""Other vessels under way: the discs that plans keep out of, and the route being sailed held against them.
+"""Other vessels under way: what plans are told of them, and the route being sailed held against them.
 
-Plans keep out of discs of a smaller risk than the one for which the active route is given up, so that a plan just
-made is not made again for the next report. A plan that cannot be found is tried with the next risk of the ladder.
+A plan gets the vessels as predictions with their spread, and their part of its promise (``companion.planner.vessels``):
+on the ladder's first step that is within 1 - delta_s, later steps risk more for them and the promise says so. A plan
+keeps farther away than where the active route is given up, so that it is not made again for the next report.
 """
 
 from __future__ import annotations
@@ -13,20 +14,25 @@ from itertools import pairwise
 
 from companion.geo.angles import difference_rad
 from companion.planner.problem import Target
+from companion.planner.vessels import VESSELS_SHARE, sigmas_for, vessel_count
 from companion.skipper.geometry import bearing_rad, distance_m
 from companion.skipper.judge import LOST_MPS
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import PointEn
-from companion.traffic import Conflict, Disc, Vessel, check_legs, planning_discs, predict
+from companion.traffic import Conflict, Disc, Vessel, check_legs, path_distance_m, planning_discs, predict
 from companion.traffic.occupancy import Keep
+from companion.traffic.predict import tail_factor
 
-RISKS = (1e-2, 5e-2, 2e-1)   # that a vessel is outside its disc, by the ladder's rung
-GIVE_UP_RISK = 1e-1          # the active route is given up for a likelier meeting only
+PART_BY_RUNG = (1.0, 4.0, 8.0)   # times the vessels' part of the promise, by the ladder's rung
+GIVE_UP_RISK = 1e-1          # the active route is given up for a likelier meeting, at an instant, only
+OWN_TIMING_MPS = 0.1         # how fast our own place along the route becomes uncertain: a sailboat's speed, tacks
 HORIZON_S = 300.0            # the plan is made again long before; later discs would close a lake
+ALIKE_S = 300.0              # successive ways are compared over this time
 SETTLED_S = 120.0            # discs of later windows grow no more: by then there are new reports, and each step checks
 UNKNOWN_S = 30.0             # a vessel of unknown course could be anywhere soon: only the next moments count
 NEAREST = 12                 # vessels that a plan looks at: those that could be met soonest
 OWN_MPS = 4.0                # no boat of ours closes faster by itself
+FAR_RISK = 1e-2              # that a vessel is nearer than counted when those that could be met are chosen
 HAIR_M = 1.0                 # a boat within a disc is let out of it: the disc ends this much before the boat
 
 
@@ -49,17 +55,17 @@ def near(turn: Turn) -> tuple[Vessel, ...]:
     for vessel in picture.vessels:
         there = predict(vessel, turn.t_s)
         closing_mps = OWN_MPS + math.hypot(*there.velocity_en_mps)
-        gap_m = distance_m(boat, there.mean_en_m) - there.radius_m(RISKS[0]) - turn.config.traffic_clearance_m
+        gap_m = distance_m(boat, there.mean_en_m) - there.radius_m(FAR_RISK) - turn.config.traffic_clearance_m
         if gap_m < closing_mps * HORIZON_S:
             soon.append((gap_m / closing_mps, vessel.mmsi, vessel.branch, vessel))
     return tuple(vessel for *_, vessel in sorted(soon, key=lambda s: s[:3])[:NEAREST])
 
 
-def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, risk: float) -> tuple[Disc, ...]:
-    """Return where not to be because of ``vessels``, in times from ``t_s`` on [s]."""
+def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Disc, ...]:
+    """Return where not to be because of ``vessels``, in times from ``t_s`` on [s], ``sigmas`` wide."""
     hull = turn.voyage.boat.hull
     keep = Keep(
-        risk=risk, clearance_m=turn.config.traffic_clearance_m, horizon_s=HORIZON_S,
+        sigmas=sigmas, clearance_m=turn.config.traffic_clearance_m, horizon_s=HORIZON_S, own_timing_mps=OWN_TIMING_MPS,
         own_radius_m=0.5 * math.hypot(hull.length_m, hull.beam_m), ahead_m=turn.config.traffic_clearance_m,
     )
     known = [v for v in vessels if v.is_moving_known]
@@ -69,43 +75,73 @@ def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, risk: float) -> tup
 
 
 def _settled(disc: Disc) -> Disc:
-    """Return the disc with the radius that it has at its window's begin, if that is late.
+    """Return the disc with the radius and the spread that it has at its window's begin, if that is late.
 
     A route that had to keep out of everywhere that a vessel might be in five minutes would flee from all of them.
     """
     if disc.from_s < SETTLED_S - 1e-6:
         return disc
-    return replace(disc, radius_m=disc.radius_at_m(disc.from_s), growth_mps=0.0)
+    known, at = disc.spread, disc.from_s
+    if known is not None:
+        known = replace(
+            known, along_m=known.along_m + known.along_mps * at, across_m=known.across_m + known.across_mps * at,
+            sigma_m=known.sigma_m + known.sigma_mps * at, along_mps=0.0, across_mps=0.0, sigma_mps=0.0)
+    return replace(disc, radius_m=disc.radius_at_m(at), growth_mps=0.0, spread=known)
 
 
-def targets(turn: Turn, start_en: PointEn, after_s: float, rung: int) -> tuple[Target, ...]:
-    """Return the planner's targets for a plan that starts at ``start_en`` in ``after_s``, on a rung of the ladder.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shares:
+    """The vessels of a plan and how the promise is shared: ``delta_s`` of both, ``wind_delta_s``, the vessels' part.
 
-    Where the start is within a vessel's disc already, its discs shrink to let the boat out: none nearer than now.
+    ``part`` is None without vessels: then all of it is the wind's.
     """
-    found = discs(turn, near(turn), turn.t_s + after_s, RISKS[min(rung, len(RISKS) - 1)])
-    inside_m: dict[tuple[int, str], float] = {}
-    for disc in found:
-        if disc.from_s <= 0.0:
-            gap_m = distance_m(start_en, disc.centre_en_m(0.0)) - disc.radius_at_m(0.0)
-            inside_m[disc.mmsi, disc.name] = HAIR_M - gap_m
+
+    targets: tuple[Target, ...]
+    delta_s: float
+    wind_delta_s: float
+    part: float | None
+
+
+def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: float) -> Shares:
+    """Return what a plan is told that starts at ``start_en`` in ``after_s``, on a rung of the ladder.
+
+    The wind keeps its part on every rung. Where the start is within a vessel's disc already, its discs shrink to let
+    the boat out: none nearer than now. What that risks is in the plan's path risk.
+    """
+    found = discs(turn, near(turn), turn.t_s + after_s, 0.0)
+    if not found:
+        return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
+    of_wind = (1.0 - VESSELS_SHARE) * (1.0 - delta_s)
+    part = VESSELS_SHARE * (1.0 - delta_s) * PART_BY_RUNG[min(rung, len(PART_BY_RUNG) - 1)]
+    inside_m: dict[int, float] = {}
+    every = tuple(Target(
+        x_m=disc.x_m, y_m=disc.y_m, vx_mps=disc.vx_mps, vy_mps=disc.vy_mps, radius_m=disc.radius_m,
+        growth_mps=disc.growth_mps, from_s=disc.from_s, until_s=disc.until_s, name=disc.name, spread=disc.spread,
+    ) for disc in found)
+    sigmas = sigmas_for(part, vessel_count(every))
+    for disc, target in zip(found, every, strict=True):
+        if disc.from_s <= 0.0 and target.spread is not None:
+            gap_m = distance_m(start_en, disc.centre_en_m(0.0)) - disc.radius_m - sigmas * target.spread.sigma_m
+            inside_m[target.spread.vessel] = HAIR_M - gap_m
     out = []
-    for disc in found:
-        radius_m = disc.radius_m - max(0.0, inside_m.get((disc.mmsi, disc.name), 0.0))
-        if radius_m + disc.growth_mps * disc.from_s > 0.0:
-            out.append(Target(
-                x_m=disc.x_m, y_m=disc.y_m, vx_mps=disc.vx_mps, vy_mps=disc.vy_mps, radius_m=radius_m,
-                growth_mps=disc.growth_mps, from_s=disc.from_s, until_s=disc.until_s, name=disc.name))
-    return tuple(out)
+    for target in every:
+        assert target.spread is not None
+        radius_m = target.radius_m - max(0.0, inside_m.get(target.spread.vessel, 0.0))
+        growth_mps = target.growth_mps + sigmas * target.spread.sigma_mps
+        if radius_m + sigmas * target.spread.sigma_m + growth_mps * target.from_s > 0.0:
+            out.append(replace(target, radius_m=radius_m))
+    if not out:
+        return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
+    return Shares(targets=tuple(out), delta_s=1.0 - of_wind - part, wind_delta_s=1.0 - of_wind, part=part)
 
 
-def timed_legs(turn: Turn) -> tuple[Leg, ...]:
-    """Return what is left of the route, timed by the polar in the mean wind."""
+def timed_legs(turn: Turn, points: Sequence[PointEn] | None = None) -> tuple[Leg, ...]:
+    """Return a way from the boat through ``points``, or what is left of the route, timed by the polar in mean wind."""
     boat, wind, vehicle = turn.boat_en, turn.wind_mean, turn.snapshot.vehicle
     if boat is None or wind is None or vehicle is None:
         return ()
     model, legs, t_s, heading = turn.voyage.boat, [], 0.0, vehicle.heading_rad
-    for a, b in pairwise((boat, *turn.ahead())):
+    for a, b in pairwise((boat, *(turn.ahead() if points is None else points))):
         length = distance_m(a, b)
         if length < 1e-6:
             continue
@@ -122,9 +158,32 @@ def timed_legs(turn: Turn) -> tuple[Leg, ...]:
     return tuple(legs)
 
 
+def apart_m(turn: Turn, points: Sequence[PointEn]) -> float | None:
+    """Return how different a new way through ``points`` looks from what is left of the route [m].
+
+    The discrete Fréchet distance of the next ``ALIKE_S`` of both; None without a route or a position.
+    """
+    old, new = soon(timed_legs(turn), ALIKE_S), soon(timed_legs(turn, points), ALIKE_S)
+    if not old or not new:
+        return None
+    return path_distance_m(old, new)
+
+
+def soon(legs: Sequence[Leg], seconds: float) -> list[PointEn]:
+    """Return the points of a way up to where the boat is after ``seconds``."""
+    points = [legs[0].from_en] if legs else []
+    for leg in legs:
+        if leg.start_s >= seconds:
+            break
+        share = min(1.0, (seconds - leg.start_s) / (leg.end_s - leg.start_s))
+        points.append((leg.from_en[0] + share * (leg.to_en[0] - leg.from_en[0]),
+                       leg.from_en[1] + share * (leg.to_en[1] - leg.from_en[1])))
+    return points
+
+
 def meetings(turn: Turn) -> tuple[Conflict, ...]:
     """Return where the route being sailed meets vessels, in order of time; empty when it is clear."""
     vessels = near(turn)
     if not vessels:
         return ()
-    return check_legs(timed_legs(turn), discs(turn, vessels, turn.t_s, GIVE_UP_RISK))
+    return check_legs(timed_legs(turn), discs(turn, vessels, turn.t_s, tail_factor(GIVE_UP_RISK)))

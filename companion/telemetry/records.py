@@ -13,6 +13,7 @@ from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.mavlink.items import mission_hash
 from companion.messages import AisReport, GeoPoint
+from companion.planner.vessels import part_of
 from companion.skipper.actions import Action, RequestPlan, SteerHeading, UploadFence, UploadMission
 from companion.skipper.config import SkipperConfig
 from companion.skipper.snapshot import Outcome, PlanOutcome, ReadOutcome, Snapshot
@@ -38,10 +39,13 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
             "widening": [[t, math.degrees(problem.no_go_half_rad(t))] for t in WIDENING_S],
             "cross_track_m": snapshot.autopilot.cross_track_m if snapshot.autopilot else None,
             "margin_m": config.margin_m,
-            **({"vessels": sorted({t.name for t in problem.targets})} if problem.targets else {}),
+            **(_vessels(problem) if problem.targets else {}),
         }
     if isinstance(action, UploadMission | UploadFence):
-        fields = {f.name: getattr(action, f.name) for f in dataclasses.fields(action) if f.name != "items"}
+        fields = {
+            f.name: getattr(action, f.name) for f in dataclasses.fields(action) if f.name not in {"items", "change"}}
+        if isinstance(action, UploadMission) and action.change.apart_m is not None:
+            fields |= {"path_distance_m": round(action.change.apart_m, 1), "old_route": action.change.unsafe or "safe"}
         items = [[i.command, i.lat_e7, i.lon_e7] for i in action.items]
         return {"kind": "action", "action": kind, **fields, "count": len(items), "hash": mission_hash(action.items),
                 "items": items}
@@ -49,6 +53,14 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
         return {"kind": "action", "action": kind, "heading_deg": math.degrees(action.heading_rad), "text": action.text}
     values = {f.name: jsonable(getattr(action, f.name)) for f in dataclasses.fields(action)}
     return {"kind": "action", "action": kind, **values}
+
+
+def _vessels(problem: Any) -> dict[str, Any]:
+    """Return whose discs a plan keeps out of, and how its promise at each instant is shared out."""
+    return {
+        "vessels": sorted({t.name for t in problem.targets}),
+        "instant": {"wind": 1.0 - problem.wind_delta_s, "vessels": part_of(problem)},
+    }
 
 
 def ais_record(report: AisReport) -> dict[str, Any]:

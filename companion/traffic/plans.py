@@ -15,8 +15,10 @@ from companion.traffic.occupancy import Disc
 
 # A plan may be this deep in a disc [m]: numerical slack.
 SLACK_M = 1e-3
-# A safe plan is replaced only by one that is better by this share of its time and by this much.
+# A safe plan is replaced only by one that is better by this share of its time and by this much ...
 BETTER_SHARE, BETTER_S = 0.15, 20.0
+# ... and by twice as much where the new path does not look like it: farther apart than this [m], see path_distance_m.
+ALIKE_M = 150.0
 # Plans are made again for traffic at most this often (Büsser 2009, section 5.2).
 MIN_INTERVAL_S = 20.0
 
@@ -164,19 +166,21 @@ class Decision(enum.Enum):
 
 def decide(
     conflicts: Sequence[Conflict], *, since_replan_s: float, urgent_s: float = 60.0,
-    active_cost_s: float | None = None, new_cost_s: float | None = None, new_conflicts: Sequence[Conflict] = (),
+    active_cost_s: float | None = None, new_cost_s: float | None = None, apart_m: float | None = None,
 ) -> Decision:
     """Return whether to replan (no new plan yet) or to replace (``new_cost_s`` given).
 
-    A plan that stays safe is kept unless the new one is better by 15 % and 20 s. Replanning for traffic keeps
-    20 s apart unless the meeting is nearer than ``urgent_s``.
+    A plan that stays safe is kept unless the new one is better by 15 % and 20 s, or by twice that where the new path
+    is ``apart_m`` > ``ALIKE_M`` from it. Replanning for traffic keeps 20 s apart unless the meeting is nearer than
+    ``urgent_s``.
     """
     if new_cost_s is not None:
-        if new_conflicts:
-            return Decision.KEEP
         if conflicts:
             return Decision.REPLACE_UNSAFE
-        if active_cost_s is not None and active_cost_s - new_cost_s > max(BETTER_S, BETTER_SHARE * active_cost_s):
+        times = 2.0 if apart_m is not None and apart_m > ALIKE_M else 1.0
+        if active_cost_s is not None and (
+            active_cost_s - new_cost_s > times * max(BETTER_S, BETTER_SHARE * active_cost_s)
+        ):
             return Decision.REPLACE_BETTER
         return Decision.KEEP
     if not conflicts:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from companion.planner import plan
+from companion.planner.vessels import sigmas_for, sized, vessel_count
 from companion.planner.worker import failed
 from companion.skipper import actions as act
 from companion.skipper.actions import ReplanReason
 from companion.skipper.geometry import distance_m
 from companion.skipper.state import Phase
-from companion.skipper.traffic import HORIZON_S, UNKNOWN_S, meetings, near, targets
+from companion.skipper.traffic import HORIZON_S, UNKNOWN_S, meetings, near, shares
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import Goal
 from companion.traffic import Targets, TrafficPicture
@@ -135,14 +136,14 @@ def test_a_plan_that_starts_within_a_disc_may_leave_it():
     here = turn.boat_en
     turn = turn_among(vessel((here[0] + 80.0, here[1]), 0.0, 2.0, t_s=turn.t_s, heard_s=turn.t_s))
     assert meetings(turn)
-    found = targets(turn, here, 0.0, 0)
+    found = shared_discs(shares(turn, here, 0.0, 0, 0.95))
     assert found
     assert all(distance_m(here, (t.x_m, t.y_m)) > t.radius_m for t in found if t.from_s == 0.0)
 
 
 def test_a_vessel_of_unknown_course_blocks_the_next_moments_only():
     turn = turn_among(vessel((300.0, 200.0), None, None, t_s=60.0, heard_s=60.0))
-    found = targets(turn, turn.boat_en, 0.0, 0)
+    found = shares(turn, turn.boat_en, 0.0, 0, 0.95).targets
     assert found
     assert max(t.until_s for t in found) == pytest.approx(UNKNOWN_S)
 
@@ -153,8 +154,25 @@ def test_only_vessels_that_can_be_met_within_the_horizon_count():
     assert meetings(turn_among(there)) == ()
 
 
-def test_later_rungs_take_more_risk():
+def shared_discs(found):
+    """The discs of a plan's vessels as the planner sizes them."""
+    return sized(found.targets, sigmas_for(found.part, vessel_count(found.targets)))
+
+
+def test_the_promise_is_shared_between_wind_and_vessels():
     turn = turn_among(vessel((400.0, 300.0), 180.0, 3.0, t_s=60.0, heard_s=60.0))
-    first, later = (targets(turn, turn.boat_en, 0.0, rung) for rung in (0, 2))
+    found = shares(turn, turn.boat_en, 0.0, 0, 0.95)
+    assert found.delta_s == pytest.approx(0.95)
+    assert (1.0 - found.wind_delta_s) + found.part == pytest.approx(0.05)
+    alone = shares(turn_among(), turn.boat_en, 0.0, 0, 0.95)
+    assert (alone.targets, alone.delta_s, alone.wind_delta_s, alone.part) == ((), 0.95, 0.95, None)
+
+
+def test_later_rungs_risk_more_for_vessels_and_say_so():
+    turn = turn_among(vessel((400.0, 300.0), 180.0, 3.0, t_s=60.0, heard_s=60.0))
+    first, later = (shares(turn, turn.boat_en, 0.0, rung, 0.95) for rung in (0, 2))
+    assert later.part > first.part
+    assert later.wind_delta_s == first.wind_delta_s
+    assert later.delta_s < first.delta_s
     assert all(a.radius_m + a.growth_mps * a.from_s > b.radius_m + b.growth_mps * b.from_s
-               for a, b in zip(first, later, strict=True))
+               for a, b in zip(shared_discs(first), shared_discs(later), strict=True))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.traffic import Decision, Disc, check_legs, decide, path_distance_m
-from companion.traffic.plans import PlainLeg
+from companion.traffic.plans import ALIKE_M, PlainLeg
 
 
 def disc(x: float, y: float, vx: float = 0.0, vy: float = 0.0, radius: float = 20.0, growth: float = 0.0,
@@ -70,8 +70,9 @@ def test_decisions() -> None:
     assert decide(meeting, since_replan_s=0.0, active_cost_s=100.0, new_cost_s=500.0) is Decision.REPLACE_UNSAFE
     assert decide((), since_replan_s=0.0, active_cost_s=200.0, new_cost_s=190.0) is Decision.KEEP
     assert decide((), since_replan_s=0.0, active_cost_s=200.0, new_cost_s=150.0) is Decision.REPLACE_BETTER
-    assert decide(meeting, since_replan_s=0.0, active_cost_s=200.0, new_cost_s=90.0,
-                  new_conflicts=near) is Decision.KEEP
+    assert decide((), since_replan_s=0.0, active_cost_s=200.0, new_cost_s=150.0, apart_m=ALIKE_M + 1.0) is Decision.KEEP
+    assert decide((), since_replan_s=0.0, active_cost_s=200.0, new_cost_s=130.0,
+                  apart_m=ALIKE_M + 1.0) is Decision.REPLACE_BETTER
 
 
 def test_path_distance_by_hand() -> None:
