@@ -9,7 +9,7 @@ from typing import Any
 from companion.boat import Boat, Polar, ardurover_sitl, constant, read_polar
 from companion.errors import InputError
 from companion.geofence import Mission
-from companion.skipper.config import Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.config import Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.voyage import Goal, Side, Voyage
 from companion.traffic import TargetLimits
 from companion.traffic.feeds import parse_feed
@@ -74,6 +74,8 @@ def config_of(mission: Mission) -> SkipperConfig:
         "plan_budget_s": options.planning_budget_s,
         "first_plan_budget_s": options.planning_budget_s,
         "replan_policy": ReplanPolicy(options.replan),
+        "guidance": Guidance(options.guidance),
+        "station_s": options.station_s,
         "min_replan_interval_s": options.min_replan_s,
         "traffic_clearance_m": mission.traffic.safe_distance_m,
         "traffic_time_s": mission.traffic.safe_time_s,

@@ -93,6 +93,10 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     replan: Literal["waypoint", "forecast"] = "waypoint"
     """At each waypoint, or also when the wind leaves what was forecast."""
     end: Literal["loiter", "home"] = "loiter"
+    guidance: Literal["plan", "field"] = "plan"
+    """Sail the plan's mission in AUTO, or steer by vector fields in GUIDED ([operator] guided and set_auto allow it)."""
+    station_s: NonNegative = 0.0
+    """Stay at the last goal for this long."""
     laps: Annotated[int, Meta(ge=1, le=10_000)] = 1
     bandwidth_m: Positive | None = None
     """Half width of the lane between two goals; None: no lane."""

@@ -17,6 +17,13 @@ class ReplanPolicy(enum.Enum):
     FORECAST = "forecast"      # only when the forecast has changed enough to matter
 
 
+class Guidance(enum.Enum):
+    """What steers the boat."""
+
+    PLAN = "plan"              # the mission, in AUTO
+    FIELD = "field"            # vector fields, in GUIDED; the mission on board is what is left when we are gone
+
+
 class SafeEnd(enum.Enum):
     """The last item of every mission."""
 
@@ -95,3 +102,5 @@ class SkipperConfig:
     # Büsser's own interface: headings sent in GUIDED instead of a mission sailed in AUTO. The mission is on board all
     # the same, its count kept in step; but a companion that dies in GUIDED leaves a boat that loiters where it is.
     steer_by_heading: bool = False
+    guidance: Guidance = Guidance.PLAN
+    station_s: float = 0.0             # how long to stay at the last goal

@@ -6,6 +6,7 @@ import math
 
 from companion.messages import Mode, StatusText
 from companion.skipper.actions import CancelPlan, Severity
+from companion.skipper.config import Guidance
 from companion.skipper.gates import Gate, passed_on
 from companion.skipper.geometry import distance_m, leg_distance_m, waypoint_done
 from companion.skipper.planning import take_plan, take_upload
@@ -112,6 +113,11 @@ def locate(turn: Turn) -> None:
         if guided:
             turn.update(index=min(turn.state.own_index, len(route.items) - 1), passed_since_s=None)
         _pass_gates(turn)
+        if guided and turn.config.guidance is Guidance.FIELD and turn.state.route is not None:
+            # Steered to the gates themselves: the waypoints before a gate that is passed need not be.
+            done = [n + 1 for n, g in enumerate(route.gate_of) if 0 <= g < turn.state.gate]
+            if done and done[-1] > turn.state.index:
+                turn.update(index=done[-1], own_index=done[-1])
         _remember(turn)
 
 

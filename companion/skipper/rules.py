@@ -29,7 +29,7 @@ from companion.skipper.planning import request, upload
 from companion.skipper.route import is_mixture, is_same_mission
 from companion.skipper.sailing import sail
 from companion.skipper.snapshot import OperatorWish, Snapshot, WindHealth
-from companion.skipper.state import PATIENT, Persisted, Phase, SkipperState
+from companion.skipper.state import PATIENT, ByField, Persisted, Phase, SkipperState
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import Voyage
 from companion.skipper.watchdogs import watch
@@ -82,6 +82,7 @@ class Skipper:
             return state.adoptable
         return Persisted(
             voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route, pending=pending,
+            own_mode=state.own_mode,
         )
 
 
@@ -121,6 +122,7 @@ def _rebooted(turn: Turn) -> None:
     keeps = turn.state.phase is Phase.OPERATOR and since is not None and turn.t_s - since > REBOOT_RACE_S
     turn.update(
         checked_mission=False, read_since_s=turn.t_s, own_mode=None, steering_until_s=None, pending_command=None,
+        by_field=ByField(),
     )
     if not keeps:
         turn.update(sailing=False, operator_since_s=None)
@@ -135,7 +137,7 @@ def _operator_has_it(turn: Turn) -> bool:
     gone = turn.is_taken
     if state.phase is not Phase.OPERATOR:
         if not gone:
-            held = state.steering_until_s is not None or turn.steers
+            held = state.steering_until_s is not None or state.by_field.resort.engaged or turn.steers
             if status.mode is Mode.AUTO and state.own_mode is not None and not held:
                 turn.update(own_mode=None)
             return False
@@ -143,6 +145,7 @@ def _operator_has_it(turn: Turn) -> bool:
             turn.act(CancelPlan(request_id=state.pending_plan.request_id))
         turn.update(
             operator_since_s=turn.t_s, pending_plan=None, own_mode=None, steering_until_s=None, pending_command=None,
+            by_field=ByField(),
         )
         what = "disarmed" if not status.is_armed else f"mode {status.mode.name if status.mode is not None else '?'}"
         turn.phase(Phase.OPERATOR, f"{what}, not by us: the companion does nothing until AUTO comes back")
@@ -257,7 +260,7 @@ def _adopt(turn: Turn, saved: Persisted) -> None:
     status = turn.autopilot
     index = (status.mission_seq or 1) - 1 if status is not None else 0
     turn.update(
-        gate=saved.gate, index=index, own_index=index, after_restart=True,
+        gate=saved.gate, index=index, own_index=index, after_restart=True, own_mode=saved.own_mode,
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         sailing=_under_way(turn) or (saved.sailing and status is not None and status.is_armed),
     )

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.actions import CancelPlan, ReplanReason, Severity, SteerHeading
-from companion.skipper.config import ReplanPolicy
+from companion.skipper.by_field import heading as by_field_heading
+from companion.skipper.by_field import keeps_station, last_resort
+from companion.skipper.config import Guidance, ReplanPolicy
 from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m
 from companion.skipper.headings import desired_heading_rad
@@ -49,7 +51,10 @@ class Trigger:
 def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     """Act for one step under way."""
     if turn.gate is None:
-        _finish(turn)
+        if not keeps_station(turn):
+            _finish(turn)
+        return
+    if last_resort(turn):
         return
     if _steer(turn, fresh):
         return
@@ -62,6 +67,10 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         return
     if turn.steers:
         _send_heading(turn)
+    elif turn.config.guidance is Guidance.FIELD:
+        turn.say(Severity.WARNING, "guidance", "guidance by field is asked for and steering is not permitted: by plan",
+                 every_s=600.0)
+        check_current(turn)
     else:
         check_current(turn)
     if turn.is_raised("stuck waypoint") and turn.state.own_index > turn.state.index:
@@ -85,9 +94,13 @@ def _send_heading(turn: Turn) -> None:
         set_mode(turn, Mode.GUIDED, "steering by headings")
         return
     turn.update(own_mode=Mode.GUIDED)
-    heading = desired_heading_rad(turn)
-    if heading is not None:
-        turn.act(SteerHeading(heading_rad=heading, text="leg"))
+    if turn.config.guidance is Guidance.FIELD:
+        told = by_field_heading(turn)
+    else:
+        wanted = desired_heading_rad(turn)
+        told = None if wanted is None else (wanted, "leg")
+    if told is not None:
+        turn.act(SteerHeading(heading_rad=told[0], text=told[1]))
     if status.mission_seq is not None and status.mission_seq < turn.state.index + 1:
         make_current(turn, turn.state.index + 1)
 
@@ -138,6 +151,8 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
+    if turn.config.guidance is Guidance.FIELD and turn.steers:
+        return _at_end(turn) or _extension(turn)   # the mission on board need not be the way that is sailed
     trigger = _traffic(turn)
     if trigger is None and not turn.is_raised("wind untrusted"):
         trigger = _no_go(turn)
@@ -192,14 +207,18 @@ def _no_go(turn: Turn) -> Trigger | None:
 
 def _position(turn: Turn) -> Trigger | None:
     """The boat is not where the plan has it, or is nowhere on it."""
-    config = turn.config
     if turn.is_raised("off the corridor"):
         return Trigger(reason=ReplanReason.OFF_LEG, text="off the leg", interval_s=_patience_off_leg_s(turn))
     if turn.is_raised("no progress"):
         return Trigger(reason=ReplanReason.NO_PROGRESS, text="no progress", interval_s=120.0)
+    return _at_end(turn)
+
+
+def _at_end(turn: Turn) -> Trigger | None:
+    """The mission on board is at its end and goals remain."""
     if (turn.is_raised("mission ended") or not turn.ahead()) and not seeks_refuge(turn):
         reason = ReplanReason.RETRY if turn.state.phase is Phase.HOLDING else ReplanReason.NEXT_GOAL
-        return Trigger(reason=reason, text="at the end of the mission with goals left", interval_s=config.settle_s)
+        return Trigger(reason=reason, text="at the end of the mission with goals left", interval_s=turn.config.settle_s)
     return None
 
 

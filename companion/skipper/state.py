@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from companion.field.guidance import LastResort
+from companion.field.station import StationState
+from companion.field.values import GuidanceState
 from companion.messages import MissionItem, Mode
 from companion.skipper.actions import ReplanReason
 from companion.skipper.snapshot import OperatorWish
@@ -22,6 +25,7 @@ class Phase(enum.Enum):
     NEW_CALCULATION = "new calculation"            # 3.2.2: no valid plan until the planner answers
     DESTINATION_APPROACH = "destination approach"  # 3.2.3: the last waypoint is the target
     BUOY_APPROACH = "buoy approach"                # 3.2.4
+    LAST_RESORT = "last resort"                    # a vessel too near to plan for: steered by field
     HOLDING = "holding"                            # nothing found or something wrong: in a safe item, waiting
     OPERATOR = "operator"                          # somebody else has the boat
     DONE = "done"
@@ -100,6 +104,19 @@ PATIENT = Retry()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ByField:
+    """Steering by field: the memory of the guidance and of the station keeper, and the last resort's."""
+
+    resort: LastResort = field(default_factory=LastResort)
+    clear_s: float | None = None          # since when the water is clear
+    seen_guided: bool = False             # GUIDED has shown since the field took over
+    not_before_s: float = float("-inf")   # somebody set AUTO in the middle of it: not again before
+    guidance: GuidanceState = field(default_factory=GuidanceState)
+    station: StationState = field(default_factory=StationState)
+    station_since_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SkipperState:
     """Everything that ``step`` needs from before. ``Skipper.initial`` makes the first."""
 
@@ -158,6 +175,7 @@ class SkipperState:
     entering: tuple[tuple[str, float], ...] = ()   # watchdogs whose entry condition holds, since when
     steering_until_s: float | None = None          # bearing away in GUIDED until
     steering_heading_rad: float | None = None
+    by_field: ByField = ByField()
     irons_s: tuple[float, ...] = ()                # when the boat was in irons
     watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
     announced: tuple[tuple[str, float], ...] = ()  # code, last said
@@ -175,12 +193,14 @@ class Persisted:
     sailing: bool
     route: Route | None
     pending: Route | None
+    own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""
         return {
             "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
             "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
+            "own_mode": None if self.own_mode is None else self.own_mode.name,
         }
 
     @classmethod
@@ -192,6 +212,7 @@ class Persisted:
             return cls(
                 voyage=str(data["voyage"]), gate=int(data["gate"]), sailing=bool(data["sailing"]),
                 route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
+                own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
             )
         except (KeyError, TypeError, IndexError, AttributeError) as error:
             raise ValueError(f"the saved state is damaged: {error!r}") from error

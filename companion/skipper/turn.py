@@ -23,7 +23,7 @@ from companion.skipper.actions import (
     UploadFence,
     UploadMission,
 )
-from companion.skipper.config import Permissions, SkipperConfig
+from companion.skipper.config import Guidance, Permissions, SkipperConfig
 from companion.skipper.gates import Gate
 from companion.skipper.problem import wind_mean, wind_now
 from companion.skipper.route import ends_safely
@@ -189,7 +189,8 @@ class Turn:
     def steers(self) -> bool:
         """Whether the boat is steered by headings (and may be)."""
         may = self.snapshot.permissions
-        return self.config.steer_by_heading and may.may_steer and may.may_set_mode
+        wanted = self.config.steer_by_heading or self.config.guidance is Guidance.FIELD
+        return wanted and may.may_steer and may.may_set_mode
 
     def leg(self) -> tuple[PointEn, PointEn] | None:
         """Return the planned leg being sailed (from, to), None without a route."""

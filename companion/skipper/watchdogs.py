@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.actions import Severity
+from companion.skipper.by_field import meets_in
 from companion.skipper.geometry import along_m, cross_track_m, distance_m
 from companion.skipper.snapshot import WindHealth
 from companion.skipper.state import Raised
@@ -33,6 +34,7 @@ class Response(enum.Enum):
     RESTART = "read the mission, take it over if it is ours, and start again as far as permitted"
     COMPARE = "read the mission; ours: go on; not ours: stop acting and report"
     ADVANCE = "make the next item current"
+    BY_FIELD = "steer by field under GUIDED, plan again from there, back to AUTO when the way is clear"
     REFUGE = "say so; plan to the nearest refuge if the mission names one"
 
 
@@ -74,6 +76,9 @@ TABLE: tuple[Watchdog, ...] = (
     W(name="in irons", watches="speed ahead while pointing within 35° of the wind", enter=0.3, exit=0.8, unit="m/s",
       enter_s=8.0, exit_s=3.0, severity=S.WARNING, response=Response.BEAR_AWAY,
       why="ArduRover has no recovery of its own; a tack takes 2 to 7 s"),
+    W(name="vessel too near", watches="time until the way being sailed is within half the distance to keep of a vessel",
+      enter=30.0, exit=60.0, unit="s", enter_s=2.0, exit_s=8.0, severity=S.WARNING, response=Response.BY_FIELD,
+      why="a plan, its upload and the turn take too long; while headings are sent, our own field keeps clear"),
     W(name="no progress", watches="way made good towards the target in 180 s", enter=5.0, exit=15.0, unit="m",
       enter_s=0.0, exit_s=0.0, severity=S.WARNING, response=Response.REPLAN,
       why="current, weed, a lee: whatever the plan did not know"),
@@ -160,6 +165,11 @@ def _irons(turn: Turn) -> float | None:
     return max(0.0, ahead)
 
 
+def _too_near(turn: Turn) -> float | None:
+    met = meets_in(turn)
+    return None if met is None else met[0]
+
+
 def _progress(turn: Turn) -> float | None:
     """Way made good in the window; None before the window is full or while there is a reason to stand still."""
     if turn.is_raised("becalmed") or not turn.ahead() or not turn.state.history:
@@ -242,10 +252,10 @@ def _planner(turn: Turn) -> float | None:
 
 _MEASURES: dict[str, Callable[[Turn], float | None]] = {
     "link silent": _link, "position lost": _position_lost, "position jump": _jump, "wind untrusted": _wind,
-    "becalmed": _becalmed, "in irons": _irons, "no progress": _progress, "heading against course": _heading,
-    "off the corridor": _corridor, "stuck waypoint": _stuck, "mission ended": _ended, "fence breach": _breach,
-    "foreign mission": _foreign, "reboot": _reboot, "battery low": _battery, "battery critical": _battery,
-    "planner dead": _planner,
+    "becalmed": _becalmed, "in irons": _irons, "vessel too near": _too_near, "no progress": _progress,
+    "heading against course": _heading, "off the corridor": _corridor, "stuck waypoint": _stuck,
+    "mission ended": _ended, "fence breach": _breach, "foreign mission": _foreign, "reboot": _reboot,
+    "battery low": _battery, "battery critical": _battery, "planner dead": _planner,
 }
 
 

@@ -31,8 +31,10 @@ from companion.skipper.snapshot import (
 from companion.skipper.state import Phase
 from companion.skipper.voyage import Goal, Side
 from companion.skipper.watchdogs import TABLE
+from companion.traffic import TrafficPicture
 from tests.skipper.test_voyage import make
 from tests.skipper.world import check_invariants
+from tests.traffic.conftest import vessel
 
 
 # --------------------------------------------------------------------------------------------- states
@@ -73,6 +75,11 @@ def states():
     held.events.append(OperatorWish.HOLD)
     held.run(60)
     keep("holding", held)
+    near = make(Goal(en_m=(300.0, 0.0)), obstacles=(), heading=math.pi / 2)
+    near.run(60)
+    near.extra = {"traffic": on_collision_course(near.snapshot())}
+    near.run(20, lambda w: w.state.by_field.seen_guided)
+    keep("last resort", near)
     fresh.run(1500, lambda w: w.state.phase is Phase.DESTINATION_APPROACH)
     keep("destination approach", fresh)
     fresh.run(1500, lambda w: w.state.phase is Phase.DONE)
@@ -88,7 +95,8 @@ def states():
 
 NAMES = (
     "idle", "waiting", "new calculation", "first upload", "standard", "planning under way", "uploading under way",
-    "operator", "comparing", "holding", "destination approach", "done", "buoy approach", "after a failed upload",
+    "operator", "comparing", "holding", "last resort", "destination approach", "done", "buoy approach",
+    "after a failed upload",
 )
 
 
@@ -130,6 +138,14 @@ def beside(snapshot, state):
     return moved(snapshot.position_en_m, heading + math.pi / 2, 22.0)
 
 
+def on_collision_course(snapshot, gap_m=90.0):
+    """Return the picture of a boat of 12 m that is ``gap_m`` to the east and comes straight at ours."""
+    east, north = snapshot.position_en_m
+    return TrafficPicture(t_s=snapshot.t_s, vessels=(vessel(
+        en=(east + gap_m, north), course_deg=270.0, speed_mps=4.0, t_s=snapshot.t_s,
+        size=(6.0, 6.0, 2.0, 2.0)),))
+
+
 EVENTS = {
     "nothing": lambda s: s,
     # one for each watchdog, by its name
@@ -142,6 +158,7 @@ EVENTS = {
         wind=replace(s.wind, health=WindHealth.LIGHT, mean_tws_mps=0.1, present_tws_mps=0.1)),
     "in irons": lambda s: replace(
         vehicle(velocity_en_mps=(0.0, -0.1), heading_rad=s.wind.present_twd_from_rad or 0.0)(s)),
+    "vessel too near": lambda s: replace(s, traffic=on_collision_course(s)),
     "no progress": vehicle(velocity_en_mps=(0.0, 0.0)),
     "heading against course": vehicle(velocity_en_mps=(-1.0, -1.0), heading_rad=math.pi / 4),
     "off the corridor": lambda s, state: replace(s, position_en_m=beside(s, state)),
