@@ -140,7 +140,7 @@ class Executor:
         autopilot = self._autopilot
         if isinstance(action, UploadMission):
             done = await autopilot.upload_mission(
-                action.items, keep_first=action.keep_first, set_current=action.set_current)
+                action.items, keep_first=action.keep_first, set_current=action.set_current, stopgap=action.stopgap)
             return UploadOutcome(upload_id=action.upload_id, result=_UPLOADS.get(done.outcome, UploadResult.TIMEOUT),
                                  text=_join(done.text, f"{done.method} {done.duration_s:.2f} s"))
         if isinstance(action, UploadFence):

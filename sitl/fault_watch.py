@@ -1,26 +1,32 @@
 """Watches a voyage with faults from the outside, and judges it.
 
-What counts as contact. An entry into what is solid fails the voyage unless one of these holds at that moment, and
-then it is counted under that name:
+What counts as contact. An entry into what is solid fails the voyage. It is counted under another name only where
+nothing on board could have prevented it:
 
-- ``position``: an injected position error was in force and the boat was clear of everything where its receiver
-  put it: nobody on board could know better; or one had ended less than 30 s ago: the boat was sailed there by it,
-  a position that jumps is not believed for 20 s, in whichever direction it jumped, and a boat takes time to turn;
-- ``operator``: the boat was not in AUTO or GUIDED, or not armed (an operator's mode, a failsafe of the autopilot
-  that stops it, a reboot that leaves it disarmed): a sailboat that nobody steers drifts; or it was given back less
-  than 10 s ago, which is what a tack away from a rock takes;
-- ``foreign``: the boat followed a mission that somebody else put on board, which the companion may not replace.
+- ``false position``: the position that every instrument on board reports was wrong at that moment, by an injected
+  error, and clear of everything; or it became right less than ``REACTION_S`` ago, which is what it takes to see it,
+  plan, upload, read back and turn a boat at speed;
+- ``operator``: a person had the boat (a mode that the companion may not end), or gave it back less than
+  ``REACTION_S`` ago;
+- ``autopilot refuses``: a failsafe of the autopilot had stopped it, or it was booting and could not be armed; or that
+  ended less than ``RESUME_S`` ago;
+- ``cut off``: it lay stopped or disarmed by the autopilot's own doing while the link was cut or the companion dead;
+- ``foreign``: the boat followed a mission that somebody else put on board and that the companion may not replace.
 
-What counts as a mixture. The list on the autopilot, up to the item that ends it, is at every moment one that somebody
-uploaded as a whole, or there is none. It may be otherwise while an upload is under way (without MAVFTP items are
-written in place, one by one, for as long as a bad link makes it), and while nobody can mend it: with the link cut
-or the companion dead. How long that was is a figure of its own.
+What counts as a mixture. The mission on the autopilot, up to the item that ends it, is at every moment one that was
+asked for as a whole, or a beginning of one that ends in a loiter at one of its own waypoints (what stands there while
+an upload without MAVFTP is under way), or there is none; anything else under way is a mixture, whatever the link and
+whoever lives. On a boat that was not armed yet a beginning without its end is a first upload on its way.
+
+Silence counts within a life of the companion: a dead process says nothing. That the process ends for want of an
+autopilot, with an error that names it, and is started again by its service 5 s later is no unhandled error.
 """
 
 from __future__ import annotations
 
+import bisect
+import enum
 import itertools
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -34,91 +40,118 @@ from companion.geo.frame import LocalFrame
 from companion.messages import Command, Mode
 from companion.skipper.actions import UploadMission
 from sitl.autopilot import Autopilot, MemoryLink
+from sitl.scenario import EventSpec
 
 MAX_SILENCE_S = 10.0
-# A mission may be half there for this long with no upload under way and a link that works [s]: putting a torn upload
-# right takes a read, item by item, before the next upload.
-MAX_MIXTURE_S = 20.0
-# A position error excuses a contact for this long after its end [s]: the watchdog's 20 s, and ten to turn the boat.
-AFTER_ERROR_S = 30.0
-AFTER_OPERATOR_S = 10.0
+# From knowing to being on another course [s]: a step of 1 s to see it, 1 s to plan, 1.5 s to upload and read back, and
+# 2.5 s for a turn of 180 degrees at speed.
+REACTION_S = 6.0
+# From an autopilot that can be sailed again to a boat that steers [s]: two commands, each believed when the heartbeat
+# of the following second shows it, and the time to gather steerage way.
+RESUME_S = 10.0
+# What excuses a contact, in the words of the campaign's table.
+EXCUSES = {
+    "false position": f"with the reported position wrong and clear, or right again for less than {REACTION_S:g} s",
+    "operator": f"in a person's hands, or given back less than {REACTION_S:g} s before",
+    "autopilot refuses": f"stopped by a failsafe or booting, or that over for less than {RESUME_S:g} s",
+    "cut off": "stopped by the autopilot, with the link cut or the companion dead",
+    "foreign": "following a stranger's mission, which may not be replaced",
+}
 # Where a mission stops being read.
 _ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
 
 MissionKey = tuple[tuple[int, int, int], ...]
 
 
+class Helm(enum.Enum):
+    """Who steers."""
+
+    SAILED = "sailed"          # armed, and in AUTO or GUIDED
+    REFUSED = "refused"        # stopped by a failsafe that lasts, or disarmed and not to be armed yet
+    ADRIFT = "adrift"          # stopped or disarmed, and free to be sailed
+
+
 @dataclass(slots=True)
 class Watch:
-    """An observer of one run, and its judge."""
+    """An observer of one run, and its judge. ``operator_s`` is when a person had the boat, from and to [s]."""
 
     solid: BaseGeometry
     frame: LocalFrame
+    operator_s: list[tuple[float, float]] = field(default_factory=list)
     t_s: list[float] = field(default_factory=list)
     en_m: list[tuple[float, float]] = field(default_factory=list)
     believed_en_m: list[tuple[float, float]] = field(default_factory=list)
-    steered: list[bool] = field(default_factory=list)
+    helm: list[Helm] = field(default_factory=list)
+    armed: list[bool] = field(default_factory=list)
     missions: list[MissionKey] = field(default_factory=list)
     link_up: list[bool] = field(default_factory=list)
     lives: list[tuple[float, float]] = field(default_factory=list)
     ours: set[MissionKey] = field(default_factory=set)
     foreign: set[MissionKey] = field(default_factory=set)
-    uploading: list[bool] = field(default_factory=list)
     has_sailed: bool = False
-    _uploads: bool = False
     _last: tuple[Any, MissionKey] = ((), ())
 
     def step(self, step: Step) -> None:
         """Note what the companion uploads."""
-        self._uploads = step.state.pending_upload is not None
         for action in step.actions:
             if isinstance(action, UploadMission):
                 self.ours.add(mission_key((i.command, i.lat_e7, i.lon_e7) for i in action.items))
 
     def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:
-        """Note where the boat is, where it believes to be, and what it sails by."""
+        """Note where the boat is, where it believes to be, who steers, and what it sails by."""
         truth, pilot = autopilot.truth, autopilot.chart.point(autopilot.vehicle.position)
-        self.has_sailed = self.has_sailed or (truth.is_armed and truth.mode in {Mode.AUTO, Mode.GUIDED})
+        helm = Helm.ADRIFT
+        if truth.is_armed and truth.mode in {Mode.AUTO, Mode.GUIDED}:
+            helm = Helm.SAILED
+        elif autopilot.failsafe.is_active or not (truth.is_armed or autopilot.ekf_ready):
+            helm = Helm.REFUSED
+        self.has_sailed = self.has_sailed or helm is Helm.SAILED
         self.t_s.append(t_s)
         self.en_m.append(self.frame.en_from_geo(truth.position))
         self.believed_en_m.append(self.frame.en_from_geo(pilot))
-        self.steered.append(truth.is_armed and truth.mode in {Mode.AUTO, Mode.GUIDED})
+        self.helm.append(helm)
+        self.armed.append(truth.is_armed)
         items = tuple(autopilot.helm.mission.items[1:])
         if items != self._last[0]:
             self._last = (items, mission_key((i.command, i.x, i.y) for i in items))
         self.missions.append(self._last[1])
         self.link_up.append(not link.is_cut)
-        self.uploading.append(self._uploads)
 
     def life(self, start_s: float, end_s: float) -> None:
         """Note one life of the companion."""
-        self._uploads = False
         self.lives.append((start_s, end_s))
 
-    def contacts(self) -> Counter[str]:
-        """Return entries into what is solid, by the reason that excuses them; "unexcused" for none."""
-        counts: Counter[str] = Counter()
+    # ------------------------------------------------------------------------------------------ contacts
+    def contacts(self) -> list[tuple[float, str]]:
+        """Return when the boat entered what is solid [s], and what excuses it; "unexcused" for nothing."""
         if not self.t_s:
-            return counts
+            return []
         shapely.prepare(self.solid)
-        positions, believed = np.asarray(self.en_m), np.asarray(self.believed_en_m)
-        wrong = np.hypot(*(positions - believed).T) > 1.0
-        times, steered = np.asarray(self.t_s), np.asarray(self.steered)
-        taken = ~steered & np.logical_or.accumulate(steered)
+        positions = np.asarray(self.en_m)
         inside = shapely.intersects(self.solid, shapely.points(positions))
-        believed_inside = shapely.intersects(self.solid, shapely.points(believed))
         entries = np.flatnonzero(inside & ~np.concatenate([[False], inside[:-1]]))
-        for i in entries:
-            recent = wrong & (times > times[i] - AFTER_ERROR_S) & (times < times[i])
-            if (wrong[i] and not believed_inside[i]) or (not wrong[i] and recent.any()):
-                counts["position"] += 1
-            elif not steered[i] or (taken & (times > times[i] - AFTER_OPERATOR_S) & (times < times[i])).any():
-                counts["operator"] += 1
-            elif self.missions[i] in self.foreign:
-                counts["foreign"] += 1
-            else:
-                counts["unexcused"] += 1
-        return counts
+        return [(self.t_s[i], self._excuse(int(i))) for i in entries]
+
+    def _excuse(self, i: int) -> str:
+        wrong = np.hypot(*(np.asarray(self.en_m) - np.asarray(self.believed_en_m)).T) > 1.0
+        if wrong[i] and not shapely.intersects(self.solid, shapely.points(self.believed_en_m[i])):
+            return "false position"
+        if not wrong[i] and wrong[self._since(i, REACTION_S):i].any():
+            return "false position"
+        t_s = self.t_s[i]
+        if any(a <= t_s <= b + REACTION_S for a, b in self.operator_s):
+            return "operator"
+        if Helm.REFUSED in self.helm[self._since(i, RESUME_S):i + 1]:
+            return "autopilot refuses"
+        if self.helm[i] is Helm.ADRIFT and not (self.link_up[i] and any(a <= t_s <= b for a, b in self.lives)):
+            return "cut off"
+        if self.missions[i] in self.foreign:
+            return "foreign"
+        return "unexcused"
+
+    def _since(self, i: int, span_s: float) -> int:
+        """Return the index of the first sample not more than ``span_s`` before sample ``i``."""
+        return bisect.bisect_left(self.t_s, self.t_s[i] - span_s)
 
     def clearance_m(self) -> float | None:
         """Return the smallest true distance to anything solid [m]."""
@@ -126,37 +159,41 @@ class Watch:
             return None
         return float(np.min(shapely.distance(self.solid, shapely.points(np.asarray(self.en_m)))))
 
-    def mixture_s(self) -> tuple[float, bool]:
-        """Return how long the mission on board was no whole one while it could be put right, and if it is so at last.
+    # ------------------------------------------------------------------------------------------ missions
+    def mixture_s(self) -> float:
+        """Return the longest time that the mission on board was a mixture [s]; a single sample counts 1 ms."""
+        return self._longest_s({"mixture"})
 
-        Only while the link is up and the companion lives can anybody do something about it; a mission on its way is
-        none yet.
-        """
-        free = [
-            up and not uploads and any(a <= t <= b for a, b in self.lives)
-            for t, up, uploads in zip(self.t_s, self.link_up, self.uploading, strict=True)
-        ]
-        last = self.missions[-1] if self.missions else ()
-        return self._longest_mixed_s(free), self._is_mixed(last)
+    def held_back_s(self) -> float:
+        """Return the longest time that a beginning of a mission, ended by a loiter, stood on board [s]."""
+        return self._longest_s({"closed"})
 
-    def half_written_s(self) -> float:
-        """Return how long the mission on board was no whole one, for whatever reason [s]."""
-        return self._longest_mixed_s([True] * len(self.t_s))
+    def kind(self, key: MissionKey, *, was_armed: bool) -> str:
+        """Return what the mission on board is: "whole", "closed", "begun", "mixture"."""
+        if not key or key in self.ours or key in self.foreign:
+            return "whole"
+        places = {place[1:] for mission in self.ours for place in mission}
+        is_beginning = any(mission[:len(key) - 1] == key[:-1] for mission in self.ours)
+        if is_beginning and key[-1][0] == Command.NAV_LOITER_UNLIM and key[-1][1:] in places:
+            return "closed"
+        if not was_armed and any(mission[:len(key)] == key for mission in self.ours):
+            return "begun"
+        return "mixture"
 
-    def _is_mixed(self, key: MissionKey) -> bool:
-        return bool(key) and key not in self.ours and key not in self.foreign
-
-    def _longest_mixed_s(self, counts: Sequence[bool]) -> float:
+    def _longest_s(self, kinds: set[str]) -> float:
         longest = 0.0
         since_s: float | None = None
-        for t_s, key, is_counted in zip(self.t_s, self.missions, counts, strict=True):
-            if not is_counted or not self._is_mixed(key):
+        was_armed = False
+        for t_s, key, armed in zip(self.t_s, self.missions, self.armed, strict=True):
+            was_armed = was_armed or armed
+            if self.kind(key, was_armed=was_armed) not in kinds:
                 since_s = None
                 continue
             since_s = t_s if since_s is None else since_s
-            longest = max(longest, t_s - since_s)
+            longest = max(longest, t_s - since_s, 1e-3)
         return longest
 
+    # ------------------------------------------------------------------------------------------- silence
     def silence_s(self, status_s: Sequence[float]) -> float:
         """Return the longest time without a status within a life of the companion [s]."""
         longest = 0.0
@@ -174,3 +211,17 @@ def mission_key(items: Iterable[tuple[int, int, int]]) -> MissionKey:
         if command in _ENDS:
             break
     return tuple(out)
+
+
+def operator_spans(events: Iterable[EventSpec], end_s: float) -> list[tuple[float, float]]:
+    """Return when a person had the boat, from and to [s]: from a mode other than AUTO to the next AUTO."""
+    spans: list[tuple[float, float]] = []
+    since_s: float | None = None
+    for event in sorted((e for e in events if e.kind == "mode"), key=lambda e: e.at_s):
+        if event.mode != Mode.AUTO.name:
+            since_s = event.at_s if since_s is None else since_s
+        elif since_s is not None:
+            spans.append((since_s, event.at_s))
+            since_s = None
+    return spans if since_s is None else [*spans, (since_s, end_s)]
+

@@ -24,7 +24,7 @@ from typing import Any
 from companion.errors import InputError
 from companion.fold import Step
 from sitl.fault_draw import draw
-from sitl.fault_watch import MAX_MIXTURE_S, MAX_SILENCE_S, Watch, mission_key
+from sitl.fault_watch import EXCUSES, MAX_SILENCE_S, Watch, mission_key, operator_spans
 from sitl.scenario import load_scenario
 
 BASE = Path(__file__).parent / "scenarios" / "faults" / "rocks.toml"
@@ -45,7 +45,8 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
     scenario = draw(seed, load_scenario(base))
     mission = load_mission(scenario.mission_path(base))
     frame = mission.frame()
-    watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame)
+    watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame,
+                  operator_s=operator_spans(scenario.events, scenario.limit_s))
     for event in scenario.events:
         if event.kind == "foreign_mission":
             item = waypoint(frame.geo_from_en(event.east_m, event.north_m))
@@ -67,16 +68,10 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
             errors = [str(e) for c in verdict.checks if c.name == "no unhandled error" for e in c.figure]
         except Exception as error:
             errors = [repr(error)]
-    contacts = watch.contacts()
-    mixture_s, is_mixed_at_last = watch.mixture_s()
-    silence_s = watch.silence_s(status_s)
-    faults = []
-    if contacts["unexcused"]:
-        faults.append("contact")
-    if mixture_s > MAX_MIXTURE_S:
-        faults.append(f"a mixture for {mixture_s:.0f} s")
-    elif is_mixed_at_last and _could_act_at_last(watch):
-        faults.append("a mixture at last")
+    contacts, mixture_s, silence_s = watch.contacts(), watch.mixture_s(), watch.silence_s(status_s)
+    faults = [f"contact at {t_s:.0f} s" for t_s, excuse in contacts if excuse == "unexcused"]
+    if mixture_s > 0.0:
+        faults.append(f"a mixture for {mixture_s:.1f} s")
     if silence_s > MAX_SILENCE_S:
         faults.append(f"silent for {silence_s:.0f} s")
     if errors:
@@ -86,18 +81,11 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
         "events": [f"{e.kind} at {e.at_s:.0f} s" for e in scenario.events],
         "kinds": sorted({e.kind for e in scenario.events}),
         "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
-        "contacts": dict(contacts), "clearance_m": watch.clearance_m(), "mixture_s": mixture_s,
-        "half_written_s": watch.half_written_s(),
+        "contacts": [{"t_s": t_s, "excuse": excuse} for t_s, excuse in contacts], "clearance_m": watch.clearance_m(),
+        "mixture_s": mixture_s, "held_back_s": watch.held_back_s(),
         "silence_s": silence_s, "sailed": watch.has_sailed, "errors": errors,
         "simulated_s": watch.t_s[-1] if watch.t_s else 0.0, "cpu_s": time.process_time() - began_s,
     }
-
-
-def _could_act_at_last(watch: Watch) -> bool:
-    """Return whether the companion lived and was connected for long enough before the end to put things right."""
-    since_s = watch.t_s[-1] - MAX_MIXTURE_S
-    return all(up for t, up in zip(watch.t_s, watch.link_up, strict=True) if t >= since_s) and any(
-        a <= since_s and b >= watch.t_s[-1] - 1.0 for a, b in watch.lives)
 
 
 def run_seeds(seeds: Sequence[int], workers: int | None) -> Iterator[dict[str, Any]]:
@@ -141,19 +129,23 @@ def run_faults(
 
 def figures_of(records: Sequence[dict[str, Any]], wall_s: float) -> dict[str, Any]:
     """Return what was counted over all voyages."""
-    excused: Counter[str] = Counter()
+    touched: Counter[str] = Counter()
     kinds: Counter[str] = Counter()
     for record in records:
-        excused.update(record["contacts"])
+        touched.update({c["excuse"] for c in record["contacts"]})
         kinds.update(record["kinds"])
     times = [r["time_s"] for r in records if r["arrived"]]
     return {
         "voyages": len(records), "passed": sum(r["passed"] for r in records),
         "failed_seeds": [r["seed"] for r in records if not r["passed"]],
         "arrived": sum(r["arrived"] for r in records),
-        "contacts_unexcused": excused.pop("unexcused", 0), "contacts_excused": dict(sorted(excused.items())),
+        "touched": touched.pop("unexcused", 0), "touched_excused": dict(sorted(touched.items())),
+        "excused_seeds": {
+            excuse: [r["seed"] for r in records if any(c["excuse"] == excuse for c in r["contacts"])]
+            for excuse in sorted(touched)
+        },
         "mixture_max_s": max((r["mixture_s"] for r in records), default=0.0),
-        "half_written_max_s": max((r["half_written_s"] for r in records), default=0.0),
+        "held_back_max_s": max((r["held_back_s"] for r in records), default=0.0),
         "silence_max_s": max((r["silence_s"] for r in records), default=0.0),
         "unhandled": sum(bool(r["errors"]) for r in records),
         "time_median_s": statistics.median(times) if times else None,
@@ -167,11 +159,11 @@ def print_figures(table: dict[str, Any]) -> None:
     """Print what was counted."""
     n = max(1, table["voyages"])
     print(f"{table['voyages']} voyages, {table['passed']} passed, {table['arrived']} arrived in time")
-    excused = ", ".join(f"{k} {v}" for k, v in table["contacts_excused"].items()) or "none"
-    print(f"contacts {table['contacts_unexcused']} (excused: {excused}); "
-          f"longest mixture {table['mixture_max_s']:.1f} s (half written, with its reasons, "
-          f"{table['half_written_max_s']:.1f} s); "
+    print(f"touched something: {table['touched']} voyages; longest mixture {table['mixture_max_s']:.1f} s; "
           f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}")
+    for excuse, voyages in table["touched_excused"].items():
+        print(f"  excused: {voyages} voyages touched, {EXCUSES[excuse]}")
+    print(f"  a mission held back by a slow upload, ended by a loiter: {table['held_back_max_s']:.1f} s at most")
     print("voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items()))
     print(f"{table['simulated_s'] / 3600.0:.1f} h simulated in {table['wall_s']:.0f} s, "
           f"{table['cpu_s'] / n:.2f} CPU s per voyage")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Literal, Self
 
@@ -38,7 +38,7 @@ from companion.messages import (
     Mode,
 )
 
-Method = Literal["auto", "ftp", "items", "partial"]
+Method = Literal["auto", "ftp", "items", "partial", "guarded"]
 OnValue = Callable[[Value], None]
 
 # How long the autopilot has to show what it acknowledged: its heartbeat and MISSION_CURRENT come once a second [s].
@@ -291,16 +291,20 @@ class Autopilot:
 
     async def upload_mission(
         self, items: Sequence[MissionItem], *, method: Method = "auto", keep_first: int = 0,
-        set_current: int | None = None,
+        set_current: int | None = None, stopgap: MissionItem | None = None,
     ) -> TransferResult:
         """Put ``items`` on the autopilot, read them back, compare, and then make ``set_current`` current if given.
 
         Args:
             items: without home; not empty. The last one should end the mission safely.
-            method: ``ftp`` in one piece, ``items`` one by one, ``partial`` only those behind ``keep_first``; ``auto``
-                takes ftp where the autopilot has it, else partial where ``keep_first`` allows it, else items.
+            method: ``ftp`` in one piece, ``items`` one by one, ``partial`` only those behind ``keep_first``,
+                ``guarded`` behind a stopgap; ``auto`` takes ftp where the autopilot has it, else guarded where there
+                is a stopgap, else partial where ``keep_first`` allows it, else items.
             keep_first: so many leading items are on the autopilot already, unchanged.
             set_current: item to sail to next, sent with reset.
+            stopgap: an item that ends a mission, to stand behind ``keep_first`` while the rest is written one by one:
+                what is on board is then at every moment the old mission, its beginning with the stopgap, or the new
+                one. Only where more than ``keep_first`` items are on board.
 
         A running autopilot keeps the tail of a longer old mission over ftp and partial writes. Over ftp the new one is
         padded with copies of its last item to the old length; a partial write leaves the tail behind the new end.
@@ -312,10 +316,15 @@ class Autopilot:
             await self.read_version()
         async with self.link.lock("lists"):
             result = TransferResult(outcome=Outcome.LINK, text="the link is silent")
-            for chosen in self._ways(items, method, keep_first):
+            for chosen in self._ways(items, method, keep_first, is_guarded=stopgap is not None):
                 if chosen == "ftp" and self._ftp_works is False:
                     continue
-                result = await self._upload_once(items, chosen, keep_first)
+                if chosen == "items" and result.method == "guarded" and result.outcome is not Outcome.UNSUPPORTED:
+                    break   # what failed by a bad link is not tried again without the guard
+                if chosen == "guarded" and stopgap is not None:
+                    result = await self._upload_guarded(items, keep_first, stopgap)
+                else:
+                    result = await self._upload_once(items, chosen, keep_first)
                 if result.is_ok or self.link.is_lost:
                     break
                 if chosen == "items" and result.outcome not in {Outcome.TIMEOUT, Outcome.MISMATCH}:
@@ -364,12 +373,17 @@ class Autopilot:
         return await self._clear(MissionType.FENCE)
 
     # ------------------------------------------------------------------------------------------ inside
-    def _ways(self, items: Sequence[MissionItem], method: Method, keep_first: int) -> tuple[Method, ...]:
+    def _ways(
+        self, items: Sequence[MissionItem], method: Method, keep_first: int, *, is_guarded: bool,
+    ) -> tuple[Method, ...]:
         """Return the protocols to try, in order: twice the chosen one, at last the plain one."""
         if method != "auto":
             return (method,) * UPLOAD_TRIES
+        plain: tuple[Method, ...] = ("guarded", "guarded", "items") if is_guarded else ("items", "items")
         if self._ftp_works is not False and (self.version is None or self.version.has_ftp):
-            return "ftp", "ftp", "items", "items"
+            return "ftp", "ftp", *plain
+        if is_guarded:
+            return plain
         total = self.status.mission_total if self.status else None
         # a partial write may lengthen the list by one item at most, and leaves what stands behind it
         is_ended = bool(items) and items[-1].command in ENDING
@@ -427,6 +441,45 @@ class Autopilot:
         tail = len(read.items) - len(sent)
         text = f"{tail} old items stand behind the end" if tail > 0 else ""
         return TransferResult(outcome=Outcome.OK, text=text, method=method, count=len(read.items))
+
+    async def _upload_guarded(
+        self, items: Sequence[MissionItem], keep_first: int, stopgap: MissionItem,
+    ) -> TransferResult:
+        """Write behind a stopgap: close the mission there, write and check the rest, then open it by a single item."""
+        party, kind, seq = self.link.party, MissionType.MISSION, keep_first + 1
+        closed = (*items[:keep_first], stopgap, *items[seq:])
+        if len(closed) > seq:
+            done = await self.link.perform(ListUpload(party, kind, (stopgap,), first=seq, partial=True))
+            if done.outcome is not Outcome.OK:
+                unknown = done.ack == wire.MAV_MISSION_UNSUPPORTED
+                return self._guarded(Outcome.UNSUPPORTED if unknown else done.outcome, done.text)
+            total = self.status.mission_total if self.status else None
+            if total is not None and len(items) <= total + 1:
+                done = await self.link.perform(ListUpload(party, kind, closed[seq:], first=seq + 1, partial=True))
+            if total is None or len(items) > total + 1 or done.outcome is Outcome.REFUSED:
+                done = await self.link.perform(ListUpload(party, kind, (self._home_item(items), *closed)))
+            if done.outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
+                return self._guarded(done.outcome, done.text)
+            read = await self._read(kind, "items")
+            difference = first_difference(closed, (read.items or ())[:len(closed)])
+            if read.items is None or difference:
+                return self._guarded(Outcome.MISMATCH if read.items is not None else read.outcome, difference)
+        done = await self.link.perform(ListUpload(party, kind, (items[keep_first],), first=seq, partial=True))
+        if done.outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
+            return self._guarded(done.outcome, done.text)
+        read = await self._read(kind, "items")
+        if read.items is None:
+            return self._guarded(read.outcome, f"written, not read back: {read.text}")
+        difference = first_difference(sailed(items), sailed(read.items))
+        result = self._guarded(Outcome.MISMATCH if difference else Outcome.OK, difference)
+        return replace(result, count=len(read.items))
+
+    def _guarded(self, outcome: Outcome, text: str) -> TransferResult:
+        if outcome is Outcome.UNCONFIRMED:
+            outcome = Outcome.TIMEOUT   # it may not stand there: nothing is written behind it
+        if outcome is not Outcome.OK and self.link.is_lost:
+            outcome = Outcome.LINK
+        return TransferResult(outcome=outcome, text=text, method="guarded")
 
     async def _upload_list(self, kind: MissionType, items: Sequence[MissionItem]) -> TransferResult:
         began_s = now_s()

@@ -85,6 +85,9 @@ class UploadMission:
     The first ``keep_first`` items are those of the mission there now: a partial write may begin after them.
     Write, read back, compare (up to the first item that ends a mission: an old tail behind it is dead), and only
     then, if ``set_current`` is given, DO_SET_MISSION_CURRENT(set_current, p2=1). OK means all of that.
+
+    ``stopgap`` stands behind the kept items while the rest is written item by item, so that no mixture of two missions
+    is ever on board: a loiter at a waypoint of the old one. None: nothing is there yet that could be mixed.
     """
 
     upload_id: int
@@ -92,6 +95,7 @@ class UploadMission:
     keep_first: int
     set_current: int | None
     plan_id: int
+    stopgap: MissionItem | None = None
     text: str = ""
     change: Change = Change()
 

@@ -17,7 +17,7 @@ from companion.skipper.judge import half_width_rad, judge
 from companion.skipper.ladder import Rung, rungs
 from companion.skipper.manoeuvre import gybe_round
 from companion.skipper.problem import Aim, Start, aim_at, problem_dict, repaired
-from companion.skipper.route import Tail, common_prefix, loiter_place, path_length_m, splice
+from companion.skipper.route import Tail, common_prefix, loiter_place, path_length_m, splice, stopgap
 from companion.skipper.snapshot import PlanOutcome, UploadOutcome, UploadResult
 from companion.skipper.state import PendingPlan, PendingUpload, Phase, Retry, Route
 from companion.skipper.traffic import apart_m, meetings, shares
@@ -333,9 +333,11 @@ def upload(
     known = old is not None and not turn.state.foreign and turn.state.checked_mission and not whole
     on_board = old.items if old is not None and known else ()
     number = turn.new_id()
+    keep = common_prefix(on_board, route.items)
     action = UploadMission(
-        upload_id=number, items=route.items, keep_first=common_prefix(on_board, route.items),
-        set_current=set_current, plan_id=route.plan_id, text=text, change=change or Change(),
+        upload_id=number, items=route.items, keep_first=keep, set_current=set_current, plan_id=route.plan_id,
+        text=text, stopgap=stopgap(old, keep, turn.state.index) if old is not None and known else None,
+        change=change or Change(),
     )
     if not turn.act(action):
         turn.update(ready_route=route)

@@ -145,6 +145,44 @@ def splice(
     )
 
 
+# ----------------------------------------------------------------------------------------- transfer
+HELD_BACK = "held back"   # the rung of a route that ends in a stopgap
+
+
+def stopgap(route: Route, keep: int, index: int) -> MissionItem | None:
+    """Return what stands behind the first ``keep`` items while what follows is being replaced; None: nothing can.
+
+    A loiter where the boat is going anyway: at its present target (``index``) when that is replaced, else at the last
+    waypoint that stays. An item that ends the mission stays what it is.
+    """
+    if keep >= len(route.items):
+        return None
+    if route.items[keep].command in ENDS:
+        return route.items[keep]
+    place = min(index, len(route.items) - 1) if index >= keep else keep - 1
+    return replace(route.items[place], command=Command.NAV_LOITER_UNLIM)
+
+
+def held_back(items: Sequence[MissionItem], route: Route) -> Route | None:
+    """Return the beginning of ``route`` that is on board behind a stopgap; None when ``items`` are something else.
+
+    It ends in a loiter at one of the route's own waypoints: whole and safe, and not yet the way to the goal.
+    """
+    whole = fingerprint(items)
+    n = len(whole) - 1
+    if n < 0 or whole[-1][0] != Command.NAV_LOITER_UNLIM or whole[:n] != fingerprint(route.items)[:n]:
+        return None
+    for item, point in zip(route.items, route.points_en_m, strict=True):
+        if (item.lat_e7, item.lon_e7) == whole[-1][1:]:
+            return replace(
+                route, items=(*route.items[:n], items[n]), points_en_m=(*route.points_en_m[:n], point),
+                leg_from_en_m=(*route.leg_from_en_m[:n], route.leg_from_en_m[min(n, len(route.items) - 1)]),
+                gate_of=(*route.gate_of[:n], -1), rung=HELD_BACK, risk=None, cost_s=None,
+                why="an upload was cut short: the mission ends in a loiter on the way",
+            )
+    return None
+
+
 def remaining_points(route: Route, index: int) -> tuple[PointEn, ...]:
     """Return the waypoints after item ``index``, without the safe end."""
     return route.points_en_m[index + 1:-1]

@@ -26,7 +26,7 @@ from companion.skipper.intake import (
 from companion.skipper.ladder import rungs
 from companion.skipper.lookout import look_out
 from companion.skipper.planning import request, upload
-from companion.skipper.route import is_mixture, is_same_mission
+from companion.skipper.route import held_back, is_mixture, is_same_mission
 from companion.skipper.sailing import sail
 from companion.skipper.snapshot import OperatorWish, Snapshot, WindHealth
 from companion.skipper.state import PATIENT, ByField, Persisted, Phase, SkipperState
@@ -228,6 +228,13 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
             if saved is not None and state.route is None:
                 _adopt(turn, saved)
             return True
+    cut = next((c for c in (held_back(items, r) for r in routes) if c is not None), None)
+    if cut is not None:
+        turn.update(route=cut, unsure_route=None)
+        turn.say(Severity.WARNING, "held back", f"{cut.why}: planning on", every_s=0.0)
+        if saved is not None and state.route is None:
+            _adopt(turn, saved)
+        return True
     if not items:
         turn.update(route=None, unsure_route=None)
         if saved is not None:

@@ -43,10 +43,15 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
         }
     if isinstance(action, UploadMission | UploadFence):
         fields = {
-            f.name: getattr(action, f.name) for f in dataclasses.fields(action) if f.name not in {"items", "change"}}
+            f.name: getattr(action, f.name) for f in dataclasses.fields(action)
+            if f.name not in {"items", "change", "stopgap"}
+        }
         if isinstance(action, UploadMission) and action.change.apart_m is not None:
             fields |= {"path_distance_m": round(action.change.apart_m, 1), "old_route": action.change.unsafe or "safe"}
         items = [[i.command, i.lat_e7, i.lon_e7] for i in action.items]
+        stopgap = getattr(action, "stopgap", None)
+        if stopgap is not None:
+            fields["stopgap"] = [stopgap.command, stopgap.lat_e7, stopgap.lon_e7]
         return {"kind": "action", "action": kind, **fields, "count": len(items), "hash": mission_hash(action.items),
                 "items": items}
     if isinstance(action, SteerHeading):

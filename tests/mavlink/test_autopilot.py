@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+from functools import partial
 
 import pytest
 
@@ -28,10 +29,11 @@ def mission(count, *, east=0.001, north=0.0):
     return [*(waypoint(p) for p in points), waypoint(points[-1], command=Command.NAV_LOITER_UNLIM)]
 
 
-def sail(main, *, impairment=None, seed=1, **link_options):
+def sail(main, *, impairment=None, seed=1, has_ftp=True, **link_options):
     """Run ``main(boat, link, autopilot, memory)`` with a warm boat at the other end of a memory link."""
     async def whole():
-        boat = SimulatedAutopilot(AutopilotConfig(is_warm=True, home=HOME), Constant(0.0, 5.0), seed=seed)
+        boat = SimulatedAutopilot(
+            AutopilotConfig(is_warm=True, home=HOME, has_ftp=has_ftp), Constant(0.0, 5.0), seed=seed)
         memory = MemoryLink(seed=seed, impairment=impairment or Impairment())
         async with (
             serve(boat, [memory.far]), Link(memory.near, **link_options) as link, Autopilot(link) as autopilot,
@@ -97,6 +99,51 @@ def test_a_partial_write_keeps_the_leg_that_is_sailed():
         assert piece.is_ok
 
     sail(main)
+
+GUARD_OLD, GUARD_NEW = mission(5), [*mission(5)[:2], *mission(7, north=0.0005)[2:]]
+GUARD_GAP = waypoint(GeoPoint(lat_deg=51.1, lon_deg=-1.298), command=Command.NAV_LOITER_UNLIM)
+
+
+@pytest.mark.parametrize("old", [GUARD_OLD, mission(14)], ids=["longer", "shorter"])
+def test_behind_a_stopgap_no_mixture_is_ever_on_board(old):
+    """The link is cut after every so many frames: what the boat would sail is the old, the held back or the new."""
+    new = [*old[:2], *GUARD_NEW[2:]]
+    whole = [tuple(canonical(i) for i in sailed(m)) for m in (old, [*old[:2], GUARD_GAP], new)]
+    seen = set()
+
+    async def main(boat, link, autopilot, memory, frames):
+        await set_sail(autopilot, old)
+        await asyncio.sleep(3.0)
+        write = memory.near.write
+        left = frames
+
+        def until_cut(data):
+            nonlocal left
+            left -= 1
+            if left < 0:
+                memory.cut()
+            write(data)
+
+        memory.near.write = until_cut
+        task = asyncio.create_task(autopilot.upload_mission(
+            new, method="guarded", keep_first=2, set_current=None, stopgap=GUARD_GAP))
+        while not task.done():
+            await asyncio.sleep(0.02)
+            stored = boat.helm.mission.items[1:]
+            on_board = tuple(canonical(MissionItem(
+                command=i.command, lat_e7=i.x, lon_e7=i.y, frame=i.frame, params=(i.p1, i.p2, i.p3, i.p4)))
+                for i in stored)
+            assert sailed(on_board) in whole, (frames, on_board)
+            seen.add(whole.index(sailed(on_board)))
+        result = await task
+        assert not result.is_ok or sailed(on_board) == whole[2]
+        return result.is_ok
+
+    frames = 0
+    while not sail(partial(main, frames=frames), has_ftp=False):
+        frames += 1
+        assert frames < 200
+    assert seen == {0, 1, 2}
 
 
 def test_refusals_have_the_autopilots_words():
