@@ -207,6 +207,9 @@ def _no_go(turn: Turn) -> Trigger | None:
 
 def _position(turn: Turn) -> Trigger | None:
     """The boat is not where the plan has it, or is nowhere on it."""
+    if turn.is_raised("position jump"):   # with a position all the same: see Turn.is_way_shut
+        return Trigger(reason=ReplanReason.OFF_LEG, text="the position jumped, and the way from there is not clear",
+                       interval_s=turn.config.no_go_replan_interval_s, urgent=True)
     if turn.is_raised("off the corridor"):
         return Trigger(reason=ReplanReason.OFF_LEG, text="off the leg", interval_s=_patience_off_leg_s(turn))
     if turn.is_raised("no progress"):

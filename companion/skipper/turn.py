@@ -121,9 +121,22 @@ class Turn:
         age = self.snapshot.vehicle_age_s
         if self.snapshot.vehicle is None or age is None or age > FRESH_S:
             return None
-        if self.is_raised("position jump") or self.jump_m >= JUMP_M:
+        if (self.is_raised("position jump") or self.jump_m >= JUMP_M) and not self.is_way_shut:
             return None
         return self.snapshot.position_en_m
+
+    @property
+    def is_way_shut(self) -> bool:
+        """Whether the autopilot, sailing by the position that it reports now, comes too near to something on its leg.
+
+        A position that has just jumped may be false; but it is what the boat is steered by, so a plan that is clear
+        from there is better than a leg that is not.
+        """
+        here, leg = self.snapshot.position_en_m, self.leg()
+        if here is None or leg is None or not self.state.sailing:
+            return False
+        area, floor_m = self.voyage.area, min(self.config.margin_floor_m, self.config.margin_m)
+        return float(area.clearance_m([here])[0]) > 0.0 and area.path_clearance_m([here, leg[1]]) < floor_m
 
     @property
     def jump_m(self) -> float:
