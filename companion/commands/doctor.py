@@ -7,6 +7,7 @@ import asyncio
 import json
 import math
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from companion.geofence import Mission
     from companion.mavlink.autopilot import Autopilot
+    from companion.mavlink.signing import SigningStore
     from companion.mavlink.transport import Transport
     from companion.skipper.checks import Examined, Finding, Needs
 
@@ -25,6 +27,7 @@ examples:
   companion doctor --link udpin:127.0.0.1:14551
   companion doctor --link /dev/serial0:921600 --mission missions/lake.toml
   companion doctor --link udpin:127.0.0.1:14551 --mission missions/lake.toml --apply
+  companion doctor --link /dev/serial0:921600 --signing-key boat.key
 
 With --mission the parameters are held against that voyage's margins, distances and boat. --apply sets what the
 warnings and errors name (never what is only good to know), one parameter at a time, and reads each back.
@@ -58,6 +61,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--link", required=True, metavar="LINK",
                         help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
     parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="hold the settings against this voyage")
+    parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (mode 0600)")
     parser.add_argument("--apply", action="store_true", help="set what the warnings and errors name, and read it back")
     parser.add_argument("--json", action="store_true", help="print findings and changes as JSON")
     parser.add_argument("--wait", type=float, default=30.0, metavar="S", help="for the first heartbeat (default: 30)")
@@ -68,12 +72,15 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
     from companion.geofence import load_mission
+    from companion.mavlink.signing import SigningStore
     from companion.mavlink.transport import open_link
     from companion.skipper.checks import Level
 
     mission = load_mission(args.mission) if args.mission is not None else None
     transport = open_link(args.link)
-    findings, changes = run_loop(diagnose(transport, needs_of(mission), wait_s=args.wait, apply=args.apply))
+    signing = SigningStore(args.signing_key, time.time()) if args.signing_key is not None else None
+    findings, changes = run_loop(
+        diagnose(transport, needs_of(mission), wait_s=args.wait, apply=args.apply, signing=signing))
     if args.json:
         print(json.dumps(as_json(findings, changes), indent=1))
     else:
@@ -102,25 +109,26 @@ def needs_of(mission: Mission | None) -> Needs:
 
 async def diagnose(
     transport: Transport, needs: Needs, *, wait_s: float = 30.0, listen_s: float = LISTEN_S, apply: bool = False,
+    signing: SigningStore | None = None,
 ) -> tuple[tuple[Finding, ...], tuple[Change, ...]]:
     """Read everything, judge it, and set what is to be set if ``apply``.
 
     Raises:
-        LinkError: no autopilot was heard.
+        LinkError: no autopilot was heard, or none whose signatures fit the key.
     """
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
     from companion.skipper.checks import examine
 
-    async with Link(transport) as link:
+    async with Link(transport, signing=signing) as link:
         await link.wait_autopilot(wait_s)
         async with Autopilot(link) as autopilot:
-            findings = examine(await read(autopilot, listen_s), needs)
+            findings = examine(await read(autopilot, listen_s, has_key=signing is not None), needs)
             changes = await _apply(autopilot, findings) if apply else ()
             return findings, changes
 
 
-async def read(autopilot: Autopilot, listen_s: float = LISTEN_S) -> Examined:
+async def read(autopilot: Autopilot, listen_s: float = LISTEN_S, *, has_key: bool = False) -> Examined:
     """Read parameters, version, mission and fence, and count messages for ``listen_s``."""
     from companion.clock import now_s
     from companion.skipper.checks import RATES_HZ, Examined
@@ -151,6 +159,8 @@ async def read(autopilot: Autopilot, listen_s: float = LISTEN_S) -> Examined:
         fence=fence.items,
         rates_hz={name: n / elapsed_s for name, n in counts.items()},
         system_id=autopilot.link.party.target_system,
+        is_signed=autopilot.link.is_signed,
+        has_key=has_key,
     )
 
 

@@ -64,6 +64,7 @@ class Codec:
     def __init__(self, system: int, component: int, signing: SigningState | None = None) -> None:
         self.dropped: Counter[Drop] = Counter()
         self.frames_in = 0
+        self.signed_in = 0   # of them, those with a signature, whether or not it was checked
         self.frames_out = 0
         self._buffer = bytearray()
         self._mav = wire.MAVLink(None, srcSystem=system, srcComponent=component)
@@ -131,6 +132,7 @@ class Codec:
             at += size
             if message is not False:
                 self.frames_in += 1
+                self.signed_in += message.get_msgbuf()[2] & _SIGNED
                 messages.append(message)
         del buffer[:at]
         return messages

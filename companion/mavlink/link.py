@@ -202,6 +202,11 @@ class Link:
         """Return what was dropped, by reason."""
         return self._codec.dropped + self.stats.dropped
 
+    @property
+    def is_signed(self) -> bool:
+        """Frames with a signature have been heard, whether or not a key is here to check them."""
+        return self._codec.signed_in > 0
+
     def loss(self) -> float:
         """Return the share of the autopilot's frames that never arrived, by their sequence numbers."""
         total = self.stats.frames_in + self.stats.frames_lost

@@ -72,6 +72,8 @@ class Examined:
     fence: Sequence[MissionItem] | None = None
     rates_hz: Mapping[str, float] | None = None
     system_id: int | None = None                 # of its heartbeats
+    is_signed: bool = False                      # its frames carry signatures
+    has_key: bool = False                        # ours do too
 
 
 class _Report:
@@ -100,7 +102,8 @@ def examine(seen: Examined, needs: Needs) -> tuple[Finding, ...]:
     report = _Report(seen.parameters)
     if not seen.parameters:
         report.add(Level.ERROR, "no parameters", "no parameter was answered",
-                   "is signing enabled on this link, or is another program using it?")
+                   "what is not signed is not answered on this link" if seen.is_signed and not seen.has_key else
+                   "is another program using the link, or does a router in between let nothing through to it?")
     else:
         if needs.sails:
             _boat(report, needs)
@@ -109,6 +112,7 @@ def examine(seen: Examined, needs: Needs) -> tuple[Finding, ...]:
         _fence(report, seen, needs)
         _failsafes(report)
         _identity(report, seen)
+    _signing(report, seen)
     _version(report, seen)
     _mission(report, seen)
     _streams(report, seen)
@@ -280,6 +284,16 @@ def _identity(report: _Report, seen: Examined) -> None:
         report.add(Level.ERROR, "system id", f"SYSID_MYGCS is the vehicle's own id {own:g}",
                    "the companion then counts as the ground station: its heartbeat keeps the station failsafe from "
                    "working, and its death triggers it", name="SYSID_MYGCS", wanted=255.0)
+
+
+def _signing(report: _Report, seen: Examined) -> None:
+    if seen.is_signed and not seen.has_key:
+        answers = bool(seen.parameters)
+        report.add(
+            Level.WARNING if answers else Level.ERROR, "signing",
+            "the autopilot signs its messages and no key was given",
+            "it answers unsigned ones on this port (as on USB), not on others: give --signing-key FILE" if answers else
+            "it refuses what is not signed: give --signing-key FILE, to 'companion run' as well")
 
 
 def _version(report: _Report, seen: Examined) -> None:

@@ -1,13 +1,23 @@
 """The doctor: each setting that would spoil a voyage is found, nothing is changed unasked, what is set reads back."""
 
+import hashlib
+import itertools
 import math
+from functools import partial
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as wire
+from pymavlink.generator.mavcrc import x25crc
 
 from companion.clock import run_virtual
 from companion.commands.doctor import as_json, as_text, diagnose
+from companion.errors import LinkError
+from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, SigningStore
 from companion.messages import GeoPoint, MissionItem
 from companion.skipper.checks import Examined, Level, Needs, examine
+from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot.memory import frames
+from sitl.wind import parse_wind
 
 # ArduRover's sailboat as `sim_vehicle.py -f sailboat` starts it.
 DEFAULTS = {
@@ -89,9 +99,13 @@ def test_names_of_4_7_are_understood():
     assert "system id" in codes(examine(seen(parameters=parameters), Needs()), Level.ERROR)
 
 
-def test_silence_points_at_signing():
+def test_silence_points_at_signing_only_where_signatures_are_heard():
+    findings = examine(seen(parameters={}, is_signed=True), Needs())
+    assert {"signing", "no parameters"} <= codes(findings, Level.ERROR)
+    assert "not signed" in next(f.why for f in findings if f.code == "no parameters")
     findings = examine(seen(parameters={}), Needs())
-    assert "signing" in next(f.why for f in findings if f.code == "no parameters")
+    assert "signing" not in codes(findings, Level.ERROR)
+    assert "another program" in next(f.why for f in findings if f.code == "no parameters")
 
 
 def test_what_is_wanted_cures():
@@ -107,18 +121,17 @@ def test_what_is_wanted_cures():
     assert [f for f in left if f.level > Level.INFO and f.wanted is not None] == []
 
 
-def doctor(parameters, *, apply):
+def doctor(parameters, *, apply=False, prepare=None, signing=None):
     """Run the doctor against the simulated autopilot over a link in memory."""
-    from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-    from sitl.wind import parse_wind
-
     async def consult():
         autopilot = Autopilot(
             AutopilotConfig(home=GeoPoint(lat_deg=50.8, lon_deg=-1.3), heading_rad=0.0, is_warm=True, is_moored=True,
                             parameters=parameters), parse_wind("5@0"), seed=1)
         link = MemoryLink("doctor", seed=1)
+        if prepare is not None:
+            prepare(link)
         async with serve(autopilot, [link.far]):
-            return await diagnose(link.near, Needs(speed_mps=2.5), apply=apply)
+            return await diagnose(link.near, Needs(speed_mps=2.5), apply=apply, signing=signing, wait_s=5.0)
 
     return run_virtual(consult())
 
@@ -146,3 +159,46 @@ def test_apply_sets_and_reads_back(consulted):
     data = as_json(findings, changes)
     assert {c["parameter"] for c in data["changes"]} == set(done)
     assert all(math.isfinite(c["wanted"]) for c in data["changes"])
+
+KEY = bytes(range(32))
+STAMP = 10**13
+
+
+def signed(frame, stamp):
+    """Return a frame with a signature, as an autopilot that was given KEY sends it."""
+    kind = wire.mavlink_map[frame[7] | frame[8] << 8 | frame[9] << 16]
+    head = bytes([frame[0], frame[1], frame[2] | 1]) + frame[3:-2]
+    body = head + x25crc(head[1:] + bytes([kind.crc_extra])).crc.to_bytes(2, "little")
+    tail = bytes([0]) + stamp.to_bytes(6, "little")
+    return body + tail + hashlib.sha256(KEY + body + tail).digest()[:6]
+
+
+def sign(link, *, is_strict=True):
+    """Let the autopilot sign what it sends and, if strict, hear only what is signed."""
+    answer, ask, stamps = link.far.write, link.near.write, itertools.count(STAMP)
+    link.far.write = lambda data: answer(b"".join(signed(f, next(stamps)) for f in frames(data)))
+    link.near.write = lambda data: ask(b"".join(f for f in frames(data) if f[2] & 1 or not is_strict))
+
+
+@pytest.mark.parametrize(("is_strict", "level", "words"), [
+    (True, Level.ERROR, "refuses what is not signed"), (False, Level.WARNING, "as on USB"),
+])
+def test_an_autopilot_that_signs_is_recognised(is_strict, level, words):
+    findings, _ = doctor({}, prepare=partial(sign, is_strict=is_strict))
+    signing = next(f for f in findings if f.code == "signing")
+    assert signing.level is level
+    assert words in signing.why
+    assert ("no parameters" in codes(findings, Level.ERROR)) == is_strict
+
+
+def test_with_the_key_a_signed_autopilot_answers_and_with_another_it_is_said(tmp_path):
+    def store(name, key):
+        file = tmp_path / name
+        file.write_text(key.hex())
+        file.chmod(0o600)
+        return SigningStore(file, EPOCH_S + STAMP / TICKS_PER_S)
+
+    findings, _ = doctor({}, prepare=sign, signing=store("right", KEY))
+    assert not {"signing", "no parameters", "streams"} & {f.code for f in findings}
+    with pytest.raises(LinkError, match="not signed with this key"):
+        doctor({}, prepare=sign, signing=store("wrong", KEY[::-1]))
