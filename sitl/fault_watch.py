@@ -172,9 +172,9 @@ class Watch:
         """Return what the mission on board is: "whole", "closed", "begun", "mixture"."""
         if not key or key in self.ours or key in self.foreign:
             return "whole"
-        places = {place[1:] for mission in self.ours for place in mission}
-        is_beginning = any(mission[:len(key) - 1] == key[:-1] for mission in self.ours)
-        if is_beginning and key[-1][0] == Command.NAV_LOITER_UNLIM and key[-1][1:] in places:
+        begun = [mission for mission in self.ours if mission[:len(key) - 1] == key[:-1]]
+        ends_in = {item[1:] for mission in begun for item in mission}
+        if key[-1][0] == Command.NAV_LOITER_UNLIM and key[-1][1:] in ends_in:
             return "closed"
         if not was_armed and any(mission[:len(key)] == key for mission in self.ours):
             return "begun"
