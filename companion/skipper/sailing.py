@@ -21,7 +21,7 @@ from companion.skipper.planning import IRONS_MEMORY_S, hold, request, seeks_refu
 from companion.skipper.route import path_length_m
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase, Route
-from companion.skipper.traffic import meetings
+from companion.skipper.traffic import meetings, near
 from companion.skipper.turn import Turn
 from companion.traffic import Decision, decide
 from companion.traffic.plans import MIN_INTERVAL_S
@@ -35,6 +35,9 @@ BEND_PLAN_AGE_S = 60.0           # ... unless the last one is this old
 FORECAST_SHARE = 0.5         # of the interval that the plan used: a smaller change of the mean does not matter
 FORECAST_RAD = math.radians(5.0)
 FORECAST_SPEED = 0.3         # share of the wind speed
+# Reasons that can wait among vessels, where plans must not follow each other fast (Büsser 5.2).
+ROUTINE = frozenset({
+    ReplanReason.WAYPOINT, ReplanReason.FORECAST, ReplanReason.WIND_SHIFT, ReplanReason.PLAN_AGE, ReplanReason.OFF_LEG})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +128,10 @@ def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
         return
     if turn.t_s < state.plan_retry.not_before_s and not trigger.urgent:
         return
-    if turn.t_s - state.last_plan_s < trigger.interval_s:
+    interval_s = trigger.interval_s
+    if trigger.reason in ROUTINE and near(turn):
+        interval_s = max(interval_s, MIN_INTERVAL_S)
+    if turn.t_s - state.last_plan_s < interval_s:
         return
     if request(turn, trigger.reason, from_index=trigger.from_index, text=trigger.text):
         changes: dict[str, object] = {"after_operator": False}

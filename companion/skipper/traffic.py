@@ -21,14 +21,15 @@ from companion.skipper.turn import Turn
 from companion.skipper.voyage import PointEn
 from companion.traffic import Conflict, Disc, Vessel, check_legs, path_distance_m, planning_discs, predict
 from companion.traffic.occupancy import Keep
+from companion.traffic.plans import TimedLeg, pressing
 from companion.traffic.predict import tail_factor
 
 PART_BY_RUNG = (1.0, 4.0, 8.0)   # times the vessels' part of the promise, by the ladder's rung
 GIVE_UP_RISK = 1e-1          # the active route is given up for a likelier meeting, at an instant, only
 OWN_TIMING_MPS = 0.1         # how fast our own place along the route becomes uncertain: a sailboat's speed, tacks
-HORIZON_S = 300.0            # the plan is made again long before; later discs would close a lake
+HORIZON_S = 600.0            # the plan is made again long before
 ALIKE_S = 300.0              # successive ways are compared over this time
-SETTLED_S = 120.0            # discs of later windows grow no more: by then there are new reports, and each step checks
+SETTLED_M = 50.0             # discs this uncertain grow no more: else later ones would close a lake
 UNKNOWN_S = 30.0             # a vessel of unknown course could be anywhere soon: only the next moments count
 NEAREST = 12                 # vessels that a plan looks at: those that could be met soonest
 OWN_MPS = 4.0                # no boat of ours closes faster by itself
@@ -67,26 +68,11 @@ def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> t
     keep = Keep(
         sigmas=sigmas, clearance_m=turn.config.traffic_clearance_m, horizon_s=HORIZON_S, own_timing_mps=OWN_TIMING_MPS,
         own_radius_m=0.5 * math.hypot(hull.length_m, hull.beam_m), ahead_m=turn.config.traffic_clearance_m,
+        settled_m=SETTLED_M,
     )
     known = [v for v in vessels if v.is_moving_known]
     unknown = [v for v in vessels if not v.is_moving_known]
-    found = (*planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
-    return tuple(_settled(disc) for disc in found)
-
-
-def _settled(disc: Disc) -> Disc:
-    """Return the disc with the radius and the spread that it has at its window's begin, if that is late.
-
-    A route that had to keep out of everywhere that a vessel might be in five minutes would flee from all of them.
-    """
-    if disc.from_s < SETTLED_S - 1e-6:
-        return disc
-    known, at = disc.spread, disc.from_s
-    if known is not None:
-        known = replace(
-            known, along_m=known.along_m + known.along_mps * at, across_m=known.across_m + known.across_mps * at,
-            sigma_m=known.sigma_m + known.sigma_mps * at, along_mps=0.0, across_mps=0.0, sigma_mps=0.0)
-    return replace(disc, radius_m=disc.radius_at_m(at), growth_mps=0.0, spread=known)
+    return (*planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,7 +155,7 @@ def apart_m(turn: Turn, points: Sequence[PointEn]) -> float | None:
     return path_distance_m(old, new)
 
 
-def soon(legs: Sequence[Leg], seconds: float) -> list[PointEn]:
+def soon(legs: Sequence[TimedLeg], seconds: float) -> list[PointEn]:
     """Return the points of a way up to where the boat is after ``seconds``."""
     points = [legs[0].from_en] if legs else []
     for leg in legs:
@@ -182,8 +168,8 @@ def soon(legs: Sequence[Leg], seconds: float) -> list[PointEn]:
 
 
 def meetings(turn: Turn) -> tuple[Conflict, ...]:
-    """Return where the route being sailed meets vessels, in order of time; empty when it is clear."""
+    """Return where the route being sailed meets vessels soon enough to act, in order of time; empty when it is clear."""
     vessels = near(turn)
     if not vessels:
         return ()
-    return check_legs(timed_legs(turn), discs(turn, vessels, turn.t_s, tail_factor(GIVE_UP_RISK)))
+    return pressing(check_legs(timed_legs(turn), discs(turn, vessels, turn.t_s, tail_factor(GIVE_UP_RISK))))

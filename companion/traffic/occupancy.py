@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.traffic.approach import OwnShip
 from companion.traffic.predict import (
@@ -113,6 +113,9 @@ class Keep:
         ahead_m: each disc is lengthened by this much ahead of a moving vessel (its centre moves forward by half
             of it): crossing astern becomes the shorter way round.
         horizon_s: how far the discs reach.
+        settled_m: windows that begin with a standard deviation above this keep radius and spread of their begin all
+            through: by then there are new reports, and who had to keep out of everywhere that a vessel might be later
+            would flee from all of them.
 
     """
 
@@ -122,6 +125,7 @@ class Keep:
     own_timing_mps: float = 0.1
     ahead_m: float = 0.0
     horizon_s: float = HORIZON_S
+    settled_m: float = math.inf
 
 
 def needed_radius_m(there: Prediction, t_s: float, keep: Keep) -> float:
@@ -176,7 +180,11 @@ def _disc(
     speed = math.hypot(*a.velocity_en_mps)
     arc = min(abs(turn) * span, math.pi) if t_s + begin < vessel.t_s + TURN_HOLD_S else 0.0
     sagitta = speed * span * arc / 8.0 * 1.2
-    ra, rb = needed_radius_m(a, begin, keep) + sagitta, needed_radius_m(b, end, keep) + sagitta
+    is_settled = max(a.sigma_along_m, a.sigma_across_m) >= keep.settled_m
+    if is_settled:
+        b = replace(b, sigma_along_m=a.sigma_along_m, sigma_across_m=a.sigma_across_m)
+    late = begin if is_settled else end
+    ra, rb = needed_radius_m(a, begin, keep) + sagitta, needed_radius_m(b, late, keep) + sagitta
     growth = (rb - ra) / span
     x, y = a.mean_en_m
 
@@ -185,7 +193,7 @@ def _disc(
         return first - slope * begin, slope
 
     along, across = line(a.sigma_along_m, b.sigma_along_m), line(a.sigma_across_m, b.sigma_across_m)
-    sigma = line(_sigma_m(a, begin, keep), _sigma_m(b, end, keep))
+    sigma = line(_sigma_m(a, begin, keep), _sigma_m(b, late, keep))
     spread = Spread(
         vessel=10 * vessel.mmsi + vessel.branch, x_m=x - vx * begin, y_m=y - vy * begin, course_rad=b.course_rad,
         keep_m=a.reach_m + keep.own_radius_m + keep.clearance_m + sagitta, along_m=along[0], along_mps=along[1],

@@ -1,9 +1,9 @@
 """Sailing by plan among ships: AVALON's four at once, and ships ten times faster crossing, overtaking and head-on.
 
 The boat sails its plan with a speed that is off by a tenth; ships are seen by noisy AIS reports every 10 s. The
-plan is checked against the picture every 5 s, made again only where ``companion.traffic.decide`` says so, and the
-distance between successive plans is taken (Büsser 2009, section 5.2: four ships, no replanning every 20 s, paths that
-look more or less the same).
+plan is checked against the picture every 5 s, made again only where ``companion.traffic.decide`` says that it has
+become unsafe, and the distance between successive plans is taken over the next five minutes (Büsser 2009, section 5.2:
+four ships, no replanning every 20 s, paths that look more or less the same).
 
     python -m sitl.tasks.ships --seeds 5
 """
@@ -15,7 +15,7 @@ import json
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,16 @@ from companion.geo.frame import LocalFrame
 from companion.messages import AisReport, GeoPoint
 from companion.planner import Plan, Problem, plan
 from companion.planner.problem import BoatLimits, Sigma, Wind
+from companion.planner.vessels import VESSELS_SHARE
+from companion.skipper.traffic import (
+    ALIKE_S,
+    GIVE_UP_RISK,
+    HORIZON_S,
+    OWN_TIMING_MPS,
+    PART_BY_RUNG,
+    SETTLED_M,
+    soon,
+)
 from companion.traffic import (
     Decision,
     Targets,
@@ -35,7 +45,8 @@ from companion.traffic import (
     planning_discs,
 )
 from companion.traffic.occupancy import Disc, Keep
-from companion.traffic.plans import MIN_INTERVAL_S
+from companion.traffic.plans import MIN_INTERVAL_S, pressing
+from companion.traffic.predict import tail_factor
 from sitl.tasks.afloat import polar_at
 from sitl.tasks.wrsc2013 import least_distance_m
 from sitl.tasks.wrsc2013_planner import target_of
@@ -43,8 +54,7 @@ from sitl.tasks.wrsc2013_planner import target_of
 ORIGIN = GeoPoint(lat_deg=48.0, lon_deg=-6.0)
 STEP_S = 5.0
 REPORT_S = 10.0
-RISKS = (1e-2, 5e-2, 2e-1)       # the ladder: what cannot be kept clear of with one is tried with the next
-GIVE_UP_RISK = 1e-1              # an active plan is given up for a likelier meeting than a new one is made to avoid
+DELTA_S = 0.7
 CLEARANCE_M = 50.0
 EXPANSIONS = 4000
 LIMIT_S = 5400.0
@@ -182,7 +192,7 @@ class Voyage:
                 heading_rad=ship.course_at(t_s), bow_m=half, stern_m=half, port_m=0.1 * half, starboard_m=0.1 * half,
             ))
 
-    def _problem(self, discs: Sequence[Disc]) -> Problem:
+    def _problem(self, discs: Sequence[Disc], part: float | None = None) -> Problem:
         twa, speed = polar_at(self._scene.tws_mps)
         return Problem(
             start_en=self._en, start_heading_rad=self._heading, goal_en=self._scene.goal_en, goal_radius_m=30.0,
@@ -190,11 +200,12 @@ class Voyage:
                       sigma=Sigma(model="ar1", sigma0_rad=0.05, sigma_inf_rad=0.15, rho_hz=0.036)),
             boat=BoatLimits(no_go_half_rad=math.radians(47.0), turn_rate_radps=0.2, polar_twa_rad=twa, polar_mps=speed,
                             tack_loss_s=7.0),
-            delta_s=0.7, targets=tuple(target_of(d) for d in discs),
+            delta_s=DELTA_S, targets=tuple(replace(target_of(d), spread=d.spread) for d in discs), vessels_part=part,
         )
 
-    def _discs(self, vessels: Sequence[Vessel], t_s: float, risk: float) -> tuple[Disc, ...]:
-        keep = Keep(risk=risk, clearance_m=CLEARANCE_M, own_radius_m=1.8, own_timing_mps=0.1, ahead_m=100.0)
+    def _discs(self, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Disc, ...]:
+        keep = Keep(sigmas=sigmas, clearance_m=CLEARANCE_M, own_radius_m=1.8, own_timing_mps=OWN_TIMING_MPS,
+                    ahead_m=CLEARANCE_M, horizon_s=HORIZON_S, settled_m=SETTLED_M)
         return planning_discs(vessels, t_s, keep)
 
     def _check(self, t_s: float, picture: TrafficPicture) -> None:
@@ -203,7 +214,7 @@ class Voyage:
             return
         if self._way is not None:
             legs = self._problem(()).evaluate(np.vstack([np.asarray(self._en), self._way[1:]])).legs
-            conflicts = check_legs(legs, self._discs(picture.vessels, t_s, GIVE_UP_RISK))
+            conflicts = pressing(check_legs(legs, self._discs(picture.vessels, t_s, tail_factor(GIVE_UP_RISK))))
             self._unsafe += bool(conflicts)
             since = t_s - self._planned[-1] if self._planned else math.inf
             if decide(conflicts, since_replan_s=since, urgent_s=0.0) is not Decision.REPLAN:
@@ -215,15 +226,22 @@ class Voyage:
             return
         way = np.array(answer.waypoints_en)
         if self._way is not None:
-            self._distances.append(path_distance_m(np.vstack([np.asarray(self._en), self._way[1:]]), way, step_m=25.0))
+            old = np.vstack([np.asarray(self._en), self._way[1:]])
+            self._distances.append(path_distance_m(self._next(old), self._next(way)))
         self._way = way
 
     def _plan(self, vessels: Sequence[Vessel], t_s: float) -> Plan | None:
-        for risk in RISKS:
-            answer = plan(self._problem(self._discs(vessels, t_s, risk)), expansions=EXPANSIONS, seed=self._seed)
+        discs = self._discs(vessels, t_s, 0.0)
+        for times in PART_BY_RUNG:
+            problem = self._problem(discs, times * VESSELS_SHARE * (1.0 - DELTA_S) if discs else None)
+            answer = plan(problem, expansions=EXPANSIONS, seed=self._seed)
             if answer.legs:
                 return answer
         return None
+
+    def _next(self, way: NDArray[np.float64]) -> list[tuple[float, float]]:
+        """Return the next five minutes of a way."""
+        return soon(self._problem(()).evaluate(way).legs, ALIKE_S)
 
     def _advance(self, seconds: float) -> None:
         """Sail along the plan; without one, hold the heading slowly."""

@@ -17,6 +17,7 @@ from companion.geofence import load_mission
 from companion.messages import AisReport, GeoPoint
 from companion.replay import replay
 from companion.telemetry.records import ais_of, ais_record
+from companion.traffic.plans import ALIKE_M
 from sitl.runner import run_embedded
 from sitl.scenario import load_scenario
 from sitl.ships import ship_of
@@ -122,3 +123,21 @@ def test_a_feed_name_that_is_none_is_bad_input(tmp_path):
 ])
 def test_a_report_survives_its_record(report):
     assert ais_of(json.loads(json.dumps(ais_record(report)))) == report
+
+
+def test_four_ships_at_once_and_the_paths_look_alike(tmp_path):
+    """Büsser 2009, section 5.2: no replanning more often than every 20 s; a path changes only where it was unsafe."""
+    path = Path("sitl/scenarios/four-ships.toml")
+    verdict = run_virtual(run_embedded(load_scenario(path), path, 0, tmp_path))
+    assert verdict.passed, failed(verdict)
+    records = decisions(tmp_path)
+    asked = [d["t_s"] for d in records if d.get("action") == "RequestPlan" and not d["rung"]]
+    assert len({v for d in records for v in d.get("vessels", ())}) == 4
+    assert all(b - a >= 20.0 for a, b in pairwise(asked))
+    changes = [d for d in records if d.get("action") == "UploadMission" and "path_distance_m" in d]
+    assert changes
+    for change in changes:
+        assert change["path_distance_m"] <= ALIKE_M or change["old_route"] != "safe"
+    shared = [d for d in records if d.get("action") == "RequestPlan" and d.get("vessels")]
+    for plan in shared:
+        assert plan["instant"]["wind"] + plan["instant"]["vessels"] == pytest.approx(1.0 - plan["delta_s"])
