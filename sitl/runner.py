@@ -41,11 +41,24 @@ from sitl.autopilot import (
 )
 from sitl.autopilot.memory import MemoryEnd
 from sitl.scenario import EventSpec, Scenario
-from sitl.ships import Ship, ship_of
+from sitl.ships import (
+    FIRST_MMSI,
+    Moving,
+    SecondBoat,
+    ais_report,
+    distance_m,
+    free_port,
+    intruder_of,
+    radio_report,
+    send_datagram,
+    ship_of,
+)
 from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
+from sitl.wind import Wind
 
 TRUTH_EVERY_S = 0.25
+OUR_LENGTH_M = 2.0    # what the second boat takes ours for
 MAX_TRUTH_SAMPLES = 20_000
 # Unix time of every simulated voyage's start: stamps must not depend on when it was run.
 EPOCH_S = 1_781_000_000.0
@@ -123,7 +136,8 @@ class _World:
     set_sail_s: float | None = None
     planner: FragilePlanner = field(default_factory=FragilePlanner)
     observer: Observer | None = None
-    ships: list[Ship] = field(default_factory=list)
+    ships: list[Moving] = field(default_factory=list)
+    radio_port: int = 0   # of this machine, where the companion hears the event's radio
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -156,12 +170,26 @@ def replace_struct(struct: Any, **changes: Any) -> Any:
     return msgspec.structs.replace(struct, **changes)
 
 
+RADIO_EVENTS = frozenset({"intruder", "second_boat"})
+
+
+def with_radio(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
+    """Return the mission with its UDP feed at a free port, and the port; 0 where nothing is told by radio."""
+    feeds = mission.traffic.feeds
+    if not any(e.kind in RADIO_EVENTS for e in scenario.events) or not any(f.startswith("udpin:") for f in feeds):
+        return mission, 0
+    port = free_port()
+    moved = tuple(f"udpin:127.0.0.1:{port}" if f.startswith("udpin:") else f for f in feeds)
+    traffic = replace_struct(mission.options.traffic, feeds=moved)
+    return replace(mission, options=replace_struct(mission.options, traffic=traffic)), port
+
+
 async def run_embedded(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, on_step: OnStep | None = None,
     expansions: int | None = EXPANSIONS, observer: Observer | None = None,
 ) -> Verdict:
     """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json."""
-    mission = permitted(load_mission(scenario.mission_path(source)))
+    mission, radio_port = with_radio(permitted(load_mission(scenario.mission_path(source))), scenario)
     wind = scenario_wind(scenario, source, seed)
     start = mission.start or mission.origin
     heading_deg = scenario.start_heading_deg
@@ -173,13 +201,16 @@ async def run_embedded(
         wind, seed=seed,
     )
     link = MemoryLink("companion", seed=seed)
-    world = _World(autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1), observer=observer)
+    world = _World(autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1), observer=observer,
+                   radio_port=radio_port)
     frame = mission.frame()
     folder.mkdir(parents=True, exist_ok=True)
     async with serve(autopilot, [link.far, world.shore.far]):
         side_tasks = [
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
             *(asyncio.create_task(_event(world, e, mission), name=f"event {e.kind}") for e in scenario.events),
+            *(asyncio.create_task(_sail_second(world, e, mission, wind, seed), name="second boat")
+              for e in scenario.events if e.kind == "second_boat"),
         ]
         await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions)
         for task in side_tasks:
@@ -276,7 +307,7 @@ async def _watch_truth(world: _World, frame: Any, limit_s: float) -> None:
             here = frame.en_from_geo(t.position)
             world.truth.add(now_s(), here, t.heading_rad, t.speed_mps, (t.twd_from_rad, t.tws_mps))
             for ship in world.ships:
-                nearest = min(world.truth.vessels_m.get(str(ship.mmsi), math.inf), ship.distance_m(here, now_s()))
+                nearest = min(world.truth.vessels_m.get(str(ship.mmsi), math.inf), distance_m(ship, here, now_s()))
                 world.truth.vessels_m[str(ship.mmsi)] = round(nearest, 2)
         if world.observer is not None:
             world.observer.truth(now_s(), world.autopilot, world.link)
@@ -329,11 +360,37 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
         ship = ship_of(event, len(world.ships))
         world.ships.append(ship)
         while event.is_on_ais:
-            autopilot.hear_vessel(ship.report(mission.frame(), now_s()))
+            autopilot.hear_vessel(ais_report(ship, mission.frame(), now_s()))
+            await asyncio.sleep(event.every_s)
+    elif event.kind == "intruder":
+        now, frame = autopilot.truth, mission.frame()
+        ours = frame.en_from_geo(now.position), now.velocity_en_mps
+        intruder = intruder_of(event, len(world.ships), now_s(), ours, now.heading_rad)
+        world.ships.append(intruder)
+        while world.radio_port:
+            send_datagram(radio_report(intruder, frame, now_s()), world.radio_port)
             await asyncio.sleep(event.every_s)
     elif event.kind == "foreign_mission":
         away = mission.frame().geo_from_en(event.east_m, event.north_m)
         await _upload_foreign(world.shore.near, [waypoint(away)])
+
+
+async def _sail_second(world: _World, event: EventSpec, mission: Mission, wind: Wind, seed: int) -> None:
+    """Sail the second boat from ``at_s`` on, and tell of it."""
+    await asyncio.sleep(max(0.0, event.at_s - now_s()))
+    frame = mission.frame()
+    boat = SecondBoat(FIRST_MMSI + len(world.ships), wind, seed, world.autopilot.truth.t_s,
+                      (event.east_m, event.north_m), (event.goal_east_m, event.goal_north_m))
+    world.ships.append(boat)
+    told_s = -math.inf
+    while True:
+        if world.radio_port and now_s() - told_s >= event.every_s:
+            send_datagram(radio_report(boat, frame, now_s()), world.radio_port)
+            told_s = now_s()
+        await asyncio.sleep(1.0)
+        now = world.autopilot.truth
+        boat.sail((frame.en_from_geo(now.position), now.velocity_en_mps), OUR_LENGTH_M)
+        world.truth.second_boat_m = boat.nearest_goal_m
 
 
 def vane_fault(event: EventSpec) -> VaneFault:

@@ -30,7 +30,9 @@ EventKind = Literal[
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
     "current",           # set_deg, drift_mps
-    "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais: a ship of 100 m passes
+    "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
+    "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
+    "second_boat",       # east_m, north_m, goal_east_m, goal_north_m: VAIMOS's model, steered by field, told by radio
 ]
 
 
@@ -74,6 +76,11 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     sog_mps: float = 0.0
     every_s: float = 10.0        # between its AIS reports
     is_on_ais: bool = True
+    length_m: float | None = None   # of a vessel; none: a ship of 100 m, a boat of 3.65 m
+    gap_m: float = 0.0
+    bearing_deg: float = 0.0     # clockwise
+    goal_east_m: float = 0.0
+    goal_north_m: float = 0.0
 
 
 class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -85,6 +92,8 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     max_time_s: float | None = None
     min_clearance_m: float | None = None
     min_vessel_distance_m: float | None = None  # from the boat to each vessel's hull
+    second_boat_within_m: float | None = None   # of its goal, at some moment
+    station_radius_m: float | None = None       # about their mean, of 95 % of 5 minutes' points at the last goal
     max_silence_s: float | None = 10.0        # without a status from the companion that says why
     max_replans_per_hour: float | None = None
     end_phase: str | None = None

@@ -64,7 +64,8 @@ class VaimosParameters:
         """Return the kernel's parameter vector."""
         return np.array([
             self.p1, *(self.share * p for p in (self.p2, self.p3, self.p4, self.p5)),
-            self.p6, self.p7, self.p8, self.p9, self.p10, self.p11, self.windage, self.share * self.damping, self.sail_rate, self.rudder_rate, self.hull_mps,
+            self.p6, self.p7, self.p8, self.p9, self.p10, self.p11, self.windage,
+            self.share * self.damping, self.sail_rate, self.rudder_rate, self.hull_mps,
         ])
 
 

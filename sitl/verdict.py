@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from sitl.scenario import ExpectSpec
+from sitl.tasks.scores import station_score
 
 # A tack is counted when the boat has been on the other side of the wind for this long.
 TACK_SETTLED_S = 3.0
@@ -33,6 +34,7 @@ class Truth:
     twd_from_rad: list[float] = field(default_factory=list)
     tws_mps: list[float] = field(default_factory=list)
     vessels_m: dict[str, float] = field(default_factory=dict)   # the least distance to each vessel's hull
+    second_boat_m: float | None = None   # the second boat's least distance to its goal
 
     def add(
         self, t_s: float, en_m: tuple[float, float], heading_rad: float, speed_mps: float, wind: tuple[float, float]
@@ -212,6 +214,15 @@ def judge(
         nearest = min(truth.vessels_m.values(), default=-math.inf)   # nothing measured does not pass
         check("distance to vessels, m", nearest >= expect.min_vessel_distance_m, truth.vessels_m,
               f"at least {expect.min_vessel_distance_m}")
+    if expect.second_boat_within_m is not None:
+        nearest_m = truth.second_boat_m
+        check("the second boat's distance to its goal, m", nearest_m is not None and
+              nearest_m <= expect.second_boat_within_m, nearest_m, f"at most {expect.second_boat_within_m}")
+    if expect.station_radius_m is not None:
+        track = np.column_stack([truth.t_s, positions]) if truth.t_s else np.zeros((0, 3))
+        score = station_score(track, goal_en_m)
+        check("station keeping: radius of 95 %, m", score.kept and score.radius95_m <= expect.station_radius_m,
+              score.radius95_m, f"at most {expect.station_radius_m}")
     if expect.max_silence_s is not None and silence_s is not None:
         check("silence, s", silence_s <= expect.max_silence_s, silence_s, f"at most {expect.max_silence_s}")
     if expect.max_replans_per_hour is not None and duration_s > 0.0:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from companion.field.values import Habits, Obstacle, Situation
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from sitl.vaimos import STEP_S, VaimosParameters, polar, sail_heading, state_at
-from sitl.wind import AR1
+from sitl.wind import AR1, Wind
 
 LENGTH_M = 3.65
 GPS_SD_M = 0.7
@@ -55,7 +55,7 @@ def wind_for(twd_from_rad: float, tws_mps: float, seed: int) -> AR1:
 class Afloat:
     """The boat, her wind and her sensors; ``track`` grows by a row (t, east, north, heading, speed) each second."""
 
-    wind: AR1
+    wind: Wind
     rng: np.random.Generator
     state: NDArray[np.float64]
     t_s: float = 0.0
@@ -65,7 +65,7 @@ class Afloat:
 
     @classmethod
     def launch(
-        cls, wind: AR1, rng: np.random.Generator, en_m: tuple[float, float], heading_rad: float
+        cls, wind: Wind, rng: np.random.Generator, en_m: tuple[float, float], heading_rad: float
     ) -> Afloat:
         """Return a boat at a place, under way at half a metre a second."""
         return cls(wind=wind, rng=rng, state=state_at(en_m[0], en_m[1], wrap_pi(heading_rad), 0.5))
@@ -74,6 +74,11 @@ class Afloat:
     def en_m(self) -> tuple[float, float]:
         """True position."""
         return float(self.state[0]), float(self.state[1])
+
+    @property
+    def velocity_en_mps(self) -> tuple[float, float]:
+        """Velocity over ground in the last second."""
+        return self._velocity
 
     def sense(self, obstacles: tuple[Obstacle, ...] = ()) -> Situation:
         """Return what is measured now."""

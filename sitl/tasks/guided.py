@@ -34,7 +34,7 @@ from companion.mavlink.link import Link
 from companion.mavlink.transport import open_link
 from companion.messages import Mode, VehicleState, WindSample
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, Truth, serve
-from sitl.tasks.station import station_score
+from sitl.tasks.scores import station_score
 from sitl.tasks.wrsc2013 import HALF_M, LEAVE_WITHIN_S, ORIGIN, Score, broadcast, draw, score
 from sitl.tasks.wrsc2013_skippers import FieldSkipper
 from sitl.wind import AR1

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sitl.tasks.guided import run_station, run_wrsc
-from sitl.tasks.station import sailbot_points, station_score
+from sitl.tasks.scores import sailbot_points, station_score
 from sitl.tasks.wrsc2013 import HALF_M, campaign, draw, run, score, table
 
 EARLY = (66, 154)
