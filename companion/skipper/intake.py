@@ -7,6 +7,7 @@ import math
 from companion.messages import Mode, StatusText
 from companion.skipper.actions import CancelPlan, Severity
 from companion.skipper.config import Guidance
+from companion.skipper.failsafe import note
 from companion.skipper.gates import Gate, passed_on
 from companion.skipper.geometry import distance_m, leg_distance_m, waypoint_done
 from companion.skipper.planning import take_plan, take_upload
@@ -92,6 +93,7 @@ def take_events(turn: Turn) -> None:
             ours = turn.state.pending_upload is not None or turn.t_s - turn.state.current_asked_s < turn.config.settle_s
             if event.text.startswith(FOREIGN_TEXTS) and not ours and event.source_component == 1:
                 turn.update(checked_mission=False, read_since_s=turn.t_s)
+            note(turn, event)
         elif isinstance(event, OperatorWish):
             turn.update(wish=event)
 

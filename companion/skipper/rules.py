@@ -13,6 +13,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, MissionState, Mode
 from companion.skipper.actions import Action, CancelPlan, ReadMission, ReplanReason, Severity
 from companion.skipper.config import SkipperConfig
+from companion.skipper.failsafe import has_stopped
 from companion.skipper.gates import Gate, gates_of
 from companion.skipper.geometry import distance_m, leg_distance_m
 from companion.skipper.helm import arm, hand_back, make_current, repair, set_mode
@@ -147,6 +148,11 @@ def _operator_has_it(turn: Turn) -> bool:
             operator_since_s=turn.t_s, pending_plan=None, own_mode=None, steering_until_s=None, pending_command=None,
             by_field=ByField(),
         )
+        if has_stopped(turn):
+            turn.update(own_mode=Mode.HOLD, operator_since_s=None, after_operator=True, plan_retry=PATIENT)
+            turn.say(Severity.WARNING, "position failsafe",
+                     "stopped by the autopilot's position failsafe: sailing on when the position is back", every_s=0.0)
+            return False
         what = "disarmed" if not status.is_armed else f"mode {status.mode.name if status.mode is not None else '?'}"
         turn.phase(Phase.OPERATOR, f"{what}, not by us: the companion does nothing until AUTO comes back")
         turn.say(Severity.NOTICE, "operator", turn.state.why, every_s=0.0)

@@ -11,6 +11,7 @@ from companion.skipper.actions import CancelPlan, ReplanReason, Severity, SteerH
 from companion.skipper.by_field import heading as by_field_heading
 from companion.skipper.by_field import keeps_station, last_resort
 from companion.skipper.config import Guidance, ReplanPolicy
+from companion.skipper.failsafe import waits_for
 from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m
 from companion.skipper.headings import desired_heading_rad
@@ -57,6 +58,9 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         if not keeps_station(turn):
             _finish(turn)
         return
+    if turn.state.own_mode is Mode.HOLD and turn.autopilot is not None and turn.autopilot.mode is Mode.HOLD:
+        _sail_on(turn, fresh)
+        return
     if last_resort(turn):
         return
     if _steer(turn, fresh):
@@ -86,6 +90,23 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     if turn.state.pending_upload is None:
         _consider(turn, fresh)
     _name(turn)
+
+
+def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
+    """Out of a HOLD that nobody asked for: plan from where the boat has drifted to, then AUTO."""
+    why = waits_for(turn)
+    if why or repair(turn):
+        turn.phase(Phase.HOLDING, why or "the mission is put right before sailing on")
+        return
+    if turn.state.pending_upload is None:
+        _consider(turn, fresh)
+    if turn.state.pending_plan is not None or turn.state.pending_upload is not None:
+        turn.phase(Phase.HOLDING, "planning from where the boat has drifted to")
+    elif turn.state.after_operator and turn.is_way_shut:
+        turn.phase(Phase.HOLDING, "no plan yet from where the boat has drifted to")
+    else:
+        hand_back(turn)
+        turn.phase(Phase.HOLDING, "asking for AUTO: sailing on")
 
 
 def _send_heading(turn: Turn) -> None:

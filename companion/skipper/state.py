@@ -164,6 +164,7 @@ class SkipperState:
     history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
     last_seen: tuple[float, float, float] | None = None          # t, east, north of the last position
     boot_s: float | None = None
+    failsafe_s: float = float("-inf")  # when the autopilot last said that it has lost its position
     after_operator: bool = False       # AUTO has come back: plan from where the boat is now
     after_restart: bool = False
     replace_foreign: bool = False      # permission was given to overwrite what is on board

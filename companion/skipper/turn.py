@@ -34,6 +34,7 @@ from companion.skipper.voyage import PointEn, Voyage
 FRESH_S = 3.0          # a part older than this is not acted upon
 JUMP_M = 20.0          # a fix this much farther than the boat can sail is a jump
 JUMP_MPS = 8.0         # no boat of ours sails faster
+DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
 JUMP_MEMORY_S = 10.0   # after a longer silence any place is possible
 
 
@@ -132,11 +133,15 @@ class Turn:
         A position that has just jumped may be false; but it is what the boat is steered by, so a plan that is clear
         from there is better than a leg that is not.
         """
-        here, leg = self.snapshot.position_en_m, self.leg()
-        if here is None or leg is None or not self.state.sailing:
+        here, leg, vehicle = self.snapshot.position_en_m, self.leg(), self.snapshot.vehicle
+        if here is None or leg is None or vehicle is None or not self.state.sailing:
             return False
+        goes_to = leg[1]
+        if self.state.own_mode is Mode.HOLD:   # stopped, and drifting
+            east, north = vehicle.velocity_en_mps
+            goes_to = (here[0] + DRIFT_LOOK_S * east, here[1] + DRIFT_LOOK_S * north)
         area, floor_m = self.voyage.area, min(self.config.margin_floor_m, self.config.margin_m)
-        return float(area.clearance_m([here])[0]) > 0.0 and area.path_clearance_m([here, leg[1]]) < floor_m
+        return float(area.clearance_m([here])[0]) > 0.0 and area.path_clearance_m([here, goes_to]) < floor_m
 
     @property
     def jump_m(self) -> float:

@@ -26,7 +26,7 @@ class Response(enum.Enum):
 
     SAY = "say so"
     FREEZE = "no actions until it clears; what is on the autopilot sails on"
-    NO_BOAT_PLANS = "no plan from the boat's position until it clears, then look whether it is still on its leg"
+    NO_BOAT_PLANS = "no plan from the boat's position until it clears, unless the way from there is shut"
     NO_WIND_PLANS = "no new plan because of the wind; the plan in place stays"
     WAIT_FOR_WIND = "no plans and no complaint about progress; plan again when the wind is back"
     BEAR_AWAY = "bear away under GUIDED until the boat sails, back to AUTO, plan again; after two, gybe round"

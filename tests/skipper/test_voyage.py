@@ -12,7 +12,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, Mode, StatusText
 from companion.skipper import actions as act
 from companion.skipper.config import DRY_RUN, Permissions, ReplanPolicy
-from companion.skipper.geometry import bearing_rad, distance_m
+from companion.skipper.geometry import bearing_rad, distance_m, moved
 from companion.skipper.manoeuvre import is_tack
 from companion.skipper.route import effective, ends_safely, is_same_mission
 from companion.skipper.snapshot import AutopilotRebooted, OperatorWish, UploadResult, WindHealth
@@ -492,6 +492,93 @@ def test_a_position_jump_into_an_island_moves_no_plan():
     assert world.count(act.RequestPlan) == asked
     assert world.run(1500, is_done)
     assert world.clearance() > world.skipper.config.margin_floor_m
+
+
+def test_a_position_that_jumped_is_planned_from_when_the_way_from_there_is_shut():
+    """The autopilot sails by it at once: waiting for it to be believed would end on the island."""
+    world = make()
+    world.run(60)
+    asked = world.count(act.RequestPlan)
+    middle = (-5.0, 140.0)
+    away = bearing_rad(world.state.route.points_en_m[world.state.index], middle)
+    world.position = moved(middle, away, 55.0)      # moved, and truly so: behind an island, seen from the waypoint
+    moved_at = len(world.track)
+    world.run(3)
+    assert any(r.name == "position jump" for r in world.state.raised)
+    assert world.count(act.RequestPlan) > asked
+    assert world.run(1500, is_done)
+    assert world.skipper.voyage.area.path_clearance_m(world.track[moved_at:]) > 0.0
+
+
+def stopped_by_failsafe(world, *texts):
+    world.set_mode(Mode.HOLD)
+    world.system_status, world.ekf_ok, world.drift_mps = 5, False, 1.0
+    world.events += [StatusText(t_s=world.t, severity=2, text=text) for text in texts]
+    world.run(12)
+    world.system_status, world.ekf_ok = 4, True
+
+
+@pytest.mark.parametrize("text", ["EKF variance", "EKF failsafe"])
+def test_a_position_failsafe_is_no_operator_and_the_boat_sails_on(text):
+    world = make()
+    world.run(60)
+    stopped_by_failsafe(world, text)
+    assert world.state.phase is Phase.HOLDING
+    assert "position filter" in world.state.why
+    assert world.mode is Mode.HOLD
+    plans = world.count(act.RequestPlan)
+    assert world.run(10, lambda w: w.mode is Mode.AUTO)
+    assert world.count(act.RequestPlan) == plans + 1          # from where it drifted to, before AUTO
+    world.drift_mps = 0.0
+    assert world.run(1500, is_done)
+    assert said(world, "position failsafe")
+    assert not said(world, "operator")
+    assert world.clearance() > 0.0
+
+
+@pytest.mark.parametrize("texts", [(), ("Radio Failsafe",), ("EKF failsafe cleared",)])
+def test_hold_without_a_position_failsafe_is_the_operators(texts):
+    world = make()
+    world.run(60)
+    stopped_by_failsafe(world, *texts)
+    assert world.state.phase is Phase.OPERATOR
+    world.run(60)
+    assert world.mode is Mode.HOLD
+
+
+def test_an_operator_who_takes_another_mode_after_a_failsafe_has_the_boat():
+    world = make()
+    world.run(60)
+    stopped_by_failsafe(world, "EKF failsafe")
+    world.set_mode(Mode.MANUAL)
+    world.run(3)
+    assert world.state.phase is Phase.OPERATOR
+
+
+def test_without_permission_a_failsafe_waits_for_the_operator():
+    world = make()
+    world.run(60)
+    world.permissions = replace(world.permissions, may_set_mode=False)
+    stopped_by_failsafe(world, "EKF failsafe")
+    world.run(30)
+    assert world.state.phase is Phase.OPERATOR
+    assert world.mode is Mode.HOLD
+
+
+def test_a_mission_held_back_by_an_upload_cut_short_is_ours_and_planned_on_from():
+    world = make()
+    world.run(60)
+    world.uploads_fail = lambda n: UploadResult.LINK
+    assert world.run(300, lambda w: any(kind == "upload" for _, kind, _ in w.pending))
+    action = next(a for _, kind, a in world.pending if kind == "upload")
+    assert action.stopgap is not None
+    world.install((*world.mission[:action.keep_first], action.stopgap, *action.items[action.keep_first + 1:]))
+    assert world.run(10, lambda w: said(w, "held back"))
+    assert not said(world, "foreign mission")
+    assert is_same_mission(world.state.route.items, world.mission)
+    world.uploads_fail = lambda n: UploadResult.OK
+    assert world.run(1500, is_done)
+    assert world.clearance() > 0.0
 
 
 def test_an_untrusted_wind_changes_no_plan():

@@ -100,6 +100,9 @@ class World:
     wind_health: WindHealth = WindHealth.GOOD
     heartbeat_age: float = 0.2
     position_offset: tuple[float, float] = (0.0, 0.0)
+    system_status: int = 4
+    ekf_ok: bool = True
+    drift_mps: float = 0.0      # along the heading, while nobody sails
     uploads_fail: Callable[[int], UploadResult] = lambda n: UploadResult.OK
     planner: Callable | None = None
     state: SkipperState | None = None
@@ -136,7 +139,7 @@ class World:
         elif self.mode is Mode.AUTO and self.armed and self.mission_state is MissionState.ACTIVE and self.target():
             want = self._auto(twd)
         else:
-            self.speed *= 0.7
+            self.speed = max(0.7 * self.speed, self.drift_mps)
             self.position = moved(self.position, self.heading, self.speed * dt)
             return
         turn = difference_rad(want, self.heading)
@@ -264,7 +267,8 @@ class World:
         vehicle = VehicleState(t_s=self.t, boot_s=self.boot_s + self.t, position=FRAME.geo_from_en(*here),
                                velocity_en_mps=velocity, heading_rad=self.heading)
         status = AutopilotStatus(
-            t_s=self.t, boot_s=self.boot_s + self.t, mode=self.mode, is_armed=self.armed, ekf_ok=True,
+            t_s=self.t, boot_s=self.boot_s + self.t, mode=self.mode, is_armed=self.armed, ekf_ok=self.ekf_ok,
+            system_status=self.system_status,
             mission_seq=self.seq, mission_total=len(self.mission), mission_state=self.mission_state)
         out = Snapshot(
             t_s=self.t, vehicle=vehicle, vehicle_age_s=0.1, position_en_m=here, autopilot=status, autopilot_age_s=0.2,
