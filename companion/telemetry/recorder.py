@@ -27,8 +27,10 @@ SUMMARY = "summary.json"
 VOYAGE = "voyage.toml"
 STATE = "state.json"
 
-# A telemetry log of one voyage ends here (24 h at the companion's rates is about 250 MB).
-MAX_TLOG_BYTES = 1_000_000_000
+# The files of one voyage end here [bytes], restarts included: what comes later is dropped and counted. A day of the
+# endurance scenario writes about a tenth of it.
+MAX_BYTES = {TLOG: 2_500_000_000, DECISIONS: 500_000_000, TRACK: 150_000_000}
+TAIL_BYTES = 1 << 20   # looked at for the end of the last whole line: no record is longer
 
 TRACK_COLUMNS = (
     "t_s", "frames", "outcomes", "lat_deg", "lon_deg", "east_m", "north_m", "heading_deg", "sog_mps", "cog_deg",
@@ -73,7 +75,7 @@ class Recorder:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.dropped = 0
-        self._tlog_bytes = 0
+        self._bytes: dict[str, int] = {}
         self._fds: dict[str, int] = {}
 
     def __enter__(self) -> Self:
@@ -84,9 +86,10 @@ class Recorder:
                 if name != TLOG:  # whose readers find the next frame by themselves
                     _cut_torn_line(path)
                 self._fds[name] = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+                self._bytes[name] = os.fstat(self._fds[name]).st_size
         except OSError as error:
             raise JobError(f"cannot write the voyage to {self.folder}: {error.strerror}") from error
-        if os.fstat(self._fds[TRACK]).st_size == 0:
+        if self._bytes[TRACK] == 0:
             self._append(TRACK, (",".join(TRACK_COLUMNS) + "\n").encode())
         return self
 
@@ -99,10 +102,15 @@ class Recorder:
 
     def _append(self, name: str, data: bytes) -> None:
         # A full disk must not end a voyage: the record is dropped, counted, and told in the summary.
+        if self._bytes[name] + len(data) > MAX_BYTES[name]:
+            self.dropped += 1
+            return
         try:
             os.write(self._fds[name], data)
         except OSError:
             self.dropped += 1
+            return
+        self._bytes[name] += len(data)
 
     def decision(self, record: Mapping[str, Any]) -> None:
         """Append one decision record."""
@@ -116,10 +124,6 @@ class Recorder:
 
     def frame(self, stamped: bytes) -> None:
         """Append one stamped frame to the telemetry log."""
-        if self._tlog_bytes + len(stamped) > MAX_TLOG_BYTES:
-            self.dropped += 1
-            return
-        self._tlog_bytes += len(stamped)
         self._append(TLOG, stamped)
 
     def sync(self) -> None:
@@ -143,12 +147,15 @@ class Recorder:
 def _cut_torn_line(path: Path) -> None:
     """Cut off the half line that a power cut left: what is appended must not join it."""
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            begin = file.seek(max(0, size - TAIL_BYTES))
+            tail = file.read()
     except FileNotFoundError:
         return
-    whole = data.rfind(b"\n") + 1
-    if whole < len(data):
-        os.truncate(path, whole)
+    whole = tail.rfind(b"\n") + 1
+    if whole < len(tail):
+        os.truncate(path, begin + whole)
 
 
 def _without_none(value: Any) -> Any:

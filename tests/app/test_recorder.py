@@ -8,7 +8,15 @@ import pytest
 
 from companion.errors import JobError
 from companion.telemetry import recorder as module
-from companion.telemetry.recorder import DECISIONS, TRACK_COLUMNS, Recorder, jsonable, read_jsonl, write_atomically
+from companion.telemetry.recorder import (
+    DECISIONS,
+    TLOG,
+    TRACK_COLUMNS,
+    Recorder,
+    jsonable,
+    read_jsonl,
+    write_atomically,
+)
 
 
 def test_records_survive_a_torn_last_line(tmp_path):
@@ -70,3 +78,28 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
 def test_json_holds_no_nan():
     value = jsonable({"a": math.nan, "b": np.array([1.0, math.inf]), "c": (1, np.float64(2.5))})
     assert json.loads(json.dumps(value, allow_nan=False)) == {"a": None, "b": [1.0, None], "c": [1, 2.5]}
+
+
+def test_files_are_bounded_over_restarts_and_what_is_left_out_is_counted(tmp_path, monkeypatch):
+    monkeypatch.setitem(module.MAX_BYTES, DECISIONS, 100)
+    monkeypatch.setitem(module.MAX_BYTES, TLOG, 20)
+    dropped = 0
+    for _ in range(3):
+        with Recorder(tmp_path) as recorder:
+            for k in range(10):
+                recorder.decision({"k": k})
+                recorder.frame(b"12345678")
+            dropped += recorder.dropped
+    assert (tmp_path / DECISIONS).stat().st_size <= 100
+    assert (tmp_path / TLOG).stat().st_size == 16
+    assert len(read_jsonl(tmp_path / DECISIONS)) + 2 + dropped == 60
+
+
+def test_a_torn_line_is_cut_off_a_long_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "TAIL_BYTES", 64)
+    path = tmp_path / DECISIONS
+    whole = b"".join(b'{"k":%d}\n' % k for k in range(100))
+    path.write_bytes(whole + b'{"k":1')
+    with Recorder(tmp_path):
+        pass
+    assert path.read_bytes() == whole
