@@ -26,7 +26,7 @@ def has_stopped(turn: Turn) -> bool:
     """Return whether HOLD is the failsafe's doing, and ours to end."""
     status = turn.autopilot
     return (
-        status is not None and status.mode is Mode.HOLD and status.is_armed and status.system_status == CRITICAL
+        status is not None and status.mode is Mode.HOLD and status.is_armed
         and turn.t_s - turn.state.failsafe_s <= TOLD_S and turn.snapshot.permissions.may_set_mode
     )
 

@@ -510,6 +510,14 @@ def test_a_position_that_jumped_is_planned_from_when_the_way_from_there_is_shut(
     assert world.skipper.voyage.area.path_clearance_m(world.track[moved_at:]) > 0.0
 
 
+def test_a_position_failsafe_that_is_over_before_it_is_seen_is_none_of_the_operators_either():
+    world = make()
+    world.run(60)
+    world.set_mode(Mode.HOLD)
+    world.events.append(StatusText(t_s=world.t, severity=2, text="EKF failsafe"))
+    assert world.run(10, lambda w: w.mode is Mode.AUTO)
+
+
 def stopped_by_failsafe(world, *texts):
     world.set_mode(Mode.HOLD)
     world.system_status, world.ekf_ok, world.drift_mps = 5, False, 1.0
