@@ -149,6 +149,7 @@ class _Shell:
         self._feed_names = feeds_of(mission)
         self._feeds: list[AisFeed] = []
         self._fed: list[AisReport] = []
+        self._silent: set[str] = set()   # feeds of which it was said
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
@@ -300,7 +301,8 @@ class _Shell:
             self.recorder.decision(self._stamped(
                 snapshot.t_s, {"kind": "phase", "phase": changed[0], "why": changed[1]}))
         self._announced = changed
-        self.status = companion_status(step, self.voyage, self.figures, clearance_m, link.bytes_per_s()[1])
+        self.status = companion_status(step, self.voyage, self.figures, clearance_m, link.bytes_per_s()[1],
+                                       self._feeds)
         persisted = self.fold.skipper.persisted(step.state)
         if persisted != self._persisted:
             self._persisted = persisted
@@ -342,7 +344,19 @@ class _Shell:
         while True:
             if self.status is not None:
                 autopilot.send_status(self.status)
+            self._tell_silence(autopilot)
             await asyncio.sleep(STATUS_EVERY_S)
+
+    def _tell_silence(self, autopilot: Autopilot) -> None:
+        """Say and record that a feed has fallen silent, and that it is heard again."""
+        for feed in self._feeds:
+            if feed.is_silent == (feed.name.text in self._silent):
+                continue
+            self._silent ^= {feed.name.text}
+            text = f"AIS feed {'silent' if feed.is_silent else 'heard again'}: {feed.sentence()}"
+            self.recorder.decision(self._stamped(
+                self._quantised(now_s())[1], {"kind": "feed", "silent": feed.is_silent, "text": text}))
+            autopilot.say(int(Severity.WARNING if feed.is_silent else Severity.NOTICE), text)
 
     async def _watch_loop(self) -> None:
         """Measure how long the event loop was held: a timer that fires late was kept waiting by somebody."""

@@ -309,6 +309,34 @@ def waypoint(point: GeoPoint, *, command: int = Command.NAV_WAYPOINT) -> Mission
 
 # -------------------------------------------------------------------------------------------- status
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TrafficStatus:
+    """What the companion sees of other vessels. The figures are those of the worst of them, None without one.
+
+    ``alarm`` is none, warn, act or touch, ``role`` and ``rule`` are what COLREGs ask of us; all empty without a vessel.
+    """
+
+    vessels: int = 0
+    refused: int = 0                   # reports and sentences left out: too old, too far, damaged
+    feeds: int = 0                     # AIS feeds of our own ...
+    silent_feeds: int = 0              # ... and those unheard for a minute
+    shared_mmsi: int = 0               # two vessels with one MMSI, times
+    clock_jumps: int = 0
+    silence_s: float | None = None     # since any report; None: never
+    name: str = ""
+    alarm: str = ""
+    role: str = ""
+    rule: str = ""
+    range_m: float | None = None       # between hulls, as is what follows
+    bearing_rad: float | None = None
+    cpa_m: float | None = None
+    tcpa_s: float | None = None
+
+    def __post_init__(self) -> None:
+        _finite(silence_s=self.silence_s, range_m=self.range_m, bearing_rad=self.bearing_rad, cpa_m=self.cpa_m,
+                tcpa_s=self.tcpa_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CompanionStatus:
     """What the companion says of itself over the radio; the shore reads it with ``companion status``.
 
@@ -339,6 +367,7 @@ class CompanionStatus:
     battery_v: float | None = None
     position: GeoPoint | None = None
     bytes_out_per_s: float | None = None      # own traffic
+    traffic: TrafficStatus | None = None      # None: no vessel was ever heard and there is no feed
     alert_code: str = ""                      # the rule or watchdog that speaks; empty: all is well
     alert_text: str = ""
 

@@ -124,6 +124,7 @@ def status_document(report: Any, autopilot: Any, is_alive: bool, bytes_in: float
             "promised_risk": _round(s.promised_risk, 4), "clearance_m": _round(s.clearance_m),
             "age_s": _age(report, "status"),
         },
+        "traffic": None if s.traffic is None else _traffic(s.traffic) | {"age_s": _age(report, "traffic")},
         "position": None if s.position is None else {
             "lat_deg": s.position.lat_deg, "lon_deg": s.position.lon_deg, "age_s": _age(report, "status"),
         },
@@ -136,6 +137,39 @@ def status_document(report: Any, autopilot: Any, is_alive: bool, bytes_in: float
                  "companion_bytes_per_s": None if s.bytes_out_per_s is None else round(s.bytes_out_per_s)},
         "ages_s": {name: round(age, 2) for name, age in report.age_s.items()},
     }
+
+
+def _traffic(seen: Any) -> dict[str, Any]:
+    worst = None if not seen.alarm else {
+        "name": seen.name, "alarm": seen.alarm, "role": seen.role, "rule": seen.rule, "range_m": _round(seen.range_m),
+        "bearing_deg": None if seen.bearing_rad is None else round(math.degrees(seen.bearing_rad), 1),
+        "cpa_m": _round(seen.cpa_m), "tcpa_s": seen.tcpa_s,
+    }
+    return {
+        "vessels": seen.vessels, "worst": worst, "silence_s": seen.silence_s, "refused": seen.refused,
+        "feeds": seen.feeds, "silent_feeds": seen.silent_feeds, "shared_mmsi": seen.shared_mmsi,
+        "clock_jumps": seen.clock_jumps,
+    }
+
+
+def traffic_line(seen: dict[str, Any]) -> str:
+    """Return the line about other vessels."""
+    parts = [f"{seen['vessels']} vessel{'' if seen['vessels'] == 1 else 's'}"]
+    worst = seen["worst"]
+    if worst is not None:
+        when = "opening" if worst["tcpa_s"] is None else f"in {worst['tcpa_s']:.0f} s"
+        parts.append(
+            f"{worst['name']}: {worst['alarm'].upper()}, {worst['range_m']:.0f} m at {worst['bearing_deg']:03.0f}°, "
+            f"CPA {worst['cpa_m']:.0f} m {when}, {worst['role']} (rule {worst['rule']})")
+    if seen["feeds"]:
+        parts.append(f"{seen['silent_feeds']} of {seen['feeds']} feeds silent")
+    if seen["silence_s"] is not None:
+        parts.append(f"last report {seen['silence_s']:.0f} s ago")
+    if seen["refused"]:
+        parts.append(f"{seen['refused']} refused")
+    odd = {"shared MMSI": seen["shared_mmsi"], "clock jumps": seen["clock_jumps"]}
+    parts += [f"{name} {count}" for name, count in odd.items() if count]
+    return " | ".join(parts)
 
 
 def _age(report: Any, part: str) -> float | None:
@@ -169,6 +203,8 @@ def _write_text(d: dict[str, Any], units: str) -> None:
           f"  TWS {show(wind['tws_mps'], '.1f', factor)} {unit}  (age {show(wind['age_s'], '.1f')} s)"
           f" | P(safe) {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
           f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {show(plan['replans'])} replans")
+    if d["traffic"] is not None:
+        print(f"  {traffic_line(d['traffic'])}")
     link = d["link"]
     print(f"  battery {show(pilot['battery_v'], '.1f')} V | link {link['bytes_per_s_in']} B/s in,"
           f" loss {100.0 * link['loss']:.0f} %, companion {show(link['companion_bytes_per_s'])} B/s", flush=True)

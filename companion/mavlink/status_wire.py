@@ -20,9 +20,10 @@ from dataclasses import dataclass, replace
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.geo.angles import wrap_two_pi
+from companion.mavlink import traffic_wire
 from companion.mavlink.codec import e7, geo_point
 from companion.mavlink.frames import Message
-from companion.messages import CompanionStatus
+from companion.messages import CompanionStatus, TrafficStatus
 
 # TUNNEL payload types from 32768 on are free for private use; ours is read by nobody else.
 PAYLOAD_TYPE = 0xC05A
@@ -133,6 +134,10 @@ def status_messages(status: CompanionStatus, boot_s: float, turn: int) -> list[M
     messages = [wire.MAVLink_tunnel_message(
         0, 0, PAYLOAD_TYPE, len(payload), list(payload.ljust(MAX_PAYLOAD_BYTES, b"\x00"))
     )]
+    if status.traffic is not None and turn % 2 == 0:
+        seen = traffic_wire.pack_traffic(status.traffic)
+        messages.append(wire.MAVLink_tunnel_message(
+            0, 0, traffic_wire.PAYLOAD_TYPE, len(seen), list(seen.ljust(MAX_PAYLOAD_BYTES, b"\x00"))))
     turn %= 4
     if turn == 3:
         wind = wind_cov(status, boot_s)
@@ -193,6 +198,7 @@ class StatusReader:
         self.bad = 0
         self._packed: CompanionStatus | None = None
         self._plain = CompanionStatus(t_s=0.0, state="")
+        self._traffic: TrafficStatus | None = None
         self._heard_s: dict[str, float] = {}
 
     def take(self, t_s: float, message: Message) -> bool:
@@ -204,6 +210,9 @@ class StatusReader:
             if kind == "TUNNEL" and message.payload_type == PAYLOAD_TYPE:
                 self._packed = unpack_status(bytes(message.payload[:message.payload_length]), t_s)
                 self._heard_s["status"] = t_s
+            elif kind == "TUNNEL" and message.payload_type == traffic_wire.PAYLOAD_TYPE:
+                self._traffic = traffic_wire.unpack_traffic(bytes(message.payload[:message.payload_length]))
+                self._heard_s["traffic"] = t_s
             elif kind == "WIND_COV":
                 self._take_wind(t_s, message)
             elif kind == "NAMED_VALUE_FLOAT" and message.name in FLOATS:
@@ -220,9 +229,10 @@ class StatusReader:
         if not self._heard_s:
             return None
         age_s = {name: t_s - heard_s for name, heard_s in sorted(self._heard_s.items())}
-        if self._packed is not None and age_s["status"] <= STALE_S:
-            return StatusReport(status=self._packed, age_s=age_s, has_packed=True)
-        return StatusReport(status=self._plain, age_s=age_s, has_packed=False)
+        has_packed = self._packed is not None and age_s["status"] <= STALE_S
+        status = self._packed if self._packed is not None and has_packed else self._plain
+        traffic = self._traffic if age_s.get("traffic", math.inf) <= STALE_S else None
+        return StatusReport(status=replace(status, traffic=traffic), age_s=age_s, has_packed=has_packed)
 
     def _take_wind(self, t_s: float, message: Message) -> None:
         north, east = float(message.wind_x), float(message.wind_y)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
-from companion.messages import CompanionStatus
+from companion.messages import CompanionStatus, TrafficStatus
 from companion.skipper.actions import Announce, Severity
 from companion.skipper.state import Phase, Route
 from companion.skipper.voyage import Voyage
 from companion.telemetry.records import sigma_ahead_rad
 from companion.telemetry.summary import VoyageFigures
+from companion.traffic import TrafficCounts
+from companion.traffic.feeds import AisFeed
 
 # Below this speed the time to a waypoint says nothing [m/s].
 MIN_SPEED_MPS = 0.2
@@ -19,6 +23,7 @@ MIN_SPEED_MPS = 0.2
 
 def companion_status(
     step: Step, voyage: Voyage, figures: VoyageFigures, clearance_m: float | None, bytes_out_per_s: float | None,
+    feeds: Sequence[AisFeed] = (),
 ) -> CompanionStatus:
     """Return the status at ``step``. The wind's spread is that of a minute ahead, which the plan lives on."""
     snapshot, state = step.snapshot, step.state
@@ -52,13 +57,36 @@ def companion_status(
         battery_v=None if autopilot is None else autopilot.battery_v,
         position=None if vehicle is None else vehicle.position,
         bytes_out_per_s=bytes_out_per_s,
+        traffic=traffic_status(step, feeds),
         alert_code=code,
         alert_text=text,
     )
 
 
+def traffic_status(step: Step, feeds: Sequence[AisFeed]) -> TrafficStatus | None:
+    """Return what is seen of other vessels, the worst one's figures; None when nobody was heard and no feed is open."""
+    picture = step.snapshot.traffic
+    if picture is None and not feeds:
+        return None
+    counts = TrafficCounts() if picture is None else picture.counts
+    seen = TrafficStatus(
+        vessels=0 if picture is None else len(picture.vessels),
+        refused=counts.stale + counts.far + sum(feed.counts.refused for feed in feeds),
+        feeds=len(feeds), silent_feeds=sum(feed.is_silent for feed in feeds), shared_mmsi=counts.shared_mmsi,
+        clock_jumps=counts.clock_jumps, silence_s=None if picture is None else picture.silence_s,
+    )
+    if not step.state.watch:
+        return seen
+    worst = step.state.watch[0]
+    approach = worst.approach
+    return replace(
+        seen, name=worst.vessel.label, alarm=worst.alarm.name.lower(), role=worst.encounter.role.value,
+        rule=worst.encounter.rule.value, range_m=approach.now_m, bearing_rad=approach.bearing_rad,
+        cpa_m=approach.distance_m, tcpa_s=approach.time_s if approach.is_closing else None)
+
+
 def risk_of(route: Route) -> float:
-    """Return what the plan promised: the probability, at each instant, of being forced into the no-go zone."""
+    """Return what the plan promised: the probability, at each instant, of the no-go zone or a vessel too near."""
     return 1.0 - route.delta_s
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from companion.fold import Step
@@ -11,6 +11,7 @@ from companion.geo.angles import wrap_pi
 from companion.messages import Mode
 from companion.skipper.actions import Announce, RequestPlan, UploadMission
 from companion.skipper.state import Phase
+from companion.traffic import TrafficCounts
 
 # Inside the no-go zone for longer than a tack takes [s] is an entry, not a tack.
 NO_GO_ENTRY_S = 5.0
@@ -43,6 +44,7 @@ class VoyageFigures:
     path_risk: float | None = None
     longest_no_go_s: float = 0.0
     alerts: dict[str, int] = field(default_factory=dict)
+    traffic: TrafficCounts | None = None
     _anchor: tuple[float, float] | None = None
     _side: int = 0
     _pending: tuple[int, float, float] | None = None
@@ -61,6 +63,8 @@ class VoyageFigures:
                 self.uploads += 1
             elif isinstance(action, Announce):
                 self.alerts[action.code] = self.alerts.get(action.code, 0) + 1
+        if snapshot.traffic is not None:
+            self.traffic = snapshot.traffic.counts
         route = step.state.route
         if route is not None:
             self.promised_risk = max(self.promised_risk or 0.0, 1.0 - route.delta_s)
@@ -139,4 +143,5 @@ class VoyageFigures:
             "path_risk": self.path_risk,
             "no_go_entries": self.no_go_entries,
             "alerts": dict(sorted(self.alerts.items())),
+            "traffic": None if self.traffic is None else asdict(self.traffic),
         }

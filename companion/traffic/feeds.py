@@ -69,6 +69,7 @@ class AisFeed:
         self._rng = random.Random(seed)
         self._partial = b""
         self.connections = 0
+        self.opened_s = now_s()
         self.last_heard_s: float | None = None
         self.last_error = ""
 
@@ -79,15 +80,14 @@ class AisFeed:
 
     @property
     def is_silent(self) -> bool:
-        """Has nothing come for a minute?"""
-        return self.last_heard_s is None or now_s() - self.last_heard_s > SILENT_S
+        """Has nothing come for a minute, since it was heard or opened?"""
+        return now_s() - (self.opened_s if self.last_heard_s is None else self.last_heard_s) > SILENT_S
 
     def sentence(self) -> str:
         """Return one line for the status."""
         c = self.counts
         heard = "never heard" if self.last_heard_s is None else f"heard {now_s() - self.last_heard_s:.0f} s ago"
-        refused = c.bad_form + c.bad_checksum + c.bad_payload + c.bad_fragment
-        text = f"{self.name.text}: {heard}, {c.reports} reports of {c.lines} lines, {refused} refused"
+        text = f"{self.name.text}: {heard}, {c.reports} reports of {c.lines} lines, {c.refused} refused"
         return f"{text}, {self.last_error}" if self.last_error else text
 
     # ------------------------------------------------------------------------------------------ bytes

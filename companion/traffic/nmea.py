@@ -40,6 +40,11 @@ class DecodeCounts:
     bad_fragment: int = 0        # out of order, incomplete, too late
     own: int = 0                 # AIVDO: our own transponder
 
+    @property
+    def refused(self) -> int:
+        """Lines that were damaged or made no sense."""
+        return self.bad_form + self.bad_checksum + self.bad_payload + self.bad_fragment
+
 
 class NmeaDecoder:
     """Sentences to reports; keeps the fragments of messages in several sentences, bounded in number and time."""

@@ -19,7 +19,7 @@ SLACK_M = 1e-3
 BETTER_SHARE, BETTER_S = 0.15, 20.0
 # ... and by twice as much where the new path does not look like it: farther apart than this [m], see path_distance_m.
 ALIKE_M = 150.0
-# A meeting later than this is left to later reports: a degree of course moves a fast ship by hundreds of metres by then.
+# A meeting later than this is left to later reports: a degree of course moves a fast ship by hundreds of metres.
 PRESSING_S = 300.0
 # Plans are made again for traffic at most this often (Büsser 2009, section 5.2).
 MIN_INTERVAL_S = 20.0

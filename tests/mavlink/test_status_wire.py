@@ -17,7 +17,9 @@ from companion.mavlink.status_wire import (
     status_messages,
     unpack_status,
 )
-from companion.messages import CompanionStatus, GeoPoint
+from companion.mavlink.traffic_wire import MAX_PAYLOAD_BYTES as TRAFFIC_BYTES
+from companion.mavlink.traffic_wire import pack_traffic, unpack_traffic
+from companion.messages import CompanionStatus, GeoPoint, TrafficStatus
 
 ASCII = st.characters(min_codepoint=32, max_codepoint=126)
 
@@ -139,3 +141,54 @@ def test_other_components_and_bad_values_are_left_out():
     assert not reader.take(0.0, nan)
     assert reader.bad == 1
     assert reader.report(1.0) is None
+
+
+SEEN = st.builds(
+    TrafficStatus,
+    vessels=st.integers(0, 60000), refused=st.integers(0, 60000), feeds=st.integers(0, 200),
+    silent_feeds=st.integers(0, 200), shared_mmsi=st.integers(0, 200), clock_jumps=st.integers(0, 200),
+    silence_s=maybe(st.floats(0.0, 60000.0)), name=st.text(ASCII, max_size=20),
+    alarm=st.sampled_from(["", "none", "warn", "act", "touch"]),
+    role=st.sampled_from(["", "give way", "stand on", "both alter to starboard", "keep clear"]),
+    rule=st.sampled_from(["", "none", "12", "13", "18"]), range_m=maybe(st.floats(0.0, 1e5)),
+    bearing_rad=maybe(st.floats(-10.0, 10.0)), cpa_m=maybe(st.floats(0.0, 1e5)), tcpa_s=maybe(st.floats(0.0, 60000.0)),
+)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(SEEN)
+def test_what_is_seen_of_vessels_survives_the_air(seen):
+    payload = pack_traffic(seen)
+    assert len(payload) <= TRAFFIC_BYTES
+    back = unpack_traffic(payload)
+    for field in dataclasses.fields(TrafficStatus):
+        sent, got = getattr(seen, field.name), getattr(back, field.name)
+        if sent is None or not isinstance(sent, float):
+            assert got == sent, field.name
+        elif field.name == "bearing_rad":
+            assert abs(math.remainder(got - sent, 2.0 * math.pi)) < 1e-4
+        else:
+            assert got == pytest.approx(sent, rel=1e-6, abs=0.51 if field.name.endswith("_s") else 1e-6), field.name
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(st.binary(max_size=140))
+def test_no_traffic_payload_raises_anything_but_value_error(payload):
+    try:
+        unpack_traffic(b"\x01" + payload)
+    except ValueError:
+        return
+
+
+def test_the_reader_joins_status_and_traffic_and_says_how_old_each_is():
+    seen = TrafficStatus(vessels=3, name="Nellie", alarm="act", role="give way", rule="18", cpa_m=12.0)
+    status = CompanionStatus(t_s=5.0, state="standard", traffic=seen)
+    reader = StatusReader()
+    for t_s, what in ((10.0, status), (12.0, dataclasses.replace(status, traffic=None))):
+        for message in on_air(what, 1):
+            reader.take(t_s, message)
+    report = reader.report(13.0)
+    assert report.status.traffic == seen
+    assert report.age_s["traffic"] == 3.0
+    assert report.age_s["status"] == 1.0
+    assert reader.report(10.0 + STALE_S + 1.0).status.traffic is None
