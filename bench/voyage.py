@@ -19,7 +19,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sitl.live import free_port
+from sitl.ships import free_port
 
 SCENARIO = Path("sitl/scenarios/demo.toml")
 MISSION = Path("missions/archipelago.toml")

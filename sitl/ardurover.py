@@ -309,6 +309,17 @@ class ArduRover:
         self.set_parameter("SIM_TIDE_DIR", math.degrees(wrap_two_pi(set_to_rad + math.pi)))
         self.set_parameter("SIM_TIDE_SPEED", drift_mps)
 
+    def set_gps_jump(self, lat_deg: float, lon_deg: float) -> None:
+        """Let the receiver err by so much; by the names of 4.5 and of 4.7, of which one is known to it."""
+        for prefix in ("SIM_GPS_GLITCH", "SIM_GPS1_GLTCH"):
+            self.set_parameter(f"{prefix}_X", lat_deg)
+            self.set_parameter(f"{prefix}_Y", lon_deg)
+
+    def set_gps(self, *, is_lost: bool) -> None:
+        """Take the receiver away, or give it back; by the names of 4.5 and of 4.7."""
+        self.set_parameter("SIM_GPS_DISABLE", float(is_lost))
+        self.set_parameter("SIM_GPS1_ENABLE", float(not is_lost))
+
     @property
     def truth(self) -> Truth:
         """What is so, from the simulator's own messages and the weather.

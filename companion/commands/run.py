@@ -38,6 +38,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--wait", type=float, default=30.0, metavar="S",
                         help="give up when no autopilot is heard for this long (default: 30)")
     parser.add_argument("--limit", type=float, metavar="S", help="end after this many seconds")
+    parser.add_argument("--feed", action="append", default=[], metavar="FEED",
+                        help="hear other vessels here too, besides the mission's [traffic] feeds: udpin:HOST:PORT, "
+                        "tcp:HOST:PORT, /dev/NAME:BAUD; may be given more than once")
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (32 bytes, mode 0600)")
     parser.add_argument("--speedup", type=float, default=1.0, metavar="N",
                         help="the autopilot is a simulator that runs N times as fast as time (default: 1)")
@@ -50,10 +53,13 @@ def run(args: argparse.Namespace) -> int:
     from companion.errors import InputError
     from companion.geofence import load_mission
     from companion.mavlink.transport import open_link
+    from companion.traffic.feeds import parse_feed
 
     if not args.speedup > 0.0:
         raise InputError("--speedup", str(args.speedup), "must be positive")
-    mission = load_mission(args.mission)
+    for name in args.feed:
+        parse_feed(name)
+    mission = load_mission(args.mission).with_feeds(*args.feed)
     for finding in mission.findings:
         sys.stderr.write(f"companion run: note: {finding}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed

@@ -6,7 +6,7 @@ import datetime as dt
 import difflib
 import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +109,11 @@ class Mission:
     def traffic(self) -> TrafficOptions:
         """The ``[traffic]`` table."""
         return self.options.traffic
+
+    def with_feeds(self, *names: str) -> Mission:
+        """Return the mission with ``names`` after its own feeds of other vessels."""
+        traffic = msgspec.structs.replace(self.traffic, feeds=(*self.traffic.feeds, *names))
+        return replace(self, options=msgspec.structs.replace(self.options, traffic=traffic))
 
     @property
     def margin_m(self) -> float:

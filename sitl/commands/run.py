@@ -32,12 +32,17 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run_virtual
+    from companion.errors import InputError
     from companion.telemetry.progress import ProgressLine
+    from companion.telemetry.recorder import DECISIONS
     from sitl.runner import run_embedded
     from sitl.scenario import load_scenario
 
     scenario = load_scenario(args.scenario)
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{scenario.name}"
+    if (folder / DECISIONS).exists():
+        raise InputError("--out", str(folder), "holds a voyage already, which this one would resume",
+                         "name another folder, or remove that one")
     if args.autopilot == "ardurover" or args.live:
         from sitl.live import run_live
 

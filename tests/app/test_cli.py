@@ -11,7 +11,7 @@ import pytest
 
 from companion import cli
 from sitl import cli as sitl_cli
-from sitl.live import free_port
+from sitl.ships import free_port
 
 GOOD = Path("missions/archipelago.toml").read_text()
 
@@ -102,6 +102,33 @@ def test_a_link_that_never_answers_is_one_line(tmp_path, capsys):
 def test_a_bad_link_is_bad_usage(tmp_path, capsys, link):
     assert cli.main(["run", str(mission(tmp_path)), "--link", link, "--out", str(tmp_path / "v")]) == 2
     assert "--link" in capsys.readouterr().err
+
+
+def test_a_bad_feed_is_bad_usage(tmp_path, capsys):
+    path = str(mission(tmp_path))
+    assert cli.main(["run", path, "--link", f"udpin:127.0.0.1:{free_port()}", "--feed", "udpin:127.0.0.1:10110",
+                     "--feed", "radio"]) == 2
+    assert "radio: is not a feed" in capsys.readouterr().err
+
+
+def test_a_scenario_is_not_sailed_into_the_folder_of_another_voyage(tmp_path, capsys):
+    (tmp_path / "decisions.jsonl").touch()
+    before = sorted(tmp_path.iterdir())
+    assert sitl_cli.main(["run", "sitl/scenarios/demo.toml", "--out", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert "holds a voyage already" in error
+    assert len(error.strip().splitlines()) == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(("autopilot", "scenario", "words"), [
+    (["--live"], "gps-jump", "gps_jump"), (["--autopilot", "ardurover"], "upload-cut", "link_quality"),
+])
+def test_a_scenario_that_cannot_be_played_live_says_so_first(tmp_path, capsys, autopilot, scenario, words):
+    out = tmp_path / "voyage"
+    assert sitl_cli.main(["run", f"sitl/scenarios/{scenario}.toml", *autopilot, "--out", str(out)]) == 1
+    assert f"{scenario}: {words} can be played by the embedded autopilot only" in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_report_and_replay_of_a_folder_that_is_none(tmp_path, capsys):

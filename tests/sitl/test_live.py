@@ -1,0 +1,116 @@
+"""Live runs: what the vessels of a scenario say over UDP, and a voyage among them on the real ArduRover."""
+
+import asyncio
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.clock import now_s, run_virtual
+from companion.geo.angles import difference_rad
+from companion.geo.frame import LocalFrame
+from companion.messages import GeoPoint
+from companion.traffic.feeds import open_feed
+from companion.traffic.nmea import NmeaDecoder
+from sitl.ardurover import find
+from sitl.autopilot import Vessel
+from sitl.boats import Fix
+from sitl.live import run_live
+from sitl.live_traffic import LiveTraffic, sentences
+from sitl.scenario import EventSpec, load_scenario
+from sitl.ships import distance_m, ship_of
+from sitl.verdict import Truth
+from sitl.wind import Constant
+
+ORIGIN = GeoPoint(lat_deg=50.817, lon_deg=-1.31)
+FRAME = LocalFrame(ORIGIN)
+
+
+@given(
+    lat=st.floats(-85.0, 85.0), lon=st.floats(-179.99, 179.99), course=st.floats(0.0, 359.99),
+    speed=st.floats(0.0, 50.0),
+    mmsi=st.integers(200_000_000, 799_999_999),
+)
+def test_a_receivers_sentence_says_where_the_ship_is(lat, lon, course, speed, mmsi):
+    vessel = Vessel(mmsi=mmsi, position=GeoPoint(lat_deg=lat, lon_deg=lon), cog_deg=course, sog_mps=speed,
+                    heading_deg=course, nav_status=0)
+    report = NmeaDecoder().feed(sentences(vessel).strip(), 1.0)
+    assert report.mmsi == mmsi
+    assert not report.is_class_b
+    assert report.position.lat_deg == pytest.approx(lat, abs=1e-4 / 60.0)
+    assert report.position.lon_deg == pytest.approx(lon, abs=1e-4 / 60.0)
+    assert report.speed_mps == pytest.approx(speed, abs=0.052)
+    assert abs(difference_rad(report.course_rad, math.radians(course))) <= math.radians(0.11)
+
+
+class Moored:
+    """A boat that lies at the origin; all that the traffic asks of it."""
+
+    plays = frozenset()
+    link = ""
+
+    def fix(self):
+        return Fix(position=ORIGIN, heading_rad=0.0, speed_mps=0.0, wind=(0.0, 5.0), sails=True)
+
+
+async def heard_for(seconds, event, began_s):
+    """Play ``event`` and return what a companion's feed hears, and the judge's truth."""
+    traffic, reports, truth = LiveTraffic(FRAME, Constant(0.0, 5.0), 0), [], Truth()
+    async with open_feed(traffic.feed, reports.append):
+        playing = asyncio.create_task(traffic.play(event, began_s, Moored()))
+        for _ in range(seconds):
+            await asyncio.sleep(1.0)
+            traffic.note(truth, (0.0, 0.0), now_s() - began_s)
+        playing.cancel()
+    return reports, truth
+
+
+def test_a_ship_is_reported_where_the_judge_measures_it():
+    event = EventSpec(at_s=40.0, kind="vessel", east_m=300.0, north_m=200.0, course_deg=180.0, sog_mps=5.0)
+    # the scenario began 40 s before the loop's time 0: the ship is at its place now
+    reports, truth = run_virtual(heard_for(60, event, -40.0))
+    assert len(reports) == 6
+    ship = ship_of(event, 0)
+    for report in reports:
+        assert math.dist(FRAME.en_from_geo(report.position), ship.at(report.t_s + 40.0)) < 1.0
+    assert reports[-1].t_s > 45.0
+    # abeam after 40 s, 300 m off the middle
+    assert truth.vessels_m == {"211000001": pytest.approx(distance_m(ship, (0.0, 0.0), 80.0), abs=0.1)}
+
+
+def test_a_ship_without_ais_is_judged_and_not_told():
+    event = EventSpec(at_s=0.0, kind="vessel", east_m=300.0, course_deg=180.0, sog_mps=5.0, is_on_ais=False)
+    reports, truth = run_virtual(heard_for(20, event, 0.0))
+    assert reports == []
+    assert truth.vessels_m["211000001"] == pytest.approx(292.0, abs=0.1)   # half a beam off its middle
+
+
+def test_an_intruder_comes_at_our_boat():
+    event = EventSpec(at_s=0.0, kind="intruder", gap_m=70.0, bearing_deg=45.0, sog_mps=3.0, every_s=1.0)
+    reports, truth = run_virtual(heard_for(40, event, 0.0))
+    assert len(reports) >= 39
+    assert truth.vessels_m["211000001"] < 1.0
+
+
+def test_a_second_boat_sails_to_its_goal_round_ours():
+    event = EventSpec(at_s=0.0, kind="second_boat", east_m=120.0, goal_east_m=-120.0, every_s=2.0)
+    reports, truth = run_virtual(heard_for(400, event, 0.0))
+    assert truth.second_boat_m < 15.0
+    assert truth.vessels_m["211000001"] > 8.0
+    assert len(reports) == 200
+
+
+PROGRAM = find()
+
+
+@pytest.mark.campaign
+@pytest.mark.ardurover
+@pytest.mark.skipif(PROGRAM is None, reason="no ardurover: run 'sitl fetch' or set $ARDUROVER")
+@pytest.mark.parametrize("name", ["crossing", "head-on", "overtaking"])
+def test_the_real_autopilot_sails_among_ships(name, tmp_path):
+    source = Path(f"sitl/scenarios/{name}.toml")
+    verdict = run_live(load_scenario(source), source, 1, tmp_path / "v", autopilot="ardurover", program=PROGRAM,
+                       speedup=None)
+    assert verdict.passed, [c for c in verdict.checks if not c.passed]
