@@ -70,12 +70,13 @@ def mean_twd_rad(forecast: WindForecast, horizon_s: float) -> float:
 def judge(
     path: Sequence[PointEn], *, boat: Boat, no_go_half_rad: float, twd_from_rad: float, tws_mps: float, area: Area,
     start_heading_rad: float | None = None, forecast: WindForecast | None = None, level: float = 0.0,
-    after_s: float = 0.0,
+    after_s: float = 0.0, beat_room_m: float | None = None,
 ) -> Verdict:
     """Judge a polyline that is sailed from its first point, ``after_s`` from now.
 
     ``level`` is the central probability of the forecast's interval that each leg must be clear of; 0 asks for the
-    present wind alone. A leg inside the zone is timed as the beat that it will become.
+    present wind alone. A leg inside the zone is timed as the beat that it will become; with ``beat_room_m`` of clear
+    water about it, it is as good as any other.
     """
     time_s, spare, worst = 0.0, math.inf, -1
     heading = start_heading_rad
@@ -88,7 +89,9 @@ def judge(
         needed = no_go_half_rad
         if forecast is not None and level > 0.0:
             needed += half_width_rad(forecast, after_s + time_s, level)
-        if length > SHORT_LEG_M and twa - needed < spare:
+        if length > SHORT_LEG_M and twa - needed < spare and not (
+            twa < needed and beat_room_m is not None and area.path_clearance_m([a, b]) >= beat_room_m
+        ):
             spare, worst = twa - needed, n
         if twa >= no_go_half_rad:
             speed = boat.polar.speed_mps(twa, tws_mps)

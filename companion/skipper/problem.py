@@ -181,7 +181,7 @@ def band(gate: Gate, start_en: PointEn, aim_en: PointEn) -> Polygon | None:
 def problem_dict(
     voyage: Voyage, gate: Gate, *, start: Start, aim: Aim, forecast: WindForecast,
     margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
-    extra_obstacles: Sequence[str] = (), title: str = "",
+    extra_obstacles: Sequence[str] = (), title: str = "", beat: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
 
@@ -215,6 +215,7 @@ def problem_dict(
         "wind": wind,
         "boat": boat,
         "delta_s": delta_s,
+        "beat": beat,
     }
 
 

@@ -71,7 +71,7 @@ def test_runs_to_a_goal_downwind():
 
 
 def test_replans_at_each_waypoint_from_the_next_one_and_before_it_is_reached():
-    world = make()
+    world = make(config={"autopilot_beats": False})   # every tack a waypoint
     assert world.run(1500, is_done)
     asked = [(t, a) for t, a in world.actions if isinstance(a, act.RequestPlan)
              and a.reason is act.ReplanReason.WAYPOINT]
