@@ -11,6 +11,7 @@ from companion.errors import InputError
 from companion.messages import Command, waypoint
 from companion.planner import Plan, Problem
 from companion.skipper.actions import CancelPlan, Change, ReplanReason, RequestPlan, Severity, UploadMission
+from companion.skipper.beating import problem_beat, room_m, tacks_fail
 from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m, moved
 from companion.skipper.judge import half_width_rad, judge
@@ -30,8 +31,6 @@ SAME_M = 1.0             # a new waypoint this near to the old one is the old on
 SPARE_SHARE = 0.001      # a path may get this much slower ...
 SPARE_S = 0.3            # ... and this much more, to have a waypoint less
 SIMPLIFIED_AT_MOST = 60  # waypoints: each costs a check of the whole path
-GYBE_AFTER = 2           # times in irons within IRONS_MEMORY_S before tacks are no longer tried
-IRONS_MEMORY_S = 600.0
 GYBE_RADIUS_M = 8.0      # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
 SLOW_MPS = 0.5           # slower than this the course over ground says nothing about the heading
 
@@ -65,6 +64,7 @@ def request(
         problem = Problem.from_json(problem_dict(
             turn.voyage, turn.gates[gate], start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
             delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
+            beat=problem_beat(turn, step.margin_m),
         ))
     except (ValueError, InputError) as error:
         turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
@@ -236,12 +236,6 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     return True
 
 
-def tacks_fail(turn: Turn) -> bool:
-    """Return whether the boat has been in irons so often of late that tacks are not tried."""
-    recent = [t for t in turn.state.irons_s if turn.t_s - t < IRONS_MEMORY_S]
-    return len(recent) >= GYBE_AFTER
-
-
 def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
     """Splice a plan into the route and ask for its upload."""
     points = simplified(pending.problem, _apart([(float(e), float(n)) for e, n in plan.waypoints_en]))[1:]
@@ -383,7 +377,7 @@ def is_old_plan_sound(turn: Turn) -> bool:
         return False
     verdict = judge(
         [boat, *ahead], boat=turn.voyage.boat, no_go_half_rad=turn.no_go_half_rad, twd_from_rad=wind[0],
-        tws_mps=wind[1], area=turn.voyage.area,
+        tws_mps=wind[1], area=turn.voyage.area, beat_room_m=room_m(turn),
     )
     return verdict.is_sound(min(turn.config.margin_floor_m, turn.config.margin_m))
 
@@ -426,7 +420,7 @@ def _tail_only(turn: Turn) -> bool:
         return False
     verdict = judge(
         [boat, leg[1]], boat=turn.voyage.boat, no_go_half_rad=turn.no_go_half_rad, twd_from_rad=wind[0],
-        tws_mps=wind[1], area=turn.voyage.area)
+        tws_mps=wind[1], area=turn.voyage.area, beat_room_m=room_m(turn))
     return verdict.is_sound(min(turn.config.margin_floor_m, turn.config.margin_m))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.actions import CancelPlan, ReplanReason, Severity, SteerHeading
+from companion.skipper.beating import IRONS_MEMORY_S, is_left_to_beat, may_restart_leg
 from companion.skipper.by_field import heading as by_field_heading
 from companion.skipper.by_field import keeps_station, last_resort
 from companion.skipper.config import Guidance, ReplanPolicy
@@ -18,7 +19,7 @@ from companion.skipper.headings import desired_heading_rad
 from companion.skipper.helm import check_current, hand_back, is_busy, make_current, repair, set_mode
 from companion.skipper.judge import predicted_beat
 from companion.skipper.manoeuvre import bear_away_rad
-from companion.skipper.planning import IRONS_MEMORY_S, hold, request, seeks_refuge
+from companion.skipper.planning import hold, request, seeks_refuge
 from companion.skipper.route import path_length_m
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase, Route
@@ -212,7 +213,8 @@ def _no_go(turn: Turn) -> Trigger | None:
         return None
     target = leg[1]
     twa = abs(difference_rad(wind[0], bearing_rad(boat, target)))
-    if twa >= turn.no_go_half_rad or distance_m(boat, target) < turn.config.announce_m + turn.speed_mps:
+    is_near = distance_m(boat, target) < turn.config.announce_m + turn.speed_mps
+    if twa >= turn.no_go_half_rad or is_near or is_left_to_beat(turn, *leg):
         turn.update(no_go_since_s=None)
         return None
     since = turn.state.no_go_since_s if turn.state.no_go_since_s is not None else turn.t_s
@@ -287,7 +289,7 @@ def _extension(turn: Turn) -> Trigger | None:
     if ends >= len(turn.gates) - 1:
         return None
     left = path_length_m([boat, *turn.ahead()])
-    if left > turn.config.look_ahead_s * max(turn.speed_mps, 1.0):
+    if left > turn.config.look_ahead_s * max(turn.speed_mps, 1.0) or not may_restart_leg(turn):
         return None
     return Trigger(
         reason=ReplanReason.NEXT_GOAL, text=f"the mission reaches {left:.0f} m ahead, goals remain", from_index=last,
@@ -304,6 +306,8 @@ def _waypoint(turn: Turn) -> Trigger | None:
         return None   # the tail to the next goal is there already: see _extension
     left_s = distance_m(boat, leg[1]) / max(turn.speed_mps, 0.3)
     if not TOO_LATE_S < left_s <= turn.config.lead_s or turn.is_raised("wind untrusted"):
+        return None
+    if not may_restart_leg(turn):
         return None
     if _is_bend(route, state.index) and turn.t_s - state.last_plan_s < BEND_PLAN_AGE_S:
         return None
