@@ -15,6 +15,7 @@ import asyncio
 import contextlib
 import random
 import re
+import termios
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from typing import Any
@@ -138,7 +139,7 @@ class AisFeed:
                 while data := await reader.read(4096):
                     self.stream(data)
                 self.last_error = "closed by the other end"
-            except (OSError, TimeoutError) as error:
+            except (OSError, TimeoutError, termios.error) as error:
                 self.last_error = str(error) or type(error).__name__
             finally:
                 if writer is not None:

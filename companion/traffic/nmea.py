@@ -10,6 +10,8 @@ import json
 import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import xor
 from typing import Any
 
 import pyais
@@ -143,14 +145,9 @@ def has_right_checksum(text: str) -> bool:
     body, star, given = text[1:].partition("*")
     if not star or len(given) < 2:
         return False
-    total = 0
-    for char in body:
-        if ord(char) > 126:
-            return False
-        total ^= ord(char)
     try:
-        return int(given[:2], 16) == total
-    except ValueError:
+        return int(given[:2], 16) == reduce(xor, body.encode("ascii"), 0) and "\x7f" not in body
+    except ValueError:      # not ASCII (UnicodeEncodeError is one), or no hexadecimal number
         return False
 
 

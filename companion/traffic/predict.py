@@ -71,6 +71,8 @@ def motion_of(vessel: Vessel) -> Motion:
     turning = min(abs(vessel.turn_rate_radps or 0.0), TURN_LIMIT_RADPS)
     if vessel.derived:
         base = replace(base, speed_mps=2.0 * base.speed_mps, course_rad=2.0 * base.course_rad)
+    if turning == 0.0:
+        return base      # most vessels, each step: a copy costs more than all the arithmetic of a prediction
     return replace(base, turn_radps=math.hypot(base.turn_radps, 0.5 * turning))
 
 
