@@ -130,7 +130,7 @@ def seeks_refuge(turn: Turn) -> bool:
 def _aim(turn: Turn, gate: int, start: Start, step: Rung) -> Aim:
     if seeks_refuge(turn):
         place = min(turn.voyage.refuges, key=lambda p: distance_m(start.en_m, p))
-        return Aim(en_m=place, radius_m=turn.config.loiter_radius_m, gate=-1)
+        return Aim(en_m=place, radius_m=turn.config.announce_m, gate=-1)
     if step.nearer_goal:
         return _nearer(turn, gate, start, step)
     return aim_at(turn.voyage, turn.config, turn.gates, gate, start.en_m)
