@@ -43,6 +43,9 @@ def boat_of(mission: Mission) -> Boat:
         max_twa_rad=math.radians(mission.boat.max_twa_deg),
         turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s),
         tack_loss_s=mission.boat.tack_loss_s,
+        gybe_loss_s=mission.boat.gybe_loss_s,
+        can_tack=mission.boat.can_tack,
+        gybe_room_m=mission.boat.gybe_room_m,
     )
 
 

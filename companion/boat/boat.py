@@ -37,6 +37,8 @@ class Boat:
         turn_rate_radps: Rate of turn in a manoeuvre [rad/s, above 0].
         tack_loss_s: Time lost in a tack beyond the turn itself [s].
         gybe_loss_s: The same for a gybe [s].
+        can_tack: False for a boat that does not get through the wind's eye: its plans gybe round instead.
+        gybe_room_m: Leg to leeward that gybing round needs [m]; None: five turning radii at full speed.
         hull: Its size.
     """
 
@@ -46,6 +48,8 @@ class Boat:
     turn_rate_radps: float = math.radians(30.0)
     tack_loss_s: float = 0.0
     gybe_loss_s: float = 0.0
+    can_tack: bool = True
+    gybe_room_m: float | None = None
     hull: Hull = field(default_factory=Hull)
 
     def __post_init__(self) -> None:
@@ -59,11 +63,14 @@ class Boat:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} is {value}; it must be 0 s or more")
+        if self.gybe_room_m is not None and not (math.isfinite(self.gybe_room_m) and self.gybe_room_m >= 0.0):
+            raise ValueError(f"gybe_room_m is {self.gybe_room_m}; it must be 0 m or more")
 
     def problem_boat(self, tws_mps: float) -> dict[str, Any]:
         """Return the ``boat`` part of a planning problem in this wind (degrees, as its JSON has them).
 
-        A polar that is the same at every angle becomes the constant model. Losses are written when there are any.
+        A polar that is the same at every angle becomes the constant model. Losses and what is
+        unusual are written where there are any.
         """
         twa_rad, speed_mps = self.polar.curve(tws_mps)
         speed: dict[str, Any]
@@ -82,4 +89,8 @@ class Boat:
             out["tack_loss_s"] = self.tack_loss_s
         if self.gybe_loss_s > 0.0:
             out["gybe_loss_s"] = self.gybe_loss_s
+        if not self.can_tack:
+            out["can_tack"] = False
+        if self.gybe_room_m is not None:
+            out["gybe_room_m"] = self.gybe_room_m
         return out

@@ -68,6 +68,11 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     max_twa_deg: Annotated[float, Meta(gt=90.0, le=180.0)] = 180.0
     turn_rate_deg_s: Annotated[float, Meta(gt=0.0, le=360.0)] = 30.0
     tack_loss_s: NonNegative = 4.0
+    gybe_loss_s: NonNegative = 0.0
+    can_tack: bool = True
+    """False: the boat does not get through the wind's eye; its plans gybe round."""
+    gybe_room_m: Positive | None = None
+    """Leg to leeward that gybing round needs; None: five turning radii at full speed."""
 
 
 class WindOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

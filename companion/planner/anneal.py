@@ -22,11 +22,15 @@ from companion.planner.kernels import (
     jit,
     meets_target,
     track,
+    turn_guess,
     turn_time,
     walk,
     worst_half,
+    wound_at,
+    wrap,
 )
 from companion.planner.moves import corner, fit_corners, kind_of, relay
+from companion.planner.rounds import WAYS, cross, overshoot, round_vector
 
 MOST_POINTS = 1200
 
@@ -50,7 +54,7 @@ def arrive(b: Boat, ax: float, ay: float, ex: float, ey: float, t: float, h: flo
     if length < 1e-9:
         return t, h
     a, v = track(b, dx, dy, t)
-    return t + turn_time(b, h, a) + length / max(v, 1e-9), a
+    return t + turn_guess(b, h, a) + length / max(v, 1e-9), a
 
 
 @jit
@@ -131,8 +135,14 @@ def time_after(
     first = max(0, head - 1)
     last = n - 1
     timeless = b.kind == 0 and b.targets.shape[0] == 0
+    wound = 0.0
     if timeless and tail > 1:
         last = n - tail + 1
+    if b.room > 0.0:
+        wound = wound_at(b, xs, ys, course, first)
+        while last < n - 1 and math.hypot(xs[last] - xs[last - 1], ys[last] - ys[last - 1]) < b.room:
+            last += 1
+            tail -= 1
     t, h = float(at[first]), float(course[first])
     for i in range(first, last):
         dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
@@ -142,6 +152,12 @@ def time_after(
         a, v = track(b, dx, dy, t)
         if v <= 1e-9 or abs(a) > b.max_twa + SLACK_RAD:
             return math.inf
+        if b.room > 0.0:
+            wound += wrap(a - h)
+            if abs(wound) > b.most_turn + SLACK_RAD and i > 0:
+                return math.inf
+            if length >= b.room:
+                wound = 0.0
         t1 = t + turn_time(b, h, a)
         t2 = t1 + length / v
         if abs(a) < worst_half(b, t1, t2) - SLACK_RAD:
@@ -167,6 +183,42 @@ def collides(g: Grid, xs: Floats, ys: Floats, n: int, head: int, tail: int) -> b
 
 
 @jit
+def go_round(b: Boat, xs: Floats, ys: Floats, n: int, i: int, at: Floats, course: Floats, way: int) -> int:
+    """Turn corner ``i`` the long way round, the lines of its two legs kept; return the number of points, 0: cannot."""
+    h, a = course[i], course[i + 1]
+    if not h * a < 0.0 or n + 2 >= MOST_POINTS:
+        return 0
+    ux, uy = _course(xs, ys, i - 1)
+    wx, wy = _course(xs, ys, i)
+    x1, y1, x2, y2, ok = round_vector(b, h, a, at[i], way)
+    if not ok:
+        return 0
+    e, _, ok = overshoot(ux, uy, wx, wy, x1 + x2, y1 + y2)
+    if not ok:
+        return 0
+    xs[i] += e * ux
+    ys[i] += e * uy
+    n = _insert(xs, ys, n, i + 1, xs[i] + x1, ys[i] + y1)
+    if x2 != 0.0 or y2 != 0.0:
+        n = _insert(xs, ys, n, i + 2, xs[i + 1] + x2, ys[i + 1] + y2)
+    return n
+
+
+@jit
+def straighten(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
+    """Put one corner in place of point ``i`` and ``count`` after it, where the legs around them meet; 0: nowhere."""
+    j = i + count
+    if j + 1 >= n:
+        return 0
+    x, y, ok = cross(xs[i - 1], ys[i - 1], xs[i] - xs[i - 1], ys[i] - ys[i - 1], xs[j], ys[j],
+                     xs[j + 1] - xs[j], ys[j + 1] - ys[j])
+    if not ok:
+        return 0
+    xs[i], ys[i] = x, y
+    return _delete(xs, ys, n, i + 1, count)
+
+
+@jit
 def propose(
     b: Boat, xs: Floats, ys: Floats, n: int, h0: float, goal: Floats, size: float, spots: Floats,
     at: Floats, course: Floats, rng: NDArray[np.uint64],
@@ -178,6 +230,11 @@ def propose(
     u = uniform(rng)
     step = size * math.exp(-14.0 * uniform(rng))
     inner = n - 2
+    if b.room > 0.0 and inner > 0 and uniform(rng) < 0.12:                # turn a corner the long way round, or not
+        i = 1 + int(uniform(rng) * inner)
+        if uniform(rng) < 0.5:
+            return straighten(xs, ys, n, i, 1 + int(2.0 * uniform(rng)))
+        return go_round(b, xs, ys, n, i, at, course, int(WAYS * uniform(rng)))
     if b.kind != 0 and inner > 0 and uniform(rng) < 0.15:                 # lay close-hauled legs again in time
         i = int(uniform(rng) * (n - 2))
         j = min(n - 1, i + 2 + int(8.0 * uniform(rng) * uniform(rng)))

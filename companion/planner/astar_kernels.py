@@ -131,6 +131,8 @@ def expand(  # type: ignore[no-untyped-def]
                 continue
             t0 = clock[state] + (turn_time(before, heading, number) if turn > 1e-9 else 0.0)
             t1 = t0 + seconds
+            if t1 == np.inf:
+                continue
             if way[k, 2] < worst_no_go(t0, t1, number, model, table):
                 continue
             if first_hit(x, y, to_x, to_y, edge, cell_first, cell_edge, grid, edge_shape) <= 1.0:

@@ -75,7 +75,7 @@ def _endpoint_in_solid(world: World) -> str | None:
     """Return which endpoint no path can have, or None."""
     p = world.problem
     for name, en in (("start", p.start_en), ("goal", p.goal_en)):
-        if not world.is_open(en) and p.eval_solid.intersects(shapely.Point(en)):
+        if not world.is_open(en) and p.shore.hits(shapely.Point(en)):
             return f"{name} is inside an obstacle or outside the fence"
     return None
 
@@ -109,7 +109,7 @@ def _lattices(s: Searcher) -> str | None:
             if s.world.fence_box:
                 break
         if step == 0:
-            closed = cut_off(s.world.problem)
+            closed = cut_off(s.world)
             if closed:
                 return closed
         if step == 2:
@@ -121,7 +121,8 @@ def _lattices(s: Searcher) -> str | None:
 
 def _improve(s: Searcher) -> None:
     """Anneal the candidates and look for others until the effort ends."""
-    _ = s.world.problem.eval_solid  # made now, so that the exact check at the end takes no time then
+    if not s.world.problem.shore.is_large:
+        _ = s.world.problem.eval_solid  # made now, so that the exact check at the end takes no time then
     has_solid = len(s.world.grid.edges) > 0
     lattices = list(_LATTICES) if has_solid else []
     drifts = list(_DRIFTS) if s.world.boat.kind != 0 else []

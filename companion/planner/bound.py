@@ -9,26 +9,28 @@ sometimes proves that the wind closes the goal for good.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import shapely
 
-from companion.planner.gauge import Gauge, velocities
+from companion.planner.gauge import Gauge, make_gauge, velocities
 from companion.planner.kernels import Floats
 from companion.planner.problem import NO_GO_SLACK_RAD, TOUCH_M, Problem
 from companion.planner.visibility import circle_cuts, geodesics, graph_nodes
-from companion.planner.world import World
+from companion.planner.world import World, make_world, polygons
 
 _NORMALS = 48
 _STEPS = 240
 
 
 def turning_s(world: World) -> float:
-    """Return the least time [s] that any path spends turning.
+    """Return the least time [s] that any path spends turning, tacks and gybes included.
 
     All courses sailed lie in the arc of headings swept, which holds the start heading; the displacement to some
     point of the goal's disc is a non-negative mixture of the courses, so an arc below half a turn holds its
-    direction, and when no course there is allowed it holds allowed ones on both sides of the zone.
+    direction, and when no course there is allowed it holds allowed ones on both sides of the zone: the boat then
+    also tacks or gybes once, and one that cannot tack has swept half a circle by way of dead down wind.
     """
     b = world.boat
     gx, gy = world.goal
@@ -42,15 +44,18 @@ def turning_s(world: World) -> float:
     def apart(a: float, c: float) -> float:
         return abs((a - c + math.pi) % (2.0 * math.pi) - math.pi)
 
+    lost = 0.0
     if abs(course) + spread < least < 0.5 * math.pi:
         ends = (least, -least)
-        sweep = min(apart(world.h0, e) for e in ends) + 2.0 * least
+        sweep = min(apart(world.h0, e) for e in ends) + 2.0 * least if b.can_tack else math.pi
+        lost = min(b.tack_s, b.gybe_s) if b.can_tack else b.gybe_s
     elif abs(course) - spread > most > 0.5 * math.pi:
         ends = (most, -most)
         sweep = min(apart(world.h0, e) for e in ends) + 2.0 * (math.pi - most)
+        lost = min(b.tack_s, b.gybe_s) if b.can_tack else b.gybe_s
     else:
         sweep = max(0.0, apart(course, world.h0) - spread)
-    return min(sweep, math.pi) / b.omega
+    return min(sweep, math.pi) / b.omega + lost
 
 
 def progress_s(problem: Problem, goal: tuple[float, float], radius_m: float) -> float:
@@ -151,14 +156,28 @@ class Bound:
         return int(made)
 
 
-def cut_off(problem: Problem) -> str | None:
+def lower_bound_s(problem: Problem, *, tests: int = 0) -> float:
+    """Return a lower bound [s] from the gauge and, with ``tests`` of visibility, from the way round the obstacles."""
+    if tests == 0:
+        problem = replace(problem, obstacles=(), fence=None)
+    bound = Bound(make_world(problem), make_gauge(problem))
+    if tests > 0:
+        bound.sharpen(math.inf, tests)
+    return bound.value_s
+
+
+def cut_off(world: World) -> str | None:
     """Return why the goal's disc cannot be reached through free water at all, or None: exact, within TOUCH_M."""
-    solid = problem.eval_solid
+    problem = world.problem
     start, goal = shapely.Point(problem.start_en), shapely.Point(problem.goal_en)
     disc = goal.buffer(problem.goal_radius_m * 1.001 + 1e-6, quad_segs=64)
-    for part in shapely.get_parts(solid):
-        if part.geom_type != "Polygon" or not part.interiors:
-            continue
+    if world.free is not None:
+        for water in polygons(world.free.buffer(TOUCH_M, join_style="mitre", mitre_limit=5.0)):
+            if water.contains(start) and water.disjoint(disc):
+                return "the start's water has no way to the goal: obstacles or the fence close it"
+    with_basins = [g for g in world.solids if len(g.interiors)]
+    for part in polygons(shapely.buffer(np.asarray(with_basins, dtype=object), -TOUCH_M, join_style="mitre",
+                                        mitre_limit=5.0)):
         filled = shapely.Polygon(part.exterior)
         for ring in part.interiors:
             basin = shapely.Polygon(ring)

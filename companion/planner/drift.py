@@ -23,7 +23,7 @@ from companion.planner.kernels import (
     meets_target,
     speed_at,
     track,
-    turn_time,
+    turn_guess,
     worst_half,
     wrap,
 )
@@ -46,6 +46,9 @@ def drift_search(
     wx, wy = (box[2] - box[0]) / nx, (box[3] - box[1]) / ny
     time = np.full(n_states, np.inf)
     px, py, course = np.zeros(n_states), np.zeros(n_states), np.zeros(n_states)
+    # What the boat has turned since its last leg with room for a turn the long way round, and its present leg so far.
+    wound, run = np.zeros(n_states), np.zeros(n_states)
+    w, r, w1, r1 = 0.0, 0.0, 0.0, 0.0
     parent = np.full(n_states, -1, np.int32)
     done = np.zeros(n_states, np.uint8)
     n_gauge = gauge.shape[0]
@@ -67,7 +70,7 @@ def drift_search(
             a, v = track(b, gx, gy, t)
             direct = False
             if v > 1e-9 and abs(a) <= b.max_twa:
-                t1 = t + turn_time(b, h, a)
+                t1 = t + turn_guess(b, h, a)
                 t2 = t1 + d * f_d / v
                 if abs(a) >= worst_half(b, t1, t2):
                     direct = True
@@ -88,7 +91,7 @@ def drift_search(
             v = speed_at(b, a)
             if v <= 1e-6:
                 continue
-            t1 = t + turn_time(b, h, a)
+            t1 = t + turn_guess(b, h, a)
             t2 = t1 + step / v
             if k < 2:
                 for _ in range(6):                       # the angle at the edge of the time that the angle makes
@@ -99,7 +102,7 @@ def drift_search(
                     v = speed_at(b, a) if abs(a) <= b.max_twa else 0.0
                     if v <= 1e-6:
                         break
-                    t1 = t + turn_time(b, h, a)
+                    t1 = t + turn_guess(b, h, a)
                     t2 = t1 + step / v
             if not abs(a) >= worst_half(b, t1, t2) - 2e-7 or not abs(a) <= b.max_twa:
                 continue
@@ -116,6 +119,15 @@ def drift_search(
             f1 = t2 + max(0.0, gauge[c] * math.hypot(qx, qy) - slack)
             if f1 >= best or not is_free(g, x, y, x1, y1):
                 continue
+            if b.room > 0.0:
+                w1, r1 = w + wrap(a - h), math.hypot(x1 - x, y1 - y)
+                if abs(wrap(a - h)) < 1e-9:
+                    r1 += r
+                if abs(w1) > b.most_turn and s >= 0:
+                    continue
+                if r1 >= b.room:
+                    w1 = 0.0
+                wound[q], run[q] = w1, r1
             if b.targets.shape[0] > 0 and (
                 meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, x1, y1, t1, t2)
             ):
@@ -146,6 +158,7 @@ def drift_search(
             break
         done[s] = 1
         x, y, t, h = px[s], py[s], time[s], course[s]
+        w, r = wound[s], run[s]
     if last == -2:
         return math.inf, np.empty((0, 2)), pops
     path = np.empty((4096, 2))

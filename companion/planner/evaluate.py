@@ -2,7 +2,10 @@
 
 cost = Σ leg length / speed(TWA) + Σ |heading change| / turn rate (+ tack and gybe losses where the problem has
 them), the first turn from the start heading included. Turns go the shorter way round, in place, and take time:
-the clock that drives sigma(t) runs through them. A leg must keep |TWA| >= no-go half angle at every instant.
+the clock that drives sigma(t) runs through them. Where tacking or gybing costs something, or cannot be done, the
+boat may turn the long way round, by way of a leg of its own: between legs that are long enough for that
+(``BoatLimits.room_m``) it turns half a circle at most. A leg must keep |TWA| >= no-go half angle at every instant, or,
+where the problem lets the autopilot beat, be clear by its corridor.
 """
 
 from __future__ import annotations
@@ -16,8 +19,9 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi, wrap_two_pi
+from companion.planner.beat import beat_s, is_clear
 from companion.planner.plan import Leg
-from companion.planner.problem import NO_GO_SLACK_RAD, Problem
+from companion.planner.problem import CLEAR_TURN_RAD, NO_GO_SLACK_RAD, Problem
 
 START_SLACK_M = 0.01
 GOAL_SLACK_M = 1e-6
@@ -42,11 +46,18 @@ class Evaluation:
 
 def endpoint_error(p: Problem) -> str | None:
     """Return why no plan can exist on inspection of the endpoints, or None."""
-    if p.eval_solid.intersects(shapely.Point(p.start_en)):
+    if p.shore.hits(shapely.Point(p.start_en)):
         return "start is inside an obstacle or outside the fence"
-    if p.eval_solid.intersects(shapely.Point(p.goal_en)):
+    if p.shore.hits(shapely.Point(p.goal_en)):
         return "goal is inside an obstacle or outside the fence"
     return None
+
+
+def manoeuvre(before_rad: float, after_rad: float) -> str:
+    """Return what a turn between two angles to the wind is, the shorter way round: "tack", "gybe" or ""."""
+    if not before_rad * after_rad < 0.0:
+        return ""
+    return "tack" if abs(before_rad) + abs(after_rad) < math.pi else "gybe"
 
 
 def worst_no_go(p: Problem, t0_s: float, t1_s: float) -> tuple[float, float]:
@@ -94,6 +105,7 @@ def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
     legs: list[Leg] = []
     turn_s = sail_s = length_m = 0.0
     tacks = gybes = 0
+    wound = 0.0  # turned since the last leg that has room for a turn the long way round
     for i, (a, b) in enumerate(itertools.pairwise(clean)):
         dx, dy = b[0] - a[0], b[1] - a[1]
         length = math.hypot(dx, dy)
@@ -102,18 +114,32 @@ def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
         spent = abs(turn) / p.boat.turn_rate_radps
         # heading less wind, as the format has it; a Leg carries the house's angle, positive to starboard
         before, twa = wrap_pi(heading - twd), wrap_pi(h - twd)
-        if before * twa < 0.0:
-            if abs(before + turn - twa) < 1e-6:
-                tacks += 1
-                spent += p.boat.tack_loss_s
-            else:
-                gybes += 1
-                spent += p.boat.gybe_loss_s
+        named = manoeuvre(before, twa)
+        if named == "tack":
+            tacks += 1
+            spent += p.boat.tack_loss_s
+        elif named == "gybe":
+            gybes += 1
+            spent += p.boat.gybe_loss_s
+        if not p.boat.can_tack and before * twa < 0.0 and abs(before) + abs(twa) < math.pi + CLEAR_TURN_RAD - 1e-6:
+            reasons.append(f"leg {i}: the turn into it is a tack, or too near to one, and this boat cannot tack")
+        wound += turn
+        if i > 0 and p.boat.room_m > 0.0 and abs(wound) > p.boat.most_turn_rad + NO_GO_SLACK_RAD:
+            reasons.append(f"leg {i}: the boat has turned {math.degrees(abs(wound)):.0f} deg without a leg of "
+                           f"{p.boat.room_m:.1f} m")
+        if length >= p.boat.room_m - 1e-6:
+            wound = 0.0
         t += spent
         turn_s += spent
         t1 = t + (length / v if v > 0.0 else math.inf)
         half, sigma = worst_no_go(p, t, min(t1, 1e12))
-        if abs(twa) - half < -NO_GO_SLACK_RAD:
+        is_closed = abs(twa) - half < -NO_GO_SLACK_RAD
+        beat = p.beat if is_closed and p.boat.can_tack and is_clear(p, shapely.LineString([a, b])) else None
+        if beat is not None:
+            beaten_s, crossings = beat_s(p, beat, dx, dy)
+            tacks += round(crossings)
+            t1, v = t + beaten_s, length / beaten_s
+        elif is_closed:
             reasons.append(f"leg {i}: |TWA| {math.degrees(abs(twa)):.2f} deg is inside the no-go zone "
                            f"{math.degrees(half):.2f} deg")
         if abs(twa) > p.boat.max_twa_rad + NO_GO_SLACK_RAD:
@@ -121,42 +147,41 @@ def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
                            f"{math.degrees(p.boat.max_twa_rad):.1f} deg")
         if not math.isfinite(t1):
             reasons.append(f"leg {i}: the boat makes no way on it")
-        if not p.eval_solid.is_empty and p.eval_solid.intersects(shapely.LineString([a, b])):
+        if p.shore.hits(shapely.LineString([a, b])):
             reasons.append(f"leg {i}: collides with an obstacle or the fence")
         hit = target_hit(p, a, a, t - spent, t)
-        hit = target_hit(p, a, b, t, t1) if hit is None else hit
+        hit = target_hit(p, a, b, t, t1, 0.0 if beat is None else beat.corridor_m) if hit is None else hit
         if hit is not None:
             reasons.append(f"leg {i}: meets target {hit}")
         legs.append(Leg(from_en=a, to_en=b, heading_rad=wrap_two_pi(h), twa_rad=wrap_pi(-twa), turn_rad=turn,
-                        length_m=length, speed_mps=v, start_s=t, end_s=t1, sigma_rad=sigma, no_go_half_rad=half))
+                        length_m=length, speed_mps=v, start_s=t, end_s=t1, sigma_rad=sigma, no_go_half_rad=half,
+                        is_beat=beat is not None, manoeuvre=named))
         sail_s += t1 - t
         length_m += length
         t, heading = t1, h
     return Evaluation(
         is_feasible=not reasons, reasons=tuple(reasons), time_s=t, sail_s=sail_s, turn_s=turn_s, length_m=length_m,
         tacks=tacks, gybes=gybes, legs=tuple(legs),
-        min_margin_rad=min((leg.margin_rad for leg in legs), default=math.inf),
+        min_margin_rad=min((leg.margin_rad for leg in legs if not leg.is_beat), default=math.inf),
     )
 
 
 def clearances(p: Problem, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
     """Return the legs with ``clearance_m`` filled in: the distance to the nearest obstacle or fence line."""
-    lines = [shapely.LineString([leg.from_en, leg.to_en]) for leg in legs]
-    walls = [] if p.obstacle_union.is_empty else [p.obstacle_union]
-    if p.fence_polygon is not None:
-        walls.append(p.fence_polygon.boundary)
-    if not lines or not walls:
+    if not legs:
         return legs
-    for wall in walls:
-        shapely.prepare(wall)
-    nearest = np.min([shapely.distance(wall, np.asarray(lines)) for wall in walls], axis=0)
+    nearest = p.shore.clearances_m(np.asarray([shapely.LineString([leg.from_en, leg.to_en]) for leg in legs]))
+    if nearest is None:
+        return legs
     return tuple(replace(leg, clearance_m=float(d)) for leg, d in zip(legs, nearest, strict=True))
 
 
 def target_hit(
-    p: Problem, a: tuple[float, float], b: tuple[float, float], t0_s: float, t1_s: float
+    p: Problem, a: tuple[float, float], b: tuple[float, float], t0_s: float, t1_s: float, wide_m: float = 0.0
 ) -> int | None:
     """Return the first target whose disc the boat enters between a at t0 and b at t1 (constant speed), or None.
+
+    The boat may be ``wide_m`` off the line.
 
     The squared distance minus the squared radius is a quadratic in time: its minimum over the common window is
     exact.
@@ -170,7 +195,7 @@ def target_hit(
         rx = a[0] + ux * (lo - t0_s) - target.x_m - target.vx_mps * lo
         ry = a[1] + uy * (lo - t0_s) - target.y_m - target.vy_mps * lo
         wx, wy = ux - target.vx_mps, uy - target.vy_mps
-        radius, g = max(0.0, target.radius_m + target.growth_mps * lo - TARGET_SLACK_M), target.growth_mps
+        radius, g = max(0.0, target.radius_m + wide_m + target.growth_mps * lo - TARGET_SLACK_M), target.growth_mps
         c2, c1, c0 = wx * wx + wy * wy - g * g, rx * wx + ry * wy - radius * g, rx * rx + ry * ry - radius * radius
         duration = hi - lo
         candidates = [0.0, duration]

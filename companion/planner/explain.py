@@ -23,6 +23,7 @@ from companion.planner.risk import path_risk, with_parts
 
 TOUCH_M = 0.5                      # nearer than this a leg is said to touch
 NO_GO_TOUCH_RAD = math.radians(0.5)
+_ING = {"tack": "tacking", "gybe": "gybing"}
 MAX_SHIFT_RAD = math.radians(60.0)  # larger shifts are another day's wind
 SHIFT_RESOLUTION_RAD = math.radians(1.0)
 _SHARE = 1.0 / 30.0                # of the budget for one replan: both sides of the bisection fit
@@ -80,7 +81,7 @@ def explain(problem: Problem, plan: Plan, budget_s: float = 5.0, *, expansions: 
         text, data = _what_would_help(problem, again)
         return replace(plan, why=Why(text=text, data=data | {"replans": again.count}))
     legs = [leg_bounds(problem, leg) for leg in plan.legs]
-    text, data = _legs_in_words(plan, legs), {"legs": legs}
+    text, data = _legs_in_words(problem, plan, legs), {"legs": legs, "turns": turns(plan)}
     side = _decisive_side(problem, plan)
     if side is not None:
         more, other = _other_side(problem, plan, side, again)
@@ -111,7 +112,9 @@ def leg_bounds(problem: Problem, leg: Leg) -> dict[str, Any]:
     line = shapely.LineString([leg.from_en, leg.to_en])
     end, start = shapely.Point(leg.to_en), shapely.Point(leg.from_en)
     binds: list[dict[str, Any]] = []
-    if leg.margin_rad <= NO_GO_TOUCH_RAD:
+    if leg.is_beat and problem.beat is not None:
+        binds.append({"by": "beat", "corridor_m": round(problem.beat.corridor_m, 1)})
+    elif leg.margin_rad <= NO_GO_TOUCH_RAD:
         widened = leg.no_go_half_rad - problem.boat.no_go_half_rad
         binds.append({
             "by": "no_go", "half_angle_deg": round(math.degrees(leg.no_go_half_rad), 2),
@@ -142,7 +145,7 @@ def _around(shape: shapely.Geometry) -> list[float]:
     return [round(float(v), 1) for v in shapely.get_coordinates(shape.representative_point())[0]]
 
 
-def _legs_in_words(plan: Plan, legs: list[dict[str, Any]]) -> str:
+def _legs_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]]) -> str:
     if len(plan.legs) == 1 and not legs[0]["binds"]:
         return "Straight there: nothing is in the way and the heading can be sailed."
     numbers: dict[str, list[int]] = {}
@@ -157,10 +160,49 @@ def _legs_in_words(plan: Plan, legs: list[dict[str, Any]]) -> str:
     zones = [bind for bound in legs for bind in bound["binds"] if bind["by"] == "no_go"]
     if zones:
         sentences.append(_zone_in_words(zones))
+    sentences += turns_in_words(problem, plan)
     if not sentences:
         return "No leg is bound by anything but its corners."
     shown = sentences if len(sentences) <= 12 else [*sentences[:11], f"And {len(sentences) - 11} more such bounds."]
     return " ".join(shown)
+
+
+def turns(plan: Plan) -> list[dict[str, Any]]:
+    """Return each tack and gybe: the leg it leads into (from 1), its name and, of a gybe or tack the long way round
+    in place of the other, the legs that it takes."""  # noqa: D205, D209
+    out: list[dict[str, Any]] = []
+    legs = plan.legs
+    for i, leg in enumerate(legs):
+        if not leg.manoeuvre:
+            continue
+        entry: dict[str, Any] = {"leg": i + 1, "manoeuvre": leg.manoeuvre, "instead_of": None, "legs": []}
+        # The same way round on both sides of a leg, by more than half a circle in all: that leg is there to turn.
+        for j in (i - 1, i):
+            if 0 < j + 1 < len(legs) and j >= 0 and abs(legs[j].turn_rad + legs[j + 1].turn_rad) > math.pi:
+                entry["legs"].append(j + 1)
+        if entry["legs"]:
+            entry["instead_of"] = "tack" if leg.manoeuvre == "gybe" else "gybe"
+        out.append(entry)
+    return out
+
+
+def turns_in_words(problem: Problem, plan: Plan) -> list[str]:
+    """Return sentences on the tacks and gybes, and why one is sailed in place of the other."""
+    every = turns(plan)
+    out = []
+    for name in ("tack", "gybe"):
+        plain = [t["leg"] for t in every if t["manoeuvre"] == name and not t["instead_of"]]
+        if plain:
+            out.append(f"A {name} leads into {_legs_of(plain)[0].lower()}{_legs_of(plain)[1:]}.")
+        round_ = sorted({k for t in every if t["manoeuvre"] == name and t["instead_of"] for k in t["legs"]})
+        if round_:
+            other = "tack" if name == "gybe" else "gybe"
+            lost = problem.boat.tack_loss_s if other == "tack" else problem.boat.gybe_loss_s
+            why = "the boat cannot tack" if other == "tack" and not problem.boat.can_tack else \
+                f"a {other} would lose {lost:.0f} s"
+            out.append(f"It {name}s round instead of {_ING[other]}, by way of "
+                       f"{_legs_of(round_)[0].lower()}{_legs_of(round_)[1:]}: {why}.")
+    return out
 
 
 def _legs_of(which: list[int]) -> str:

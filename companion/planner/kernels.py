@@ -15,6 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from companion.planner.problem import CLEAR_TURN_RAD
+
 F = TypeVar("F", bound=Callable[..., Any])
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -37,7 +39,7 @@ class Grid(NamedTuple):
 
 
 class Boat(NamedTuple):
-    """Speed by |TWA|, turning, no-go zone in time, losses, current, targets (m, 9)."""
+    """Speed by |TWA|, turning, no-go zone in time, losses, current, targets (m, 9), what gybing round takes."""
 
     twa: Floats
     mps: Floats
@@ -59,6 +61,10 @@ class Boat(NamedTuple):
     up: float
     down: float
     targets: Floats
+    can_tack: bool
+    room: float
+    most_turn: float
+    round_s: float
 
 
 def jit(function: F) -> F:
@@ -173,12 +179,40 @@ def track(b: Boat, dx: float, dy: float, t: float) -> tuple[float, float]:
 
 @jit
 def turn_time(b: Boat, h0: float, h1: float) -> float:
-    """Return the time [s] to turn from TWA h0 to h1 the shorter way, losses included."""
-    d = wrap(h1 - h0)
-    t = abs(d) / b.omega
+    """Return the time [s] to turn from TWA h0 to h1 the shorter way, losses included; inf for a tack it cannot do."""
+    t = abs(wrap(h1 - h0)) / b.omega
     if h0 * h1 < 0.0:
-        t += b.tack_s if abs(h0 + d - h1) < 1e-6 else b.gybe_s
+        through_eye = abs(h0) + abs(h1)
+        if not b.can_tack and through_eye < math.pi + CLEAR_TURN_RAD:
+            return math.inf
+        t += b.tack_s if through_eye < math.pi else b.gybe_s
     return t
+
+
+@jit
+def turn_guess(b: Boat, h0: float, h1: float) -> float:
+    """Return ``turn_time``, or about what it takes to turn the other way, through a leg of its own, if that is less."""
+    t = turn_time(b, h0, h1)
+    if b.room > 0.0 and h0 * h1 < 0.0:
+        through_eye = abs(h0) + abs(h1)
+        if through_eye < math.pi + CLEAR_TURN_RAD:
+            t = min(t, (2.0 * math.pi - through_eye) / b.omega + b.gybe_s + b.round_s)
+        elif b.can_tack:
+            t = min(t, through_eye / b.omega + b.tack_s + b.round_s)
+    return t
+
+
+@jit
+def wound_at(b: Boat, xs: Floats, ys: Floats, course: Floats, i: int) -> float:
+    """Return how far the boat has turned [rad, signed] at point ``i``, before its turn there, since its last long leg.
+
+    ``course`` is the TWA of arrival at each point.
+    """
+    wound = 0.0
+    while i > 0 and math.hypot(xs[i] - xs[i - 1], ys[i] - ys[i - 1]) < b.room:
+        wound += wrap(course[i] - course[i - 1])
+        i -= 1
+    return wound
 
 
 @jit
@@ -288,8 +322,8 @@ def rasterise(edges: Floats, x0: float, y0: float, inv: float, nx: int, ny: int)
 
 @jit
 def walk(b: Boat, xs: Floats, ys: Floats, n: int, h0: float) -> float:
-    """Return the time [s] of the path of n points; inf where a leg breaks an angle limit or meets a target."""
-    t, h = 0.0, h0
+    """Return the time [s] of the path of n points; inf where it breaks a limit of angles or turns or meets a target."""
+    t, h, wound = 0.0, h0, 0.0
     for i in range(n - 1):
         dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
         length = math.hypot(dx, dy)
@@ -298,6 +332,12 @@ def walk(b: Boat, xs: Floats, ys: Floats, n: int, h0: float) -> float:
         a, v = track(b, dx, dy, t)
         if v <= 1e-9 or abs(a) > b.max_twa + SLACK_RAD:
             return math.inf
+        if b.room > 0.0:
+            wound += wrap(a - h)
+            if abs(wound) > b.most_turn + SLACK_RAD and i > 0:
+                return math.inf
+            if length >= b.room:
+                wound = 0.0
         t1 = t + turn_time(b, h, a)
         t2 = t1 + length / v
         if abs(a) < worst_half(b, t1, t2) - SLACK_RAD:

@@ -13,6 +13,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.planner.gauge import Gauge
 from companion.planner.kernels import (
@@ -25,13 +26,15 @@ from companion.planner.kernels import (
     jit,
     meets_target,
     track,
+    turn_guess,
     turn_time,
     worst_half,
+    wrap,
 )
 from companion.planner.moves import corner
 from companion.planner.world import World
 
-_START, _CLOCKWISE, _COUNTER, _MOVE = 1, 2, 3, 4
+_START, _CLOCKWISE, _COUNTER, _MOVE, _ROUND = 1, 2, 3, 4, 5
 
 
 @jit
@@ -73,12 +76,43 @@ def _misses(
     for leg in range(2):
         qx, qy = (mx, my) if leg == 0 else (ex, ey)
         a, v = track(b, qx - x, qy - y, t)
-        t1 = t + turn_time(b, h, a)
+        t1 = t + turn_guess(b, h, a)
         t2 = t1 + math.hypot(qx - x, qy - y) / max(v, 1e-9)
         if meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, qx, qy, t1, t2):
             return False
         x, y, h, t = qx, qy, a, t2
     return True
+
+
+@jit
+def _wound(
+    b: Boat, came: NDArray[np.uint8], s: int, nj: int, steps: Ints, angle: Floats, lengths: Floats, h0: float,
+    deep: float,
+) -> float:
+    """Return how far the boat has turned [rad, signed] in state ``s`` since its last leg as long as ``b.room``.
+
+    ``lengths``: of one step on each course [m]; a turn the long way round goes by a leg at TWA ``deep``.
+    """
+    nd = steps.shape[0]
+    wound, length = 0.0, 0.0
+    for _ in range(256):
+        node, k = s // nd, s % nd
+        label = came[s]
+        if label == _START:
+            return wound + wrap(angle[k] - h0)
+        if label == _ROUND:
+            return wound + wrap(angle[k] - deep)
+        if label == _MOVE:
+            length += lengths[k]
+            if length >= b.room:
+                return wound
+            s = (node - steps[k, 0] * nj - steps[k, 1]) * nd + k
+        else:
+            length = 0.0
+            before = (k - 1) % nd if label == _CLOCKWISE else (k + 1) % nd
+            wound += wrap(angle[k] - angle[before])
+            s = node * nd + before
+    return wound
 
 
 @jit
@@ -89,7 +123,8 @@ def lattice_search(
     """Search; return (arrival time, points (n, 2), states expanded, exhausted).
 
     ``origin``: x, y, TWA and time of the start;
-    ``axes`` (2, 2): axis vectors in rows [m]; ``shape``: ni, nj, i0, j0 of the start; ``steps`` (nd, 2): courses as
+    ``axes`` (2, 2): axis vectors in rows [m]; ``shape``: ni, nj, i0, j0 of the start, and the
+    leg of a turn the long way round as a lattice step (0, 0: none); ``steps`` (nd, 2): courses as
     lattice steps, sorted by angle; ``goal``: x, y, radius; ``box``: x0, y0, x1, y1 that nodes stay in; ``gauge``:
     least seconds per metre by direction (a table over [-π, π)), ``slack`` what the goal's disc saves; only paths
     below ``bound`` are looked for; ``side`` 1 or -1 starts on courses with that sign of TWA only. Exhausted without a
@@ -107,6 +142,19 @@ def lattice_search(
         angle[k], duration[k] = a, (math.hypot(dx[k], dy[k]) / v if v > 1e-9 else math.inf)
     for k in range(nd):
         turn[k] = turn_time(b, angle[k], angle[(k + 1) % nd])
+    # The way round from close-hauled to close-hauled: the leg (jump, hop) to leeward, with the room for it.
+    lengths = np.hypot(dx, dy)
+    jump, hop = shape[4], shape[5]
+    port, starboard, deep, round_t, wound = -1, -1, 0.0, math.inf, 0.0
+    for k in range(nd):
+        if angle[k] < 0.0:
+            port = k
+        elif starboard < 0:
+            starboard = k
+    down_x, down_y = jump * axes[0, 0] + hop * axes[1, 0], jump * axes[0, 1] + hop * axes[1, 1]
+    if (jump != 0 or hop != 0) and port >= 0 and starboard >= 0:
+        deep, v = track(b, down_x, down_y, 0.0)
+        round_t = math.hypot(down_x, down_y) / v
     n_states = ni * nj * nd
     cost = np.full(n_states, np.inf, np.float32)
     came = np.zeros(n_states, np.uint8)
@@ -123,6 +171,8 @@ def lattice_search(
             continue
         s = start * nd + k
         cost[s] = t0 + turn_time(b, h0, angle[k])
+        if cost[s] == np.inf:
+            continue
         came[s] = _START
         keys[size], items[size] = cost[s], s
         size += 1
@@ -148,6 +198,8 @@ def lattice_search(
         x = ox + (i - i0) * axes[0, 0] + (j - j0) * axes[1, 0]
         y = oy + (i - i0) * axes[0, 1] + (j - j0) * axes[1, 1]
         t = float(cost[s])
+        if b.room > 0.0:
+            wound = _wound(b, came, s, nj, steps, angle, lengths, h0, deep)
         # ---- the exact end, from near the goal and now and then from afar
         gx, gy = goal[0] - x, goal[1] - y
         d = math.hypot(gx, gy)
@@ -165,11 +217,12 @@ def lattice_search(
                 t2 = t1 + d * f_d / v
                 if abs(a) >= worst_half(b, t1, t2):
                     direct = True
-                    if t2 < best and is_free(g, x, y, ex, ey) and not (
+                    turns = b.room == 0.0 or abs(wound + wrap(a - angle[k])) <= b.most_turn
+                    if t2 < best and turns and is_free(g, x, y, ex, ey) and not (
                         meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, ex, ey, t1, t2)
                     ):
                         best, best_state, end_x, end_y, with_via = t2, s, ex, ey, False
-            if not direct:
+            if not direct and b.can_tack:
                 first = 0 if gy > 0.0 else 2
                 for way in range(2):
                     mx, my, t2, ok = corner(b, x, y, angle[k], t, ex, ey, first + way, first + 1 - way)
@@ -179,8 +232,25 @@ def lattice_search(
                         best, best_state, end_x, end_y = t2, s, ex, ey
                         via_x, via_y, with_via = mx, my, True
         # ---- neighbours: turn either way, or sail one step on
-        for move in range(3):
-            if move == 0:
+        for move in range(4):
+            if move == 3:
+                if not round_t < math.inf or k not in (port, starboard):
+                    break
+                k1 = starboard if k == port else port
+                i1, j1 = i + jump, j + hop
+                x1, y1 = x + down_x, y + down_y
+                if i1 < 0 or j1 < 0 or i1 >= ni or j1 >= nj or abs(wound + wrap(deep - angle[k])) > b.most_turn:
+                    break
+                if x1 < box[0] or y1 < box[1] or x1 > box[2] or y1 > box[3]:
+                    break
+                t1 = t + turn_time(b, angle[k], deep) + round_t + turn_time(b, deep, angle[k1])
+                label, node1 = _ROUND, i1 * nj + j1
+                s1 = node1 * nd + k1
+            elif move < 2 and b.room > 0.0 and came[s] != _START and abs(
+                wound + wrap(angle[(k + 1 - 2 * move) % nd] - angle[k])
+            ) > b.most_turn:
+                continue
+            elif move == 0:
                 k1 = (k + 1) % nd
                 s1, t1, label = node * nd + k1, t + turn[k], _CLOCKWISE
                 node1 = node
@@ -212,8 +282,9 @@ def lattice_search(
                 came[s] == (_COUNTER if move == 0 else _CLOCKWISE) or meets_target(b, x, y, x, y, t, t1)
             ):
                 continue
-            if move == 2:
-                if abs(angle[k]) < worst_half(b, t, t1) - 0.5 * SLACK_RAD or not is_free(g, x, y, x1, y1):
+            if move > 1:
+                a = angle[k] if move == 2 else deep
+                if abs(a) < worst_half(b, t, t1) - 0.5 * SLACK_RAD or not is_free(g, x, y, x1, y1):
                     continue
                 if b.targets.shape[0] > 0 and meets_target(b, x, y, x1, y1, t, t1):
                     continue
@@ -250,6 +321,9 @@ def lattice_search(
         if label == _MOVE:
             last = k
             s = ((i - steps[k, 0]) * nj + (j - steps[k, 1])) * nd + k
+        elif label == _ROUND:
+            last = -1
+            s = ((i - jump) * nj + (j - hop)) * nd + (starboard if k == port else port)
         elif label == _CLOCKWISE:
             s = node * nd + (k - 1) % nd
         else:
@@ -270,6 +344,26 @@ class LatticeResult:
 def _steps(reach: int) -> list[tuple[int, int]]:
     span = range(-reach, reach + 1)
     return [(i, j) for i in span for j in span if math.gcd(i, j) == 1]
+
+
+def _leeward(b: Boat, axes: Floats) -> tuple[int, int]:
+    """Return the shortest lattice step that turns the boat from either close-hauled course to the other by a gybe."""
+    if b.room == 0.0:
+        return 0, 0
+    sign = -1 if axes[0, 1] + axes[1, 1] > 0.0 else 1
+    best, chosen = math.inf, (0, 0)
+    most = min(60, math.ceil(2.0 * b.room / min(float(np.hypot(*axes[0])), float(np.hypot(*axes[1])))) + 2)
+    for i in range(most):
+        for j in range(most):
+            dx, dy = (sign * (i * axes[0] + j * axes[1])).tolist()
+            length = math.hypot(dx, dy)
+            if not b.room <= length < best:
+                continue
+            a, v = track(b, dx, dy, 0.0)
+            turns = turn_time(b, -b.up, a) + turn_time(b, a, b.up) + turn_time(b, b.up, a) + turn_time(b, a, -b.up)
+            if v > 1e-9 and abs(a) <= b.max_twa and turns < math.inf:
+                best, chosen = length, (sign * i, sign * j)
+    return chosen
 
 
 def run_lattice(
@@ -313,7 +407,7 @@ def run_lattice(
     if not steps or ni * nj * len(steps) > 24_000_000:
         return LatticeResult(cost_s=math.inf, points=None, pops=0, exhausted=False)
     cost, points, pops, exhausted = lattice_search(
-        world.grid, b, np.array(origin), axes, np.array([ni, nj, -low[0], -low[1]], np.int32),
+        world.grid, b, np.array(origin), axes, np.array([ni, nj, -low[0], -low[1], *_leeward(b, axes)], np.int32),
         np.array([(i, j) for _, i, j in steps], np.int32), np.array(goal),
         np.array(box), gauge.table, goal[2] * gauge.table_max, bound_s, max_pops, 6.0 * max(sizes), side,
     )

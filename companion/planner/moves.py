@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import math
 
-from companion.planner.kernels import SLACK_RAD, Boat, Floats, jit, speed_at, track, turn_time, worst_half, wrap
+from companion.planner.kernels import (
+    SLACK_RAD,
+    Boat,
+    Floats,
+    jit,
+    speed_at,
+    track,
+    turn_guess,
+    turn_time,
+    worst_half,
+    wrap,
+)
 
 UP_STARBOARD, UP_PORT, DOWN_STARBOARD, DOWN_PORT = 0, 1, 2, 3
 """Kinds of an edge course: close hauled or at the best gybing angle, TWA positive or negative."""
@@ -44,12 +55,14 @@ def corner(
         l2 = (vx * (qy - py) - vy * (qx - px)) / det
         if l1 <= 1e-9 or l2 <= 1e-9:
             return 0.0, 0.0, math.inf, False
-        ta = t + turn_time(b, h, a1)
+        ta = t + turn_guess(b, h, a1)
         tb = ta + l1
-        tc = tb + turn_time(b, a1, a2)
+        tc = tb + turn_guess(b, a1, a2)
         t2 = tc + l2
         if r + 1 < rounds:
             n1, n2 = edge_angle(b, k1, ta, tb), edge_angle(b, k2, tc, t2)
+            if b.room > 0.0 and turn_time(b, a1, a2) > tc - tb:   # the way round belongs to both legs
+                n1, n2 = edge_angle(b, k1, ta, tc), edge_angle(b, k2, tb, t2)
             settled = abs(n1 - a1) + abs(n2 - a2) < 1e-10
             a1, a2 = n1, n2
             if settled:
@@ -81,7 +94,7 @@ def fit_corners(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, first: int, 
             a, v = track(b, dx, dy, t)
             if v <= 1e-9:
                 return
-            t1 = t + turn_time(b, h, a)
+            t1 = t + turn_guess(b, h, a)
             t2 = t1 + length / v
             if attempt == 0 and i + 2 < n and i + 1 >= first and abs(a) < 0.5 * math.pi:
                 ex, ey = xs[i + 2] - xs[i + 1], ys[i + 2] - ys[i + 1]
@@ -111,7 +124,7 @@ def _laid(b: Boat, kind: int, t: float, h: float, length: float) -> tuple[float,
     for _ in range(3):
         if not abs(a) >= 0.0:
             break
-        t1 = t + turn_time(b, h, a)
+        t1 = t + turn_guess(b, h, a)
         t2 = t1 + length / max(speed_at(b, a), 1e-9)
         a = edge_angle(b, kind, t1, t2)
     return a, t2
@@ -163,7 +176,7 @@ def relay(
                     ys[q] += my
                 t, h = t2, a
             else:
-                t += turn_time(b, h, a) + length / v
+                t += turn_guess(b, h, a) + length / v
                 h = a
         end = t
         for k in range(j - 1, c, -1):
@@ -189,7 +202,7 @@ def relay(
         for k in range(c - 1):
             dx, dy = xs[k + 1] - xs[k], ys[k + 1] - ys[k]
             a, v = track(b, dx, dy, t)
-            t += turn_time(b, h, a) + math.hypot(dx, dy) / max(v, 1e-9)
+            t += turn_guess(b, h, a) + math.hypot(dx, dy) / max(v, 1e-9)
             h = a
         k1 = 0 if xs[c] > xs[c - 1] else 1
         x, y, _, ok = corner(b, xs[c - 1], ys[c - 1], h, t, xs[c + 1], ys[c + 1], k1, 1 - k1)

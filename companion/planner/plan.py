@@ -37,7 +37,9 @@ class Leg:
     |TWA| minus it. ``clearance_m`` is the distance to the nearest obstacle or fence (None: there is none).
     ``risk`` is the probability that the wind forces the leg into the no-go zone at some instant of it, and that the
     boat comes too near to an uncertain vessel (None: not
-    computed).
+    computed). ``is_beat``: the autopilot beats it by itself, tacking about the line (``companion.planner.beat``);
+    ``speed_mps`` is then what it makes good. ``manoeuvre`` is the turn into the leg: "tack", "gybe", or "" for one
+    that goes through neither the wind's eye nor dead down wind.
     """
 
     from_en: tuple[float, float]
@@ -53,10 +55,12 @@ class Leg:
     no_go_half_rad: float
     risk: float | None = None
     clearance_m: float | None = None
+    is_beat: bool = False
+    manoeuvre: str = ""
 
     @property
     def margin_rad(self) -> float:
-        """|TWA| minus the no-go half angle [rad]; touching the zone is 0."""
+        """|TWA| minus the no-go half angle [rad]; touching the zone is 0, a beaten leg's line is inside it."""
         return abs(self.twa_rad) - self.no_go_half_rad
 
 
@@ -169,6 +173,8 @@ def _leg_dict(leg: Leg) -> dict[str, Any]:
         "no_go_half_deg": math.degrees(leg.no_go_half_rad),
         "risk": leg.risk,
         "clearance_m": leg.clearance_m,
+        **({"is_beat": True} if leg.is_beat else {}),
+        "manoeuvre": leg.manoeuvre,
     }
 
 
@@ -187,4 +193,6 @@ def _leg(raw: Mapping[str, Any]) -> Leg:
         no_go_half_rad=math.radians(raw["no_go_half_deg"]),
         risk=raw["risk"],
         clearance_m=raw["clearance_m"],
+        is_beat=bool(raw.get("is_beat", False)),
+        manoeuvre=str(raw.get("manoeuvre", "")),
     )

@@ -25,12 +25,23 @@ from companion.errors import InputError
 
 if TYPE_CHECKING:
     from companion.planner.evaluate import Evaluation
+    from companion.planner.shore import Shore
     from companion.traffic.occupancy import Spread
 
 TOUCH_M = 1e-3
 """A path may be this deep in an obstacle [m]: numerical slack for touching."""
 NO_GO_SLACK_RAD = math.radians(0.01)
 """A leg may be this far inside the no-go zone [rad]: numerical slack."""
+
+BEAT_CLEAR_SHARE = 0.98
+"""Of a beaten leg's clearance that is checked: the arcs of a grown obstacle are polygons inside the circle."""
+
+LEAST_MPS = 1e-6
+"""A boat that is never faster than this [m/s] cannot move."""
+CLEAR_TURN_RAD = math.radians(10.0)
+"""A boat that cannot tack turns through dead down wind only where that is the shorter way by twice this [rad]."""
+ROUND_RADII = 5.0
+"""Turning radii in the leg of a round: from close-hauled to dead down wind and on, 2 tan(135°/2) of them."""
 
 SIGMA_MODELS = ("none", "kalman", "ar1", "forecast")
 
@@ -77,7 +88,11 @@ class Wind:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoatLimits:
-    """What the boat can do: no-go half angle, deepest angle, turn rate, speed by |TWA| (linear between nodes)."""
+    """What the boat can do: no-go half angle, deepest angle, turn rate, speed by |TWA| (linear between nodes).
+
+    ``can_tack`` False: no turn goes through the wind's eye, so the boat gybes round. ``gybe_room_m`` is the leg that
+    turning round the long way needs; None: five turning radii at full speed.
+    """
 
     no_go_half_rad: float
     max_twa_rad: float = math.pi
@@ -86,6 +101,25 @@ class BoatLimits:
     polar_mps: tuple[float, ...]
     tack_loss_s: float = 0.0
     gybe_loss_s: float = 0.0
+    can_tack: bool = True
+    gybe_room_m: float | None = None
+
+    @property
+    def room_m(self) -> float:
+        """Length [m] that a leg needs to let the boat turn on by more than half a circle in all.
+
+        0 where it makes no difference: a boat that tacks and gybes without loss always turns the shorter way.
+        """
+        if self.can_tack and self.tack_loss_s == 0.0 and self.gybe_loss_s == 0.0:
+            return 0.0
+        if self.gybe_room_m is not None:
+            return self.gybe_room_m
+        return ROUND_RADII * max(self.polar_mps) / self.turn_rate_radps
+
+    @property
+    def most_turn_rad(self) -> float:
+        """How far the boat may turn [rad] between two legs of that length; the first turn of all is free of it."""
+        return math.pi if self.can_tack else math.pi - CLEAR_TURN_RAD
 
     def speed_mps(self, twa_rad: float) -> float:
         """Return the speed [m/s] at the true wind angle."""
@@ -131,6 +165,20 @@ class RiskLimit:
     correlation_time_s: float = 60.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beat:
+    """What the autopilot makes of a leg inside its no-go zone (``companion.planner.beat``).
+
+    It sails at ``no_go_half_rad`` off the wind and tacks ``corridor_m`` (above 0) off the line, in ``tack_s`` each.
+    A leg is left to it only where nothing solid is within ``clearance_m`` (0 or more) of the line.
+    """
+
+    no_go_half_rad: float
+    corridor_m: float
+    clearance_m: float
+    tack_s: float = 0.0
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
     """One planning problem (see the module's text). Times count from the start of the plan, t = 0.
@@ -154,6 +202,7 @@ class Problem:
     vessels_part: float | None = None
     risk: RiskLimit | None = None
     clearance_floor_m: float = 0.0
+    beat: Beat | None = None
     notes: str = ""
     extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -291,6 +340,21 @@ class Problem:
         shapely.prepare(shrunk)
         return shrunk
 
+    @cached_property
+    def beat_solid(self) -> shapely.Geometry:
+        """``solid`` grown by what a leg beaten by the autopilot needs, prepared; round corners cut off a little."""
+        clear = self.beat.clearance_m if self.beat is not None else 0.0
+        grown = self.solid.buffer(BEAT_CLEAR_SHARE * clear - TOUCH_M)
+        shapely.prepare(grown)
+        return grown
+
+    @cached_property
+    def shore(self) -> Shore:
+        """The exact test of legs against all that is solid."""
+        from companion.planner.shore import Shore
+
+        return Shore(self)
+
     # ---------------------------------------------------------------------------------------- judging
     @cached_property
     def defect(self) -> str | None:
@@ -318,7 +382,8 @@ def _defect(p: Problem) -> str | None:
         "wind.from_deg": w.twd_from_rad, "wind.speed_mps": 1.0 if w.tws_mps is None else w.tws_mps,
         "boat.no_go_half_deg": b.no_go_half_rad, "boat.max_twa_deg": b.max_twa_rad,
         "boat.turn_rate_rad_s": b.turn_rate_radps, "delta_s": p.delta_s, "boat.tack_loss_s": b.tack_loss_s,
-        "boat.gybe_loss_s": b.gybe_loss_s, "current": p.current.set_rad + p.current.drift_mps,
+        "boat.gybe_loss_s": b.gybe_loss_s,
+        "boat.gybe_room_m": b.gybe_room_m or 0.0, "current": p.current.set_rad + p.current.drift_mps,
         "clearance_floor_m": p.clearance_floor_m,
         "wind.sigma": sum((w.sigma.sigma0_rad, w.sigma.growth_rad_per_sqrt_s, w.sigma.sigma_inf_rad,
                            w.sigma.rho_hz, *w.sigma.horizon_s, *w.sigma.sigma_rad,
@@ -345,8 +410,9 @@ def _defect(p: Problem) -> str | None:
         (b.no_go_half_rad >= 0.0, "the no-go half angle is negative"),
         (b.max_twa_rad > 0.0, "max_twa_deg is not above zero"),
         (min(b.polar_mps) >= 0.0, "the polar has a negative speed"),
-        (max(b.polar_mps) > 0.0, "the polar is zero everywhere: the boat cannot move"),
+        (max(b.polar_mps) > LEAST_MPS, "the polar is zero everywhere: the boat cannot move"),
         (b.tack_loss_s >= 0.0 and b.gybe_loss_s >= 0.0, "a tack or gybe loss is negative"),
+        ((b.gybe_room_m or 0.0) >= 0.0, "gybe_room_m is negative"),
         (p.current.drift_mps >= 0.0, "the current's drift is negative"),
         (p.clearance_floor_m >= 0.0, "the clearance floor is negative"),
         (min((w.sigma.sigma0_rad, w.sigma.growth_rad_per_sqrt_s, w.sigma.sigma_inf_rad, w.sigma.rho_hz,
@@ -357,6 +423,10 @@ def _defect(p: Problem) -> str | None:
         (p.fence is None or not p.fence.is_empty, "the fence is empty"),
         (p.vessels_part is None or 0.0 < p.vessels_part < 1.0 - p.delta_s,
          "allocation.vessels is not between 0 and 1 - delta_s"),
+        (p.beat is None or (0.0 < p.beat.no_go_half_rad < 0.5 * math.pi and 0.0 < p.beat.corridor_m < math.inf
+                            and 0.0 <= p.beat.clearance_m < math.inf and 0.0 <= p.beat.tack_s < math.inf),
+         "beat needs 0 < no_go_half_deg < 90, corridor_m > 0, clearance_m >= 0 and tack_s >= 0"),
+        (p.beat is None or p.current.drift_mps == 0.0, "a beat left to the autopilot is not planned in a current"),
     )
     for holds, text in checks:
         if not holds:

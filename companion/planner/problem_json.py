@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -12,6 +13,7 @@ import shapely
 from companion.errors import InputError
 from companion.planner.problem import (
     SIGMA_MODELS,
+    Beat,
     BoatLimits,
     Current,
     Problem,
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from companion.traffic.occupancy import Spread
 
 T = TypeVar("T")
+_NAN = re.compile(r"\bnan\b", re.IGNORECASE)
 
 
 # ---------------------------------------------------------------------------------------------- reading
@@ -63,6 +66,10 @@ class _Reader:
         """Return a list of floats."""
         return self._get(key, default, lambda v: tuple(_as_float(x) for x in _as_list(v)))
 
+    def flag(self, key: str, default: Any = ...) -> bool:
+        """Return true or false."""
+        return self._get(key, default, _as_bool)
+
     def text(self, key: str, default: Any = ...) -> str:
         """Return a string."""
         return self._get(key, default, str)
@@ -84,6 +91,12 @@ def _as_float(value: Any) -> float:
         return math.inf if value > 0 else -math.inf
 
 
+def _as_bool(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError("true or false is needed")
+    return value
+
+
 def _as_int(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise TypeError("a whole number is needed")
@@ -103,7 +116,8 @@ def _polygon(text: Any, source: str, place: str) -> shapely.Geometry:
         if not isinstance(text, str):
             raise InputError(source, place, "is not WKT text", "write POLYGON ((x y, ...))")
         try:
-            geometry = shapely.from_wkt(text)
+            # A ring with NaN in it is never closed; a number that is none either is for ``defect`` to say.
+            geometry = shapely.from_wkt(_NAN.sub("inf", text))
         except shapely.errors.ShapelyError as error:
             first = str(error).splitlines()[0] if str(error) else "unreadable"
             raise InputError(source, place, f"is not WKT ({first})", "write POLYGON ((x y, ...))") from error
@@ -126,7 +140,7 @@ def parse(raw: Mapping[str, Any], source: str) -> Problem:
         raise InputError(source, "targets", "is not a list", "write a list of objects")
     twa, mps = _parse_speed(boat.child("speed"))
     known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
-             "targets", "allocation", "risk", "clearance_floor_m"}
+             "targets", "allocation", "risk", "clearance_floor_m", "beat"}
     return Problem(
         id=top.text("id", ""),
         title=top.text("title", ""),
@@ -150,6 +164,8 @@ def parse(raw: Mapping[str, Any], source: str) -> Problem:
             polar_mps=mps,
             tack_loss_s=boat.number("tack_loss_s", 0.0),
             gybe_loss_s=boat.number("gybe_loss_s", 0.0),
+            can_tack=boat.flag("can_tack", True),
+            gybe_room_m=boat.number("gybe_room_m") if boat.raw.get("gybe_room_m") is not None else None,
         ),
         delta_s=top.number("delta_s"),
         current=Current(set_rad=math.radians(current.number("set_deg", 0.0)),
@@ -158,6 +174,7 @@ def parse(raw: Mapping[str, Any], source: str) -> Problem:
         vessels_part=_parse_allocation(top.child("allocation")) if raw.get("allocation") is not None else None,
         risk=_parse_risk(_Reader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,
         clearance_floor_m=top.number("clearance_floor_m", 0.0),
+        beat=_parse_beat(top.child("beat")) if raw.get("beat") is not None else None,
         extra={k: v for k, v in raw.items() if k not in known},
     )
 
@@ -240,6 +257,12 @@ def _parse_risk(risk: _Reader) -> RiskLimit:
                      correlation_time_s=risk.number("correlation_time_s", 60.0))
 
 
+def _parse_beat(beat: _Reader) -> Beat:
+    return Beat(
+        no_go_half_rad=math.radians(beat.number("no_go_half_deg")), corridor_m=beat.number("corridor_m"),
+        clearance_m=beat.number("clearance_m"), tack_s=beat.number("tack_s", 0.0))
+
+
 # ---------------------------------------------------------------------------------------------- writing
 def _wkt(geometry: shapely.Geometry) -> str:
     """Return WKT with every digit (shapely's own writer rounds the last): reading it gives the same numbers."""
@@ -291,6 +314,8 @@ def unparse(p: Problem) -> dict[str, Any]:
                       "v_mps": list(p.boat.polar_mps)},
             **({"tack_loss_s": p.boat.tack_loss_s} if p.boat.tack_loss_s else {}),
             **({"gybe_loss_s": p.boat.gybe_loss_s} if p.boat.gybe_loss_s else {}),
+            **({} if p.boat.can_tack else {"can_tack": False}),
+            **({} if p.boat.gybe_room_m is None else {"gybe_room_m": p.boat.gybe_room_m}),
         },
         "delta_s": p.delta_s,
     }
@@ -312,4 +337,7 @@ def unparse(p: Problem) -> dict[str, Any]:
         out["risk"] = {"max_path_risk": p.risk.max_path_risk, "correlation_time_s": p.risk.correlation_time_s}
     if p.clearance_floor_m:
         out["clearance_floor_m"] = p.clearance_floor_m
+    if p.beat is not None:
+        out["beat"] = {"no_go_half_deg": deg(p.beat.no_go_half_rad), "corridor_m": p.beat.corridor_m,
+                       "clearance_m": p.beat.clearance_m, "tack_s": p.beat.tack_s}
     return out | dict(p.extra)

@@ -130,7 +130,7 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
     half = problem.boat.no_go_half_rad
     start = np.array([leg.start_s for leg in legs], dtype=np.float64)
     end = np.array([leg.end_s for leg in legs], dtype=np.float64)
-    twa = np.array([wrap_pi(-leg.twa_rad) for leg in legs], dtype=np.float64)
+    twa = _angles(legs)
     first = np.zeros(len(legs))
     if legs and process.model != kernels.NONE:
         _first_passage((start, end), twa, half, process, first)
@@ -153,6 +153,11 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
         boole=float(min(1.0, boole)),
         assumption=ASSUMPTION[process.model], correlation_time_s=process.correlation_time_s,
     )
+
+
+def _angles(legs: Sequence[Leg]) -> NDArray[np.float64]:
+    """Return heading less mean wind [rad]; a leg that the autopilot beats follows the wind and is never forced."""
+    return np.array([math.pi if leg.is_beat else wrap_pi(-leg.twa_rad) for leg in legs], dtype=np.float64)
 
 
 def _instant(margin_rad: float, sigma_rad: float) -> float:
@@ -215,7 +220,7 @@ def simulate_entries(
         kernels.simulate(
             np.array([leg.start_s for leg in legs], dtype=np.float64),
             np.array([leg.end_s for leg in legs], dtype=np.float64),
-            np.array([-leg.twa_rad for leg in legs], dtype=np.float64), float(problem.boat.no_go_half_rad),
+            _angles(legs), float(problem.boat.no_go_half_rad),
             p.model, float(p.s0), float(p.s1), float(p.rho), float(p.tau), p.table_t, p.table_s, float(step_s),
             np.random.default_rng(seed), winds, hits,
         )

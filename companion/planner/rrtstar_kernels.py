@@ -10,6 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
+from companion.planner.problem import CLEAR_TURN_RAD
 from companion.planner.risk_kernels import leg_risk
 
 TWO_PI = 2.0 * math.pi
@@ -178,12 +179,14 @@ def way_on(course, number, polar, table_course):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, cache=True)
 def turn_time(before, after, number):  # type: ignore[no-untyped-def]
-    """Return the time [s] of a change of heading, the loss of a tack or gybe included."""
-    turn = wrap(after - before)
-    spent = abs(turn) / number[RATE]
+    """Return the time [s] of a change of heading, a tack's or gybe's loss included; inf for a tack it cannot do."""
+    spent = abs(wrap(after - before)) / number[RATE]
     a, b = wrap(before - number[TWD]), wrap(after - number[TWD])
     if a * b < 0.0:
-        spent += number[TACK] if abs(a + turn - b) < 1e-6 else number[GYBE]
+        through_eye = abs(a) + abs(b)
+        if number[TACK] == np.inf:
+            return np.inf if through_eye < math.pi + CLEAR_TURN_RAD else spent + number[GYBE]
+        spent += number[TACK] if through_eye < math.pi else number[GYBE]
     return spent
 
 
@@ -200,6 +203,8 @@ def straight(  # type: ignore[no-untyped-def]
     if v <= 1e-9:
         return False, h, t, t
     t0 = t + turn_time(heading, h, number)
+    if t0 == np.inf:
+        return False, h, t, t
     t1 = t0 + dist / v
     twa = abs(wrap(h - number[TWD]))
     if twa > number[DEEP] + 1e-9 or twa < worst_no_go(t0, t1, number, model, table):

@@ -77,7 +77,8 @@ def world_of(p: Problem) -> World:
         table = np.array([s.horizon_s, [p.widening_rad(t) for t in s.horizon_s]], dtype=np.float64)
     b, c = p.boat, p.current
     number = np.array([
-        p.wind.twd_from_rad, b.no_go_half_rad, b.max_twa_rad, b.turn_rate_radps, b.tack_loss_s, b.gybe_loss_s,
+        p.wind.twd_from_rad, b.no_go_half_rad, b.max_twa_rad, b.turn_rate_radps,
+        b.tack_loss_s if b.can_tack else math.inf, b.gybe_loss_s,
         *widen, c.drift_mps * math.sin(c.set_rad), c.drift_mps * math.cos(c.set_rad),
     ], dtype=np.float64)
     target = np.array([

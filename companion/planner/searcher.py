@@ -15,6 +15,7 @@ from companion.planner.drift import run_drift
 from companion.planner.gauge import Gauge
 from companion.planner.kernels import Floats, is_free
 from companion.planner.lattice import run_lattice
+from companion.planner.rounds import fitted, rounded
 from companion.planner.solve import Effort
 from companion.planner.visibility import crossings, geodesics, graph_nodes
 from companion.planner.world import World
@@ -29,6 +30,8 @@ _LONGEST_CYCLE = 512_000
 _HOT, _COLD = 2e-3, 1e-7
 """Temperatures of an annealing cycle, as a share of the path's time."""
 _POOL = 16
+_MANY = 5_000
+"""Corners above which those near a path are looked for now and then only."""
 
 
 @dataclass(slots=True, eq=False)
@@ -44,6 +47,8 @@ class Candidate:
     cycle: int = _FIRST_CYCLE
     done: int = 0
     cycles: int = 0
+    spots: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    spots_at: int = 0
 
     def worth(self, price_s: float) -> float:
         """Return the cost with every point priced [s]."""
@@ -78,6 +83,16 @@ class Searcher:
         if points is None or len(points) < 2:
             return None
         points = np.ascontiguousarray(points)
+        taken = self._take(points, origin, within)
+        world = self.world
+        if world.boat.room > 0.0:
+            way = rounded(world.grid, world.boat, points, world.h0)
+            if len(way) > len(points):
+                way = way if world.boat.kind == 0 else fitted(world.boat, way, world.h0)
+                return self._take(way, f"{origin}, turned the long way round", within) or taken
+        return taken
+
+    def _take(self, points: Floats, origin: str, within: float) -> Candidate | None:
         cost = float(check_path(self.world.grid, self.world.boat, points, self.world.h0))
         if not math.isfinite(cost) or cost > within * self.upper_s:
             return None
@@ -378,10 +393,15 @@ class Searcher:
         corners = self.world.corners
         if len(corners) == 0:
             return corners
+        if len(corners) > _MANY:
+            if len(candidate.spots) and candidate.moves < 2 * candidate.spots_at:
+                return candidate.spots
+            candidate.spots_at = max(_CHUNK, candidate.moves)
         near = np.full(len(corners), np.inf)
         for p, q in zip(candidate.points[:-1], candidate.points[1:], strict=True):
             d = q - p
             f = np.clip((corners - p) @ d / max(float(d @ d), 1e-18), 0.0, 1.0)
             near = np.minimum(near, np.sum((p + f[:, None] * d - corners) ** 2, axis=1))
         keep = np.argsort(near, kind="stable")[:200]
-        return np.ascontiguousarray(corners[keep])
+        candidate.spots = np.ascontiguousarray(corners[keep])
+        return candidate.spots

@@ -79,6 +79,10 @@ class Effort:
         """Computing time left [s]; inf without a budget in seconds."""
         return self.budget_s - self.elapsed_s
 
+    def part(self, share: float) -> Effort:
+        """Return an effort that ends when ``share`` of this one's limits is spent; what it spends counts here."""
+        return _Part(self, share)
+
     def remaining(self, chunk: int) -> int:
         """Return how much of a chunk of expansions is left."""
         return chunk if self.limit is None else max(0, min(chunk, self.limit - self.used))
@@ -87,6 +91,22 @@ class Effort:
         """Note the moment of the first path."""
         if self.first_s is None:
             self.first_s = self.elapsed_s
+
+
+class _Part(Effort):
+    def __init__(self, whole: Effort, share: float) -> None:
+        super().__init__(
+            None if math.isinf(whole.budget_s) else share * whole.remaining_s,
+            None if whole.limit is None else max(1, int(share * (whole.limit - whole.used))))
+        self._whole = whole
+
+    def spend(self, expansions: int) -> None:
+        super().spend(expansions)
+        self._whole.spend(expansions)
+
+    def found(self) -> None:
+        super().found()
+        self._whole.found()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,7 +161,9 @@ def plan(
     if problem.defect is not None:
         return replace(empty, why=Why(text=f"Cannot be planned: {problem.defect}."))
     try:
-        return _solved(problem, effort, empty)
+        # Numbers that overflow or underflow on the way (1e-180 m in a WKT) end as inf or NaN, which no check passes.
+        with np.errstate(all="ignore"):
+            return _solved(problem, effort, empty)
     except shapely.errors.GEOSException as error:
         reason = f"the obstacles or the fence cannot be made valid ({str(error).splitlines()[0]})"
         return replace(empty, reason=reason, elapsed_s=effort.elapsed_s, why=Why(text=reason))
@@ -164,6 +186,10 @@ def _solved(problem: Problem, effort: Effort, empty: Plan) -> Plan:
     def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
         return search(problem.resolved, effort, seed)
 
+    if problem.beat is not None and problem.boat.can_tack and empty.algorithm == "auto":
+        from companion.planner.beat_search import with_beats
+
+        search = with_beats(search, problem.beat)
     if problem.risk is None:
         return with_risk(problem, _judged(problem, search_resolved(problem, effort, empty.seed), effort, empty))
     if empty.algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)

@@ -15,6 +15,9 @@ import numpy as np
 from companion.planner.gauge import Gauge, disc_time
 from companion.planner.kernels import Floats, Grid, Ints, is_free, jit
 
+_EXACT = 5_000
+"""Corners up to which each one's least time is worked out to the last digit; of more, from the gauge's table."""
+
 
 @jit
 def _time(normals: Floats, dx: float, dy: float) -> float:
@@ -43,14 +46,24 @@ def geodesics(
     parent = np.full(n, -1, np.int32)
     state = np.zeros(n, np.uint8)
     to_go, from_start = np.zeros(n), np.zeros(n)
+    n_table = table.shape[0]
+    steepest = 0.0
+    for i in range(normals.shape[0]):
+        steepest = max(steepest, math.hypot(normals[i, 0], normals[i, 1]))
     for i in range(n):
-        to_go[i] = disc_time(normals, blocked, goal[0] - nodes[i, 0], goal[1] - nodes[i, 1], goal[2])
-        from_start[i] = _time(normals, nodes[i, 0] - nodes[0, 0], nodes[i, 1] - nodes[0, 1])
+        gx, gy = goal[0] - nodes[i, 0], goal[1] - nodes[i, 1]
+        sx, sy = nodes[i, 0] - nodes[0, 0], nodes[i, 1] - nodes[0, 1]
+        c = int((math.atan2(gx, gy) + math.pi) / (2.0 * math.pi) * n_table) % n_table
+        to_go[i] = max(0.0, table[c] * math.hypot(gx, gy) - goal[2] * steepest)
+        c = int((math.atan2(sx, sy) + math.pi) / (2.0 * math.pi) * n_table) % n_table
+        from_start[i] = table[c] * math.hypot(sx, sy)
+        if to_go[i] + from_start[i] <= bound and n <= _EXACT:
+            to_go[i] = disc_time(normals, blocked, gx, gy, goal[2])
+            from_start[i] = _time(normals, sx, sy)
         if to_go[i] + from_start[i] > bound:
             state[i] = 2
     tests = 0
     end, end_cost = -1, math.inf
-    n_table = table.shape[0]
     if backward:
         for i in range(n):
             if state[i] == 2:

@@ -108,8 +108,8 @@ def test_no_way_up_wind_and_no_course_at_all():
 
 def test_a_disc_that_reaches_round_a_wall_is_not_called_cut_off():
     wall = simple(obstacles=[box(-400, 70, 400, 75)], fence=box(-200, -50, 200, 150))
-    assert cut_off(Problem.from_json(wall)) is not None
-    assert cut_off(Problem.from_json(wall | {"goal": {"x": 0, "y": 100, "radius": 40}})) is None
+    assert cut_off(make_world(Problem.from_json(wall))) is not None
+    assert cut_off(make_world(Problem.from_json(wall | {"goal": {"x": 0, "y": 100, "radius": 40}}))) is None
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)
