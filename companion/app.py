@@ -149,6 +149,7 @@ class _Shell:
         self._feed_names = feeds_of(mission)
         self._feeds: list[AisFeed] = []
         self._fed: list[AisReport] = []
+        self._ais_dropped = 0
         self._silent: set[str] = set()   # feeds of which it was said
 
     async def run(self, transport: Transport) -> dict[str, Any]:
@@ -235,6 +236,8 @@ class _Shell:
     def _on_ais(self, report: AisReport) -> None:
         if len(self._fed) < FED_AT_MOST:
             self._fed.append(report)
+        else:
+            self._ais_dropped += 1
 
     # --------------------------------------------------------------------------------------- steps
     def _tick(self, t_s: float) -> Step:
@@ -302,7 +305,7 @@ class _Shell:
                 snapshot.t_s, {"kind": "phase", "phase": changed[0], "why": changed[1]}))
         self._announced = changed
         self.status = companion_status(step, self.voyage, self.figures, clearance_m, link.bytes_per_s()[1],
-                                       self._feeds)
+                                       self._feeds, self._ais_dropped)
         persisted = self.fold.skipper.persisted(step.state)
         if persisted != self._persisted:
             self._persisted = persisted
@@ -435,6 +438,7 @@ class _Shell:
             "end_reason": self.end_reason,
             "end_why": state.why,
             "ais_feeds": [feed.sentence() for feed in self._feeds],
+            "ais_dropped": self._ais_dropped,
             "records_dropped": self.recorder.dropped,
             "planner_restarts": self.planner.restarts,
             "loop_held_max_s": round(self.loop_held_s * self.options.budget_scale, 4),

@@ -23,7 +23,7 @@ MIN_SPEED_MPS = 0.2
 
 def companion_status(
     step: Step, voyage: Voyage, figures: VoyageFigures, clearance_m: float | None, bytes_out_per_s: float | None,
-    feeds: Sequence[AisFeed] = (),
+    feeds: Sequence[AisFeed] = (), ais_dropped: int = 0,
 ) -> CompanionStatus:
     """Return the status at ``step``. The wind's spread is that of a minute ahead, which the plan lives on."""
     snapshot, state = step.snapshot, step.state
@@ -57,13 +57,13 @@ def companion_status(
         battery_v=None if autopilot is None else autopilot.battery_v,
         position=None if vehicle is None else vehicle.position,
         bytes_out_per_s=bytes_out_per_s,
-        traffic=traffic_status(step, feeds),
+        traffic=traffic_status(step, feeds, ais_dropped),
         alert_code=code,
         alert_text=text,
     )
 
 
-def traffic_status(step: Step, feeds: Sequence[AisFeed]) -> TrafficStatus | None:
+def traffic_status(step: Step, feeds: Sequence[AisFeed], dropped: int) -> TrafficStatus | None:
     """Return what is seen of other vessels, the worst one's figures; None when nobody was heard and no feed is open."""
     picture = step.snapshot.traffic
     if picture is None and not feeds:
@@ -71,7 +71,7 @@ def traffic_status(step: Step, feeds: Sequence[AisFeed]) -> TrafficStatus | None
     counts = TrafficCounts() if picture is None else picture.counts
     seen = TrafficStatus(
         vessels=0 if picture is None else len(picture.vessels),
-        refused=counts.stale + counts.far + sum(feed.counts.refused for feed in feeds),
+        refused=counts.stale + counts.far + dropped + sum(feed.counts.refused for feed in feeds),
         feeds=len(feeds), silent_feeds=sum(feed.is_silent for feed in feeds), shared_mmsi=counts.shared_mmsi,
         clock_jumps=counts.clock_jumps, silence_s=None if picture is None else picture.silence_s,
     )
