@@ -98,8 +98,10 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     replan: Literal["waypoint", "forecast"] = "waypoint"
     """At each waypoint, or also when the wind leaves what was forecast."""
     end: Literal["loiter", "home"] = "loiter"
-    guidance: Literal["plan", "field"] = "plan"
-    """Sail the plan's mission in AUTO, or steer by vector fields in GUIDED ([operator] guided and set_auto allow it)."""
+    guidance: Literal["plan", "heading", "field"] = "plan"
+    """Sail the plan's mission in AUTO; or steer in GUIDED, by the plan's headings or by vector fields.
+
+    GUIDED is for those whom ``[operator] guided`` and ``set_auto`` allow it."""
     station_s: NonNegative = 0.0
     """Stay at the last goal for this long."""
     laps: Annotated[int, Meta(ge=1, le=10_000)] = 1

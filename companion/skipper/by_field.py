@@ -21,7 +21,7 @@ from companion.messages import Mode
 from companion.skipper.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.config import Guidance
 from companion.skipper.geometry import distance_m
-from companion.skipper.helm import is_busy, set_mode
+from companion.skipper.helm import hand_back, is_busy, set_mode
 from companion.skipper.planning import request
 from companion.skipper.state import ByField, Phase
 from companion.skipper.traffic import GIVE_UP_RISK, near, timed_legs
@@ -218,6 +218,7 @@ def keeps_station(turn: Turn) -> bool:
     off = "" if boat is None else f", {distance_m(boat, place):.0f} m off"
     turn.phase(Phase.HOLDING, f"keeping station for {left_s:.0f} s more{off}")
     if turn.config.guidance is not Guidance.FIELD or not turn.steers:
+        hand_back(turn)   # out of GUIDED, where the goal was reached by headings
         return True
     status, seen = turn.autopilot, situation(turn)
     if status is not None and status.mode is not Mode.GUIDED:

@@ -21,6 +21,7 @@ class Guidance(enum.Enum):
     """What steers the boat."""
 
     PLAN = "plan"              # the mission, in AUTO
+    HEADING = "heading"        # the plan's headings, in GUIDED (Büsser's own interface)
     FIELD = "field"            # vector fields, in GUIDED; the mission on board is what is left when we are gone
 
 
@@ -100,8 +101,7 @@ class SkipperConfig:
     backoff_max_s: float = 300.0
     announce_interval_s: float = 30.0          # the same sentence is not said again sooner
     wind_settle_s: float = 30.0                # wind is believed after this long at the start
-    # Büsser's own interface: headings sent in GUIDED instead of a mission sailed in AUTO. The mission is on board all
-    # the same, its count kept in step; but a companion that dies in GUIDED leaves a boat that loiters where it is.
-    steer_by_heading: bool = False
+    # Steered in GUIDED the mission is on board all the same, its count kept in step; but a companion that dies leaves a
+    # boat that loiters where it is.
     guidance: Guidance = Guidance.PLAN
     station_s: float = 0.0             # how long to stay at the last goal

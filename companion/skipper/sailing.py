@@ -75,9 +75,9 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         return
     if turn.steers:
         _send_heading(turn)
-    elif turn.config.guidance is Guidance.FIELD:
-        turn.say(Severity.WARNING, "guidance", "guidance by field is asked for and steering is not permitted: by plan",
-                 every_s=600.0)
+    elif turn.config.guidance is not Guidance.PLAN:
+        turn.say(Severity.WARNING, "guidance", f"guidance by {turn.config.guidance.value} is asked for and steering is "
+                 "not permitted: by plan", every_s=600.0)
         check_current(turn)
     else:
         check_current(turn)

@@ -207,8 +207,7 @@ class Turn:
     def steers(self) -> bool:
         """Whether the boat is steered by headings (and may be)."""
         may = self.snapshot.permissions
-        wanted = self.config.steer_by_heading or self.config.guidance is Guidance.FIELD
-        return wanted and may.may_steer and may.may_set_mode
+        return self.config.guidance is not Guidance.PLAN and may.may_steer and may.may_set_mode
 
     def leg(self) -> tuple[PointEn, PointEn] | None:
         """Return the planned leg being sailed (from, to), None without a route."""

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.geofence.mission import dump_options, parse_options
+from companion.geofence.options import tables
 from companion.geofence.text import decode
 from tests.geofence.strategies import QUIET
 
@@ -141,3 +142,17 @@ def test_a_damaged_mission_is_refused_in_one_line_or_read(data):
         refusal = str(error)
     assert "\n" not in refusal
     assert not refusal or refusal.startswith("m.toml")
+
+
+def test_every_option_is_documented():
+    text = (pathlib.Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    part = text.partition("## The mission file")[2].partition("\n## ")[0]
+    table, documented = "", set()
+    for row in part.splitlines():
+        cells = row.split("|")
+        if len(cells) == 6:
+            table = cells[1].strip().strip("`[]") or table
+            documented |= {(table, key.strip().strip("`")) for key in cells[2].split(",")}
+    missing = {
+        (name, key) for name, keys in tables().items() if name for key in keys if (name, key) not in documented}
+    assert missing == set()

@@ -11,7 +11,7 @@ from shapely.geometry import box
 from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, Mode, StatusText
 from companion.skipper import actions as act
-from companion.skipper.config import DRY_RUN, Permissions, ReplanPolicy
+from companion.skipper.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
 from companion.skipper.geometry import bearing_rad, distance_m, moved
 from companion.skipper.manoeuvre import is_tack
 from companion.skipper.route import effective, ends_safely, is_same_mission
@@ -645,7 +645,7 @@ def test_a_critical_battery_goes_to_the_refuge():
 # ------------------------------------------------------------------------------------------- headings
 def test_by_headings_under_guided_it_arrives_and_hands_back():
     world = make(Goal(en_m=(250.0, 120.0), radius_m=8.0), Goal(en_m=(0.0, 200.0), radius_m=8.0), obstacles=(),
-                 config={"steer_by_heading": True}, wind=lambda t: (0.0, 5.0))
+                 config={"guidance": Guidance.HEADING}, wind=lambda t: (0.0, 5.0))
     assert world.run(40, lambda w: w.mode is Mode.GUIDED)
     assert world.run(1500, is_done)
     assert world.state.reached == (0, 1)
@@ -657,7 +657,7 @@ def test_by_headings_under_guided_it_arrives_and_hands_back():
 
 
 def test_by_headings_the_operator_is_still_the_operator():
-    world = make(config={"steer_by_heading": True}, obstacles=())
+    world = make(config={"guidance": Guidance.HEADING}, obstacles=())
     assert world.run(60, lambda w: w.mode is Mode.GUIDED)
     world.run(20)
     world.set_mode(Mode.HOLD)
@@ -673,7 +673,7 @@ def test_by_headings_the_operator_is_still_the_operator():
 def test_by_headings_it_rounds_buoys(side):
     hand = 1.0 if side is Side.PORT else -1.0
     places = [(0.0, 150.0), (-90.0 * hand, 75.0), (0.0, 0.0)]
-    world = make(*(Goal(en_m=p, side=side) for p in places), obstacles=(), config={"steer_by_heading": True},
+    world = make(*(Goal(en_m=p, side=side) for p in places), obstacles=(), config={"guidance": Guidance.HEADING},
                  voyage={"laps": 2, "home": (20.0 * hand, -40.0)}, position=(20.0 * hand, -40.0), expansions=600)
     assert world.run(3000, is_done)
     assert len(world.state.reached) == 6
