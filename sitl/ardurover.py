@@ -159,8 +159,9 @@ class ArduRover:
         heading_rad: of the bow at power-up.
         speedup: simulated seconds per second; run the event loop with the same (``clock.run(.., speedup=..)``).
         instance: chooses the ports (5760 + 10 instance); the first free one when None.
-        parameters: set besides those of sailboat.parm.
+        parameters: set besides those of the model's file, sailboat.parm or motorboat.parm.
         folder: where it keeps eeprom and logs; a temporary one when None.
+        model: of the simulator.
 
     ``link`` is the companion's LINK, ``shore_link`` another port (SERIAL2) for a ground station.
     """
@@ -168,12 +169,13 @@ class ArduRover:
     def __init__(
         self, program: Path, home: GeoPoint, wind: Wind, *, heading_rad: float = 0.0, speedup: float = 1.0,
         instance: int | None = None, parameters: Mapping[str, float] | None = None, folder: Path | None = None,
+        model: str = "sailboat",
     ) -> None:
         self._program, self._home, self._wind = program.resolve(), home, wind
         self._heading_rad, self._speedup = heading_rad, speedup
         self._wanted = instance
         self._parameters = dict(parameters or {})
-        self._folder = folder
+        self._folder, self._model = folder, model
         self._stack = contextlib.AsyncExitStack()
         self._process: asyncio.subprocess.Process | None = None
         self._harness: Any = None
@@ -214,13 +216,14 @@ class ArduRover:
             folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="ardurover-")))
         folder.mkdir(parents=True, exist_ok=True)
         defaults = folder / "boat.parm"
-        lines = [DEFAULTS.read_text(), *(f"{name} {value:g}" for name, value in self._parameters.items())]
+        common = DEFAULTS.with_name(f"{self._model}.parm").read_text()
+        lines = [common, *(f"{name} {value:g}" for name, value in self._parameters.items())]
         defaults.write_text("\n".join(lines) + "\n")
         self.instance = free_instance() if self._wanted is None else self._wanted
         heading_deg = math.degrees(wrap_two_pi(self._heading_rad))
         log = self._stack.enter_context((folder / "ardurover.log").open("wb"))
         self._process = await asyncio.create_subprocess_exec(
-            str(self._program), "--model", "sailboat", "--speedup", f"{self._speedup:g}", "-I", str(self.instance),
+            str(self._program), "--model", self._model, "--speedup", f"{self._speedup:g}", "-I", str(self.instance),
             "--home", f"{self._home.lat_deg:.7f},{self._home.lon_deg:.7f},0,{heading_deg:.3f}",
             "--defaults", str(defaults), "-w", "--serial0", "tcp:0", "--serial1", "tcp:2", "--serial2", "tcp:3",
             cwd=folder, stdout=log, stderr=asyncio.subprocess.STDOUT, stdin=asyncio.subprocess.DEVNULL,

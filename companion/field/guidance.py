@@ -44,7 +44,8 @@ def step(
         wanted = math.atan2(v[0], v[1])
         margin: float | None = None
         if habits.look_ahead:
-            wanted, margin = choose(wanted, None, situation, intent, habits, state)
+            wanted, margin, side = choose(wanted, None, situation, intent, habits, state)
+            state = replace(state, round_side=side)
         return replace(state, wanted_rad=wanted), Setpoint(
             t_s=situation.t_s, heading_rad=wrap_pi(wanted), reason="field", margin_m=margin
         )
@@ -54,7 +55,8 @@ def step(
     margin = None
     state = replace(state, q=q)
     if habits.look_ahead:
-        chosen, margin = choose(wanted, twd, situation, intent, habits, state)
+        chosen, margin, side = choose(wanted, twd, situation, intent, habits, state)
+        state = replace(state, round_side=side)
         off = wrap_pi(chosen - twd)
         if abs(wrap_pi(wanted - twd)) < habits.no_go_half_rad + 1e-6 and abs(off) < math.pi / 2.0:
             # Beating: the tack that something in the way made her take is kept, else she would tack back at once.

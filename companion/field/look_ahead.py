@@ -15,16 +15,17 @@ from numpy.typing import NDArray
 from companion.field.values import Clearance, GuidanceState, Habits, Intent, Obstacle, Situation
 from companion.geo.angles import wrap_pi
 
+OTHER_SIDE_COST = 2.0     # of changing one's mind about the side on which to pass what stands in the way
 _FAN_TWA = np.radians(np.arange(0.0, 181.0, 6.0))
 _STEP_S = 2.5
 
 
 def choose(
     wanted_rad: float, twd: float | None, situation: Situation, intent: Intent, habits: Habits, state: GuidanceState
-) -> tuple[float, float | None]:
-    """Return the heading of the fan with the least cost, and its margin [m]."""
+) -> tuple[float, float | None, int]:
+    """Return the heading of the fan with the least cost, its margin [m], and the side to pass what stands still on."""
     if not situation.obstacles and intent.stay_in is None and intent.clearance is None:
-        return wanted_rad, None
+        return wanted_rad, None, 0
     if twd is None:
         headings = np.concatenate([[wanted_rad], wanted_rad + np.radians(np.arange(6.0, 360.0, 6.0))])
     else:
@@ -36,7 +37,7 @@ def choose(
     last = state.wanted_rad
     if last is not None:
         cost += 0.1 * (1.0 - np.cos(headings - last))
-    margin = margins(track, situation.obstacles)
+    margin, blocked = margins(track, situation.obstacles), False
     if situation.obstacles:
         cost += np.where(margin < 0.0, 10.0 - 0.2 * margin, 0.0)
         cost += np.maximum(0.0, 1.0 - np.maximum(margin, 0.0) / habits.comfort_m)
@@ -44,9 +45,17 @@ def choose(
     if intent.stay_in is not None:
         cost += 4.0 * _leaving(track, intent.stay_in, habits)
     if intent.clearance is not None:
-        cost += _ashore(track, intent.clearance, habits)
+        ashore = _ashore(track, intent.clearance, habits)
+        blocked = bool(ashore[0] > 0.0)       # headings[0] is the field's own
+        side = _wrap(headings - wanted_rad) * state.round_side
+        cost += ashore + np.where(blocked & (side < 0.0), OTHER_SIDE_COST, 0.0)
     best = int(np.argmin(cost))
-    return wrap_pi(float(headings[best])), float(margin[best]) if situation.obstacles else None
+    round_side = state.round_side
+    if not blocked:
+        round_side = 0
+    elif round_side == 0:
+        round_side = 1 if wrap_pi(float(headings[best]) - wanted_rad) > 0.0 else -1
+    return wrap_pi(float(headings[best])), float(margin[best]) if situation.obstacles else None, round_side
 
 
 def foresee(

@@ -110,6 +110,7 @@ class GuidanceState:
     failed_tacks: int = 0
     irons: int = 0
     irons_side: int = 1
+    round_side: int = 0       # something stands in the way and is passed by turning right (1) or left (-1) of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

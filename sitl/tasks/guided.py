@@ -58,8 +58,8 @@ def ardurover_habits(tws_mps: float, **changes: float | bool) -> Habits:
 class Steering:
     """Heading setpoints to one autopilot in GUIDED, each from what was last heard of boat and wind."""
 
-    def __init__(self, facade: Facade, frame: LocalFrame) -> None:
-        self._facade, self._frame = facade, frame
+    def __init__(self, facade: Facade, frame: LocalFrame, *, needs_wind: bool = True) -> None:
+        self._facade, self._frame, self._needs_wind = facade, frame, needs_wind
         self._vehicle: VehicleState | None = None
         self._wind: WindSample | None = None
         self._stop = facade.on_value(self._take)
@@ -72,13 +72,14 @@ class Steering:
             self._wind = value
 
     def seen(self, t_s: float) -> Situation | None:
-        """Return the situation, or None before both were heard."""
-        if self._vehicle is None or self._wind is None:
+        """Return the situation, or None before both (a motorboat: before it) were heard."""
+        if self._vehicle is None or (self._wind is None and self._needs_wind):
             return None
+        wind = self._wind
         return Situation(
             t_s=t_s, en_m=self._frame.en_from_geo(self._vehicle.position),
             velocity_en_mps=self._vehicle.velocity_en_mps, heading_rad=self._vehicle.heading_rad,
-            twd_from_rad=self._wind.twd_from_rad, tws_mps=self._wind.tws_mps,
+            twd_from_rad=None if wind is None else wind.twd_from_rad, tws_mps=0.0 if wind is None else wind.tws_mps,
         )
 
     async def take_over(self) -> None:
@@ -111,13 +112,13 @@ class Steering:
         self._stop()
 
 
-async def _sail(
+async def sail_guided(
     facade: Facade, truth: Callable[[], Truth], frame: LocalFrame, decide: Decide, until: Callable[[float], bool],
-    limit_s: float,
+    limit_s: float, *, needs_wind: bool = True,
 ) -> list[tuple[float, float, float, float, float]]:
     """Steer by ``decide`` while the truth is sampled each half second; return its rows."""
     rows: list[tuple[float, float, float, float, float]] = []
-    steering = Steering(facade, frame)
+    steering = Steering(facade, frame, needs_wind=needs_wind)
     await steering.take_over()
     zero = now_s()
 
@@ -134,9 +135,9 @@ async def _sail(
     return rows
 
 
-def _with_boat(
+def with_boat(
     wind: AR1, seed: int, heading_rad: float, job: Callable[[Facade, Callable[[], Truth]], Any], autopilot: str,
-    speedup: float,
+    speedup: float, model: str = "sailboat",
 ) -> Any:
     """Run ``job`` with a boat: the simulated autopilot in virtual time, or the real ArduRover in a hurry."""
     async def simulated() -> Any:
@@ -154,7 +155,7 @@ def _with_boat(
         from sitl.ardurover import ArduRover, require
 
         async with (
-            ArduRover(require(), ORIGIN, wind, heading_rad=heading_rad, speedup=speedup) as boat,
+            ArduRover(require(), ORIGIN, wind, heading_rad=heading_rad, speedup=speedup, model=model) as boat,
             Link(open_link(boat.link)) as link,
             Facade(link) as facade,
         ):
@@ -186,7 +187,7 @@ def run_wrsc(seed: int, autopilot: str = "embedded", speedup: float = 8.0) -> Sc
         # The real boat drifts while it boots: it sails to the middle first, before the clock of the task starts.
         start = truth()
         if math.hypot(start.east_m, start.north_m) > 30.0:
-            await _sail(facade, truth, frame, lambda s: skipper.by_field(s, ()),
+            await sail_guided(facade, truth, frame, lambda s: skipper.by_field(s, ()),
                         lambda _: math.hypot(truth().east_m, truth().north_m) < 25.0, 240.0)
 
         def over(t_s: float) -> bool:
@@ -195,9 +196,9 @@ def run_wrsc(seed: int, autopilot: str = "embedded", speedup: float = 8.0) -> Sc
             out = max(abs(now.east_m), abs(now.north_m)) > HALF_M + 15.0
             return t_s > course.entry_s and out and math.hypot(now.east_m - ix, now.north_m - iy) > 60.0
 
-        return await _sail(facade, truth, frame, decide, over, course.entry_s + LEAVE_WITHIN_S)
+        return await sail_guided(facade, truth, frame, decide, over, course.entry_s + LEAVE_WITHIN_S)
 
-    rows = np.asarray(_with_boat(wind, seed, course.twd_from_rad + math.pi / 2.0, job, autopilot, speedup))
+    rows = np.asarray(with_boat(wind, seed, course.twd_from_rad + math.pi / 2.0, job, autopilot, speedup))
     return score(rows, np.column_stack(course.at(rows[:, 0])), seed=seed)
 
 
@@ -227,9 +228,9 @@ def run_station(
                 inside.append(t_s)
             return bool(inside) and t_s > inside[0] + 301.0
 
-        return await _sail(facade, truth, frame, decide, over, 900.0)
+        return await sail_guided(facade, truth, frame, decide, over, 900.0)
 
-    rows = np.asarray(_with_boat(wind, seed, twd + math.pi / 2.0, job, autopilot, speedup))
+    rows = np.asarray(with_boat(wind, seed, twd + math.pi / 2.0, job, autopilot, speedup))
     result = station_score(rows, point, radius_m=radius_m, length_m=1.0)
     return {"seed": seed, "tws_mps": round(tws, 1), **asdict(result)}
 
