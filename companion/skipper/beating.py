@@ -24,19 +24,24 @@ def tacks_fail(turn: Turn) -> bool:
     return len(recent) >= TACKS_FAIL_AFTER
 
 
-def room_m(turn: Turn) -> float | None:
-    """Return how far from everything solid a leg is left to the autopilot's beating [m]; None: never.
+def corridor_room_m(turn: Turn) -> float | None:
+    """Return how far from everything solid a closed leg must be for the autopilot's beat about it [m].
 
-    SAIL_XTRACK_MAX, what a tack at its edge swings wide, and the margin's floor beyond that. Without a corridor the
-    autopilot sails to the layline, wherever that is.
+    SAIL_XTRACK_MAX, what a tack at its edge swings wide, and the margin's floor beyond that. None without a corridor:
+    the autopilot then sails to the layline, wherever that is.
     """
     corridor, wind = turn.tack_corridor_m, turn.wind_mean
-    if not turn.config.autopilot_beats or turn.snapshot.limits is None or wind is None or tacks_fail(turn):
-        return None
-    if not 0.0 < corridor <= WIDEST_M:
+    if wind is None or not 0.0 < corridor <= WIDEST_M:
         return None
     speed = turn.voyage.boat.polar.speed_mps(turn.no_go_half_rad, wind[1])
     return corridor + OVERSHOOT_S * speed + turn.config.margin_floor_m
+
+
+def room_m(turn: Turn) -> float | None:
+    """Return ``corridor_room_m`` where beats may be planned for the autopilot, None where not."""
+    if not turn.config.autopilot_beats or turn.snapshot.limits is None or tacks_fail(turn):
+        return None
+    return corridor_room_m(turn)
 
 
 def problem_beat(turn: Turn, margin_m: float) -> dict[str, Any] | None:
@@ -60,8 +65,10 @@ def may_restart_leg(turn: Turn) -> bool:
     boat, leg, wind = turn.boat_en, turn.leg(), turn.wind_now
     if boat is None or leg is None or wind is None or abs(cross_track_m(boat, *leg)) <= OFF_LINE_M:
         return True
-    off = abs(difference_rad(wind[0], bearing_rad(boat, leg[1])))
-    return off > turn.no_go_half_rad + FOLLOWS_RAD or is_left_to_beat(turn, boat, leg[1])
+    room = corridor_room_m(turn)
+    if room is None or abs(difference_rad(wind[0], bearing_rad(boat, leg[1]))) > turn.no_go_half_rad + FOLLOWS_RAD:
+        return True
+    return turn.voyage.area.path_clearance_m([boat, leg[1]]) >= room
 
 
 def is_left_to_beat(turn: Turn, a: PointEn, b: PointEn) -> bool:

@@ -45,8 +45,10 @@ def is_sailing(world):
 
 
 def make(*goals, config=None, obstacles=ISLANDS, **world):
+    """Return a world whose plans have every tack as a waypoint: much to upload that can go wrong."""
     made = voyage(*(goals or (GOAL,)), obstacles=obstacles, **world.pop("voyage", {}))
-    return World(skipper=skipper(made, **(config or {})), **{"wind": swinging, **FAST, **world})
+    return World(skipper=skipper(made, **{"autopilot_beats": False, **(config or {})}),
+                 **{"wind": swinging, **FAST, **world})
 
 
 def said(world, code):
@@ -54,9 +56,10 @@ def said(world, code):
 
 
 # ------------------------------------------------------------------------------------- the main job
+@pytest.mark.parametrize("beats", [False, True])
 @pytest.mark.parametrize("seed", range(4))
-def test_beats_through_islands_to_a_goal_upwind(seed):
-    world = make(wind=ar1(seed, 8.0), sigma=math.radians(8.0))
+def test_beats_through_islands_to_a_goal_upwind(seed, beats):
+    world = make(wind=ar1(seed, 8.0), sigma=math.radians(8.0), config={"autopilot_beats": beats})
     assert world.run(1500, is_done)
     assert distance_m(world.position, GOAL.en_m) < 10.0
     assert world.clearance() > world.skipper.config.margin_floor_m
@@ -71,7 +74,7 @@ def test_runs_to_a_goal_downwind():
 
 
 def test_replans_at_each_waypoint_from_the_next_one_and_before_it_is_reached():
-    world = make(config={"autopilot_beats": False})   # every tack a waypoint
+    world = make()
     assert world.run(1500, is_done)
     asked = [(t, a) for t, a in world.actions if isinstance(a, act.RequestPlan)
              and a.reason is act.ReplanReason.WAYPOINT]
