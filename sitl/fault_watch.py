@@ -18,8 +18,9 @@ asked for as a whole, or a beginning of one that ends in a loiter at one of its 
 an upload without MAVFTP is under way), or there is none; anything else under way is a mixture, whatever the link and
 whoever lives. On a boat that was not armed yet a beginning without its end is a first upload on its way.
 
-Silence counts within a life of the companion: a dead process says nothing. That the process ends for want of an
-autopilot, with an error that names it, and is started again by its service 5 s later is no unhandled error.
+Silence is the time without a status that says why; it counts within a life of the companion: a dead process says
+nothing. That the process ends for want of an autopilot, with an error that names it, and is started again by its
+service 5 s later is no unhandled error.
 """
 
 from __future__ import annotations
@@ -128,7 +129,9 @@ class Watch:
             return []
         shapely.prepare(self.solid)
         positions = np.asarray(self.en_m)
-        inside = shapely.intersects(self.solid, shapely.points(positions))
+        # looked at between the samples too: a corner can be cut in a quarter of a second
+        ways = shapely.linestrings(np.stack([positions[:-1], positions[1:]], axis=1))
+        inside = shapely.intersects(self.solid, np.concatenate([[shapely.points(positions[0])], ways]))
         entries = np.flatnonzero(inside & ~np.concatenate([[False], inside[:-1]]))
         return [(self.t_s[i], self._excuse(int(i))) for i in entries]
 
@@ -195,7 +198,7 @@ class Watch:
 
     # ------------------------------------------------------------------------------------------- silence
     def silence_s(self, status_s: Sequence[float]) -> float:
-        """Return the longest time without a status within a life of the companion [s]."""
+        """Return the longest time without a status, given when there was one, within a life of the companion [s]."""
         longest = 0.0
         for start_s, end_s in self.lives:
             times = [start_s, *[t for t in status_s if start_s <= t <= end_s], end_s]

@@ -54,7 +54,8 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
     status_s: list[float] = []
 
     def on_step(step: Step) -> None:
-        status_s.append(step.snapshot.t_s)
+        if step.state.why:
+            status_s.append(step.snapshot.t_s)
         watch.step(step)
 
     figures: dict[str, Any] = {}

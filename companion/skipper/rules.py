@@ -35,6 +35,7 @@ from companion.skipper.turn import Turn
 from companion.skipper.voyage import Voyage
 from companion.skipper.watchdogs import watch
 
+STALE_S = 60.0           # a plan that waits for permission is renewed no more often than this
 REBOOT_RACE_S = 15.0     # a mode change this long before a reboot shows was the reboot, not the operator
 
 
@@ -373,11 +374,14 @@ def _look_at_margin(turn: Turn) -> None:
 
 
 def _is_stale(turn: Turn) -> bool:
-    """Return whether the first plan no longer fits: the boat has drifted off its leg, or the wind has turned."""
+    """Return whether the plan no longer fits: the boat has drifted off its leg or behind something, the wind turned."""
     boat, leg, wind, route = turn.boat_en, turn.leg(), turn.wind_mean, turn.state.route
-    if boat is None or leg is None or wind is None or route is None or turn.t_s - turn.state.last_plan_s < 60.0:
+    if boat is None or leg is None or wind is None or route is None or turn.snapshot.wind.forecast is None:
         return False
-    if turn.snapshot.wind.forecast is None:
+    age_s, config = turn.t_s - turn.state.last_plan_s, turn.config
+    if turn.voyage.area.path_clearance_m([boat, leg[1]]) < min(config.margin_floor_m, config.margin_m):
+        return age_s > config.no_go_replan_interval_s
+    if age_s < STALE_S:
         return False
     off = min(leg_distance_m(boat, *leg), distance_m(boat, leg[0]))
     return off > turn.config.grid_size_m or (

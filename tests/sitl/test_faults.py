@@ -119,6 +119,12 @@ def test_a_contact_is_excused_only_by_what_nobody_could_help(ghost):
     assert ghost.watch.clearance_m() == 0.0
 
 
+def test_a_corner_that_is_cut_between_two_looks_is_a_contact(ghost):
+    ghost.at(9.5, 4.0)
+    ghost.at(10.5, 5.5)
+    assert excuses(ghost) == ["unexcused"]
+
+
 def test_a_boat_that_was_stopped_is_excused_while_nobody_reaches_it(ghost):
     ghost.at(0.0, 0.0)
     ghost.link.is_cut = True

@@ -513,6 +513,20 @@ def test_a_position_that_jumped_is_planned_from_when_the_way_from_there_is_shut(
     assert world.skipper.voyage.area.path_clearance_m(world.track[moved_at:]) > 0.0
 
 
+def test_a_boat_that_drifted_behind_something_before_it_sails_is_planned_for_again_at_once():
+    world = make(permissions=Permissions(may_upload=True, may_set_mode=True))
+    assert world.run(30, lambda w: bool(w.mission) and w.mode is Mode.AUTO)
+    world.run(20)
+    middle = (-5.0, 140.0)
+    away = bearing_rad(world.state.route.points_en_m[0], middle)
+    world.position = moved(middle, away, 75.0)      # believed after 20 s
+    asked = world.t
+    assert world.run(28, lambda w: any(t >= asked for t, a in w.actions if isinstance(a, act.RequestPlan)))
+    world.run(5)
+    ahead = [world.position, *world.state.route.points_en_m[:-1]]
+    assert world.skipper.voyage.area.path_clearance_m(ahead) > 0.0
+
+
 def test_a_position_failsafe_that_is_over_before_it_is_seen_is_none_of_the_operators_either():
     world = make()
     world.run(60)
