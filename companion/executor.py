@@ -96,7 +96,7 @@ class Executor:
                 if self._plan is not None and self._plan.request_id == action.request_id:
                     self._plan = None
             elif isinstance(action, SteerHeading):
-                self._autopilot.steer_heading(action.heading_rad)
+                self._autopilot.steer_heading(action.heading_rad, thrust=action.thrust)
             elif isinstance(action, Announce):
                 self._autopilot.say(int(action.severity), action.text)
             else:

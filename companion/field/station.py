@@ -1,8 +1,8 @@
 """Station keeping: stay near a point with a boat that cannot stop.
 
-Short boards close-hauled, each ended by wearing round: bearing away and gybing is a circle of a few metres, while
-a tack without way is irons. A board lasts until the boat has made up the height that the circle will cost and is
-past the point; far off she sails back by the attractive point of the field.
+A boat that tacks within seconds sails short boards close-hauled and ends each by tacking. Any other turns in loops,
+always the same way, with the sail eased, and goes straight for the point whenever that lies ahead: through the wind
+she needs way, which she gathers first. Far off both sail back by the attractive point of the field.
 """
 
 from __future__ import annotations
@@ -15,26 +15,35 @@ from companion.field.guidance import go_to, helm, step
 from companion.field.values import GuidanceState, Habits, Manoeuvre, Setpoint, Situation
 from companion.geo.angles import wrap_pi
 
+RETURNED_M = 10.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Station:
-    """Where and how to stay.
+    """Where and how to stay. At ``far_m`` the field takes over.
 
-    A board at ``board_twa_rad`` ends when the boat is ``board_m`` beyond the point on its side and ``height_m`` to
-    windward of it, or ``board_max_m`` beyond. At ``far_m`` the field takes over. ``thrust`` eases the sail: 1 is
-    full. ``bear_off_deg_per_m`` is how much lower she sails for each metre too far to windward. With ``tacks``
-    boards end by tacking, for a boat that tacks within seconds.
+    Boards (``tacks``): one at ``board_twa_rad`` ends when the boat is ``board_max_m`` beyond the point on its side;
+    ``bear_off_deg_per_m`` is how much lower she sails for each metre too far to windward.
+
+    Loops: about a point ``loop_up_m`` to windward of the station, since they drift; ``loop_cone_rad`` is how far from
+    ahead a point may lie that she goes straight for, beyond ``loop_near_m`` of it; above ``ease_mps`` the sail is let
+    out; ``loop_turn_rad`` is how far ahead of the bow a turn's heading is set; ``look_s`` her place is looked at ahead.
     """
 
     at_en: tuple[float, float]
-    board_m: float = 0.0
-    board_max_m: float = 3.0
-    height_m: float = 6.0
-    far_m: float = 20.0
-    board_twa_rad: float = math.radians(55.0)
-    thrust: float = 1.0
-    bear_off_deg_per_m: float = 10.0
+    far_m: float = 25.0
     tacks: bool = False
+    board_max_m: float = 2.0
+    board_twa_rad: float = math.radians(55.0)
+    bear_off_deg_per_m: float = 10.0
+    loop_up_m: float = 3.0
+    loop_near_m: float = 2.0
+    loop_cone_rad: float = math.radians(48.0)
+    loop_turn_rad: float = math.radians(92.0)
+    ease_mps: float = 0.5
+    eased_within_m: float = 12.0
+    tack_mps: float = 0.6
+    look_s: float = 0.5
 
 
 class Phase(enum.Enum):
@@ -42,7 +51,8 @@ class Phase(enum.Enum):
 
     RETURN = "return"     # by the field
     BOARD = "board"
-    WEAR = "wear"
+    TACK = "tack"
+    LOOP = "loop"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,40 +74,74 @@ def keep(
         ValueError: the wind is not known.
 
     """
-    twd, t = situation.twd_from_rad, situation.t_s
+    twd = situation.twd_from_rad
     if twd is None:
         raise ValueError("station keeping under sail needs the wind")
     habits = replace(habits, look_ahead=False)
+    distance = math.dist(situation.en_m, station.at_en)
+    if distance > (RETURNED_M if state.phase is Phase.RETURN else station.far_m):
+        steering, setpoint = step(state.steering, situation, go_to(station.at_en, twd, 15.0), habits)
+        return replace(state, phase=Phase.RETURN, steering=steering), setpoint
+    if station.tacks:
+        return _board(state, situation, station, habits, twd)
+    return _loop(state, situation, station, habits, twd)
+
+
+def _board(
+    state: StationState, situation: Situation, station: Station, habits: Habits, twd: float
+) -> tuple[StationState, Setpoint]:
+    t = situation.t_s
     de, dn = situation.en_m[0] - station.at_en[0], situation.en_m[1] - station.at_en[1]
     up = de * math.sin(twd) + dn * math.cos(twd)
     across = de * math.cos(twd) - dn * math.sin(twd)      # to starboard of the wind's eye
-    distance = math.hypot(de, dn)
     twa = wrap_pi(twd - situation.heading_rad)
-    if state.phase is Phase.RETURN or distance > station.far_m:
-        if distance < 10.0:
-            state = replace(state, phase=Phase.BOARD, since_s=t, side=1 if twa > 0.0 else -1)
-        else:
-            steering, setpoint = step(state.steering, situation, go_to(station.at_en, twd, 15.0), habits)
-            return replace(state, phase=Phase.RETURN, steering=steering), setpoint
+    if state.phase is Phase.RETURN:
+        state = replace(state, phase=Phase.BOARD, since_s=t, side=1 if twa > 0.0 else -1)
     # Wind on starboard (side +1) carries her to port of the wind's eye.
     beyond = -state.side * across
-    if state.phase is Phase.BOARD and (
-        (beyond > station.board_m and up > station.height_m) or beyond > station.board_max_m
-    ):
-        state = replace(state, phase=Phase.WEAR, since_s=t, side=-state.side)
-    if state.phase is Phase.WEAR:
-        # Round by the stern: bear away past dead before the wind, then come up on the new side.
+    if state.phase is Phase.BOARD and beyond > (0.0 if up > 0.0 else station.board_max_m):
+        state = replace(state, phase=Phase.TACK, since_s=t, side=-state.side)
+    if state.phase is Phase.TACK:
         if twa * state.side > 0.0 and abs(twa) < station.board_twa_rad + math.radians(25.0):
             state = replace(state, phase=Phase.BOARD, since_s=t)
         elif t - state.since_s > 45.0:
             state = replace(state, phase=Phase.RETURN, since_s=t)
     # To windward of the point she bears off, up to a broad reach: that is how she loses height on purpose.
-    height = max(0.0, up - station.height_m + 1.0)
+    height = max(0.0, up + 1.0)
     angle = min(math.radians(125.0), station.board_twa_rad + math.radians(station.bear_off_deg_per_m) * height)
-    wanted = twd - state.side * angle
-    if not station.tacks:
-        habits = replace(habits, tack_min_mps=math.inf)
-    steering, heading, why = helm(state.steering, situation, wanted, habits)
-    thrust = 1.0 if steering.manoeuvre is not Manoeuvre.SAIL else station.thrust
-    setpoint = Setpoint(t_s=t, heading_rad=wrap_pi(heading), thrust=thrust, reason=f"{state.phase.value}: {why}")
+    steering, heading, why = helm(state.steering, situation, twd - state.side * angle, habits)
+    setpoint = Setpoint(t_s=t, heading_rad=wrap_pi(heading), reason=f"{state.phase.value}: {why}")
     return replace(state, steering=steering), setpoint
+
+
+def _loop(
+    state: StationState, situation: Situation, station: Station, habits: Habits, twd: float
+) -> tuple[StationState, Setpoint]:
+    half, heading_rad = habits.no_go_half_rad, situation.heading_rad
+    ve, vn = situation.velocity_en_mps
+    speed = math.hypot(ve, vn)
+    de = situation.en_m[0] + station.look_s * ve - station.at_en[0] - station.loop_up_m * math.sin(twd)
+    dn = situation.en_m[1] + station.look_s * vn - station.at_en[1] - station.loop_up_m * math.cos(twd)
+    distance, bearing = math.hypot(de, dn), math.atan2(-de, -dn)
+    twa = wrap_pi(twd - heading_rad)
+    same_tack = 1.0 if twa > 0.0 else -1.0
+    thrust = 1.0 if speed < station.ease_mps or distance > station.eased_within_m else 0.0
+    if distance > station.loop_near_m and abs(wrap_pi(bearing - heading_rad)) < station.loop_cone_rad:
+        wanted, what = bearing, "to the point"
+        if abs(wrap_pi(twd - bearing)) <= half:
+            wanted, thrust = twd - same_tack * (half + math.radians(3.0)), 1.0
+    else:
+        wanted, what = heading_rad + station.loop_turn_rad, "turning"
+        through = abs(wrap_pi(twd - wanted)) < half or (
+            wrap_pi(twd - wanted) * twa < 0.0 and abs(twa) < math.radians(95.0))
+        if through and speed < station.tack_mps and abs(twa) > math.radians(40.0):
+            wanted, thrust, what = twd - same_tack * math.radians(65.0), 1.0, "gathering way"
+        elif abs(wrap_pi(twd - wanted)) < half:
+            wanted = twd + half      # she turns to the right: out of the zone on the other side
+    way = replace(habits, tack_min_mps=0.8 * station.tack_mps)
+    steering, heading, why = helm(state.steering, situation, wanted, way)
+    if steering.manoeuvre in {Manoeuvre.IRONS, Manoeuvre.WEAR}:
+        what, thrust = why, 1.0
+    setpoint = Setpoint(
+        t_s=situation.t_s, heading_rad=wrap_pi(heading), thrust=thrust, reason=f"{Phase.LOOP.value}: {what}")
+    return replace(state, phase=Phase.LOOP, steering=steering), setpoint

@@ -143,9 +143,13 @@ class SetCurrent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SteerHeading:
-    """A GUIDED heading setpoint [rad, true]; repeated every step, since it times out after 3 s. Not answered."""
+    """A GUIDED heading setpoint [rad, true]; repeated every step, since it times out after 3 s. Not answered.
+
+    ``thrust`` below 1 eases the sail.
+    """
 
     heading_rad: float
+    thrust: float = 1.0
     text: str = ""
 
 

@@ -227,8 +227,9 @@ def keeps_station(turn: Turn) -> bool:
         turn.update(own_mode=Mode.GUIDED)
         station = Station(at_en=place)
         if turn.voyage.boat.turn_rate_radps >= QUICK_RADPS:
-            station = replace(station, board_max_m=2.0, height_m=0.0, tacks=True)
+            station = replace(station, tacks=True)
         after, setpoint = keep(memory.station, seen, station, habits(turn, seen.tws_mps))
         turn.update(by_field=replace(turn.state.by_field, station=after))
-        turn.act(SteerHeading(heading_rad=setpoint.heading_rad, text=f"station: {setpoint.reason}"))
+        turn.act(SteerHeading(
+            heading_rad=setpoint.heading_rad, thrust=setpoint.thrust, text=f"station: {setpoint.reason}"))
     return True

@@ -55,7 +55,8 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
         return {"kind": "action", "action": kind, **fields, "count": len(items), "hash": mission_hash(action.items),
                 "items": items}
     if isinstance(action, SteerHeading):
-        return {"kind": "action", "action": kind, "heading_deg": math.degrees(action.heading_rad), "text": action.text}
+        return {"kind": "action", "action": kind, "heading_deg": math.degrees(action.heading_rad),
+                "thrust": action.thrust, "text": action.text}
     values = {f.name: jsonable(getattr(action, f.name)) for f in dataclasses.fields(action)}
     return {"kind": "action", "action": kind, **values}
 

@@ -212,7 +212,7 @@ def run_station(
     wind = _weather(twd, tws, seed)
     off = float(rng.uniform(0.0, 2.0 * math.pi))
     point = (45.0 * math.sin(off), 45.0 * math.cos(off))
-    station, state = Station(at_en=point, board_max_m=2.0, height_m=0.0, tacks=True), StationState()
+    station, state = Station(at_en=point, tacks=True), StationState()
 
     def decide(seen: Situation) -> tuple[float, float]:
         nonlocal state
