@@ -322,6 +322,8 @@ class TrafficStatus:
     shared_mmsi: int = 0               # two vessels with one MMSI, times
     clock_jumps: int = 0
     silence_s: float | None = None     # since any report; None: never
+    promised_risk: float | None = None  # the vessels' part of what the plan promises at each instant ...
+    path_risk: float | None = None      # ... and of the whole path
     name: str = ""
     alarm: str = ""
     role: str = ""
@@ -332,6 +334,7 @@ class TrafficStatus:
     tcpa_s: float | None = None
 
     def __post_init__(self) -> None:
+        _finite(promised_risk=self.promised_risk, path_risk=self.path_risk)
         _finite(silence_s=self.silence_s, range_m=self.range_m, bearing_rad=self.bearing_rad, cpa_m=self.cpa_m,
                 tcpa_s=self.tcpa_s)
 

@@ -8,6 +8,7 @@ written in degrees.
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import tomllib
 from collections.abc import Iterator
@@ -103,11 +104,10 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
         for t_s, n_messages, n_outcomes in rows:
             if not start_s <= t_s < end_s:
                 continue
-            for _ in range(n_messages):
-                at_s, message = next(heard)
+            # A power cut may take the last line of one file and leave the row that counted it in another.
+            for at_s, message in itertools.islice(heard, n_messages):
                 fold.message(at_s, message)
-            for _ in range(n_outcomes):
-                record = next(outcomes)
+            for record in itertools.islice(outcomes, n_outcomes):
                 fold.take_outcome(float(record["t_s"]), _outcome(record))
             for record in fed.get(t_s, ()):
                 fold.take(ais_of(record))

@@ -146,6 +146,7 @@ def _traffic(seen: Any) -> dict[str, Any]:
         "cpa_m": _round(seen.cpa_m), "tcpa_s": seen.tcpa_s,
     }
     return {
+        "promised_risk": _round(seen.promised_risk, 4), "path_risk": _round(seen.path_risk, 4),
         "vessels": seen.vessels, "worst": worst, "silence_s": seen.silence_s, "refused": seen.refused,
         "feeds": seen.feeds, "silent_feeds": seen.silent_feeds, "shared_mmsi": seen.shared_mmsi,
         "clock_jumps": seen.clock_jumps,
@@ -161,6 +162,9 @@ def traffic_line(seen: dict[str, Any]) -> str:
         parts.append(
             f"{worst['name']}: {worst['alarm'].upper()}, {worst['range_m']:.0f} m at {worst['bearing_deg']:03.0f}°, "
             f"CPA {worst['cpa_m']:.0f} m {when}, {worst['role']} (rule {worst['rule']})")
+    if seen["promised_risk"]:
+        each, whole = 100.0 * seen["promised_risk"], 100.0 * seen["path_risk"]
+        parts.append(f"risk {each:.1f} % at each instant, {whole:.1f} % in all")
     if seen["feeds"]:
         parts.append(f"{seen['silent_feeds']} of {seen['feeds']} feeds silent")
     if seen["silence_s"] is not None:

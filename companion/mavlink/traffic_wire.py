@@ -15,8 +15,8 @@ PAYLOAD_TYPE = 0xC05B
 VERSION = 1
 MAX_PAYLOAD_BYTES = 128
 # Version, feeds, silent feeds, shared MMSIs, clock jumps; vessels, refused, silence [s], TCPA [s], bearing [0.01 deg];
-# range and CPA [m]. The words follow: alarm, role, rule, name.
-_PACK = struct.Struct("<BBBBBHHHHHff")
+# range and CPA [m], the two risks. The words follow: alarm, role, rule, name.
+_PACK = struct.Struct("<BBBBBHHHHHffff")
 _NONE16 = 0xFFFF
 _MARK = "\x1f"
 _WORDS = 4
@@ -49,7 +49,7 @@ def pack_traffic(status: TrafficStatus) -> bytes:
         VERSION, _u8(status.feeds), _u8(status.silent_feeds), _u8(status.shared_mmsi), _u8(status.clock_jumps),
         _u16(status.vessels), _u16(status.refused), _u16(status.silence_s), _u16(status.tcpa_s),
         _NONE16 if bearing is None else round(math.degrees(wrap_two_pi(bearing)) * 100.0) % 36000,
-        _f32(status.range_m), _f32(status.cpa_m),
+        _f32(status.range_m), _f32(status.cpa_m), _f32(status.promised_risk), _f32(status.path_risk),
     )
     words = _MARK.join(w.replace(_MARK, " ") for w in (status.alarm, status.role, status.rule, status.name))
     return head + words.encode("ascii", "replace")[:MAX_PAYLOAD_BYTES - _PACK.size]
@@ -63,14 +63,15 @@ def unpack_traffic(payload: bytes) -> TrafficStatus:
     """
     if len(payload) < _PACK.size or payload[0] != VERSION:
         raise ValueError(f"traffic payload of {len(payload)} bytes, version {payload[0] if payload else None}")
-    (_, feeds, silent, shared, jumps, vessels, refused, silence, tcpa, bearing, range_m,
-     cpa_m) = _PACK.unpack_from(payload)
+    (_, feeds, silent, shared, jumps, vessels, refused, silence, tcpa, bearing, range_m, cpa_m, promised,
+     path) = _PACK.unpack_from(payload)
     words = payload[_PACK.size:].decode("ascii", "replace").split(_MARK)
     if len(words) != _WORDS:
         raise ValueError("traffic payload is torn")
     return TrafficStatus(
         vessels=vessels, refused=refused, feeds=feeds, silent_feeds=silent, shared_mmsi=shared, clock_jumps=jumps,
         silence_s=_seconds(silence), tcpa_s=_seconds(tcpa), range_m=_float(range_m), cpa_m=_float(cpa_m),
+        promised_risk=_float(promised), path_risk=_float(path),
         bearing_rad=None if bearing == _NONE16 else math.radians(bearing / 100.0),
         alarm=words[0], role=words[1], rule=words[2], name=words[3],
     )

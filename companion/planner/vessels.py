@@ -101,7 +101,7 @@ def vessel_risk(problem: Problem, legs: Sequence[Leg]) -> VesselRisk:
     worst: dict[int, float] = {}
     for vessel in sorted({spread.vessel for _, spread in found}):
         windows = sorted(((t, s) for t, s in found if s.vessel == vessel), key=lambda w: w[0].from_s)
-        entries, worst[vessel] = _walk(legs, windows)
+        entries, worst[vessel] = _walk(legs, windows, problem.beat.corridor_m if problem.beat is not None else 0.0)
         by_leg += entries
         name = windows[0][0].name or f"vessel {vessel}"
         by_name[name] = min(1.0, by_name.get(name, 0.0) + PROMISE_FACTOR * float(entries.sum()))
@@ -112,8 +112,13 @@ def vessel_risk(problem: Problem, legs: Sequence[Leg]) -> VesselRisk:
     )
 
 
-def _walk(legs: Sequence[Leg], windows: Sequence[tuple[Target, Spread]]) -> tuple[NDArray[np.float64], float]:
-    """Return the expected entries on each leg, and the largest P(inside) of any instant, for one vessel."""
+def _walk(
+    legs: Sequence[Leg], windows: Sequence[tuple[Target, Spread]], wide_m: float,
+) -> tuple[NDArray[np.float64], float]:
+    """Return the expected entries on each leg, and the largest P(inside) of any instant, for one vessel.
+
+    On a leg that the autopilot beats the boat may be ``wide_m`` off the line.
+    """
     entries, worst, before, t = np.zeros(len(legs)), 0.0, -1.0, 0.0
     out = np.empty(3)
     for i, leg in enumerate(legs):
@@ -134,7 +139,7 @@ def _walk(legs: Sequence[Leg], windows: Sequence[tuple[Target, Spread]]) -> tupl
                 by = leg.from_en[1] + velocity[1] * (lo - begin) - spread.y_m - target.vy_mps * lo
                 kernels.piece(
                     lo, hi, bx, by, velocity[0] - target.vx_mps, velocity[1] - target.vy_mps, _errors(spread, along),
-                    spread.keep_m, before, out)
+                    spread.keep_m + (wide_m if leg.is_beat else 0.0), before, out)
                 entries[i] += out[0]
                 before, worst = float(out[1]), max(worst, float(out[2]))
         t = leg.end_s

@@ -70,7 +70,7 @@ def draw_plan(axes: Axes, problem: Problem, plan: Plan, *, title: str | None = N
     axes.add_patch(Circle(problem.goal_en, max(problem.goal_radius_m, 1e-6), fc="none", ec=GOAL, lw=1.2, zorder=7))
     axes.plot(*problem.goal_en, "o", color=GOAL, ms=8, mec="black", mew=0.6, zorder=7)
     draw_wind(axes, problem)
-    for target in problem.targets:
+    for target in problem.resolved.targets:
         axes.add_patch(Circle((target.x_m, target.y_m), target.radius_m, fc="none", ec="#7a3fa0", ls="--", zorder=4))
         axes.annotate("", (target.x_m + 60.0 * target.vx_mps, target.y_m + 60.0 * target.vy_mps),
                       (target.x_m, target.y_m), arrowprops={"arrowstyle": "->", "color": "#7a3fa0"}, zorder=4)

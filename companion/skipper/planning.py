@@ -75,6 +75,7 @@ def request(
         turn.blank_facts(number, step.margin_m, shared.delta_s, name),
         plan_twd_from_rad=problem.wind.twd_from_rad,
         plan_half_width_rad=half_width_rad(forecast, start.after_s + 60.0, turn.config.wind_change_level),
+        vessels_part=shared.part or 0.0,
     )
     if turn.state.pending_plan is not None:
         turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
@@ -249,7 +250,9 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     if pending.lead_in:
         boat = turn.boat_en
         tail = replace(tail, start_en=boat if boat is not None else pending.start_en_m)
-    facts = replace(pending.facts, risk=plan.risk, cost_s=plan.cost_s, why=plan.why.text or plan.reason)
+    facts = replace(
+        pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
+        why=plan.why.text or plan.reason)
     old = turn.state.route
     if old is not None:
         # A gate that was missed is to be passed by the new tail: what the kept items counted for is void.

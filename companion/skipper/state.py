@@ -51,7 +51,9 @@ class Route:
     margin_m: float
     delta_s: float
     rung: str = ""                     # the step of the ladder it was found on; empty: as configured
-    risk: float | None = None
+    risk: float | None = None          # of the whole path, wind and vessels
+    vessel_risk: float = 0.0           # the vessels' part of it
+    vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
     cost_s: float | None = None
     why: str = ""
 
@@ -224,6 +226,7 @@ _FIGURES = (
     "plan_id", "plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s", "rung",
     "risk", "cost_s", "why",
 )
+_VESSEL_FIGURES = ("vessel_risk", "vessels_part")
 
 
 def _route_to_dict(route: Route | None) -> dict[str, Any] | None:
@@ -234,7 +237,7 @@ def _route_to_dict(route: Route | None) -> dict[str, Any] | None:
         "points": [list(p) for p in route.points_en_m],
         "from": [list(p) for p in route.leg_from_en_m],
         "gates": list(route.gate_of),
-        **{name: getattr(route, name) for name in _FIGURES},
+        **{name: getattr(route, name) for name in (*_FIGURES, *_VESSEL_FIGURES)},
     }
 
 
@@ -252,4 +255,5 @@ def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
     if not len(items) == len(points) == len(starts) == len(gates):
         raise ValueError("the saved state is damaged: its lists differ in length")
     return Route(items=items, points_en_m=points, leg_from_en_m=starts, gate_of=gates,
-                 **{name: data[name] for name in _FIGURES})
+                 **{name: data[name] for name in _FIGURES},
+                 vessel_risk=float(data.get("vessel_risk", 0.0)), vessels_part=float(data.get("vessels_part", 0.0)))

@@ -168,7 +168,7 @@ def soon(legs: Sequence[TimedLeg], seconds: float) -> list[PointEn]:
 
 
 def meetings(turn: Turn) -> tuple[Conflict, ...]:
-    """Return where the route being sailed meets vessels soon enough to act, in order of time; empty when it is clear."""
+    """Return where the route meets vessels soon enough to act, in order of time; empty when it is clear."""
     vessels = near(turn)
     if not vessels:
         return ()

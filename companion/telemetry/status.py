@@ -69,11 +69,14 @@ def traffic_status(step: Step, feeds: Sequence[AisFeed], dropped: int) -> Traffi
     if picture is None and not feeds:
         return None
     counts = TrafficCounts() if picture is None else picture.counts
+    route = step.state.route
     seen = TrafficStatus(
         vessels=0 if picture is None else len(picture.vessels),
         refused=counts.stale + counts.far + dropped + sum(feed.counts.refused for feed in feeds),
         feeds=len(feeds), silent_feeds=sum(feed.is_silent for feed in feeds), shared_mmsi=counts.shared_mmsi,
         clock_jumps=counts.clock_jumps, silence_s=None if picture is None else picture.silence_s,
+        promised_risk=None if route is None else route.vessels_part,
+        path_risk=None if route is None else route.vessel_risk,
     )
     if not step.state.watch:
         return seen

@@ -26,7 +26,8 @@ class VoyageFigures:
     """Accumulates; ``take`` once a step. Time and distance count from the first step under way (armed, AUTO).
 
     ``promised_risk`` is the largest probability, at any instant of any plan that was sailed, of being forced into
-    the no-go zone (1 - delta_s); ``path_risk`` the largest of a whole plan's, as if nobody replanned on the way.
+    the no-go zone or too near to a vessel (1 - delta_s); ``path_risk`` the largest of a whole plan's, as if nobody
+    replanned on the way. What vessels have of both is beside them.
     """
 
     first_s: float | None = None
@@ -41,7 +42,9 @@ class VoyageFigures:
     no_go_entries: int = 0
     min_clearance_m: float = math.inf
     promised_risk: float | None = None
+    promised_risk_vessels: float = 0.0
     path_risk: float | None = None
+    path_risk_vessels: float = 0.0
     longest_no_go_s: float = 0.0
     alerts: dict[str, int] = field(default_factory=dict)
     traffic: TrafficCounts | None = None
@@ -68,6 +71,8 @@ class VoyageFigures:
         route = step.state.route
         if route is not None:
             self.promised_risk = max(self.promised_risk or 0.0, 1.0 - route.delta_s)
+            self.promised_risk_vessels = max(self.promised_risk_vessels, route.vessels_part)
+            self.path_risk_vessels = max(self.path_risk_vessels, route.vessel_risk)
             if route.risk is not None:
                 self.path_risk = max(self.path_risk or 0.0, route.risk)
         autopilot = snapshot.autopilot
@@ -140,7 +145,9 @@ class VoyageFigures:
             "uploads": self.uploads,
             "min_clearance_m": self.min_clearance_m if math.isfinite(self.min_clearance_m) else None,
             "promised_risk": self.promised_risk,
+            "promised_risk_vessels": self.promised_risk_vessels,
             "path_risk": self.path_risk,
+            "path_risk_vessels": self.path_risk_vessels,
             "no_go_entries": self.no_go_entries,
             "alerts": dict(sorted(self.alerts.items())),
             "traffic": None if self.traffic is None else asdict(self.traffic),

@@ -45,6 +45,11 @@ def test_a_ship_heard_by_the_autopilot_is_avoided_and_the_voyage_replays(tmp_pat
     assert any(d["reason"] == "obstacle" and "211000001" in d["text"] and d["vessels"] == ["211000001"] for d in asked)
     assert all(b["t_s"] - a["t_s"] >= 20.0 for a, b in pairwise(asked) if b["reason"] == "obstacle")
     assert not replay(tmp_path).differences
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert 0.0 < summary["promised_risk_vessels"] < summary["promised_risk"]
+    assert 0.0 <= summary["path_risk_vessels"] <= summary["path_risk"]
+    plans = [d["plan"] for d in decisions(tmp_path) if d["kind"] == "plan" and d["plan"]]
+    assert any("vessels" in p["why"]["text"] and p["why"]["data"]["risk"]["by_vessel"] for p in plans)
 
 
 def test_the_same_ship_unheard_is_run_into(tmp_path):

@@ -151,6 +151,7 @@ SEEN = st.builds(
     alarm=st.sampled_from(["", "none", "warn", "act", "touch"]),
     role=st.sampled_from(["", "give way", "stand on", "both alter to starboard", "keep clear"]),
     rule=st.sampled_from(["", "none", "12", "13", "18"]), range_m=maybe(st.floats(0.0, 1e5)),
+    promised_risk=maybe(st.floats(0.0, 1.0)), path_risk=maybe(st.floats(0.0, 1.0)),
     bearing_rad=maybe(st.floats(-10.0, 10.0)), cpa_m=maybe(st.floats(0.0, 1e5)), tcpa_s=maybe(st.floats(0.0, 60000.0)),
 )
 

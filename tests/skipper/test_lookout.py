@@ -1,6 +1,5 @@
 """The lookout: alarms are said when they rise, with rule and role; the mission's safe distance and time count."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
