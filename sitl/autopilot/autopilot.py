@@ -17,7 +17,7 @@ from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.messages import Mode
 from sitl.autopilot import kernel as k
 from sitl.autopilot.chart import Chart
-from sitl.autopilot.config import EKF_READY_S, AutopilotConfig, GpsFault, Truth, VaneFault
+from sitl.autopilot.config import EKF_READY_S, INVALID_RESULT, AutopilotConfig, GpsFault, Truth, VaneFault
 from sitl.autopilot.failsafe import Failsafe
 from sitl.autopilot.fence import CHECK_S, Fence
 from sitl.autopilot.ftp import FtpServer
@@ -36,6 +36,7 @@ from sitl.wind import Constant, Wind
 WARM_BOOT_S = 60.0
 ORIGIN_S = 19.8
 _CHUNK = 50
+_INTERNAL_ERROR = f"Internal errors 0x{INVALID_RESULT:x} l:90 invalid arguments"
 _BOOT_TEXTS: tuple[tuple[float, int, str], ...] = (
     (0.04, 6, "Calibrating barometer"), (1.64, 6, "Barometer 1 calibration complete"),
     (1.66, 6, "Beginning INS calibration. Do not move vehicle"), (2.28, 6, "ArduPilot Ready"),
@@ -84,6 +85,7 @@ class Autopilot:
 
     def _power_up(self) -> None:
         self.is_armed = False
+        self.internal_errors = 0
         self.has_origin = False
         self.origin_en = (0.0, 0.0)
         self.home_en = None
@@ -279,6 +281,8 @@ class Autopilot:
         if self.is_armed:
             return True
         reasons = []
+        if self.internal_errors:
+            reasons.append(_INTERNAL_ERROR)
         if self.parameters.flag("SAIL_ENABLE") and not self.parameters.flag("WNDVN_TYPE"):
             reasons.append("Sailing enabled with no WindVane")
         if not self.ekf_ready and self.helm.mode is not Mode.MANUAL:
@@ -296,6 +300,13 @@ class Autopilot:
         self.helm.armed()
         self.announce_after_ack(mav.MAV_SEVERITY_INFO, "Throttle armed")
         return True
+
+    def err_internally(self) -> None:
+        """Find a result that cannot be, as the S-curve of a leg without limits is: no arming until a reboot."""
+        self.announce_after_ack(mav.MAV_SEVERITY_CRITICAL, f"Internal Errors 0x{INVALID_RESULT:x}")
+        if not self.internal_errors:
+            self.announce_after_ack(mav.MAV_SEVERITY_CRITICAL, f"PreArm: {_INTERNAL_ERROR}")
+        self.internal_errors += 1
 
     def disarm(self) -> bool:
         """Disarm; outside AUTO this forgets the mission's index."""

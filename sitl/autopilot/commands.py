@@ -59,9 +59,8 @@ def _dispatch(a: Autopilot, m: Any, link: Link, p: tuple[float, ...], place: tup
     if command == mav.MAV_CMD_MISSION_START:
         return OK if a.helm.set_mode(Mode.AUTO) else FAILED
     if command == mav.MAV_CMD_DO_SET_MISSION_CURRENT:
-        mission = a.helm.mission
-        run = p[1] == 1.0 and a.helm.mode is Mode.AUTO
-        if not (0 <= p[0] < len(mission.items) and mission.set_current(int(p[0]), run=run)):
+        known = 0 <= p[0] < len(a.helm.mission.items)
+        if not (known and a.helm.set_current(int(p[0]), resets=p[1] == 1.0)):
             return REFUSED
         a.ports.send_once(link, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
         return OK

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 GUIDED_TIMEOUT_S = 3.0
 AUX_TACK = 63
+# Entering one of these gives the navigation its limits of acceleration and jerk.
+NAVIGATING = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL})
 KNOWN = frozenset({
     Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.HOLD, Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED,
 })
@@ -50,6 +52,7 @@ class Helm:
         self._is_arrival_told = False
         self._told_home = False
         self._setpoint_s = 0.0
+        self._has_limits = False
         autopilot.vehicle.sticks_at_rest()
 
     # ------------------------------------------------------------------------------------------- modes
@@ -73,6 +76,7 @@ class Helm:
             self.mission.stop()
         a.vehicle.clear_tack()
         self.mode = mode
+        self._has_limits = self._has_limits or mode in NAVIGATING
         self._is_waiting = False
         self._corner_passed = False
         if mode is Mode.AUTO:
@@ -86,6 +90,26 @@ class Helm:
             self._manual()
         else:
             self._hold()
+        return True
+
+    def set_current(self, index: int, *, resets: bool) -> bool:
+        """Make an item current, with DO_SET_MISSION_CURRENT's reset or without; False if there is none.
+
+        A reset outside AUTO runs the mission without sailing it, and reckons its first leg at once: before the
+        navigation has its limits that is an internal error.
+        """
+        mission, is_outside = self.mission, resets and self.mode is not Mode.AUTO
+        if is_outside:
+            mission.stop()
+            mission.reset()
+        if not mission.set_current(index, run=resets and not is_outside):
+            return False
+        if is_outside and mission.nav_item is not None:
+            mission.state = RunState.RUNNING
+            name = NAMES.get(mission.nav_item.command, "Cmd")
+            self._a.announce_after_ack(mav.MAV_SEVERITY_INFO, f"Mission: {mission.nav_index} {name}")
+            if not self._has_limits:
+                self._a.err_internally()
         return True
 
     def armed(self) -> None:

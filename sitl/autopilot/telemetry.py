@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.geo.angles import wrap_two_pi
 from companion.messages import Mode
 from sitl.autopilot import kernel as k
+from sitl.autopilot.config import INVALID_RESULT
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot
@@ -50,7 +51,8 @@ def _sys_status(a: Autopilot) -> Any:
         healthy &= ~mav.MAV_SYS_STATUS_SENSOR_GPS
     percent = a.battery_percent
     return mav.MAVLink_sys_status_message(
-        present, enabled, healthy, 0, round(a.battery_v * 1000), 0, percent, 0, 0, 0, 0, 0, 0
+        present, enabled, healthy, 0, round(a.battery_v * 1000), 0, percent, 0, 0,
+        0, INVALID_RESULT >> 16 if a.internal_errors else 0, 0, a.internal_errors
     )
 
 

@@ -417,3 +417,52 @@ def test_ftp_refusals() -> None:
         assert (await ftp.ask(6, b"@MISSION/mission.dat"))[0] == 128
 
     sail(job)
+
+
+def test_a_reset_outside_auto_before_the_first_auto_is_an_internal_error() -> None:
+    async def job(c: Client) -> None:
+        assert await c.upload(EAST) == 0
+        assert await c.ask(mav.MAV_CMD_DO_SET_MISSION_CURRENT, 2, 0) == 0
+        await asyncio.sleep(1.5)
+        assert c.last("MISSION_CURRENT").mission_state == 2
+        assert c.last("SYS_STATUS").errors_count2 == 0
+        start = now_s()
+        assert await c.ask(mav.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1) == 0
+        await asyncio.sleep(1.5)
+        assert c.texts(start)[:2] == ["Mission: 1 WP", "Internal Errors 0x20000000"]
+        current = c.last("MISSION_CURRENT")
+        assert (current.seq, current.mission_state, current.mission_mode) == (1, 3, 0)
+        assert c.last("SYS_STATUS").errors_count2 == 0x2000
+        for mode in (0, 10):
+            assert await c.ask(mav.MAV_CMD_DO_SET_MODE, 1, mode) == 0
+            start = now_s()
+            assert await c.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1) == 4
+            await asyncio.sleep(0.2)
+            assert c.texts(start)[-2:] == ["Arm: Internal errors 0x20000000 l:90 invalid argum", "ents"]
+        assert await c.ask(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1) == 0
+        await asyncio.sleep(60.0)
+        assert await c.ask(mav.MAV_CMD_DO_SET_MODE, 1, 10) == 0
+        assert await c.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1) == 0
+
+    sail(job, is_moored=True)
+
+
+def test_a_reset_outside_auto_after_the_first_auto_runs_the_mission_and_sails_nothing() -> None:
+    async def job(c: Client) -> None:
+        assert await c.upload(EAST) == 0
+        for mode in (10, 4):
+            assert await c.ask(mav.MAV_CMD_DO_SET_MODE, 1, mode) == 0
+            await asyncio.sleep(1.0)
+        start = now_s()
+        assert await c.ask(mav.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1) == 0
+        await asyncio.sleep(1.5)
+        assert c.texts(start) == ["Mission: 1 WP"]
+        current = c.last("MISSION_CURRENT")
+        assert (current.seq, current.mission_state, current.mission_mode) == (1, 3, 0)
+        assert await c.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1) == 0
+        await asyncio.sleep(30.0)
+        assert abs(c.autopilot.truth.east_m) < 1.0   # it drifts with the wind, to the south
+        assert await c.ask(mav.MAV_CMD_DO_SET_MODE, 1, 10) == 0
+        await c.wait("MISSION_ITEM_REACHED", 90.0, lambda m: m.seq == 2)
+
+    sail(job, is_moored=True)
