@@ -22,6 +22,7 @@ from shapely.geometry import Point, box
 
 from companion.field.guidance import follow_line, go_to, step
 from companion.field.values import GuidanceState, Habits, Obstacle, Situation
+from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea
 from companion.mavlink.autopilot import Autopilot as Facade
@@ -39,6 +40,7 @@ KEEP_M = 8.0
 INTRUDER_KEEP_M = 15.0
 INTRUDER_GAP_M = 90.0
 LIMIT_S = 900.0
+SLOW = 0.3                # of full thrust, at least
 HABITS = Habits(
     is_sailing=False, polar_mps=(2.0, 2.0), turn_rate_radps=math.radians(20.0), tack_s=0.0, lag_s=2.0, horizon_s=60.0,
     repulsive_sigma_m=30.0, keep_m=KEEP_M,
@@ -93,7 +95,8 @@ class Pilot:
         near = math.dist(seen.en_m, b) < NEAR_M
         intent = replace(go_to(b, 0.0) if near else follow_line(a, b, 20.0), clearance=self._area.clearance_m)
         self._state, setpoint = step(self._state, seen, intent, self._habits)
-        return setpoint.heading_rad, 1.0
+        # Slower through sharp turns: at full speed she would circle a mark that lies inside her turning circle.
+        return setpoint.heading_rad, max(SLOW, math.cos(wrap_pi(setpoint.heading_rad - seen.heading_rad)))
 
     def _appear(self, seen: Situation) -> None:
         """Put the intruder on collision course, from somewhere ahead."""

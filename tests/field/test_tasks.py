@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import csv
+import datetime as dt
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from companion.geo.frame import LocalFrame
+from companion.messages import GeoPoint
 from sitl.tasks.guided import run_station, run_wrsc
 from sitl.tasks.scores import sailbot_points, station_score
 from sitl.tasks.wrsc2013 import HALF_M, campaign, draw, run, score, table
@@ -125,3 +131,45 @@ def test_sailbot_points_by_hand() -> None:
     assert sailbot_points(circle(5.0, 390.0), (0.0, 0.0)) == pytest.approx(8.0, abs=0.05)      # a minute too long
     assert sailbot_points(circle(5.0, 120.0), (0.0, 0.0)) == pytest.approx(4.0, abs=0.05)
     assert sailbot_points(circle(5.0), (500.0, 0.0)) == 0.0
+
+
+def test_the_95_percent_radius_is_the_organisers() -> None:
+    """19 of 20 points: the farthest of them counts, not something between it and the outlier."""
+    t = np.arange(0.0, 400.0)
+    east = np.where(t % 20.0 < 10.0, 5.0, -5.0)
+    east[::20] += 7.0 * np.where(np.arange(len(east[::20])) % 2 == 0, 1.0, -1.0)
+    track = np.column_stack([t, east, np.zeros_like(t)])
+    during = east[:301]
+    apart = np.sort(np.abs(during - during.mean()))
+    assert station_score(track, (0.0, 0.0)).radius95_m == pytest.approx(apart[round(0.95 * 301) - 1])
+
+
+# WRSC 2018's published radii [m]; the tracks have no licence and are not ours to ship. None: not counted by the jury.
+PUBLISHED = {
+    "Aberystwyth_Micro_sailboat_attempt1": None, "Aberystwyth_Micro_sailboat_attempt2": None,
+    "Aberystwyth_Micro_sailboat_attempt3": 12.5902291279047, "ENSTA_Sailboat_attempt1": 14.3082980898413,
+    "ENSTA_Sailboat_attempt2": 9.38229774571029, "Plymouth_short_Micro_sailboat_attempt1": 17.5473253279203,
+    "Plymouth_short_Micro_sailboat_attempt2": 13.2630265729155, "Plymouth_short_Micro_sailboat_attempt3": None,
+    "Shanghai_Sailboat_attempt1": None, "Shanghai_Sailboat_attempt2": 20.9179144878088,
+    "Shanghai_Sailboat_attempt3": 14.906022330996, "Southampton_Micro_sailboat_attempt1": 11.100143492592549,
+    "Southampton_Micro_sailboat_attempt2": 12.2116654508522, "ZMART_Micro_sailboat_attempt1": 14.2711403324557,
+    "ZMART_Micro_sailboat_attempt2": None,
+}
+
+
+@pytest.mark.skipif("COMPANION_WRSC_TRACKS" not in os.environ, reason="WRSC 2018's tracks: $COMPANION_WRSC_TRACKS")
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_the_scorer_gives_the_published_radii_of_2018(name: str) -> None:
+    """The jury measured in UTM, whose scale there is 0.99977; ours are metres on the ground."""
+    lat, lon = (50.82046666, -1.311983333) if "Micro" in name else (50.82083333, -1.310983333)
+    frame = LocalFrame(GeoPoint(lat_deg=lat, lon_deg=lon))
+    with (Path(os.environ["COMPANION_WRSC_TRACKS"]) / f"{name}.csv").open() as stream:
+        rows = list(csv.reader(stream))[1:]
+    track = np.array([
+        (dt.datetime.fromisoformat(r[0]).timestamp(),
+         *frame.en_from_geo(GeoPoint(lat_deg=float(r[1]), lon_deg=float(r[2])))) for r in rows])
+    score = station_score(track, (0.0, 0.0))
+    published = PUBLISHED[name]
+    assert score.kept is (published is not None)
+    if published is not None:
+        assert score.radius95_m == pytest.approx(published, abs=0.05)
