@@ -69,6 +69,34 @@ async def _with_tacks(client: Client) -> tuple[list[float], int]:
     return marks, client.autopilot.truth.tacks
 
 
+async def reset_before_auto(client: Client) -> list[object]:
+    """Reset the mission outside AUTO before the first AUTO, and try to arm; return what is seen of it."""
+    assert await client.upload(COURSE) == 0
+    start = clock.now_s()
+    seen: list[object] = [await client.ask(mav.MAV_CMD_DO_SET_MISSION_CURRENT, 1, 1)]
+    await asyncio.sleep(3.0)
+    current, status = client.last("MISSION_CURRENT"), client.last("SYS_STATUS")
+    seen += [current.seq, current.mission_state, current.mission_mode, status.errors_count2]
+    seen.append(await client.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1))
+    await asyncio.sleep(1.0)
+    return [*seen, *(text for text in client.texts(start) if "nternal" in text or text.startswith("Mission"))]
+
+
+@pytest.mark.parametrize("mark", [pytest.param(None, marks=needs_program)])
+def test_the_same_internal_error_on_the_real_one(mark: None, tmp_path: Path) -> None:
+    async def real() -> list[object]:
+        async with ArduRover(PROGRAM, HOME, Constant(0.0, 5.0), speedup=6.0, folder=tmp_path) as boat:
+            link = open_link(boat.link)
+            client = Client(link.write, None)
+            await link.open(client.on_bytes)
+            await client.wait("HEARTBEAT", 60.0)
+            seen = await reset_before_auto(client)
+            await link.close()
+            return seen
+
+    assert sail(reset_before_auto, is_moored=True) == clock.run(real(), speedup=6.0)
+
+
 @pytest.mark.parametrize("mark", [pytest.param(None, marks=needs_program)])
 def test_wind_follows_and_two_boats_side_by_side(mark: None) -> None:
     wind = Scripted(Constant(1.0, 4.0), (Event(at_s=30.0, veer_rad=1.0),))
