@@ -22,6 +22,7 @@ from companion.geofence import load_mission
 from companion.telemetry.recorder import DECISIONS, write_atomically
 from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.live_traffic import TRAFFIC, LiveTraffic
+from sitl.relay import LINK_EVENTS, Relay, befall
 from sitl.runner import TRUTH_EVERY_S, VERDICT, marks_of, solid_of
 from sitl.scenario import EventSpec, Scenario
 from sitl.verdict import Truth, Verdict, judge
@@ -30,12 +31,12 @@ from sitl.weather import scenario_wind
 COMPANION_STOP_S = 20.0
 # Loading and compiling may take this long before the companion opens its voyage folder [s of real time].
 COMPANION_START_S = 300.0
-# What befalls the companion's process, and what the wind is made of.
-OURS = TRAFFIC | {"kill_companion", "link_cut", "wind_shift", "wind_speed"}
+# What befalls the companion's process or its link, and what the wind is made of.
+OURS = TRAFFIC | LINK_EVENTS | {"kill_companion", "wind_shift", "wind_speed"}
 
 
 class _Companion:
-    """The companion's process: started, killed, frozen and started again."""
+    """The companion's process: started, killed and started again."""
 
     def __init__(self, command: list[str]) -> None:
         self._command = command
@@ -86,15 +87,6 @@ class _Companion:
             await asyncio.sleep(restart_after_s)
             await self.start()
 
-    async def freeze(self, for_s: float | None) -> None:
-        """Stop it for a while, or for good."""
-        if self._process is None or self._process.returncode is not None:
-            return
-        self._process.send_signal(signal.SIGSTOP)
-        if for_s is not None:
-            await asyncio.sleep(for_s)
-            self._process.send_signal(signal.SIGCONT)
-
 
 def run_live(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, autopilot: str, program: Path | None,
@@ -131,9 +123,13 @@ async def _run(
             boat = await stack.enter_async_context(RealBoat.start(scenario, mission, wind, program, pace, folder))
         else:
             boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace))
+        relay, link = None, boat.link
+        if any(e.kind in LINK_EVENTS for e in scenario.events):
+            relay = await stack.enter_async_context(Relay(boat.link, seed=seed))
+            link = relay.link
         feeds = ["--feed", traffic.feed] if any(e.kind in TRAFFIC for e in scenario.events) else []
         companion = _Companion([
-            sys.executable, "-m", "companion.cli", "run", str(mission_path), "--link", boat.link, "--out", str(folder),
+            sys.executable, "-m", "companion.cli", "run", str(mission_path), "--link", link, "--out", str(folder),
             "--state", str(folder / "state.json"), "--seed", str(seed), "--speedup", f"{pace:g}",
             "--limit", f"{scenario.limit_s:g}", *feeds,
         ])
@@ -143,7 +139,7 @@ async def _run(
         began_s = now_s()
         side = [
             asyncio.create_task(_watch(boat, frame, truth, traffic, began_s), name="judge"),
-            *(asyncio.create_task(_event(e, began_s, boat, companion, traffic), name=f"event {e.kind}")
+            *(asyncio.create_task(_event(e, began_s, boat, companion, traffic, relay), name=f"event {e.kind}")
               for e in scenario.events),
         ]
         try:
@@ -182,7 +178,7 @@ async def _watch(boat: Boat, frame: LocalFrame, truth: Truth, traffic: LiveTraff
 
 
 async def _event(
-    event: EventSpec, began_s: float, boat: Boat, companion: _Companion, traffic: LiveTraffic
+    event: EventSpec, began_s: float, boat: Boat, companion: _Companion, traffic: LiveTraffic, relay: Relay | None
 ) -> None:
     """Play one event; wind events are in the wind."""
     await asyncio.sleep(max(0.0, began_s + event.at_s - now_s()))
@@ -190,8 +186,7 @@ async def _event(
         await traffic.play(event, began_s, boat)
     elif event.kind == "kill_companion":
         await companion.kill(event.restart_after_s)
-    elif event.kind == "link_cut":
-        # A stopped process hears and says nothing: to both sides the link is gone.
-        await companion.freeze(event.for_s)
+    elif event.kind in LINK_EVENTS and relay is not None:
+        await befall(relay.line, event)
     elif event.kind in boat.plays:
         await boat.play(event, traffic.frame)

@@ -33,13 +33,13 @@ from sitl.autopilot import (
     Autopilot,
     AutopilotConfig,
     GpsFault,
-    Impairment,
     MemoryLink,
     VaneFault,
     VaneState,
     serve,
 )
 from sitl.autopilot.memory import MemoryEnd
+from sitl.relay import LINK_EVENTS, befall
 from sitl.scenario import EventSpec, Scenario
 from sitl.ships import (
     FIRST_MMSI,
@@ -322,17 +322,8 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
         autopilot.set_mode(Mode[event.mode or "HOLD"])
     elif event.kind == "reboot":
         autopilot.reboot()
-    elif event.kind == "link_cut":
-        link.cut()
-        if event.for_s is not None:
-            await asyncio.sleep(event.for_s)
-            link.mend()
-    elif event.kind == "link_quality":
-        link.impairment = Impairment(loss=event.loss, duplicate=event.duplicate, reorder=event.reorder,
-                                     corrupt=event.corrupt, delay_s=event.delay_s)
-        if event.for_s is not None:
-            await asyncio.sleep(event.for_s)
-            link.impairment = Impairment()
+    elif event.kind in LINK_EVENTS:
+        await befall(link, event)
     elif event.kind == "gps_jump":
         autopilot.set_gps(GpsFault(east_m=event.east_m, north_m=event.north_m, is_resisted=event.is_resisted))
         if event.for_s is not None:

@@ -159,11 +159,31 @@ def frames(data: bytes) -> Iterator[bytes]:
     """Split bytes into MAVLink 2 frames; what is none comes out as it is, up to the next frame."""
     start = 0
     while start < len(data):
-        if data[start] == _STX and start + 3 <= len(data):
-            signed = 13 if data[start + 2] & 1 else 0
-            end = start + 12 + data[start + 1] + signed
-        else:
-            end = data.find(bytes([_STX]), start + 1)
-            end = len(data) if end < 0 else end
+        end = start + _frame_length(data, start)
         yield data[start:end]
         start = end
+
+
+class FrameStream:
+    """A byte stream, which may be cut anywhere, as whole frames."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def take(self, data: bytes) -> list[bytes]:
+        """Return the frames that ``data`` completes; what is no frame comes out as in ``frames``."""
+        whole = list(frames(self._rest + data))
+        self._rest = b""
+        if whole and len(whole[-1]) < _frame_length(whole[-1], 0):
+            self._rest = whole.pop()
+        return whole
+
+
+def _frame_length(data: bytes, start: int) -> int:
+    """Return the length of the frame at ``start``, at least 12 where it is not told yet, or of what is no frame."""
+    if data[start] != _STX:
+        end = data.find(bytes([_STX]), start + 1)
+        return (len(data) if end < 0 else end) - start
+    if start + 3 > len(data):
+        return 12
+    return 12 + data[start + 1] + (13 if data[start + 2] & 1 else 0)

@@ -122,7 +122,7 @@ def test_a_scenario_is_not_sailed_into_the_folder_of_another_voyage(tmp_path, ca
 
 
 @pytest.mark.parametrize(("autopilot", "scenario", "words"), [
-    (["--live"], "gps-jump", "gps_jump"), (["--autopilot", "ardurover"], "upload-cut", "link_quality"),
+    (["--live"], "gps-jump", "gps_jump"), (["--autopilot", "ardurover"], "frozen-vane", "vane"),
 ])
 def test_a_scenario_that_cannot_be_played_live_says_so_first(tmp_path, capsys, autopilot, scenario, words):
     out = tmp_path / "voyage"

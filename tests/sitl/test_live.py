@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.clock import now_s, run_virtual
 from companion.geo.angles import difference_rad
 from companion.geo.frame import LocalFrame
+from companion.mavlink.transport import open_link
 from companion.messages import GeoPoint
 from companion.traffic.feeds import open_feed
 from companion.traffic.nmea import NmeaDecoder
@@ -19,8 +21,9 @@ from sitl.autopilot import Vessel
 from sitl.boats import Fix
 from sitl.live import run_live
 from sitl.live_traffic import LiveTraffic, sentences
+from sitl.relay import Relay, befall
 from sitl.scenario import EventSpec, load_scenario
-from sitl.ships import distance_m, ship_of
+from sitl.ships import distance_m, free_port, ship_of
 from sitl.verdict import Truth
 from sitl.wind import Constant
 
@@ -100,6 +103,43 @@ def test_a_second_boat_sails_to_its_goal_round_ours():
     assert truth.second_boat_m < 15.0
     assert truth.vessels_m["211000001"] > 8.0
     assert len(reports) == 200
+
+
+def test_a_relay_carries_both_ways_and_its_link_is_cut_for_a_while():
+    codec = mav.MAVLink(None)
+
+    def frame(n):
+        return mav.MAVLink_system_time_message(n, n).pack(codec)
+
+    async def main():
+        port = free_port()
+        boat, heard_by_boat, heard = open_link(f"udpin:127.0.0.1:{port}"), [], []
+        await boat.open(heard_by_boat.append)
+        async with Relay(f"udpout:127.0.0.1:{port}", seed=1) as relay:
+            companion = open_link(relay.link)
+            await companion.open(heard.append)
+            relay.line.near.write(frame(0))       # as the companion's first word: the boat then knows whom to answer
+            await asyncio.sleep(0.1)
+            boat.write(frame(1)[:7])
+            boat.write(frame(1)[7:] + frame(2))
+            await asyncio.sleep(0.1)
+            companion.write(frame(3))
+            await asyncio.sleep(0.1)
+            cut = asyncio.create_task(befall(relay.line, EventSpec(at_s=0.0, kind="link_cut", for_s=0.3)))
+            await asyncio.sleep(0.1)
+            for end in (boat, companion):
+                end.write(frame(4))
+            await cut
+            boat.write(frame(5))
+            await asyncio.sleep(0.1)
+            await companion.close()
+        await boat.close()
+        return heard_by_boat, heard
+
+    heard_by_boat, heard = asyncio.run(main())
+    numbers = [m.time_boot_ms for m in mav.MAVLink(None).parse_buffer(b"".join(heard))]
+    assert numbers == [1, 2, 5]
+    assert [m.time_boot_ms for m in mav.MAVLink(None).parse_buffer(b"".join(heard_by_boat))] == [0, 3]
 
 
 PROGRAM = find()

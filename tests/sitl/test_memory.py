@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 
 import pytest
 from hypothesis import given, settings
@@ -13,7 +14,7 @@ from companion.clock import now_s, run_virtual
 from companion.errors import LinkError
 from companion.mavlink.transport import TransportState
 from sitl.autopilot import Impairment, MemoryLink
-from sitl.autopilot.memory import frames
+from sitl.autopilot.memory import FrameStream, frames
 from sitl.autopilot.server import pieces
 
 
@@ -111,3 +112,16 @@ def test_datagrams_hold_whole_frames() -> None:
     for piece in cut:
         assert len(piece) <= 1200
         assert all(m.get_type() == "PARAM_VALUE" for m in mav.MAVLink(None).parse_buffer(piece))
+
+
+@given(cuts=st.lists(st.integers(0, 400), max_size=30), noise=st.binary(max_size=20).filter(lambda b: b"\xfd" not in b))
+def test_a_stream_cut_anywhere_comes_out_as_whole_frames(cuts: list[int], noise: bytes) -> None:
+    codec = mav.MAVLink(None)
+    sent = [mav.MAVLink_system_time_message(n, n).pack(codec) for n in range(8)]
+    stream = noise + b"".join(sent)
+    places = sorted({min(c, len(stream)) for c in cuts} | {0, len(stream)})
+    line, out = FrameStream(), []
+    for a, b in itertools.pairwise(places):
+        out += line.take(stream[a:b])
+    assert out[-8:] == sent
+    assert b"".join(out) == stream
