@@ -32,7 +32,7 @@ from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Facade
 from companion.mavlink.link import Link
 from companion.mavlink.transport import open_link
-from companion.messages import Mode, VehicleState, WindSample
+from companion.messages import Command, MissionItem, Mode, VehicleState, WindSample, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, Truth, serve
 from sitl.tasks.scores import station_score
 from sitl.tasks.wrsc2013 import HALF_M, LEAVE_WITHIN_S, ORIGIN, Score, broadcast, draw, score
@@ -42,6 +42,7 @@ from sitl.wind import AR1
 Decide = Callable[[Situation], tuple[float, float]]
 # The intruder of a run over MAVLink comes early: nobody learns more from 40 minutes of waiting.
 ENTRY_LIMIT_S = 300.0
+AUTO_HALF_M, AUTO_LOOPS = 5.0, 100   # a station's plan: to and fro across the wind
 
 
 def ardurover_habits(tws_mps: float, **changes: float | bool) -> Habits:
@@ -167,6 +168,24 @@ def with_boat(
     return clock.run(real(), speedup=speedup)
 
 
+async def _sail_mission(
+    facade: Facade, truth: Callable[[], Truth], items: list[MissionItem], until: Callable[[float], bool],
+    limit_s: float,
+) -> list[tuple[float, float, float, float, float]]:
+    """Sail a mission in AUTO while the truth is sampled each half second; return its rows."""
+    rows: list[tuple[float, float, float, float, float]] = []
+    uploaded = await facade.upload_mission(items)
+    armed, auto = await facade.arm(), await facade.set_mode(Mode.AUTO)
+    if not (armed.is_ok and auto.is_ok):
+        raise LinkError(f"the autopilot refuses: {uploaded.text} {armed.text} {auto.text}")
+    zero = now_s()
+    while now_s() - zero < limit_s and not until(now_s() - zero):
+        now = truth()
+        rows.append((now_s() - zero, now.east_m, now.north_m, now.heading_rad, now.speed_mps))
+        await asyncio.sleep(0.5)
+    return rows
+
+
 def _weather(twd_from_rad: float, tws_mps: float, seed: int) -> AR1:
     return AR1(twd_from_rad, tws_mps, seed=seed, sd_rad=math.radians(9.0), tws_sd_mps=0.1 * tws_mps)
 
@@ -203,9 +222,12 @@ def run_wrsc(seed: int, autopilot: str = "embedded", speedup: float = 8.0) -> Sc
 
 
 def run_station(
-    seed: int, autopilot: str = "embedded", speedup: float = 8.0, radius_m: float = 20.0
+    seed: int, autopilot: str = "embedded", speedup: float = 8.0, radius_m: float = 20.0, method: str = "field",
 ) -> dict[str, float]:
-    """Keep station over MAVLink for five minutes after the first point inside, and score it."""
+    """Keep station over MAVLink for five minutes after the first point inside, and score it.
+
+    ``method``: field (headings in GUIDED), plan (a loop of two waypoints in AUTO) or loiter (the mission's last item).
+    """
     rng = np.random.default_rng((2018, seed))
     twd, tws = float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(3.0, 8.0))
     frame = LocalFrame(ORIGIN)
@@ -228,7 +250,15 @@ def run_station(
                 inside.append(t_s)
             return bool(inside) and t_s > inside[0] + 301.0
 
-        return await sail_guided(facade, truth, frame, decide, over, 900.0)
+        if method == "field":
+            return await sail_guided(facade, truth, frame, decide, over, 900.0)
+        items = [waypoint(frame.geo_from_en(*point))]
+        if method == "plan":
+            e, n = AUTO_HALF_M * math.cos(twd), -AUTO_HALF_M * math.sin(twd)
+            pair = [waypoint(frame.geo_from_en(point[0] + s * e, point[1] + s * n)) for s in (1.0, -1.0)]
+            items += pair * AUTO_LOOPS
+        items.append(waypoint(frame.geo_from_en(*point), command=Command.NAV_LOITER_UNLIM))
+        return await _sail_mission(facade, truth, items, over, 900.0)
 
     rows = np.asarray(with_boat(wind, seed, twd + math.pi / 2.0, job, autopilot, speedup))
     result = station_score(rows, point, radius_m=radius_m, length_m=1.0)
@@ -240,6 +270,7 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m sitl.tasks.guided", description="Field guidance over MAVLink.",
                                      epilog="example: python -m sitl.tasks.guided --seeds 10 --autopilot ardurover")
     parser.add_argument("--task", choices=["wrsc", "station"], default="wrsc")
+    parser.add_argument("--method", choices=["field", "plan", "loiter"], default="field", help="of station keeping")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--autopilot", choices=["embedded", "ardurover"], default="embedded")
     parser.add_argument("--speedup", type=float, default=8.0, help="of the real ArduRover (default 8)")
@@ -251,7 +282,7 @@ def main(argv: list[str] | None = None) -> int:
             passed += result.complete
             row: dict[str, Any] = {**asdict(result), "complete": result.complete}
         else:
-            row = run_station(seed, args.autopilot, args.speedup)
+            row = run_station(seed, args.autopilot, args.speedup, method=args.method)
             passed += bool(row["kept"])
         sys.stdout.write(json.dumps({k: round(v, 2) if isinstance(v, float) else v for k, v in row.items()}) + "\n")
         sys.stdout.flush()
