@@ -71,11 +71,13 @@ def config_of(mission: Mission) -> SkipperConfig:
     options = mission.skipper
     changes: dict[str, Any] = {
         "delta_s": mission.risk.delta_s,
+        "max_path_risk": mission.risk.max_path_risk,
         "delta_s_ladder": tuple(d for d in SkipperConfig().delta_s_ladder if d < mission.risk.delta_s),
         "margin_m": mission.margin_m,
         "margin_floor_m": mission.margin_floor_m,
         "plan_budget_s": options.planning_budget_s,
         "first_plan_budget_s": options.planning_budget_s,
+        "autopilot_beats": options.autopilot_beats,
         "replan_policy": ReplanPolicy(options.replan),
         "guidance": Guidance(options.guidance),
         "station_s": options.station_s,

@@ -56,6 +56,7 @@ class SkipperConfig:
 
     # planning
     delta_s: float = 0.95
+    max_path_risk: float | None = None  # of ever being forced into the no-go zone along a plan; None: not bounded
     delta_s_ladder: tuple[float, ...] = (0.90, 0.80, 0.66)  # tried in this order when nothing is found
     margin_m: float = 15.0             # >= 15 m at 3 m/s: a breach coasts 6 to 10 m (ardurover notes, fence)
     margin_floor_m: float = 8.0        # never planned closer than this, whatever the ladder

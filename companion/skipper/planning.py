@@ -64,7 +64,7 @@ def request(
         problem = Problem.from_json(problem_dict(
             turn.voyage, turn.gates[gate], start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
             delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
-            beat=problem_beat(turn, step.margin_m),
+            beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk,
         ))
     except (ValueError, InputError) as error:
         turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")

@@ -150,3 +150,24 @@ def test_the_ladder_never_goes_below_the_floor_and_never_repeats_itself():
     assert [s.delta_s for s in steps] == sorted((s.delta_s for s in steps), reverse=True)
     tight = rungs(SkipperConfig(margin_m=5.0, margin_floor_m=8.0))
     assert all(s.margin_m == 5.0 for s in tight)
+
+
+def test_a_limit_on_the_paths_risk_reaches_the_problem_and_is_given_up_before_delta_s():
+    steps = rungs(SkipperConfig(max_path_risk=0.2))
+    given_up = next(n for n, s in enumerate(steps) if s.max_path_risk is None)
+    assert all(s.max_path_risk == 0.2 for s in steps[:given_up])
+    assert "not bounded" in steps[given_up].name
+    assert steps[given_up].delta_s == SkipperConfig().delta_s
+    assert all(s.max_path_risk is None for s in steps[given_up:])
+    made = voyage(Goal(en_m=(0.0, 400.0), radius_m=6.0))
+    config = SkipperConfig(max_path_risk=0.2)
+    start, gates = Start(en_m=(0.0, 0.0), heading_rad=0.8), gates_of(made)
+    aim = aim_at(made, config, gates, 0, start.en_m)
+    problem = Problem.from_json(problem_dict(
+        made, gates[0], start=start, aim=aim, forecast=forecast(0.0, 0.0, sigma_rad=0.1), margin_m=15.0, delta_s=0.9,
+        no_go_half_rad=NO_GO, max_path_risk=0.2))
+    assert problem.risk is not None
+    answer = plan(problem, expansions=8000)
+    assert answer.has_path
+    assert answer.risk is not None
+    assert answer.risk <= 0.2
