@@ -3,7 +3,7 @@
 Two baselines beside the companion. ``alone``: ArduRover with nothing but a waypoint at each goal, in AUTO.
 ``dijkstra``: the same with ArduRover's own path planning round the obstacles as exclusion fences, set at boot as
 well as we know how. Both sail on the real ArduRover; ``alone`` on the embedded autopilot too, which has no path
-planning. The companion sails on the embedded one. Everybody is timed alike, on the true track: from sailing in AUTO
+planning. The companion sails on both. Everybody is timed alike, on the true track: from sailing in AUTO
 to being within the radius of the last goal, all goals reached in order; a contact is an entry into an obstacle or
 over the limits.
 """
@@ -36,9 +36,10 @@ from companion.messages import Command, MissionItem, Mode, waypoint
 from sitl.ardurover import ArduRover, require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.config import Truth as Now
+from sitl.live import run_live
 from sitl.runner import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.scenario import load_scenario
-from sitl.verdict import Truth, contacts_and_clearance, count_tacks
+from sitl.verdict import Truth, Verdict, contacts_and_clearance, count_tacks
 from sitl.weather import scenario_wind
 from sitl.wind import Wind
 
@@ -93,7 +94,20 @@ class Track:
         if self.is_done or (not self.truth.t_s and not (now.is_armed and now.mode in {Mode.AUTO, Mode.GUIDED})):
             return
         en = self.mission.frame().en_from_geo(now.position)
-        self.truth.add(t_s, en, now.heading_rad, now.speed_mps, (now.twd_from_rad, now.tws_mps))
+        self._note(t_s, en, now.heading_rad, now.speed_mps, (now.twd_from_rad, now.tws_mps))
+
+    def follow(self, noted: Truth) -> None:
+        """Take the track that somebody else noted, up to the last goal."""
+        for n, t_s in enumerate(noted.t_s):
+            if self.is_done:
+                return
+            wind = (noted.twd_from_rad[n], noted.tws_mps[n])
+            self._note(t_s, noted.en_m[n], noted.heading_rad[n], noted.speed_mps[n], wind)
+
+    def _note(
+        self, t_s: float, en: tuple[float, float], heading_rad: float, speed_mps: float, wind: tuple[float, float],
+    ) -> None:
+        self.truth.add(t_s, en, heading_rad, speed_mps, wind)
         goal = self.mission.goals[len(self.goals_s)]
         radius_m = goal.radius_m if goal.radius_m is not None else 10.0
         if math.dist(en, self.mission.frame().en_from_geo(goal.point)) <= radius_m:
@@ -139,11 +153,23 @@ def sail_companion(path: Path, seed: int) -> dict[str, Any]:
     track = Track(load_mission(scenario.mission_path(path)))
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
         verdict = run_virtual(run_embedded(scenario, path, seed, Path(folder) / "voyage", observer=track.observe()))
-    figures = verdict.figures
-    return {
-        **track.record("companion", scenario.name, seed), "promised_risk": figures.get("promised_risk"),
-        "no_go_entries": figures.get("no_go_entries"), "replans": figures.get("replans"),
-    }
+    return {**track.record("companion", scenario.name, seed), **_promises(verdict)}
+
+
+def sail_companion_ardurover(path: Path, seed: int, speedup: float) -> dict[str, Any]:
+    """Sail with the companion, as a process of its own, on the real ArduRover."""
+    scenario = load_scenario(path)
+    track, noted = Track(load_mission(scenario.mission_path(path))), Truth()
+    with tempfile.TemporaryDirectory(prefix="figures-") as folder:
+        verdict = run_live(
+            scenario, path, seed, Path(folder) / "voyage", autopilot="ardurover", program=None, speedup=speedup,
+            truth=noted)
+    track.follow(noted)
+    return {**track.record("companion, ArduRover", scenario.name, seed), **_promises(verdict)}
+
+
+def _promises(verdict: Verdict) -> dict[str, Any]:
+    return {key: verdict.figures.get(key) for key in ("promised_risk", "no_go_entries", "replans")}
 
 
 def sail_alone(path: Path, seed: int) -> dict[str, Any]:
@@ -259,6 +285,8 @@ def sail(job: Job) -> dict[str, Any]:
     try:
         if job.who == "companion":
             record = sail_companion(job.scenario, job.seed)
+        elif job.who == "companion-ardurover":
+            record = sail_companion_ardurover(job.scenario, job.seed, job.speedup)
         elif job.who == "alone-embedded":
             record = sail_alone(job.scenario, job.seed)
         else:
@@ -315,7 +343,7 @@ def table(records: Sequence[dict[str, Any]]) -> str:
     names = list(dict.fromkeys(load_scenario(p).name for p in SCENARIOS))
     sailed = [r for r in records if "error" not in r]
     for name in [*names, *sorted({r["scenario"] for r in sailed} - set(names))]:
-        for who in ("companion", "alone, embedded", "alone, ArduRover", "dijkstra, ArduRover"):
+        for who in ("companion", "companion, ArduRover", "alone, embedded", "alone, ArduRover", "dijkstra, ArduRover"):
             rows = [r for r in sailed if r["scenario"] == name and r["who"] == who]
             if rows:
                 lines.append(_row(name, who, rows))

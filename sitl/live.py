@@ -90,9 +90,9 @@ class _Companion:
 
 def run_live(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, autopilot: str, program: Path | None,
-    speedup: float | None,
+    speedup: float | None, truth: Truth | None = None,
 ) -> Verdict:
-    """Run ``scenario``; leaves a voyage folder with verdict.json.
+    """Run ``scenario``; leaves a voyage folder with verdict.json. The judge's track is noted in ``truth``.
 
     Raises:
         JobError: it has an event that this autopilot cannot play, or the companion left nothing.
@@ -104,18 +104,19 @@ def run_live(
             f"{scenario.name}: {', '.join(cannot)} can be played by the embedded autopilot only; leave out "
             f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}")
     pace = speedup or scenario.speedup
-    return run(_run(scenario, source, seed, folder, autopilot, program, pace), speedup=pace)
+    track = Truth() if truth is None else truth
+    return run(_run(scenario, source, seed, folder, autopilot, program, pace, track), speedup=pace)
 
 
 async def _run(
-    scenario: Scenario, source: Path, seed: int, folder: Path, kind: str, program: Path | None, pace: float
+    scenario: Scenario, source: Path, seed: int, folder: Path, kind: str, program: Path | None, pace: float,
+    truth: Truth,
 ) -> Verdict:
     mission_path = scenario.mission_path(source)
     mission = load_mission(mission_path)
     wind = scenario_wind(scenario, source, seed)
     frame = mission.frame()
     folder.mkdir(parents=True, exist_ok=True)
-    truth = Truth()
     traffic = LiveTraffic(frame, wind, seed)
     async with contextlib.AsyncExitStack() as stack:
         boat: Boat

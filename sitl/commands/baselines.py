@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-SAILORS = ("companion", "alone-embedded", "alone", "dijkstra")
+SAILORS = ("companion", "companion-ardurover", "alone-embedded", "alone", "dijkstra")
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -15,7 +15,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "baselines", help=summary,
         description="Sail six scenarios with the companion and with ArduRover alone, in the same weather, and print "
         "the table of arrivals, contacts, times, tacks and clearances. 'companion' and 'alone-embedded' use the "
-        "embedded autopilot; 'alone' (a waypoint per goal) and 'dijkstra' (its own path planning) the real ArduRover. "
+        "embedded autopilot; 'companion-ardurover', 'alone' (a waypoint per goal) and 'dijkstra' (its own path "
+        "planning) the real ArduRover. "
         "Voyages are appended to FILE, and the table is of everything in it.",
         epilog="Example: sitl baselines --who alone dijkstra --seeds 5 --out figures.jsonl",
     )
