@@ -3,9 +3,11 @@
 Two baselines beside the companion. ``alone``: ArduRover with nothing but a waypoint at each goal, in AUTO.
 ``dijkstra``: the same with ArduRover's own path planning round the obstacles as exclusion fences, set at boot as
 well as we know how. Both sail on the real ArduRover; ``alone`` on the embedded autopilot too, which has no path
-planning. The companion sails on both. Everybody is timed alike, on the true track: from sailing in AUTO
-to being within the radius of the last goal, all goals reached in order; a contact is an entry into an obstacle or
-over the limits.
+planning. The companion sails on both. On the real one a disarmed boat drifts while the companion watches the wind,
+so the others begin where the companion set sail, if it has sailed that seed into the same file.
+
+Everybody is timed alike, on the true track: from sailing in AUTO to being within the radius of the last goal, all
+goals reached in order; a contact is an entry into an obstacle or over the limits.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link, LinkIdentity
 from companion.mavlink.machines import Outcome
 from companion.mavlink.transport import open_link
-from companion.messages import Command, MissionItem, Mode, waypoint
+from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
 from sitl.ardurover import ArduRover, require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.config import Truth as Now
@@ -165,7 +167,11 @@ def sail_companion_ardurover(path: Path, seed: int, speedup: float) -> dict[str,
             scenario, path, seed, Path(folder) / "voyage", autopilot="ardurover", program=None, speedup=speedup,
             truth=noted)
     track.follow(noted)
-    return {**track.record("companion, ArduRover", scenario.name, seed), **_promises(verdict)}
+    if not noted.t_s:
+        raise JobError("it never sailed in AUTO")
+    point = track.mission.frame().geo_from_en(*noted.en_m[0])
+    start = [point.lat_deg, point.lon_deg, math.degrees(noted.heading_rad[0])]
+    return {**track.record("companion, ArduRover", scenario.name, seed), **_promises(verdict), "start": start}
 
 
 def _promises(verdict: Verdict) -> dict[str, Any]:
@@ -195,8 +201,13 @@ def sail_alone(path: Path, seed: int) -> dict[str, Any]:
     return track.record("alone, embedded", scenario.name, seed)
 
 
-def sail_ardurover(path: Path, seed: int, who: str, speedup: float) -> dict[str, Any]:
-    """Sail with the real ArduRover, "alone" or with its own "dijkstra"."""
+def sail_ardurover(
+    path: Path, seed: int, who: str, speedup: float, set_sail: tuple[float, float, float] | None = None,
+) -> dict[str, Any]:
+    """Sail with the real ArduRover, "alone" or with its own "dijkstra".
+
+    ``set_sail`` is where, in place of the mission's start: latitude, longitude, heading [deg].
+    """
     scenario = load_scenario(path)
     mission = load_mission(scenario.mission_path(path))
     track = Track(mission)
@@ -204,10 +215,13 @@ def sail_ardurover(path: Path, seed: int, who: str, speedup: float) -> dict[str,
     parameters = {**scenario.parameters, **(DIJKSTRA if who == "dijkstra" and has_obstacles else {})}
 
     async def voyage() -> None:
-        start = mission.start or mission.origin
+        start, heading_rad = mission.start or mission.origin, _heading_rad(mission)
+        if set_sail is not None:
+            start = GeoPoint(lat_deg=set_sail[0], lon_deg=set_sail[1])
+            heading_rad = math.radians(set_sail[2])
         wind = Held(scenario_wind(scenario, path, seed))
         async with (
-            ArduRover(require(), start, wind, heading_rad=_heading_rad(mission), speedup=speedup,
+            ArduRover(require(), start, wind, heading_rad=heading_rad, speedup=speedup,
                       parameters=parameters) as rover,
             Link(open_link(rover.link), identity=LinkIdentity(system=255, component=190), streams=()) as link,
             Pilot(link, timeout_s=30.0 * speedup) as pilot,
@@ -277,6 +291,7 @@ class Job:
     scenario: Path
     seed: int
     speedup: float
+    set_sail: tuple[float, float, float] | None = None
 
 
 def sail(job: Job) -> dict[str, Any]:
@@ -290,7 +305,7 @@ def sail(job: Job) -> dict[str, Any]:
         elif job.who == "alone-embedded":
             record = sail_alone(job.scenario, job.seed)
         else:
-            record = sail_ardurover(job.scenario, job.seed, job.who, job.speedup)
+            record = sail_ardurover(job.scenario, job.seed, job.who, job.speedup, job.set_sail)
     except (JobError, LinkError) as error:
         record = {"who": job.who, "scenario": load_scenario(job.scenario).name, "seed": job.seed, "error": str(error)}
     return {**record, "wall_s": time.perf_counter() - began}
@@ -309,7 +324,10 @@ def run_baselines(
     *, who: Sequence[str], scenarios: Sequence[Path], seeds: int, workers: int, speedup: float, out: Path,
 ) -> int:
     """Sail everything, append each voyage to ``out`` as it ends, print the table of all that ``out`` holds."""
-    jobs = [Job(who=w, scenario=p, seed=s, speedup=speedup) for w in who for s in range(seeds) for p in scenarios]
+    began = {(r["scenario"], r["seed"]): tuple(r["start"]) for r in (read(out) if out.exists() else []) if "start" in r}
+    jobs = [
+        Job(who=w, scenario=p, seed=s, speedup=speedup, set_sail=began.get((load_scenario(p).name, s)))
+        for w in who for s in range(seeds) for p in scenarios]
     with out.open("a", encoding="utf-8") as file:
         for n, record in enumerate(_jobs_done(jobs, workers), 1):
             file.write(json.dumps(record, separators=(",", ":")) + "\n")
