@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.signing import SigningStore
     from companion.mavlink.transport import Transport
-    from companion.skipper.checks import Examined, Finding, Needs
+    from companion.skipper.findings import Examined, Finding, Needs
 
 LISTEN_S = 6.0   # long enough for messages of once a second to show their rate
 
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from companion.geofence import load_mission
     from companion.mavlink.signing import SigningStore
     from companion.mavlink.transport import open_link
-    from companion.skipper.checks import Level
+    from companion.skipper.findings import Level
 
     mission = load_mission(args.mission) if args.mission is not None else None
     transport = open_link(args.link)
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
 
 def needs_of(mission: Mission | None) -> Needs:
     """Return what a voyage needs of the autopilot."""
-    from companion.skipper.checks import Needs
+    from companion.skipper.findings import Needs
 
     if mission is None:
         return Needs()
@@ -131,7 +131,8 @@ async def diagnose(
 async def read(autopilot: Autopilot, listen_s: float = LISTEN_S, *, has_key: bool = False) -> Examined:
     """Read parameters, version, mission and fence, and count messages for ``listen_s``."""
     from companion.clock import now_s
-    from companion.skipper.checks import RATES_HZ, Examined
+    from companion.skipper.checks_safety import RATES_HZ
+    from companion.skipper.findings import Examined
 
     counts = dict.fromkeys(RATES_HZ, 0)
 
@@ -166,7 +167,7 @@ async def read(autopilot: Autopilot, listen_s: float = LISTEN_S, *, has_key: boo
 
 async def _apply(autopilot: Autopilot, findings: Sequence[Finding]) -> tuple[Change, ...]:
     """Set what warnings and errors want, worst first, each parameter once, and read it back."""
-    from companion.skipper.checks import Level
+    from companion.skipper.findings import Level
 
     changes: dict[str, Change] = {}
     for finding in findings:
@@ -203,7 +204,7 @@ def as_json(findings: Sequence[Finding], changes: Sequence[Change]) -> dict[str,
 
 def as_text(findings: Sequence[Finding], changes: Sequence[Change], *, applied: bool) -> str:
     """Return the findings as lines for a person, worst first."""
-    from companion.skipper.checks import Level
+    from companion.skipper.findings import Level
 
     lines = []
     for f in findings:

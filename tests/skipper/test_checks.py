@@ -14,7 +14,8 @@ from companion.commands.doctor import as_json, as_text, diagnose
 from companion.errors import LinkError
 from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, SigningStore
 from companion.messages import GeoPoint, MissionItem
-from companion.skipper.checks import Examined, Level, Needs, examine
+from companion.skipper.checks import examine
+from companion.skipper.findings import Examined, Level, Needs
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.memory import frames
 from sitl.wind import parse_wind
