@@ -98,6 +98,8 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     replan: Literal["waypoint", "forecast"] = "waypoint"
     """At each waypoint, or also when the wind leaves what was forecast."""
     end: Literal["loiter", "home"] = "loiter"
+    autopilot_beats: bool = True
+    """Where the water is clear by its corridor, leave the beat to the autopilot: it follows each shift at once."""
     guidance: Literal["plan", "heading", "field"] = "plan"
     """Sail the plan's mission in AUTO; or steer in GUIDED, by the plan's headings or by vector fields.
 

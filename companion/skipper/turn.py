@@ -205,7 +205,7 @@ class Turn:
 
     @property
     def steers(self) -> bool:
-        """Whether the boat is steered by headings (and may be)."""
+        """Whether the boat is steered by headings, a plan's or a field's (and may be)."""
         may = self.snapshot.permissions
         return self.config.guidance is not Guidance.PLAN and may.may_steer and may.may_set_mode
 
