@@ -46,7 +46,9 @@ def choose(
         cost += 4.0 * _leaving(track, intent.stay_in, habits)
     if intent.clearance is not None:
         ashore = _ashore(track, intent.clearance, habits)
-        blocked = bool(ashore[0] > 0.0)       # headings[0] is the field's own
+        # headings[0] is the field's own. On a beat the tack she is on is the side that is kept, by q.
+        beats = twd is not None and abs(wrap_pi(wanted_rad - twd)) < habits.no_go_half_rad + 1e-6
+        blocked = bool(ashore[0] > 0.0) and not beats
         side = _wrap(headings - wanted_rad) * state.round_side
         cost += ashore + np.where(blocked & (side < 0.0), OTHER_SIDE_COST, 0.0)
     best = int(np.argmin(cost))
@@ -138,15 +140,18 @@ def _leaving(
 
 
 def _ashore(track: NDArray[np.float64], clearance: Clearance, habits: Habits) -> NDArray[np.float64]:
-    """Return what each track's way towards what stands still costs, (k,): 0 clear, to 24 where it touches now.
+    """Return what each track's way towards what stands still costs, (k,): 0 clear, to 40 where it touches now.
 
-    Nearer than ``keep_m`` counts by how soon, and so does touching, again. A boat that is within that distance already
-    is let out of it: what counts then is coming nearer still.
+    Nearer than ``keep_m`` counts by how soon, and so does touching, again; how near counts from half as far again on,
+    so that of two ways past a corner the wider is taken. A boat that is within that distance already is let out of it:
+    what counts then is coming nearer still.
     """
     near = track[:, : int(habits.shore_s / _STEP_S) + 1]
     clear = clearance(near.reshape(-1, 2)).reshape(near.shape[:2])
     now = float(clear[:, 0].min())
-    cost = np.zeros(len(track))
+    soon = 1.0 - np.arange(near.shape[1]) * _STEP_S / habits.shore_s
+    depth = np.clip((1.5 * habits.keep_m - clear) / max(habits.keep_m, 1.0), 0.0, 2.5)
+    cost = np.asarray(3.0 * np.max((depth * np.maximum(soon, 0.0))[:, 1:], axis=1, initial=0.0), dtype=np.float64)
     for keep in (min(habits.keep_m, now - 0.5), min(0.5, now - 0.5)):
         hit = clear < keep
         first = np.where(hit.any(axis=1), np.argmax(hit, axis=1), near.shape[1]) * _STEP_S

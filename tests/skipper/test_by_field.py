@@ -205,9 +205,12 @@ def test_a_voyage_by_field_alone(goals):
     assert not [a for t, a in world.actions if isinstance(a, act.UploadMission)][5:]
 
 
-def test_a_voyage_by_field_goes_round_a_rock():
-    rock = box(80.0, -12.0, 110.0, 25.0)
-    world = make(rock, goals=(Goal(en_m=(200.0, 0.0), radius_m=8.0),), config=BY_FIELD)
+@pytest.mark.parametrize(("rock", "goal"), [
+    (box(80.0, -12.0, 110.0, 25.0), (200.0, 0.0)),
+    (box(-45.0, 60.0, 45.0, 120.0), (0.0, 230.0)),      # dead to windward
+], ids=["reach", "beat"])
+def test_a_voyage_by_field_goes_round_a_rock(rock, goal):
+    world = make(rock, goals=(Goal(en_m=goal, radius_m=8.0),), config=BY_FIELD)
     assert world.run(600, lambda w: w.state.phase is Phase.DONE)
     assert world.clearance() > 4.0
 
