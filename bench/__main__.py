@@ -1,14 +1,16 @@
 """Compare the planners on the problem set: ``python -m bench`` (make bench).
 
-    python -m bench                                  0.1, 1 and 10 s, three seeds (one at 10 s); about an hour
+    python -m bench                                  0.1, 1 and 10 s, two seeds (one at 10 s); says first how long
     python -m bench --budgets 0.1 1 --seeds 1        a few minutes
+    python -m bench --rows rows.json                 keeps each result there; a run broken off goes on from it
     python -m bench --planners auto rrtstar          without OMPL
     python -m bench --scaling                        time against obstacle vertices and distance only
 
 For each planner and budget: of the problems that can be solved how many were, in every seed; how many of the others
 were recognised as such; when the first path came; cost / bound (the best lower bound that any run proved) and
-cost / best (the cheapest path that any run found): median, 90th percentile and worst over problems and seeds.
-OMPL's planners (optional: requirements-bench.lock) run in a process of their own; see bench/ompl_planners.py.
+cost / best (the cheapest path that any run found): median, 90th percentile and worst over problems and seeds. The
+table comes out ready for docs/planner.md. AVALON's A* and OMPL's planners run at 1 s only, unless --all. OMPL's
+(optional: requirements-bench.lock) run in a process of their own; see bench/ompl_planners.py.
 """
 
 from __future__ import annotations
@@ -64,20 +66,49 @@ def run_one(path, problem, planner, budget_s, seed):
             "first_s": None, "elapsed_s": time.perf_counter() - began}
 
 
-def compare(args, planners):
+def schedule(args, planners):
+    """Return the runs to make: (path, planner, budget [s], seed)."""
     paths = sorted(Path(p) for p in args.problems) or sorted((HERE / "problems").glob("*.json"))
-    rows = []
+    once = max([b for b in args.budgets if b <= 1.0], default=min(args.budgets))
+    runs = []
     for path in paths:
-        problem = Problem.from_json(path)
         for planner in planners:
-            for budget_s in args.budgets:
+            budgets = args.budgets if args.all or planner in {"auto", "rrtstar"} else [once]
+            for budget_s in budgets:
                 seeds = args.seeds if budget_s < 5.0 and planner != "astar" else 1
-                for seed in range(seeds):
-                    row = run_one(path, problem, planner, budget_s, seed)
-                    rows.append({"problem": problem.id, "planner": planner, "budget_s": budget_s, "seed": seed, **row})
-        print(f"{problem.id} ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+                runs += [(path, planner, budget_s, seed) for seed in range(seeds)]
+    return runs
+
+
+def compare(args, planners):
+    """Make the runs, with progress on the error output, and return their rows."""
+    runs = schedule(args, planners)
+    kept = Path(args.rows) if args.rows else None
+    rows = json.loads(kept.read_text(encoding="utf-8"))["rows"] if kept is not None and kept.exists() else []
+    known = {(r["problem"], r["planner"], r["budget_s"], r["seed"]) for r in rows}
+    longest = _longest_s(runs)
+    print(f"{len(runs)} runs, {len(known)} of them made already: at most {longest / 60.0:.0f} minutes and usually half "
+          "of that (a run ends when its path is proved good enough)", file=sys.stderr, flush=True)
+    began, problem, last = time.monotonic(), None, None
+    for i, (path, planner, budget_s, seed) in enumerate(runs):
+        if path != last:
+            problem, last = Problem.from_json(path), path
+        if (problem.id, planner, budget_s, seed) in known:
+            continue
+        row = run_one(path, problem, planner, budget_s, seed)
+        rows.append({"problem": problem.id, "planner": planner, "budget_s": budget_s, "seed": seed, **row})
+        if i + 1 == len(runs) or runs[i + 1][0] != path or time.monotonic() - began > 60.0 * (1 + len(rows)):
+            left = _longest_s(runs[i + 1:])
+            print(f"{i + 1:5}/{len(runs)}  {problem.id:24} {(time.monotonic() - began) / 60.0:5.1f} min, "
+                  f"at most {left / 60.0:.0f} more", file=sys.stderr, flush=True)
+            if kept is not None:
+                kept.write_text(json.dumps({"rows": rows}) + "\n", encoding="utf-8")
     return rows
+
+
+def _longest_s(runs):
+    start_s = {True: 0.05, False: 1.5}  # OMPL's planners start a process each
+    return sum(budget_s + start_s[planner in OURS] for _, planner, budget_s, _ in runs)
 
 
 def summary(rows):
@@ -119,17 +150,27 @@ def _spread(values):
     return [float(np.median(values)), float(np.percentile(values, 90)), float(np.max(values))]
 
 
+NAMES = {"ompl-rrtstar-se2": "OMPL RRT* in SE(2)", "ompl-informed": "OMPL Informed RRT*", "ompl-bitstar": "OMPL BIT*"}
+
+
 def show(lines):
-    print(f"{'planner':18} {'s':>5} {'solved':>8} {'hopeless':>9} {'first path ms':>20} {'over the bound %':>22} "
-          f"{'over the best %':>22}")
-    print(f"{'':18} {'':>5} {'':>8} {'known':>9} {'median 90 % worst':>20} {'median 90 % worst':>22} "
-          f"{'median 90 % worst':>22}")
+    """Print the table in Markdown, as docs/planner.md has it."""
+    if not lines:
+        return
+    print(f"of {lines[0]['solvable']} solvable and {lines[0]['hopeless']} hopeless; median / 90th percentile / worst\n")
+    print("| planner | s | solved | known | first path ms | over the bound % | over best % |")
+    print("|---|---|---|---|---|---|---|")
     for line in lines:
-        first = "-" if line["first_ms"] is None else " ".join(f"{v:6.0f}" for v in line["first_ms"])
-        over = ["-" if line[k] is None else " ".join(f"{100 * v:6.2f}" for v in line[k])
-                for k in ("over_bound", "over_best")]
-        print(f"{line['planner']:18} {line['budget_s']:5g} {line['solved']:4d}/{line['solvable']:<3d} "
-              f"{line['recognised']:5d}/{line['hopeless']:<3d} {first:>20} {over[0]:>22} {over[1]:>22}")
+        name = NAMES.get(line["planner"], f"`{line['planner']}`")
+        cells = (_cell(line["first_ms"], 1.0), _cell(line["over_bound"], 100.0), _cell(line["over_best"], 100.0))
+        print(f"| {name} | {line['budget_s']:g} | {line['solved']} | {line['recognised']} | {' | '.join(cells)} |")
+
+
+def _cell(spread, by):
+    if spread is None:
+        return "-"
+    digits = [2 if by > 1.0 and by * v < 10.0 else 0 for v in spread]
+    return " / ".join(f"{by * v:.{d}f}" for v, d in zip(spread, digits, strict=True))
 
 
 # ---------------------------------------------------------------------------------------- scaling
@@ -164,12 +205,12 @@ def board(size_m, shapes):
 
 def scaling(budget_s):
     rows = []
-    print(f"\nauto, {budget_s:g} s: obstacle vertices on a board of 2 km, up wind")
-    print(f"{'vertices':>10} {'first path s':>13} {'in all s':>9} {'over bound %':>13}")
+    print(f"\nauto, {budget_s:g} s: obstacle vertices on a board of 2 km, up wind\n")
+    print("| obstacle vertices | first path s | in all s | over the bound % |\n|---|---|---|---|")
     for vertices in (10, 100, 1000, 10_000, 100_000):
         rows.append(_scaled("vertices", vertices, islands(vertices, 2000.0), budget_s))
-    print(f"\nauto, {budget_s:g} s: distance, 300 islands of 10 vertices, up wind")
-    print(f"{'metres':>10} {'first path s':>13} {'in all s':>9} {'over bound %':>13}")
+    print(f"\nauto, {budget_s:g} s: distance in metres, 300 islands of 10 vertices, up wind\n")
+    print("| distance, 300 islands | first path s | in all s | over the bound % |\n|---|---|---|---|")
     for size_m in (100.0, 1000.0, 10_000.0, 40_000.0, 100_000.0):
         rows.append(_scaled("distance_m", size_m, islands(3000, size_m, per=10), budget_s))
     return rows
@@ -179,9 +220,9 @@ def _scaled(kind, value, problem, budget_s):
     began = time.perf_counter()
     answer = plan(problem, budget_s=budget_s)
     took = time.perf_counter() - began
-    first = f"{answer.first_s:13.3f}" if answer.first_s is not None else f"{answer.status.value:>13}"
-    gap = f"{100 * answer.gap:13.2f}" if math.isfinite(answer.gap) else f"{'-':>13}"
-    print(f"{value:10g} {first} {took:9.2f} {gap}", flush=True)
+    first = f"{answer.first_s:.3f}" if answer.first_s is not None else answer.status.value
+    gap = f"{100 * answer.gap:.2f}" if math.isfinite(answer.gap) else "-"
+    print(f"| {value:,.0f} | {first} | {took:.2f} | {gap} |".replace(",", " "), flush=True)
     return {"kind": kind, "value": value, "first_s": answer.first_s, "elapsed_s": took, "status": answer.status.value,
             "gap": answer.gap if math.isfinite(answer.gap) else None}
 
@@ -193,10 +234,12 @@ def main(argv=None):
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("problems", nargs="*", help="problem files (default: bench/problems)")
     parser.add_argument("--budgets", nargs="+", type=float, default=[0.1, 1.0, 10.0], metavar="S")
-    parser.add_argument("--seeds", type=int, default=3, help="at budgets below 5 s; one above")
+    parser.add_argument("--seeds", type=int, default=2, help="at budgets below 5 s; one above")
     parser.add_argument("--planners", nargs="+", choices=every, default=every if has_ompl else list(OURS))
+    parser.add_argument("--all", action="store_true", help="every planner at every budget")
     parser.add_argument("--scaling", action="store_true", help="only the scaling tables")
     parser.add_argument("--json", metavar="FILE", help="write all rows")
+    parser.add_argument("--rows", metavar="FILE", help="keep results there as they come, and do not repeat them")
     parser.add_argument("--table", nargs="+", metavar="FILE", help="only print the table of rows written before")
     args = parser.parse_args(argv)
     if args.table:

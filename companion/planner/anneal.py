@@ -243,7 +243,11 @@ def propose(
         if uniform(rng) < 0.25:
             i = 0
         r, longer = uniform(rng), -1
-        if r < 0.2 and n + 1 < MOST_POINTS:                               # ... one of them in two parts
+        if r < 0.1 and n + j - i < MOST_POINTS:                           # ... each of them in two parts
+            for m in range(j - 1, i - 1, -1):
+                n = _insert(xs, ys, n, m + 1, 0.5 * (xs[m] + xs[m + 1]), 0.5 * (ys[m] + ys[m + 1]))
+            j += j - i
+        elif r < 0.2 and n + 1 < MOST_POINTS:                             # ... one of them in two parts
             m = i + int(uniform(rng) * (j - i))
             f = uniform(rng)
             n = _insert(xs, ys, n, m + 1, xs[m] + f * (xs[m + 1] - xs[m]), ys[m] + f * (ys[m + 1] - ys[m]))

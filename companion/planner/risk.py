@@ -254,28 +254,34 @@ def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -
     # ``low`` keeps too little away from the zone; ``high`` keeps the limit, or leaves no path at all.
     low, high, extra = 0.0, math.inf, 0.0
     over, under = 0.0, -math.inf  # log of hazard / limit's hazard at them
+    settled, kept = False, 0.0
     for turn in range(RISK_TURNS):
-        inner = Effort(
-            None if math.isinf(effort.budget_s) else max(1e-3, effort.budget_s / RISK_ROUNDS),
-            None if effort.limit is None else max(1, effort.limit // RISK_ROUNDS),
-        )
+        # Equal parts: each step of the bisection needs a good plan to judge by. What is left at its end is used up.
+        seconds, steps = effort.remaining_s, (effort.limit or 0) - effort.used
+        if not settled:
+            seconds, steps = min(seconds, effort.budget_s / RISK_ROUNDS), min(steps, (effort.limit or 0) // RISK_ROUNDS)
+        inner = Effort(None if math.isinf(effort.budget_s) else max(1e-3, seconds),
+                       None if effort.limit is None else max(1, steps))
         outcome = search(widened(problem, extra), inner, seed)
         effort.spend(inner.used)
-        if turn == 0:
-            if outcome.waypoints_en is None:
-                return outcome  # what fails without the limit fails with it
-            bound_s = outcome.lower_bound_s
+        if turn == 0 or (settled and extra == 0.0):
+            bound_s = max(bound_s, outcome.lower_bound_s)
+        if turn == 0 and outcome.waypoints_en is None:
+            return outcome  # what fails without the limit fails with it
         judged = None if outcome.waypoints_en is None else problem.evaluate(outcome.waypoints_en)
         promised = path_risk(problem, judged.legs).total if judged is not None and judged.is_feasible else math.inf
         least = min(least, promised)
         if promised <= limit and judged is not None:
             effort.found()
             if judged.time_s < best_s:
-                best, best_s = outcome, judged.time_s
+                best, best_s, kept = outcome, judged.time_s, extra
+        if settled or effort.is_over:
+            break
         if limit < promised < math.inf:
             low, over = extra, math.log(_hazard(promised) / _hazard(limit))
         elif turn == 0:
-            break
+            settled = True
+            continue
         else:
             high = extra
             under = math.log(_hazard(promised) / _hazard(limit)) if promised < math.inf else -math.inf
@@ -284,13 +290,15 @@ def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -
         else:  # regula falsi, kept off the ends; bisection where there was no path
             part = over / (over - under) if math.isfinite(under) else 0.5
             extra = low + (high - low) * min(0.85, max(0.15, part))
-        if effort.is_over or extra > MOST_EXTRA_SIGMAS or high - low < EXTRA_RESOLUTION:
-            break
+        if extra > MOST_EXTRA_SIGMAS or high - low < EXTRA_RESOLUTION:
+            if best is None:
+                break
+            settled, extra = True, kept
     if best is None:
         reason = (f"no path within the limit of {100.0 * limit:.3g} % on its risk; the least risky found has "
                   f"{100.0 * least:.3g} %")
         return Outcome(waypoints_en=None, reason=reason)
-    return replace(best, lower_bound_s=bound_s, trace={**best.trace, "extra_sigmas": high if turn else 0.0})
+    return replace(best, lower_bound_s=bound_s, trace={**best.trace, "extra_sigmas": kept})
 
 
 def _hazard(promised: float) -> float:

@@ -20,8 +20,12 @@ from companion.planner.solve import Effort
 from companion.planner.visibility import crossings, geodesics, graph_nodes
 from companion.planner.world import World
 
-LEG_PRICE = 8e-5
-"""What a leg must save to be worth sailing, as a share of the path's time."""
+LEG_PRICE, FINE_PRICE = 8e-5, 1e-5
+"""What a leg must save to be worth sailing, as a share of the path's time: while ways are compared, and at the end.
+
+A beat into a closing wind follows a curve, of which each further leg cuts off a little; but many legs make a
+candidate slow to improve, and the wrong way round then wins."""
+FINE_FROM = 0.85
 STOP_GAP = 2e-4
 """Stop when the path is this close to the bound."""
 _CHUNK = 4_000
@@ -74,6 +78,11 @@ class Searcher:
         return self.best.cost_s if self.best is not None else math.inf
 
     @property
+    def leg_price(self) -> float:
+        """What a leg must save now, as a share of the path's time."""
+        return LEG_PRICE if self.effort.fraction < FINE_FROM else FINE_PRICE
+
+    @property
     def is_done(self) -> bool:
         """Is there nothing left to find, or nothing left to spend?"""
         return self.effort.is_over or self.upper_s <= self.bound.tight_s * (1.0 + STOP_GAP)
@@ -109,7 +118,7 @@ class Searcher:
 
     def note(self, candidate: Candidate) -> None:
         """Remember the best."""
-        price = LEG_PRICE * candidate.cost_s
+        price = self.leg_price * candidate.cost_s
         if self.best is None or candidate.worth(price) < self.best.worth(price):
             self.best = candidate
             self.effort.found()
@@ -351,7 +360,7 @@ class Searcher:
         """Take the candidate one chunk further through its annealing cycle."""
         chunk = max(400, min(_CHUNK, 60_000 // len(c.last)))
         moves = max(1, min(chunk, self.effort.remaining(chunk), c.cycle - c.done))
-        cold, price = _COLD, LEG_PRICE * c.cost_s * (2 if c.cycles == 0 else 1)
+        cold, price = _COLD, self.leg_price * c.cost_s * (2 if c.cycles == 0 else 1)
         hot = _HOT * (0.25 ** (c.cycles % 3))
         f0, f1 = c.done / c.cycle, (c.done + moves) / c.cycle
         at = [c.cost_s * hot * (cold / hot) ** f for f in (f0, f1)]
