@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from companion.messages import MissionState, Mode
 from companion.skipper.actions import Arm, SetCurrent, SetMode
-from companion.skipper.planning import upload
 from companion.skipper.turn import Turn
+from companion.skipper.uploads import upload
 
 ARMING, CURRENT = "arming", "set current"
 CHECK_S = 3.0   # MISSION_CURRENT comes once a second: by then it shows what was asked for

@@ -6,11 +6,11 @@ import math
 
 from companion.messages import Mode, StatusText
 from companion.skipper.actions import CancelPlan, Severity
+from companion.skipper.answers import take_plan
 from companion.skipper.config import Guidance
 from companion.skipper.failsafe import note
 from companion.skipper.gates import Gate, passed_on
 from companion.skipper.geometry import distance_m, leg_distance_m, waypoint_done
-from companion.skipper.planning import take_plan, take_upload
 from companion.skipper.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
@@ -23,6 +23,7 @@ from companion.skipper.snapshot import (
 )
 from companion.skipper.state import PATIENT, Phase
 from companion.skipper.turn import FRESH_S, Turn
+from companion.skipper.uploads import take_upload
 from companion.skipper.voyage import Side
 
 HISTORY_STEP_S = 10.0

@@ -1,0 +1,269 @@
+"""Taking the planner's answers: the splice, keeping the old plan, climbing down the ladder, holding."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from companion.messages import Command, waypoint
+from companion.planner import Plan, Problem
+from companion.skipper.actions import Change, ReplanReason, Severity
+from companion.skipper.beating import room_m, tacks_fail
+from companion.skipper.geometry import distance_m
+from companion.skipper.judge import judge
+from companion.skipper.ladder import rungs
+from companion.skipper.manoeuvre import gybe_round
+from companion.skipper.planning import request
+from companion.skipper.route import Tail, loiter_place, splice
+from companion.skipper.snapshot import PlanOutcome
+from companion.skipper.state import PendingPlan, Phase, Retry, Route
+from companion.skipper.traffic import apart_m, meetings
+from companion.skipper.turn import Turn
+from companion.skipper.uploads import upload
+from companion.skipper.voyage import PointEn
+from companion.traffic import Decision, decide
+
+SAME_M = 1.0             # a new waypoint this near to the old one is the old one
+SPARE_SHARE = 0.001      # a path may get this much slower ...
+SPARE_S = 0.3            # ... and this much more, to have a waypoint less
+SIMPLIFIED_AT_MOST = 60  # waypoints: each costs a check of the whole path
+GYBE_RADIUS_M = 8.0      # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
+
+
+def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
+    """Take the planner's answer: splice and upload it, keep the old plan, or climb down the ladder."""
+    pending = turn.state.pending_plan
+    if pending is None or pending.request_id != outcome.request_id:
+        return
+    turn.update(pending_plan=None)
+    if turn.state.phase in {Phase.OPERATOR, Phase.DONE} or turn.is_taken:
+        return   # the operator may have taken the boat in this very step
+    if turn.state.sailing and not turn.state.checked_mission:
+        return
+    plan = outcome.plan
+    if plan is None or not plan.has_path:
+        reason = outcome.text or (plan.reason if plan is not None else "the planner died")
+        _not_found(turn, pending, reason)
+        return
+    turn.update(
+        rung=0, ladder_reason=None, plan_retry=turn.failed(turn.state.plan_retry) if pending.rung > 0 else Retry())
+    keep, set_current = _place(turn, pending)
+    if keep is None:
+        turn.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
+        return
+    if _keep_old(turn, pending, plan):
+        return
+    put_in_place(turn, pending, plan, keep, set_current)
+
+
+def _place(turn: Turn, pending: PendingPlan) -> tuple[int | None, int | None]:
+    """Return how many items stay and which seq must be made current (None: none; keep None: too late)."""
+    state, k = turn.state, pending.from_index
+    if state.route is None or state.foreign:
+        return 0, 1
+    if k is None:
+        return state.index, state.index + 1
+    if state.index <= k:
+        return k + 1, None
+    boat = turn.boat_en
+    if state.index == k + 1 and boat is not None and distance_m(boat, pending.start_en_m) < turn.config.grid_size_m:
+        return k + 1, k + 2
+    return None, None
+
+
+def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
+    """Keep the old plan when it is sound under the new forecast and the new one is not clearly better."""
+    route = turn.state.route
+    if tacks_fail(turn):
+        return False
+    if route is None or pending.reason in {ReplanReason.START, ReplanReason.OPERATOR_BACK, ReplanReason.RETRY}:
+        return False
+    first = turn.state.index if pending.from_index is None else pending.from_index + 1
+    points = route.points_en_m[first:-1]
+    ends = [n for n in range(first, len(route.items) - 1) if route.gate_of[n] == pending.gate]
+    if not points or pending.gate < 0 or not ends or pending.lead_in:
+        return False
+    points = route.points_en_m[first:ends[0] + 1]
+    problem = pending.problem
+    # A vessel that the old route was planned clear of need not be kept so far from; it is held against its own discs.
+    old = replace(problem.resolved, targets=()).evaluate(np.asarray([pending.start_en_m, *points]))
+    gain = old.time_s - plan.cost_s
+    if not old.is_feasible:
+        return False
+    if problem.targets:
+        tail = [(float(e), float(n)) for e, n in plan.waypoints_en]
+        way = [*route.points_en_m[turn.state.index:first], *tail]
+        verdict = decide(meetings(turn), since_replan_s=0.0, active_cost_s=old.time_s, new_cost_s=plan.cost_s,
+                         apart_m=apart_m(turn, way))
+        if verdict is not Decision.KEEP:
+            return False
+    elif gain > max(turn.config.keep_gain_s, turn.config.keep_gain * old.time_s):
+        return False
+    facts = pending.facts
+    turn.update(route=replace(
+        route, plan_t_s=facts.plan_t_s, plan_twd_from_rad=facts.plan_twd_from_rad, plan_tws_mps=facts.plan_tws_mps,
+        plan_half_width_rad=facts.plan_half_width_rad, risk=plan.risk if gain <= 0.0 else route.risk,
+    ))
+    turn.say(
+        Severity.INFO, "plan kept",
+        f"{pending.reason.value}: the old plan stays ({old.time_s:.0f} s; a new one gains {max(0.0, gain):.1f} s)",
+        every_s=0.0,
+    )
+    return True
+
+
+def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
+    """Splice a plan into the route and ask for its upload."""
+    points = simplified(pending.problem, _apart([(float(e), float(n)) for e, n in plan.waypoints_en]))[1:]
+    if tacks_fail(turn):
+        # Tacks have failed: turn the other way round where there is room.
+        points = list(gybe_round(
+            pending.start_en_m, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
+            area=turn.voyage.area, floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m)))
+        turn.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
+    tail = Tail(start_en=pending.start_en_m, points_en=(*pending.lead_in, *points), gate=pending.gate)
+    if pending.lead_in:
+        boat = turn.boat_en
+        tail = replace(tail, start_en=boat if boat is not None else pending.start_en_m)
+    facts = replace(
+        pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
+        why=plan.why.text or plan.reason)
+    old = turn.state.route
+    if old is not None:
+        # A gate that was missed is to be passed by the new tail: what the kept items counted for is void.
+        old = replace(old, gate_of=tuple(
+            -1 if n < turn.state.index and g >= turn.state.gate else g for n, g in enumerate(old.gate_of)))
+    if keep + len(tail.points_en) + 1 > turn.config.max_items and old is not None:
+        # Start the numbering again with what is still ahead of the boat.
+        ahead = slice(turn.state.index, keep)
+        old = replace(old, items=old.items[ahead], points_en_m=old.points_en_m[ahead],
+                      leg_from_en_m=old.leg_from_en_m[ahead], gate_of=old.gate_of[ahead])
+        keep, set_current = len(old.items), 1
+    route = splice(
+        turn.voyage, turn.config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts)
+    if turn.state.route is not None and _is_same(turn.state.route, route):
+        turn.update(route=replace(route, items=turn.state.route.items, points_en_m=turn.state.route.points_en_m))
+        turn.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
+        return
+    way = route.points_en_m[turn.state.index if set_current is None else set_current - 1:-1]
+    met = meetings(turn)
+    unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
+    change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
+    upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}", change=change)
+
+
+def _apart(points: list[PointEn]) -> list[PointEn]:
+    """Return the points without those that stand on the one before: the autopilot cannot sail a leg of no length."""
+    out = points[:1]
+    for n, point in enumerate(points[1:], start=1):
+        if distance_m(out[-1], point) >= SAME_M:
+            out.append(point)
+        elif n == len(points) - 1 and len(out) > 1:
+            out[-1] = point   # the end stays where it was planned
+        elif n == len(points) - 1:
+            out.append(point)
+    return out
+
+
+def simplified(problem: Problem, points: list[PointEn]) -> list[PointEn]:
+    """Return the path without the waypoints that it does not need.
+
+    A planner bends a leg a little as the no-go zone widens with time; each bend is an upload's item and a replan.
+    A waypoint goes when the path without it passes the planner's own check and is not slower than by
+    ``SPARE_SHARE`` and ``SPARE_S``.
+    """
+    if len(points) < 3 or len(points) > SIMPLIFIED_AT_MOST:
+        return points
+    whole = problem.evaluate(np.asarray(points))
+    if not whole.is_feasible:
+        return points
+    allowed_s = whole.time_s * (1.0 + SPARE_SHARE) + SPARE_S
+    kept = list(points)
+    n = 1
+    while n < len(kept) - 1:
+        shorter = kept[:n] + kept[n + 1:]
+        judged = problem.evaluate(np.asarray(shorter))
+        if judged.is_feasible and judged.time_s <= allowed_s:
+            kept = shorter
+        else:
+            n += 1
+    return kept
+
+
+def _is_same(a: Route, b: Route) -> bool:
+    return len(a.items) == len(b.items) and all(
+        x.command == y.command and distance_m(p, q) < SAME_M
+        for x, y, p, q in zip(a.items, b.items, a.points_en_m, b.points_en_m, strict=True)
+    )
+
+
+def is_old_plan_sound(turn: Turn) -> bool:
+    """Return whether the mission sailed now is still good for the present wind and keeps the margin's floor."""
+    boat, wind, ahead = turn.boat_en, turn.wind_mean, turn.ahead()
+    if boat is None or wind is None or not ahead:
+        return False
+    verdict = judge(
+        [boat, *ahead], boat=turn.voyage.boat, no_go_half_rad=turn.no_go_half_rad, twd_from_rad=wind[0],
+        tws_mps=wind[1], area=turn.voyage.area, beat_room_m=room_m(turn),
+    )
+    return verdict.is_sound(min(turn.config.margin_floor_m, turn.config.margin_m))
+
+
+def _not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
+    steps = rungs(turn.config)
+    state = turn.state
+    where = steps[min(pending.rung, len(steps) - 1)].name or "as configured"
+    met = meetings(turn) if state.route is not None else ()
+    if pending.rung == 0 and state.route is not None and not met and is_old_plan_sound(turn):
+        turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
+        turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
+        return
+    # Only the boat's own place helps when the way from a waypoint ahead is closed: the rungs start at the boat.
+    from_index = pending.from_index if pending.rung == 0 and state.route is not None and _tail_only(turn) else None
+    if pending.rung + 1 < len(steps):
+        following = steps[pending.rung + 1].name
+        text = f"no plan {where} ({reason}): trying {following}"
+        turn.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
+        if request(turn, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
+            return
+    turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
+    if met and is_old_plan_sound(turn):
+        # Loitering in a vessel's way is no better than sailing on through it: the operator must know.
+        turn.say(
+            Severity.CRITICAL, "no way clear",
+            f"no plan keeps clear of {met[0].name}, met in {met[0].time_s:.0f} s: the old plan stays", every_s=0.0)
+        return
+    wait = turn.state.plan_retry.not_before_s - turn.t_s
+    turn.say(
+        Severity.CRITICAL, "no plan at all",
+        f"no plan on any step of the ladder ({reason}): holding, trying again in {wait:.0f} s", every_s=0.0)
+    hold(turn, f"no plan found: {reason}")
+
+
+def _tail_only(turn: Turn) -> bool:
+    """Return whether the way to the present target is sound by itself, so that only the tail needs a plan."""
+    boat, leg, wind = turn.boat_en, turn.leg(), turn.wind_mean
+    if boat is None or leg is None or wind is None:
+        return False
+    verdict = judge(
+        [boat, leg[1]], boat=turn.voyage.boat, no_go_half_rad=turn.no_go_half_rad, twd_from_rad=wind[0],
+        tws_mps=wind[1], area=turn.voyage.area, beat_room_m=room_m(turn))
+    return verdict.is_sound(min(turn.config.margin_floor_m, turn.config.margin_m))
+
+
+def hold(turn: Turn, why: str) -> None:
+    """Loiter in the roomiest place near the boat, by a mission that ends there at once."""
+    boat, wind, state = turn.boat_en, turn.wind_mean, turn.state
+    turn.phase(Phase.HOLDING if state.sailing else Phase.WAITING, why)
+    if boat is None or not state.sailing or state.route is None or state.index >= len(state.route.items) - 1:
+        return   # not under way, or already in the safe end of the mission
+    place, room = loiter_place(turn.voyage, turn.config, boat, wind[0] if wind else 0.0)
+    keep = state.index
+    end = waypoint(turn.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
+    route = replace(
+        state.route, items=(*state.route.items[:keep], end), points_en_m=(*state.route.points_en_m[:keep], place),
+        leg_from_en_m=(*state.route.leg_from_en_m[:keep], boat), gate_of=(*state.route.gate_of[:keep], -1),
+        rung="hold", risk=None, cost_s=None, why=f"{why}; loitering with {room:.0f} m of room",
+    )
+    upload(turn, route, keep + 1, route.why)

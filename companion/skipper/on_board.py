@@ -1,0 +1,119 @@
+"""The mission on the autopilot: read, compared, and known to be ours, empty, a mixture of ours, or foreign."""
+
+from __future__ import annotations
+
+from companion.messages import MissionItem, Mode
+from companion.skipper.actions import ReadMission, Severity
+from companion.skipper.route import held_back, is_mixture, is_same_mission
+from companion.skipper.snapshot import OperatorWish
+from companion.skipper.state import Persisted, Phase
+from companion.skipper.turn import Turn
+
+
+def mission_is_known(turn: Turn) -> bool:
+    """Make sure that the mission on the autopilot is ours, empty, or known not to be."""
+    state = turn.state
+    if state.wish is OperatorWish.REPLACE_FOREIGN:
+        turn.update(wish=None, foreign="", replace_foreign=True)
+        state = turn.state
+    if state.foreign:
+        if turn.snapshot.permissions.may_replace_foreign:
+            turn.update(foreign="", route=None, replace_foreign=True)
+            return True
+        phase = Phase.OPERATOR if state.sailing else Phase.WAITING
+        turn.phase(phase, f"{state.foreign}; it is not resumed and not replaced without permission")
+        return False
+    if state.pending_upload is not None:
+        return True
+    if state.checked_mission:
+        if state.sailing and turn.t_s - state.read_t_s > turn.config.reread_s and state.pending_read is None:
+            _read(turn, "a look now and then whether it is still ours")
+        elif state.read_t_s > state.read_since_s and state.read_items is not None and state.route is not None and (
+            state.read_t_s == turn.t_s and not is_same_mission(state.read_items, state.route.items)
+        ):
+            turn.update(checked_mission=False, read_since_s=state.read_t_s)
+        else:
+            return True
+    state = turn.state
+    if state.checked_mission:
+        return True
+    onboard = turn.snapshot.mission
+    items, read_t_s = state.read_items, state.read_t_s
+    if onboard.items is not None and onboard.read_t_s is not None and onboard.read_t_s > read_t_s:
+        items, read_t_s = onboard.items, onboard.read_t_s
+    if items is None or read_t_s < state.read_since_s:
+        if state.pending_read is None and turn.t_s >= state.read_retry.not_before_s:
+            _read(turn, "whose mission is on board?")
+        if not state.sailing:
+            turn.phase(Phase.WAITING, "reading the mission on the autopilot")
+        else:
+            # Under way nothing is changed on a mission that may not be ours; what is there sails on.
+            turn.phase(state.phase, "reading the mission on board before anything is changed on it")
+        return False
+    return _compare(turn, items)
+
+
+def _read(turn: Turn, text: str) -> None:
+    number = turn.new_id()
+    turn.update(pending_read=(number, turn.t_s))
+    turn.act(ReadMission(read_id=number, text=text))
+
+
+def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
+    """Judge the mission that was read: ours, empty, a mixture of ours, or foreign."""
+    state = turn.state
+    saved = state.adoptable
+    turn.update(checked_mission=True, read_t_s=turn.t_s, adoptable=None)
+    routes = [r for r in (
+        state.route, state.unsure_route, saved.route if saved else None, saved.pending if saved else None,
+    ) if r is not None]
+    for route in routes:
+        if is_same_mission(items, route.items):
+            turn.update(route=route, unsure_route=None)
+            if saved is not None and state.route is None:
+                _adopt(turn, saved)
+            return True
+    cut = next((c for c in (held_back(items, r) for r in routes) if c is not None), None)
+    if cut is not None:
+        turn.update(route=cut, unsure_route=None)
+        turn.say(Severity.WARNING, "held back", f"{cut.why}: planning on", every_s=0.0)
+        if saved is not None and state.route is None:
+            _adopt(turn, saved)
+        return True
+    if not items:
+        turn.update(route=None, unsure_route=None)
+        if saved is not None:
+            turn.update(gate=saved.gate)
+        return True
+    if any(is_mixture(items, a.items, b.items) for a in routes for b in routes):
+        newest = state.unsure_route or (saved.pending if saved else None) or routes[0]
+        turn.say(Severity.WARNING, "mixture", "an upload was cut short: the mission is put right", every_s=0.0)
+        if saved is not None:
+            turn.update(gate=saved.gate, sailing=state.sailing or _under_way(turn))
+        turn.update(route=state.route or newest, unsure_route=newest, repair=True)
+        return True
+    if state.replace_foreign or turn.snapshot.permissions.may_replace_foreign:
+        turn.update(route=None, unsure_route=None, replace_foreign=True)
+        return True
+    text = f"the mission on the autopilot ({len(items)} items) is not ours"
+    turn.update(foreign=text, route=None, unsure_route=None)
+    turn.say(Severity.ERROR, "foreign mission", turn.state.foreign, every_s=0.0)
+    turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{turn.state.foreign}; it is not resumed")
+    return False
+
+
+def _under_way(turn: Turn) -> bool:
+    status = turn.autopilot
+    return status is not None and status.is_armed and status.mode is Mode.AUTO
+
+
+def _adopt(turn: Turn, saved: Persisted) -> None:
+    """Take over the mission that sails, without an upload."""
+    status = turn.autopilot
+    index = (status.mission_seq or 1) - 1 if status is not None else 0
+    turn.update(
+        gate=saved.gate, index=index, own_index=index, after_restart=True, own_mode=saved.own_mode,
+        # Armed but not in AUTO: somebody else has taken the boat while we were away.
+        sailing=_under_way(turn) or (saved.sailing and status is not None and status.is_armed),
+    )
+    turn.say(Severity.NOTICE, "adopted", f"the mission on board is ours: taken over at item {index + 1}", every_s=0.0)
