@@ -32,6 +32,18 @@ def test_clearance_is_the_smallest_distance():
     assert clearance == pytest.approx(7.0, abs=0.05)
 
 
+def test_a_boat_that_never_sailed_touched_nothing_and_does_not_pass():
+    def verdict(truth):
+        return judge(scenario="x", seed=0, expect=ExpectSpec(arrived=None), truth=truth, solid=ISLAND,
+                     goal_en_m=(0.0, 99.0), summary={}, status_times_s=None, alerts=())
+
+    assert verdict(_truth([0.0] * 400)).passed is False   # through the island
+    away = _truth([0.0] * 400)
+    away.en_m = [(50.0, north) for _, north in away.en_m]
+    assert verdict(away).passed
+    assert not verdict(Truth()).passed
+
+
 def test_open_water_has_no_clearance():
     assert contacts_and_clearance(np.zeros((3, 2)), shapely.Polygon()) == (0, math.inf)
 
