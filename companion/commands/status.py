@@ -13,6 +13,7 @@ from typing import Any
 EXIT_NO_LINK, EXIT_STALE, EXIT_ALARM = 3, 4, 5
 # States of the skipper that somebody ashore should look at.
 ALARM_STATES = frozenset({"holding"})
+ALARMS_OF_VESSELS = frozenset({"act", "touch"})
 SCHEMA = "companion.status/1"
 
 
@@ -82,7 +83,7 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
             document = status_document(report, vehicle.status, link.is_alive, link.bytes_per_s()[0], link.loss())
             write(document)
             if args.once:
-                return _exit_code(document, args.max_age)
+                return exit_code(document, args.max_age)
             await asyncio.sleep(args.every)
 
 
@@ -90,10 +91,13 @@ def _has_packed(report: Any) -> bool:
     return report is not None and bool(report.has_packed)
 
 
-def _exit_code(document: dict[str, Any], max_age_s: float) -> int:
+def exit_code(document: dict[str, Any], max_age_s: float) -> int:
+    """Return how the command ends with this status."""
     if document["age_s"] > max_age_s:
         return EXIT_STALE
-    return EXIT_ALARM if document["state"] in ALARM_STATES else 0
+    worst = None if document["traffic"] is None else document["traffic"]["worst"]
+    is_near = worst is not None and worst["alarm"] in ALARMS_OF_VESSELS
+    return EXIT_ALARM if is_near or document["state"] in ALARM_STATES else 0
 
 
 def status_document(report: Any, autopilot: Any, is_alive: bool, bytes_in: float, loss: float) -> dict[str, Any]:

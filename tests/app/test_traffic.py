@@ -49,6 +49,8 @@ def test_a_ship_heard_by_the_autopilot_is_avoided_and_the_voyage_replays(tmp_pat
     assert 0.0 < summary["promised_risk_vessels"] < summary["promised_risk"]
     assert 0.0 <= summary["path_risk_vessels"] <= summary["path_risk"]
     plans = [d["plan"] for d in decisions(tmp_path) if d["kind"] == "plan" and d["plan"]]
+    changed = [d for d in decisions(tmp_path) if "path_distance_m" in d]
+    assert any(d["path_distance_m"] > 50.0 and "211000001" in d["old_route"] for d in changed)
     assert any("vessels" in p["why"]["text"] and p["why"]["data"]["risk"]["by_vessel"] for p in plans)
 
 
@@ -131,7 +133,7 @@ def test_a_report_survives_its_record(report):
 
 
 def test_four_ships_at_once_and_the_paths_look_alike(tmp_path):
-    """Büsser 2009, section 5.2: no replanning more often than every 20 s; a path changes only where it was unsafe."""
+    """Büsser 2009, section 5.2: no replanning more often than every 20 s; a path that is safe stays, or changes to one like it."""
     path = Path("sitl/scenarios/four-ships.toml")
     verdict = run_virtual(run_embedded(load_scenario(path), path, 0, tmp_path))
     assert verdict.passed, failed(verdict)
@@ -140,7 +142,6 @@ def test_four_ships_at_once_and_the_paths_look_alike(tmp_path):
     assert len({v for d in records for v in d.get("vessels", ())}) == 4
     assert all(b - a >= 20.0 for a, b in pairwise(asked))
     changes = [d for d in records if d.get("action") == "UploadMission" and "path_distance_m" in d]
-    assert changes
     for change in changes:
         assert change["path_distance_m"] <= ALIKE_M or change["old_route"] != "safe"
     shared = [d for d in records if d.get("action") == "RequestPlan" and d.get("vessels")]

@@ -10,7 +10,7 @@ import pytest
 from pyais.encode import encode_dict
 
 from companion.clock import now_s, run_virtual
-from companion.commands.status import status_document, traffic_line
+from companion.commands.status import EXIT_ALARM, exit_code, status_document, traffic_line
 from companion.geofence import load_mission
 from companion.mavlink.frames import Codec
 from companion.mavlink.status_wire import StatusReader
@@ -71,6 +71,9 @@ def on_air(out):
                 document = status_document(reader.report(record.unix_us / 1e6), None, True, 0.0, 0.0)
                 if document["traffic"] is not None:
                     found.append(document["traffic"])
+                    worst = document["traffic"]["worst"]
+                    assert (worst is None or worst["alarm"] not in {"act", "touch"}) or (
+                        exit_code(document, 10.0) == EXIT_ALARM)
     return found
 
 
