@@ -142,6 +142,7 @@ def _improve(s: Searcher) -> None:
             sharpened = True
             left = 8.0 * (s.effort.limit - s.effort.used) if s.effort.limit is not None else 2e6 * s.effort.remaining_s
             s.geodesic(int(0.25 * left))
+            s.effort.spend(s.bound.sharpen_late(s.upper_s, min(40_000, int(0.1 * left))) // 8)
         elif drifts and spent <= 0.35 * before and len(drifts) >= len(lattices):
             s.drift(*drifts.pop(0), 1.05 * s.upper_s)
         elif lattices and spent <= 0.35 * before:

@@ -22,6 +22,10 @@ from companion.planner.world import World, make_world, polygons
 
 _NORMALS = 48
 _STEPS = 240
+_ANGLES = 901
+LATE = 0.9
+"""Share of the path's time whose zone gives the metric of ``Bound.sharpen_late``: the bound is flat about it."""
+MOST_LATE_RAD = math.radians(86.0)
 
 
 def turning_s(world: World) -> float:
@@ -58,14 +62,19 @@ def turning_s(world: World) -> float:
     return min(sweep, math.pi) / b.omega + lost
 
 
+def grows(problem: Problem) -> bool:
+    """Does the no-go zone grow steadily, in water that stands still?"""
+    sigma = problem.wind.sigma
+    steadily = sigma.model == "kalman" or (sigma.model == "ar1" and sigma.sigma_inf_rad > sigma.sigma0_rad)
+    return problem.is_time_varying and steadily and problem.current.drift_mps == 0.0
+
+
 def progress_s(problem: Problem, goal: tuple[float, float], radius_m: float) -> float:
     """Return the least sailing time [s] to the goal's disc with the no-go zone as it grows; inf when never.
 
     0 where the zone does not grow steadily. ``goal`` is in the wind frame.
     """
-    sigma = problem.wind.sigma
-    grows = sigma.model == "kalman" or (sigma.model == "ar1" and sigma.sigma_inf_rad > sigma.sigma0_rad)
-    if not problem.is_time_varying or not grows or problem.current.drift_mps > 0.0:
+    if not grows(problem):
         return 0.0
     least = max(0.0, problem.no_go_min_rad - NO_GO_SLACK_RAD)
     top = min(math.pi, problem.boat.max_twa_rad + NO_GO_SLACK_RAD)
@@ -104,6 +113,30 @@ def progress_s(problem: Problem, goal: tuple[float, float], radius_m: float) -> 
         else:
             worst = max(worst, float(times[-1]))
     return worst
+
+
+def late_s(problem: Problem, late: Gauge, metric_s: float, at_s: float) -> float:
+    """Return the least sailing time [s] to where the metric of ``at_s`` says ``metric_s``, in a zone that grows.
+
+    A velocity allowed at s < ``at_s`` takes at most its gauge in that metric off the time to go; one allowed later is
+    in the later hull, so it takes 1 at most. The integral of that must come to ``metric_s``.
+    """
+    times = np.linspace(0.0, at_s, _STEPS)
+    half = np.array([problem.no_go_half_rad(float(t)) for t in times]) - NO_GO_SLACK_RAD
+    least, top = max(0.0, float(half[0])), min(math.pi, problem.boat.max_twa_rad + NO_GO_SLACK_RAD)
+    nodes = np.asarray(problem.boat.polar_twa_rad)
+    angle = np.unique(np.clip(np.concatenate([np.linspace(least, top, _ANGLES), half, nodes]), least, top))
+    v = np.interp(angle, problem.boat.polar_twa_rad, problem.boat.polar_mps) * (1.0 + 1e-5)
+    side, ahead = v * np.sin(angle), v * np.cos(angle)
+    gauged = np.maximum(np.max(np.outer(side, late.normals[:, 0]) + np.outer(ahead, late.normals[:, 1]), axis=1),
+                        np.max(np.outer(-side, late.normals[:, 0]) + np.outer(ahead, late.normals[:, 1]), axis=1))
+    beyond = np.maximum.accumulate(gauged[::-1])[::-1]                          # over all angles >= this one
+    index = np.minimum(np.searchsorted(angle, half, side="left"), len(angle) - 1)
+    fastest = np.maximum(1.0, beyond[index])
+    made = np.concatenate([[0.0], np.cumsum(fastest[:-1] * np.diff(times))])   # at its largest over each step
+    if metric_s >= made[-1]:
+        return at_s + metric_s - float(made[-1])
+    return float(np.interp(metric_s, made, times))
 
 
 class Bound:
@@ -153,6 +186,30 @@ class Bound:
             cut = 4.0 * TOUCH_M * gauge.table_max * (2 + (len(self.path) if self.path is not None else len(nodes)))
             self.metric_s = max(self.metric_s, low - cut)
             self.is_exact = found
+        return int(made)
+
+
+    def sharpen_late(self, upper_s: float, tests: int) -> int:
+        """Search the visibility graph with the metric of the zone near the end, where it grows; return the tests."""
+        world, problem = self.world, self.world.problem
+        at_s = LATE * upper_s
+        if not grows(problem) or not self.gauge.can_move or not math.isfinite(at_s):
+            return 0
+        half = problem.no_go_half_rad(at_s)
+        if half > MOST_LATE_RAD:
+            return 0
+        late = make_gauge(replace(problem, wind=replace(problem.wind, sigma=type(problem.wind.sigma)()),
+                                  boat=replace(problem.boat, no_go_half_rad=max(0.0, half - NO_GO_SLACK_RAD))))
+        if not late.can_move or len(late.blocked):
+            return 0
+        goal = np.array([*world.goal, world.goal_radius])
+        nodes = graph_nodes(world.corners, late, (*world.goal, world.goal_radius), math.inf)
+        _, parent, low, end, made = geodesics(
+            world.grid, nodes, late.normals, late.blocked, late.table, goal, 0, math.inf, tests, self.ends)
+        if math.isfinite(low):
+            count = 2 + (len(nodes) if end < 0 or made > tests else int(np.sum(parent >= 0)))
+            low = (low - 4.0 * TOUCH_M * late.table_max * count) / late.slack
+            self.progress_s = max(self.progress_s, late_s(problem, late, low, at_s))
         return int(made)
 
 

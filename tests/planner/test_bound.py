@@ -50,6 +50,19 @@ def test_never_above_a_feasible_plan(raw):
     assert judged.is_feasible, judged.reasons
     assert judged.time_s == pytest.approx(s.best.cost_s, abs=1e-6)
     assert bound.value_s <= judged.time_s + 1e-9
+    for share in (0.5, 1.0, 1.6):                              # the late metric bounds whatever moment it is taken at
+        bound.sharpen_late(share * judged.time_s, 10**5)
+        assert bound.value_s <= judged.time_s + 1e-9
+
+
+def test_the_late_metric_sees_obstacles_in_a_closing_wind():
+    p = load("four-beat-75")
+    bound = Bound(make_world(p), make_gauge(p))
+    bound.sharpen(math.inf, 10**6)
+    before = bound.value_s
+    bound.sharpen_late(475.0, 40_000)
+    assert bound.value_s > 1.01 * before
+    assert bound.value_s < p.evaluate(plan(p, expansions=20_000).waypoints_en).time_s
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
