@@ -1,6 +1,7 @@
 """The skipper among vessels: the route is given up when it meets one, and only then, and at most every 20 s."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from companion.planner.worker import failed
 from companion.skipper import actions as act
 from companion.skipper.actions import ReplanReason
 from companion.skipper.geometry import distance_m
+from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase
 from companion.skipper.traffic import HORIZON_S, UNKNOWN_S, meetings, near, shares
 from companion.skipper.turn import Turn
@@ -110,6 +112,43 @@ def test_a_ship_that_passes_clear_changes_nothing():
     assert not for_traffic(world)
     assert [a.reason for _, a in asked(world)] == [a.reason for _, a in asked(alone)]
     assert np.allclose(world.position, alone.position)
+
+
+@pytest.mark.parametrize(("faster", "north_m", "is_replaced"), [
+    (0.05, 60.0, False), (0.10, 250.0, False),    # clear of everyone: not for so little
+    (0.25, 60.0, True),                           # clearly faster, and it looks alike
+    (0.25, 250.0, False), (0.45, 250.0, True),    # far apart: only for twice as much
+])
+def test_among_ships_a_safe_route_is_replaced_by_a_clearly_faster_one_only(faster, north_m, is_replaced):
+    """A ship passes clear; the planner is made to answer with a path ``north_m`` aside that claims to be faster."""
+    def planner(p, seed):
+        found = plan(p, expansions=1500, seed=seed)
+        if not p.targets or not armed:
+            return found
+        start, goal = found.waypoints_en[0], found.waypoints_en[-1]
+        middle = np.array([0.5 * (start[0] + goal[0]), north_m])
+        half = np.linspace(0.0, 1.0, 40)[:, None]         # more waypoints than are simplified away
+        aside = np.vstack([start + half * (middle - start), middle + half[1:] * (goal - middle)])
+        return replace(found, waypoints_en=aside, cost_s=(1.0 - faster) * found.cost_s)
+
+    armed = []
+    world = make(planner=planner)
+    ship, heard = Ship((200.0, 1100.0), 90.0, 2.0), Targets.empty(FRAME)
+    while world.t < 120.0:
+        if world.t % 10.0 == 0.0:
+            heard = heard.heard(ship.heard(world.t))
+        world.extra = {"traffic": heard.picture(world.t)}
+        if world.t == 90.0:
+            armed.append(True)
+            before = len([a for _, a in world.actions if isinstance(a, act.UploadMission)])
+            world.events.append(OperatorWish.REPLAN)
+        world.step()
+    uploads = [a for _, a in world.actions if isinstance(a, act.UploadMission)][before:]
+    assert asked(world)[-1][1].problem.targets
+    assert bool(uploads) is is_replaced
+    for upload in uploads:
+        assert not upload.change.unsafe
+        assert upload.change.apart_m == pytest.approx(north_m, abs=30.0)
 
 
 def test_without_a_way_clear_the_old_plan_stays_and_the_operator_is_told():
