@@ -10,7 +10,7 @@ from companion.clock import run_virtual
 from companion.geofence import load_mission
 from companion.replay import replay
 from sitl.runner import run_embedded
-from sitl.scenario import load_scenario
+from sitl.scenario import EventSpec, load_scenario
 
 FOLDER = Path("sitl/scenarios")
 LAST_RESORT = FOLDER / "last-resort.toml"
@@ -79,3 +79,12 @@ def test_two_boats_that_do_not_look_meet(tmp_path):
     near = blind.figures["vessel_distances_m"]["211000001"]
     assert near < 60.0 < seeing.figures["vessel_distances_m"]["211000001"]
     assert near > 8.0      # the other boat looks
+
+
+def test_killed_in_the_middle_of_it_the_companion_takes_the_boat_back_to_auto(tmp_path):
+    scenario = load_scenario(LAST_RESORT)
+    kill = EventSpec(at_s=126.0, kind="kill_companion", restart_after_s=4.0)
+    expect = msgspec.structs.replace(scenario.expect, alerts=(), max_silence_s=None)
+    verdict = sail(LAST_RESORT, 0, tmp_path,
+                   msgspec.structs.replace(scenario, events=(*scenario.events, kill), expect=expect))
+    assert verdict.passed, failed(verdict)
