@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import os
 import re
 import signal
 import sys
@@ -104,6 +105,7 @@ async def _sail(
         # The child loads its kernels while this process imports the rest.
         from companion.app import sail
         from companion.telemetry.progress import ProgressLine
+        from companion.telemetry.service import ServiceManager
 
         ready = asyncio.ensure_future(planner.ready())
         if not (await asyncio.wait({ready}, timeout=PATIENCE_S * speedup))[0]:
@@ -112,8 +114,13 @@ async def _sail(
             await ready
         except (TimeoutError, EOFError, OSError) as error:
             raise JobError(f"the planner's process did not start: {error!r}") from error
-        with ProgressLine(sys.stdout) as progress:
-            return await sail(mission, transport, planner, folder, options(), on_status=progress.show, stop=stop)
+        with ProgressLine(sys.stdout) as progress, ServiceManager(os.environ) as manager:
+
+            def show(status: Any, step: Any) -> None:
+                progress.show(status, step)
+                manager.alive(f"{step.state.phase.value}: {step.state.why}")
+
+            return await sail(mission, transport, planner, folder, options(), on_status=show, stop=stop)
 
 
 def _signing(path: Path | None) -> Any:

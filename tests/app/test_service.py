@@ -1,0 +1,93 @@
+"""What the service manager is told, heard on a real socket, and the unit file that is handed out."""
+
+import configparser
+import os
+import shlex
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from companion import cli
+from companion.telemetry.service import STATUS_CHARACTERS, ServiceManager
+from sitl.ships import free_port
+
+UNIT = Path("deploy/companion.service")
+
+
+@pytest.fixture
+def manager(tmp_path):
+    """A service manager that listens: (environment, socket)."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
+        listening.bind(str(tmp_path / "notify"))
+        listening.setblocking(False)
+        yield {"NOTIFY_SOCKET": str(tmp_path / "notify")}, listening
+
+
+def heard(listening):
+    out = []
+    try:
+        while True:
+            out.append(listening.recv(4096).decode())
+    except BlockingIOError:
+        return out
+
+
+def test_it_is_ready_once_alive_each_time_and_says_when_it_stops(manager):
+    environment, listening = manager
+    with ServiceManager(environment) as service:
+        service.alive("waiting: for wind")
+        service.alive("standard:\nitem 2 of 5 " + 500 * "x")
+    first, second, last = heard(listening)
+    assert first == "READY=1\nSTATUS=waiting: for wind\nWATCHDOG=1"
+    status = second.splitlines()[0]
+    assert status.startswith("STATUS=standard: item 2 of 5")     # one line, whatever it was
+    assert len(status) <= STATUS_CHARACTERS + len("STATUS=")
+    assert second.splitlines()[1] == "WATCHDOG=1"
+    assert last == "STOPPING=1"
+
+
+def test_without_a_manager_or_with_one_that_is_gone_nothing_happens(tmp_path):
+    with ServiceManager({}) as service:
+        service.alive("nobody hears this")
+    with ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "gone")}) as service:
+        service.alive("nor this")
+
+
+def test_an_abstract_socket():
+    name = f"companion-test-{os.getpid()}"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
+        listening.bind("\0" + name)
+        listening.setblocking(False)
+        with ServiceManager({"NOTIFY_SOCKET": "@" + name}) as service:
+            service.alive("here")
+        assert heard(listening)[0].startswith("READY=1")
+
+
+def test_companion_run_tells_the_manager_while_it_waits_for_an_autopilot(manager, tmp_path):
+    environment, listening = manager
+    link = f"udpin:127.0.0.1:{free_port()}"
+    ended = subprocess.run(
+        [sys.executable, "-m", "companion.cli", "run", "missions/open-water.toml", "--link", link, "--out",
+         str(tmp_path / "voyage"), "--wait", "3"],
+        env={**os.environ, **environment}, capture_output=True, text=True, timeout=300, check=False)
+    assert ended.returncode == 1
+    told = heard(listening)
+    assert told[0].startswith("READY=1\nSTATUS=waiting: ")
+    assert sum("WATCHDOG=1" in text for text in told) >= 2
+    assert told[-1] == "STOPPING=1"
+
+
+def test_the_unit_file_starts_the_program_as_it_is():
+    unit = configparser.ConfigParser(interpolation=None, strict=False)
+    unit.optionxform = str
+    unit.read_string(UNIT.read_text())
+    service = unit["Service"]
+    assert service["Type"] == "notify"
+    assert service["RestartPreventExitStatus"] == "2"
+    program, *arguments = shlex.split(service["ExecStart"])
+    assert Path(program).name == "companion"
+    parsed = cli.PROGRAM.parser().parse_args(arguments)
+    assert str(parsed.link) == "udpin:127.0.0.1:14551"
