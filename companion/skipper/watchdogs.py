@@ -76,7 +76,7 @@ TABLE: tuple[Watchdog, ...] = (
     W(name="in irons", watches="speed ahead while pointing within 35° of the wind", enter=0.3, exit=0.8, unit="m/s",
       enter_s=8.0, exit_s=3.0, severity=S.WARNING, response=Response.BEAR_AWAY,
       why="ArduRover has no recovery of its own; a tack takes 2 to 7 s"),
-    W(name="vessel too near", watches="time until the way being sailed is within half the distance to keep of a vessel",
+    W(name="vessel too near", watches="time until our way is within half the distance to keep of a vessel that moves",
       enter=30.0, exit=60.0, unit="s", enter_s=2.0, exit_s=8.0, severity=S.WARNING, response=Response.BY_FIELD,
       why="a plan, its upload and the turn take too long; while headings are sent, our own field keeps clear"),
     W(name="no progress", watches="way made good towards the target in 180 s", enter=5.0, exit=15.0, unit="m",

@@ -109,6 +109,16 @@ def test_the_same_intruder_comes_nearer_without_permission_to_steer_and_it_is_sa
     assert not any(isinstance(a, act.SetMode) and a.mode is Mode.GUIDED for _, a in world.actions)
 
 
+def test_a_vessel_at_anchor_is_the_planners_matter():
+    world = make()
+    world.run(100)
+    anchored = Intruder(world, 90.0, 60.0, speed_mps=3.0)
+    anchored.speed = 0.0
+    meet(world, anchored, 60.0)
+    assert NAME not in said(world)
+    assert not steered(world)
+
+
 def test_what_stands_still_is_kept_clear_of_too():
     """The way out that the look-ahead would take in open water ends on a rock."""
     least = []
