@@ -17,6 +17,7 @@ from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from sitl.tasks.guided import run_station, run_wrsc
 from sitl.tasks.scores import sailbot_points, station_score
+from sitl.tasks.station import run as keep_station
 from sitl.tasks.wrsc2013 import HALF_M, campaign, draw, run, score, table
 
 EARLY = (66, 154)
@@ -103,6 +104,22 @@ def test_station_keeping_over_mavlink() -> None:
     result = run_station(0)
     assert result["kept"]
     assert result["radius95_m"] < 9.4      # 2018's best by a real boat; this one tacks in 2 s and has no leeway
+
+
+@pytest.mark.parametrize(("method", "within_m"), [("plan", 9.4), ("loiter", 9.4)])
+def test_station_keeping_by_plan_over_mavlink(method: str, within_m: float) -> None:
+    result = run_station(0, method=method)
+    assert result["kept"]
+    assert result["radius95_m"] < within_m
+
+
+def test_vaimos_keeps_station_by_field_better_than_by_plan_and_than_2018s_best_per_length() -> None:
+    by_field, by_plan = ([keep_station(seed, method)[1] for seed in range(12)] for method in ("field", "plan"))
+    assert all(s.kept for s in (*by_field, *by_plan))
+    lengths = [float(np.median([s.lengths for s in scores])) for scores in (by_field, by_plan)]
+    assert lengths[0] < lengths[1]
+    assert lengths[0] < 9.38229774571029 / 2.6
+    assert np.median([s.sailbot for s in by_field]) >= 9.5
 
 
 # ------------------------------------------------------------------------------------- station scorers
