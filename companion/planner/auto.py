@@ -20,7 +20,7 @@ from companion.planner.gauge import make_gauge
 from companion.planner.kernels import Floats
 from companion.planner.plan import PlanStatus
 from companion.planner.problem import Problem
-from companion.planner.searcher import Searcher
+from companion.planner.searcher import FINE_FROM, Searcher
 from companion.planner.solve import Effort, Outcome
 from companion.planner.world import World, make_world
 
@@ -132,6 +132,9 @@ def _improve(s: Searcher) -> None:
         s.geodesic(40_000)
     while not s.is_done:
         before = s.effort.fraction
+        if before >= FINE_FROM:
+            s.finish()
+            continue
         if not looked and before > 0.08:
             looked = True
             s.other_sides(12)

@@ -69,6 +69,7 @@ class Searcher:
         self.pool: list[Candidate] = []
         self.best: Candidate | None = None
         self.turns = 0
+        self.is_finishing = False
         self.pops_per_s = 6e5
 
     # ------------------------------------------------------------------------------------ candidates
@@ -396,6 +397,16 @@ class Searcher:
             self.refine(min(rivals, key=lambda c: (c.cost_s / self.upper_s - 1.0) * 1e6 + c.moves))
         else:
             self.refine(kept[0])
+
+    def finish(self) -> None:
+        """Give a chunk to the best candidate: its way is chosen, its curves are drawn, in cycles that are not hot."""
+        best = self.best
+        if best is None:
+            return
+        if not self.is_finishing:
+            self.is_finishing = True
+            best.last, best.done, best.cycle, best.cycles = best.points, 0, _FIRST_CYCLE, 2
+        self.refine(best)
 
     def _spots(self, candidate: Candidate) -> Floats:
         """Return up to 200 obstacle corners near the path."""
