@@ -7,7 +7,7 @@ from companion.planner.solve import plan
 
 
 def warm(algorithm: str = "auto") -> None:
-    """Plan two small problems: a beat round an obstacle, and the same with uncertain wind and a target."""
+    """Plan two small problems: a beat round an obstacle, and the same with uncertain wind and a vessel."""
     base = {
         "id": "warm", "title": "warm", "start": {"x": 0, "y": 0, "heading_deg": 10},
         "goal": {"x": 5, "y": 120, "radius": 4}, "obstacles": ["POLYGON ((-15 40, 15 40, 15 60, -15 60, -15 40))"],
@@ -16,7 +16,8 @@ def warm(algorithm: str = "auto") -> None:
                                                           "growth_deg_per_sqrt_s": 0.2}},
         "boat": {"no_go_half_deg": 42, "max_twa_deg": 165, "turn_rate_rad_s": 0.5,
                  "speed": {"model": "polar", "twa_deg": [0, 45, 90, 180], "v_mps": [0, 1, 1.6, 1.2]}},
-        "delta_s": 0.6, "targets": [{"x": 500, "y": 500, "radius_m": 1}],
+        "delta_s": 0.6, "targets": [{"x": 500, "y": 500, "radius_m": 1, "spread": {
+            "vessel": 1, "x": 500, "y": 500, "course_deg": 0, "keep_m": 1, "along_m": 1, "across_m": 1, "sigma_m": 1}}],
     }
     for problem in (base, base | {"fence": None, "targets": []}):
         plan(Problem.from_json(problem), expansions=20_000 if algorithm == "auto" else 2000, algorithm=algorithm)
