@@ -184,6 +184,7 @@ class Problem:
     """One planning problem (see the module's text). Times count from the start of the plan, t = 0.
 
     ``vessels_part`` is what uncertain targets get of 1 - delta_s, at each instant and together; None: a tenth of it.
+    ``leg_saving`` is what a leg must save, as a share of the path's time, for ``auto`` to keep it.
     """
 
     id: str = ""
@@ -202,6 +203,7 @@ class Problem:
     vessels_part: float | None = None
     risk: RiskLimit | None = None
     clearance_floor_m: float = 0.0
+    leg_saving: float = 1e-5
     beat: Beat | None = None
     notes: str = ""
     extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
@@ -384,7 +386,7 @@ def _defect(p: Problem) -> str | None:
         "boat.turn_rate_rad_s": b.turn_rate_radps, "delta_s": p.delta_s, "boat.tack_loss_s": b.tack_loss_s,
         "boat.gybe_loss_s": b.gybe_loss_s,
         "boat.gybe_room_m": b.gybe_room_m or 0.0, "current": p.current.set_rad + p.current.drift_mps,
-        "clearance_floor_m": p.clearance_floor_m,
+        "clearance_floor_m": p.clearance_floor_m, "leg_saving": p.leg_saving,
         "wind.sigma": sum((w.sigma.sigma0_rad, w.sigma.growth_rad_per_sqrt_s, w.sigma.sigma_inf_rad,
                            w.sigma.rho_hz, *w.sigma.horizon_s, *w.sigma.sigma_rad,
                            *(w.sigma.half_width_rad or ()))),
@@ -415,6 +417,7 @@ def _defect(p: Problem) -> str | None:
         ((b.gybe_room_m or 0.0) >= 0.0, "gybe_room_m is negative"),
         (p.current.drift_mps >= 0.0, "the current's drift is negative"),
         (p.clearance_floor_m >= 0.0, "the clearance floor is negative"),
+        (p.leg_saving >= 0.0, "leg_saving is negative"),
         (min((w.sigma.sigma0_rad, w.sigma.growth_rad_per_sqrt_s, w.sigma.sigma_inf_rad, w.sigma.rho_hz,
               *w.sigma.sigma_rad, *(w.sigma.half_width_rad or ()))) >= 0.0,
          "a sigma, growth or rate of the wind is negative"),

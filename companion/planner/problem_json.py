@@ -140,7 +140,7 @@ def parse(raw: Mapping[str, Any], source: str) -> Problem:
         raise InputError(source, "targets", "is not a list", "write a list of objects")
     twa, mps = _parse_speed(boat.child("speed"))
     known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
-             "targets", "allocation", "risk", "clearance_floor_m", "beat"}
+             "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat"}
     return Problem(
         id=top.text("id", ""),
         title=top.text("title", ""),
@@ -174,6 +174,7 @@ def parse(raw: Mapping[str, Any], source: str) -> Problem:
         vessels_part=_parse_allocation(top.child("allocation")) if raw.get("allocation") is not None else None,
         risk=_parse_risk(_Reader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,
         clearance_floor_m=top.number("clearance_floor_m", 0.0),
+        leg_saving=top.number("leg_saving", Problem.leg_saving),
         beat=_parse_beat(top.child("beat")) if raw.get("beat") is not None else None,
         extra={k: v for k, v in raw.items() if k not in known},
     )
@@ -337,6 +338,8 @@ def unparse(p: Problem) -> dict[str, Any]:
         out["risk"] = {"max_path_risk": p.risk.max_path_risk, "correlation_time_s": p.risk.correlation_time_s}
     if p.clearance_floor_m:
         out["clearance_floor_m"] = p.clearance_floor_m
+    if p.leg_saving != Problem.leg_saving:
+        out["leg_saving"] = p.leg_saving
     if p.beat is not None:
         out["beat"] = {"no_go_half_deg": deg(p.beat.no_go_half_rad), "corridor_m": p.beat.corridor_m,
                        "clearance_m": p.beat.clearance_m, "tack_s": p.beat.tack_s}

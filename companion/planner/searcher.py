@@ -20,12 +20,13 @@ from companion.planner.solve import Effort
 from companion.planner.visibility import crossings, geodesics, graph_nodes
 from companion.planner.world import World
 
-LEG_PRICE, FINE_PRICE = 8e-5, 1e-5
-"""What a leg must save to be worth sailing, as a share of the path's time: while ways are compared, and at the end.
+LEG_PRICE = 8e-5
+"""What a leg must save, as a share of the path's time, while ways are compared; at the end the problem's share counts.
 
 A beat into a closing wind follows a curve, of which each further leg cuts off a little; but many legs make a
 candidate slow to improve, and the wrong way round then wins."""
 FINE_FROM = 0.85
+"""Share of the effort after which only the best path is improved."""
 STOP_GAP = 2e-4
 """Stop when the path is this close to the bound."""
 _CHUNK = 4_000
@@ -81,7 +82,8 @@ class Searcher:
     @property
     def leg_price(self) -> float:
         """What a leg must save now, as a share of the path's time."""
-        return LEG_PRICE if self.effort.fraction < FINE_FROM else FINE_PRICE
+        least = self.world.problem.leg_saving
+        return max(LEG_PRICE, least) if self.effort.fraction < FINE_FROM else least
 
     @property
     def is_done(self) -> bool:

@@ -27,6 +27,7 @@ from companion.skipper.voyage import PointEn, Voyage
 REPAIR_RINGS_M = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0)
 REPAIR_DIRECTIONS = 24
 NOTCH = 2.0     # radius of the notch as a multiple of what the start lacks: room to turn out of it
+LEG_SAVING = 8e-5   # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
 HAIR_M = 0.2    # a repaired point stands this far clear of the margin it was repaired for
 
 
@@ -216,6 +217,7 @@ def problem_dict(
         "wind": wind,
         "boat": boat,
         "delta_s": delta_s,
+        "leg_saving": LEG_SAVING,
         "beat": beat,
         "risk": None if max_path_risk is None else {
             "max_path_risk": max_path_risk, "correlation_time_s": forecast.correlation_time_s},

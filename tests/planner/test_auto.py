@@ -103,6 +103,13 @@ def test_a_tack_that_costs_is_avoided_by_gybing():
     assert dear.cost_s < cheap.cost_s + 60.0
 
 
+def test_a_leg_must_save_what_the_problem_asks():
+    raw = load("open-beat-kalman").to_dict()
+    many, few = (plan(Problem.from_json(raw | {"leg_saving": s}), expansions=60_000) for s in (1e-5, 1e-3))
+    assert len(many.legs) > len(few.legs)
+    assert many.cost_s < few.cost_s
+
+
 def test_a_clearance_floor_is_kept():
     raw = simple(goal={"x": 0, "y": -100, "radius": 1}, obstacles=[box(-30, -60, 4, -40)])
     answer = plan(Problem.from_json(raw | {"clearance_floor_m": 6.0}), expansions=30_000)
