@@ -101,14 +101,14 @@ def _board(
     beyond = -state.side * across
     if state.phase is Phase.BOARD and beyond > (0.0 if up > 0.0 else station.board_max_m):
         state = replace(state, phase=Phase.TACK, since_s=t, side=-state.side)
-    if state.phase is Phase.TACK:
-        if twa * state.side > 0.0 and abs(twa) < station.board_twa_rad + math.radians(25.0):
-            state = replace(state, phase=Phase.BOARD, since_s=t)
-        elif t - state.since_s > 45.0:
-            state = replace(state, phase=Phase.RETURN, since_s=t)
     # To windward of the point she bears off, up to a broad reach: that is how she loses height on purpose.
     height = max(0.0, up + 1.0)
     angle = min(math.radians(125.0), station.board_twa_rad + math.radians(station.bear_off_deg_per_m) * height)
+    if state.phase is Phase.TACK:
+        if twa * state.side > 0.0 and abs(twa) < angle + math.radians(25.0):
+            state = replace(state, phase=Phase.BOARD, since_s=t)
+        elif t - state.since_s > 45.0:
+            state = replace(state, phase=Phase.RETURN, since_s=t)
     steering, heading, why = helm(state.steering, situation, twd - state.side * angle, habits)
     setpoint = Setpoint(t_s=t, heading_rad=wrap_pi(heading), reason=f"{state.phase.value}: {why}")
     return replace(state, steering=steering), setpoint
