@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from companion.planner.gauge import Gauge
+from companion.planner.heap import sift_down, sift_up
 from companion.planner.kernels import (
     Boat,
     Floats,
@@ -27,7 +28,7 @@ from companion.planner.kernels import (
     worst_half,
     wrap,
 )
-from companion.planner.lattice import LatticeResult, sift_down, sift_up
+from companion.planner.lattice import LatticeResult
 from companion.planner.moves import corner, edge_angle
 from companion.planner.world import World
 

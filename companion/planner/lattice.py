@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.planner.gauge import Gauge
+from companion.planner.heap import sift_down, sift_up
 from companion.planner.kernels import (
     SLACK_RAD,
     Boat,
@@ -35,37 +36,6 @@ from companion.planner.moves import corner
 from companion.planner.world import World
 
 _START, _CLOCKWISE, _COUNTER, _MOVE, _ROUND = 1, 2, 3, 4, 5
-
-
-@jit
-def sift_up(keys: Floats, items: Ints, i: int) -> None:
-    """Restore the heap after its item ``i`` was put there."""
-    key, item = keys[i], items[i]
-    while i > 0:
-        p = (i - 1) >> 1
-        if keys[p] <= key:
-            break
-        keys[i], items[i] = keys[p], items[p]
-        i = p
-    keys[i], items[i] = key, item
-
-
-@jit
-def sift_down(keys: Floats, items: Ints, n: int) -> None:
-    """Restore the heap of ``n`` after its top was taken; item ``n`` moves there."""
-    key, item = keys[n], items[n]
-    i = 0
-    while True:
-        c = 2 * i + 1
-        if c >= n:
-            break
-        if c + 1 < n and keys[c + 1] < keys[c]:
-            c += 1
-        if keys[c] >= key:
-            break
-        keys[i], items[i] = keys[c], items[c]
-        i = c
-    keys[i], items[i] = key, item
 
 
 @jit

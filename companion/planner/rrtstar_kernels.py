@@ -12,6 +12,7 @@ from numba import njit
 
 from companion.planner.problem import CLEAR_TURN_RAD
 from companion.planner.risk_kernels import leg_risk
+from companion.planner.xorshift import uniform
 
 TWO_PI = 2.0 * math.pi
 EDGE_PAD = 1e-6     # of a heading laid on the edge of the no-go zone [rad]: below the judge's slack
@@ -24,17 +25,6 @@ TWD, HALF, DEEP, RATE, TACK, GYBE, W0, W1, RHO, CX, CY = range(11)
 def wrap(a):  # type: ignore[no-untyped-def]
     """Return the angle on [-π, π)."""
     return (a + math.pi) % TWO_PI - math.pi
-
-
-@njit(nogil=True, cache=True)
-def uniform(state):  # type: ignore[no-untyped-def]
-    """Return the next number of [0, 1) from the generator (xorshift64*) in ``state[0]``."""
-    x = state[0]
-    x ^= x >> np.uint64(12)
-    x ^= x << np.uint64(25)
-    x ^= x >> np.uint64(27)
-    state[0] = x
-    return float((x * np.uint64(2685821657736338717)) >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
 @njit(nogil=True, cache=True)

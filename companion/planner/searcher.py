@@ -8,17 +8,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.planner.anneal import MOST_POINTS, anneal, timetable, uniform
+from companion.planner.anneal import anneal, timetable
 from companion.planner.beating import check_path, follow, zigzag
 from companion.planner.bound import Bound
 from companion.planner.drift import run_drift
 from companion.planner.gauge import Gauge
 from companion.planner.kernels import Floats, is_free
 from companion.planner.lattice import run_lattice
+from companion.planner.proposals import MOST_POINTS
 from companion.planner.rounds import fitted, rounded
 from companion.planner.solve import Effort
 from companion.planner.visibility import crossings, geodesics, graph_nodes
 from companion.planner.world import World
+from companion.planner.xorshift import uniform
 
 LEG_PRICE = 8e-5
 """What a leg must save, as a share of the path's time, while ways are compared; at the end the problem's share counts.
