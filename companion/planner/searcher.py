@@ -278,14 +278,23 @@ class Searcher:
         cell = ((np.arctan2(d[:, 0], d[:, 1]) + math.pi) / (2.0 * math.pi) * len(table)).astype(int) % len(table)
         return np.asarray(table[cell] * np.hypot(d[:, 0], d[:, 1]), np.float64)
 
+    def left(self) -> tuple[float, float]:
+        """Return (expansions, seconds) that a search for other paths may take: the end belongs to the best path."""
+        share = 1.0 - FINE_FROM if self.best is not None else 0.0
+        steps = 1e9 if self.effort.limit is None else (1.0 - share) * self.effort.limit - self.effort.used
+        seconds = self.effort.remaining_s
+        if math.isfinite(self.effort.budget_s):
+            seconds -= share * self.effort.budget_s
+        return max(0.0, steps), max(0.0, seconds)
+
     def lattice(self, cells: int, reach: int, *, margin: float, half_at_s: float, stretch: float = 1.0,
                 bound_s: float | None = None, side: int = 0) -> Candidate | None:
         """Run one lattice whose axes fit the no-go zone at ``half_at_s`` and offer its path."""
         b = self.world.boat
         half = self.world.problem.no_go_half_rad(half_at_s)
         began_s = self.effort.elapsed_s
-        most = 1e9 if self.effort.limit is None else 8.0 * (self.effort.limit - self.effort.used)
-        most = min(most, max(2_000.0, 0.8 * self.pops_per_s * self.effort.remaining_s))
+        steps, seconds = self.left()
+        most = min(8.0 * steps, max(2_000.0, 0.8 * self.pops_per_s * seconds))
         downwind = self.world.goal[1] < 0.0 and b.down < math.pi - 1e-6
         found = run_lattice(
             self.world, self.gauge, cells=cells, reach=reach,
@@ -301,8 +310,8 @@ class Searcher:
     def drift(self, cells: int, stride: float, bound_s: float, side: int = 0) -> Candidate | None:
         """Run one search whose courses follow the no-go zone in time and offer its path."""
         began_s = self.effort.elapsed_s
-        most = 1e9 if self.effort.limit is None else 2.0 * (self.effort.limit - self.effort.used)
-        most = min(most, max(500.0, 0.2 * self.pops_per_s * self.effort.remaining_s))
+        steps, seconds = self.left()
+        most = min(2.0 * steps, max(500.0, 0.2 * self.pops_per_s * seconds))
         found = run_drift(self.world, self.gauge, cells=cells, box=self.inner_box(0.5), bound_s=bound_s,
                           max_pops=int(most), stride=stride, side=side)
         self.effort.spend(max(1, found.pops // 2))
