@@ -25,6 +25,7 @@ from companion.traffic.plans import TimedLeg, pressing
 from companion.traffic.predict import tail_factor
 
 PART_BY_RUNG = (1.0, 4.0, 8.0)   # times the vessels' part of the promise, by the ladder's rung
+LEAST_DELTA_S = 0.5          # no plan promises less: of the ladder's last rungs the vessels get what is left
 GIVE_UP_RISK = 1e-1          # the active route is given up for a likelier meeting, at an instant, only
 OWN_TIMING_MPS = 0.1         # how fast our own place along the route becomes uncertain: a sailboat's speed, tacks
 HORIZON_S = 600.0            # the plan is made again long before
@@ -98,7 +99,8 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
     if not found:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
     of_wind = (1.0 - VESSELS_SHARE) * (1.0 - delta_s)
-    part = VESSELS_SHARE * (1.0 - delta_s) * PART_BY_RUNG[min(rung, len(PART_BY_RUNG) - 1)]
+    wanted = VESSELS_SHARE * (1.0 - delta_s) * PART_BY_RUNG[min(rung, len(PART_BY_RUNG) - 1)]
+    part = min(wanted, 1.0 - LEAST_DELTA_S - of_wind)
     inside_m: dict[int, float] = {}
     every = tuple(Target(
         x_m=disc.x_m, y_m=disc.y_m, vx_mps=disc.vx_mps, vy_mps=disc.vy_mps, radius_m=disc.radius_m,

@@ -180,6 +180,17 @@ def test_a_plan_that_starts_within_a_disc_may_leave_it():
     assert all(distance_m(here, (t.x_m, t.y_m)) > t.radius_m for t in found if t.from_s == 0.0)
 
 
+@pytest.mark.parametrize("delta_s", [0.5, 0.66, 0.8, 0.95])
+@pytest.mark.parametrize("rung", range(6))
+def test_no_rung_among_vessels_asks_for_less_than_a_plan_can_promise(rung, delta_s):
+    turn = turn_among(vessel((300.0, 200.0), 0.0, 2.0, t_s=60.0, heard_s=60.0))
+    asked = shares(turn, turn.boat_en, 0.0, rung, delta_s)
+    assert asked.targets
+    assert asked.part is not None
+    assert asked.part > 0.0
+    assert 0.5 <= asked.delta_s <= asked.wind_delta_s
+
+
 def test_a_vessel_of_unknown_course_blocks_the_next_moments_only():
     turn = turn_among(vessel((300.0, 200.0), None, None, t_s=60.0, heard_s=60.0))
     found = shares(turn, turn.boat_en, 0.0, 0, 0.95).targets
