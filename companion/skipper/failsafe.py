@@ -35,7 +35,7 @@ def waits_for(turn: Turn) -> str:
     """Return what is missing before the boat can be planned for; empty: nothing."""
     status = turn.autopilot
     if status is None or not status.ekf_ok or status.system_status == CRITICAL:
-        return "the autopilot's position filter stopped the boat: waiting until it is well"
+        return "stopped: waiting until the autopilot's position filter is well"
     if turn.boat_en is None:
-        return "the autopilot's position filter stopped the boat: waiting for a position that can be believed"
+        return "stopped: waiting for a position that can be believed"
     return ""

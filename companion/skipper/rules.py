@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
 from companion.skipper.config import SkipperConfig
+from companion.skipper.doubt import follow
 from companion.skipper.failsafe import has_stopped
 from companion.skipper.gates import Gate, gates_of
-from companion.skipper.helm import hand_back, repair
+from companion.skipper.helm import hand_back, is_busy, repair
 from companion.skipper.intake import (
     locate,
     notice_truncation,
@@ -57,6 +58,7 @@ class Skipper:
         turn = Turn(self.voyage, self.config, self.gates, state, snapshot)
         take_events(turn)
         take_outcomes(turn)
+        follow(turn)
         locate(turn)
         look_out(turn)
         fresh = watch(turn)
@@ -134,7 +136,8 @@ def _operator_has_it(turn: Turn) -> bool:
     gone = turn.is_taken
     if state.phase is not Phase.OPERATOR:
         if not gone:
-            held = state.steering_until_s is not None or state.by_field.resort.engaged or turn.steers
+            held = state.steering_until_s is not None or state.by_field.resort.engaged or turn.steers or (
+                state.own_mode is Mode.LOITER and is_busy(turn, Mode.LOITER.name))
             if status.mode is Mode.AUTO and state.own_mode is not None and not held:
                 turn.update(own_mode=None)
             return False

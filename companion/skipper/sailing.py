@@ -12,6 +12,7 @@ from companion.skipper.beating import IRONS_MEMORY_S
 from companion.skipper.by_field import heading as by_field_heading
 from companion.skipper.by_field import keeps_station, last_resort
 from companion.skipper.config import Guidance
+from companion.skipper.doubt import stands_off
 from companion.skipper.failsafe import waits_for
 from companion.skipper.geometry import distance_m
 from companion.skipper.headings import desired_heading_rad
@@ -39,7 +40,10 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         if not keeps_station(turn):
             _finish(turn)
         return
-    if turn.state.own_mode is Mode.HOLD and turn.autopilot is not None and turn.autopilot.mode is Mode.HOLD:
+    if stands_off(turn):
+        return
+    stopped = turn.state.own_mode in {Mode.HOLD, Mode.LOITER}
+    if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:
         _sail_on(turn, fresh)
         return
     if last_resort(turn):
@@ -74,7 +78,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
 
 
 def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
-    """Out of a HOLD that nobody asked for: plan from where the boat has drifted to, then AUTO."""
+    """Out of a HOLD that nobody asked for, or a LOITER of ours: plan from where the boat is now, then AUTO."""
     why = waits_for(turn)
     if why or repair(turn):
         turn.phase(Phase.HOLDING, why or "the mission is put right before sailing on")

@@ -166,6 +166,8 @@ class SkipperState:
     history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
     last_seen: tuple[float, float, float] | None = None          # t, east, north of the last position
     boot_s: float | None = None
+    doubt: tuple[float, float, float] | None = None   # a jump of the position: east, north [m], when
+    back_s: float = float("-inf")      # when it was back where it was reckoned: this step's jump is none
     failsafe_s: float = float("-inf")  # when the autopilot last said that it has lost its position
     after_operator: bool = False       # AUTO has come back: plan from where the boat is now
     after_restart: bool = False

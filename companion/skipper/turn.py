@@ -137,7 +137,7 @@ class Turn:
         if here is None or leg is None or vehicle is None or not self.state.sailing:
             return False
         goes_to = leg[1]
-        if self.state.own_mode is Mode.HOLD:   # stopped, and drifting
+        if self.state.own_mode in {Mode.HOLD, Mode.LOITER}:   # stopped, and drifting or turning
             east, north = vehicle.velocity_en_mps
             goes_to = (here[0] + DRIFT_LOOK_S * east, here[1] + DRIFT_LOOK_S * north)
         area, floor_m = self.voyage.area, min(self.config.margin_floor_m, self.config.margin_m)
@@ -147,7 +147,7 @@ class Turn:
     def jump_m(self) -> float:
         """How much farther than it can sail the boat has moved since the last fix [m]."""
         here, last, age = self.snapshot.position_en_m, self.state.last_seen, self.snapshot.vehicle_age_s
-        if here is None or last is None or age is None:
+        if here is None or last is None or age is None or self.state.back_s == self.t_s:
             return 0.0
         elapsed_s = self.t_s - age - last[0]
         if elapsed_s > JUMP_MEMORY_S:

@@ -488,9 +488,9 @@ def test_a_position_jump_into_an_island_moves_no_plan():
     asked = world.count(act.RequestPlan)
     world.position_offset = (-world.position[0], 140.0 - world.position[1])
     world.step()
+    assert any(r.name == "position jump" for r in world.state.raised)
     world.position_offset = (0.0, 0.0)
     world.step()
-    assert any(r.name == "position jump" for r in world.state.raised)
     world.run(3)
     assert world.count(act.RequestPlan) == asked
     assert world.run(1500, is_done)
@@ -549,7 +549,7 @@ def test_a_position_failsafe_is_no_operator_and_the_boat_sails_on(text):
     world.run(60)
     stopped_by_failsafe(world, text)
     assert world.state.phase is Phase.HOLDING
-    assert "position filter" in world.state.why
+    assert "position filter is well" in world.state.why
     assert world.mode is Mode.HOLD
     plans = world.count(act.RequestPlan)
     assert world.run(10, lambda w: w.mode is Mode.AUTO)

@@ -353,7 +353,6 @@ def test_a_jump_is_raised_at_once_and_forgotten_after_quiet_fixes():
     world.position_offset = (300.0, 0.0)
     world.step()
     assert any(r.name == "position jump" for r in world.state.raised)
-    world.position_offset = (0.0, 0.0)
     world.run(10)
     assert any(r.name == "position jump" for r in world.state.raised)
     world.run(20)
