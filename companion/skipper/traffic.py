@@ -120,7 +120,8 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
             out.append(replace(target, radius_m=radius_m))
     if not out:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
-    return Shares(targets=tuple(out), delta_s=1.0 - of_wind - part, wind_delta_s=1.0 - of_wind, part=part)
+    least = max(LEAST_DELTA_S, 1.0 - of_wind - part)   # a half and not the last digit below it
+    return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)
 
 
 def timed_legs(turn: Turn, points: Sequence[PointEn] | None = None) -> tuple[Leg, ...]:
