@@ -182,7 +182,7 @@ class _Shell:
                     autopilot.say(int(Severity.WARNING), text)
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
                                     expansions=self.options.expansions,
-                                    budget_scale=self.options.budget_scale)
+                                    budget_scale=self.options.budget_scale, config=self.config)
                 if self.fold.permissions.may_upload_fence:
                     await self._upload_fence(autopilot)
                 async with asyncio.TaskGroup() as group:

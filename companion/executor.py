@@ -2,14 +2,19 @@
 
 Transfers and commands go to the autopilot one after another, in the order asked; planning runs beside them, one
 request at a time, the newest winning. The skipper hears every outcome under the id of its action.
+
+No order outlives the skipper's patience with it: on a bad link an order that is still waiting, or still under way, when
+the skipper has given it up would act on the autopilot when nobody reckons with it any more.
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.commands import CommandAnswer
 from companion.mavlink.machines import Outcome as WireOutcome
@@ -27,6 +32,7 @@ from companion.skipper.actions import (
     UploadFence,
     UploadMission,
 )
+from companion.skipper.config import SkipperConfig
 from companion.skipper.snapshot import (
     CommandOutcome,
     CommandResult,
@@ -39,6 +45,8 @@ from companion.skipper.snapshot import (
 
 # More orders than this waiting means that the autopilot has long stopped answering.
 MAX_WAITING = 16
+# An order ends so long before the skipper gives it up [s].
+EARLY_S = 2.0
 
 _UPLOADS = {
     WireOutcome.OK: UploadResult.OK,
@@ -77,11 +85,14 @@ class Executor:
 
     def __init__(
         self, autopilot: Autopilot, planner: Planner, on_outcome: Callable[[Outcome], None], *,
-        seed: int = 0, expansions: int | None = None, budget_scale: float = 1.0,
+        seed: int = 0, expansions: int | None = None, budget_scale: float = 1.0, config: SkipperConfig | None = None,
     ) -> None:
         self._autopilot, self._planner, self._on_outcome = autopilot, planner, on_outcome
         self._seed, self._expansions, self._budget_scale = seed, expansions, budget_scale
-        self._orders: asyncio.Queue[Action] = asyncio.Queue(MAX_WAITING)
+        self._config = config or SkipperConfig()
+        self._orders: deque[tuple[float, Action]] = deque()
+        self._order_wanted = asyncio.Event()
+        self._reading: asyncio.Task[Outcome] | None = None
         self._plan: RequestPlan | None = None
         self._plan_wanted = asyncio.Event()
         self.refused = 0
@@ -103,11 +114,32 @@ class Executor:
                 self._enqueue(action)
 
     def _enqueue(self, action: Action) -> None:
-        try:
-            self._orders.put_nowait(action)
-        except asyncio.QueueFull:
+        if isinstance(action, UploadMission):
+            self._give_up_reads()
+        if len(self._orders) >= MAX_WAITING:
             self.refused += 1
             self._on_outcome(_gave_up(action, f"{MAX_WAITING} orders are waiting"))
+            return
+        self._orders.append((now_s() + self._patience_s(action), action))
+        self._order_wanted.set()
+
+    def _give_up_reads(self) -> None:
+        """An upload is asked for: what a read would tell is void, and the upload need not wait for it."""
+        waiting = [action for _, action in self._orders if isinstance(action, ReadMission)]
+        self._orders = deque(order for order in self._orders if order[1] not in waiting)
+        for action in waiting:
+            self._on_outcome(_gave_up(action, "an upload has overtaken it"))
+        if self._reading is not None:
+            self._reading.cancel()
+
+    def _patience_s(self, action: Action) -> float:
+        """Return how long an order may take from being asked for [s]."""
+        config = self._config
+        if isinstance(action, ReadMission):
+            return config.read_timeout_s - EARLY_S
+        if isinstance(action, UploadMission | UploadFence):
+            return config.upload_timeout_s - EARLY_S
+        return config.command_timeout_s - EARLY_S
 
     async def run(self) -> None:
         """Carry out orders until cancelled."""
@@ -133,8 +165,31 @@ class Executor:
 
     async def _run_orders(self) -> None:
         while True:
-            action = await self._orders.get()
-            self._on_outcome(await self._carry_out(action))
+            while not self._orders:
+                self._order_wanted.clear()
+                await self._order_wanted.wait()
+            until_s, action = self._orders.popleft()
+            if now_s() >= until_s:
+                self._on_outcome(_gave_up(action, "waited too long behind other orders"))
+                continue
+            try:
+                async with asyncio.timeout_at(until_s):
+                    outcome = await (self._read(action) if isinstance(action, ReadMission) else self._carry_out(action))
+            except TimeoutError:
+                outcome = _gave_up(action, "took too long")
+            self._on_outcome(outcome)
+
+    async def _read(self, action: ReadMission) -> Outcome:
+        """Read the mission, unless an upload overtakes it."""
+        self._reading = asyncio.create_task(self._carry_out(action), name="read")
+        try:
+            await asyncio.wait({self._reading})
+            if self._reading.cancelled():
+                return _gave_up(action, "an upload has overtaken it")
+            return self._reading.result()
+        finally:
+            self._reading.cancel()
+            self._reading = None
 
     async def _carry_out(self, action: Action) -> Outcome:
         autopilot = self._autopilot
@@ -166,7 +221,7 @@ def _command(command_id: int, answer: CommandAnswer) -> CommandOutcome:
 
 def _gave_up(action: Action, why: str) -> Outcome:
     if isinstance(action, UploadMission | UploadFence):
-        return UploadOutcome(upload_id=action.upload_id, result=UploadResult.LINK, text=why)
+        return UploadOutcome(upload_id=action.upload_id, result=UploadResult.TIMEOUT, text=why)
     if isinstance(action, ReadMission):
         return ReadOutcome(read_id=action.read_id, text=why)
     if isinstance(action, SetMode | Arm | SetCurrent):

@@ -52,7 +52,7 @@ def take_outcomes(turn: Turn) -> None:
         take_upload(turn, UploadOutcome(
             upload_id=state.pending_upload.upload_id, result=UploadResult.TIMEOUT,
             text=f"no outcome within {config.upload_timeout_s:.0f} s"))
-    if state.pending_read is not None and turn.t_s - state.pending_read[1] > config.upload_timeout_s:
+    if state.pending_read is not None and turn.t_s - state.pending_read[1] > config.read_timeout_s:
         turn.update(pending_read=None, read_retry=turn.failed(state.read_retry))
     if state.pending_command is not None and turn.t_s - state.pending_command[1] > config.command_timeout_s:
         turn.update(pending_command=None, command_retry=turn.failed(state.command_retry))

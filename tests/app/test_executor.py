@@ -1,0 +1,79 @@
+"""Orders on a bad link: none outlives the skipper's patience, and a read gives way to an upload.
+
+Found by packet-loss seed 1: an upload behind a read of 106 s was counted as failed, was made all the same, and was
+taken for somebody else's mission.
+"""
+
+import asyncio
+
+from companion.clock import now_s, run_virtual
+from companion.executor import Executor
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.link import Link
+from companion.messages import GeoPoint, Mode, waypoint
+from companion.planner.worker import InlinePlanner
+from companion.skipper.actions import ReadMission, SetMode, UploadMission
+from companion.skipper.config import SkipperConfig
+from companion.skipper.snapshot import CommandResult, UploadResult
+from sitl.autopilot import HOME, AutopilotConfig, Impairment, MemoryLink, serve
+from sitl.autopilot import Autopilot as SimulatedAutopilot
+from sitl.wind import Constant
+
+ITEMS = tuple(waypoint(GeoPoint(lat_deg=HOME.lat_deg + 0.001 * n, lon_deg=HOME.lon_deg)) for n in range(1, 31))
+CONFIG = SkipperConfig()
+
+
+def order(number):
+    return UploadMission(upload_id=number, items=ITEMS[:5], keep_first=0, set_current=None, plan_id=number)
+
+
+def carried_out(orders):
+    """Let ``orders(link, executor, boat, autopilot)`` act; return the outcomes with their times."""
+    outcomes = []
+
+    async def main():
+        boat, line = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=0), MemoryLink(seed=3)
+        async with serve(boat, [line.far]), Link(line.near) as link, Autopilot(link, timeout_s=30.0) as autopilot:
+            executor = Executor(autopilot, InlinePlanner(), lambda o: outcomes.append((now_s(), o)), config=CONFIG)
+            running = asyncio.create_task(executor.run())
+            await orders(line, executor, boat, autopilot)
+            running.cancel()
+
+    run_virtual(main())
+    return outcomes
+
+
+def test_an_upload_does_not_wait_for_a_read_that_is_void_by_it():
+    async def orders(line, executor, boat, autopilot):
+        await autopilot.upload_mission(ITEMS)
+        line.impairment = Impairment(loss=0.5)
+        executor.submit([ReadMission(read_id=1)])
+        await asyncio.sleep(1.0)
+        executor.submit([ReadMission(read_id=2), order(3)])
+        line.impairment = Impairment()
+        await asyncio.sleep(5.0)
+
+    outcomes = [o for _, o in carried_out(orders)]
+    assert [o.items for o in outcomes[:2]] == [None, None]
+    assert outcomes[2].upload_id == 3
+    assert outcomes[2].result is UploadResult.OK
+
+
+def test_an_order_that_the_skipper_has_given_up_is_not_carried_out_late():
+    """A mode asked for minutes ago, or an upload that was counted as failed, must not happen when the link is back."""
+    seen = []
+
+    async def orders(line, executor, boat, autopilot):
+        await autopilot.upload_mission(ITEMS)
+        line.cut()
+        executor.submit([order(1), SetMode(command_id=2, mode=Mode.AUTO)])
+        await asyncio.sleep(CONFIG.upload_timeout_s)
+        line.mend()
+        await asyncio.sleep(30.0)
+        seen.extend((boat.truth.mode, len((await autopilot.read_mission()).items)))
+
+    (upload_s, upload), (_, command) = carried_out(orders)
+    assert upload.result is not UploadResult.OK
+    assert upload_s < CONFIG.upload_timeout_s
+    assert command.result is CommandResult.TIMEOUT
+    assert seen == [Mode.MANUAL, len(ITEMS)]
