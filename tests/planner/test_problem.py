@@ -58,8 +58,8 @@ def test_extensions_survive_write_then_read():
     raw = simple(
         wind={"from_deg": 10, "speed_mps": 5, "sigma": {"model": "forecast", "horizon_s": [0, 60], "sigma_deg": [2, 8],
                                                         "half_width_deg": [1, 9]}},
-        current={"set_deg": 90, "drift_mps": 0.3}, clearance_floor_m=3.0,
-        leg_saving=2e-4, targets=[{"x": 1, "y": 2, "vx": 3, "vy": 4, "radius_m": 5, "growth_mps": 0.1, "from_s": 1, "until_s": 9}],
+        current={"set_deg": 90, "drift_mps": 0.3}, clearance_floor_m=3.0, leg_saving=2e-4,
+        targets=[{"x": 1, "y": 2, "vx": 3, "vy": 4, "radius_m": 5, "growth_mps": 0.1, "from_s": 1, "until_s": 9}],
         risk={"max_path_risk": 0.05, "correlation_time_s": 30}, note_of_mine="kept",
     )
     first = Problem.from_json(raw)
