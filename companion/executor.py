@@ -45,6 +45,8 @@ from companion.skipper.snapshot import (
 
 # More orders than this waiting means that the autopilot has long stopped answering.
 MAX_WAITING = 16
+# Real time that a plan gets at least, however fast the simulator beside it: with less a busy machine finds no path.
+LEAST_BUDGET_S = 0.5
 # An order ends so long before the skipper gives it up [s].
 EARLY_S = 2.0
 
@@ -155,13 +157,17 @@ class Executor:
             if request is None:
                 continue
             plan = await self._planner.plan(
-                request.problem, budget_s=request.budget_s * self._budget_scale, expansions=self._expansions,
+                request.problem, budget_s=self._budget_s(request), expansions=self._expansions,
                 seed=self._seed + request.seed,
             )
             # A request that was cancelled or overtaken while it was computed is answered by the newer one.
             if self._plan is not None and self._plan.request_id == request.request_id:
                 self._plan = None
                 self._on_outcome(PlanOutcome(request_id=request.request_id, plan=plan, text=plan.reason))
+
+    def _budget_s(self, request: RequestPlan) -> float:
+        """Return the real time for a plan [s]: what was asked for, less beside a hurried simulator, never nothing."""
+        return max(min(request.budget_s, LEAST_BUDGET_S), request.budget_s * self._budget_scale)
 
     async def _run_orders(self) -> None:
         while True:

@@ -6,11 +6,13 @@ import math
 from dataclasses import replace
 
 from companion.planner.beat import beaten
-from companion.planner.bound import lower_bound_s
+from companion.planner.bound import cut_off, lower_bound_s
+from companion.planner.plan import PlanStatus
 from companion.planner.problem import Beat, Problem
 from companion.planner.solve import Effort, Outcome, Search
+from companion.planner.world import make_world
 
-BOUND_TESTS = 40_000   # of visibility, for the bound of both kinds of path
+BOUND_TESTS = 40_000   # of visibility, for the bound of both kinds of path, when there is effort left
 BEAT_SHARE = 0.3       # of the effort, for the path with beats: an easier search, and often the end of it
 
 
@@ -20,20 +22,32 @@ def with_beats(search: Search, beat: Beat) -> Search:
     def both(problem: Problem, effort: Effort, seed: int) -> Outcome:
         closed = replace(problem, beat=None)
         straight = beaten(problem, beat)
-        bound_s = lower_bound_s(
-            replace(straight, clearance_floor_m=problem.clearance_floor_m), tests=BOUND_TESTS)
-        beating = search(straight, effort.part(BEAT_SHARE), seed)
-        beating_s = math.inf
+
+        def bounded(outcome: Outcome) -> Outcome:
+            either = replace(straight, clearance_floor_m=problem.clearance_floor_m)
+            bound_s = lower_bound_s(either, tests=0 if effort.is_over else BOUND_TESTS)
+            return replace(outcome, lower_bound_s=min(bound_s, outcome.lower_bound_s))
+
+        # Where the fence leaves no corridor there is nothing to search.
+        beating, beating_s = Outcome(waypoints_en=None), math.inf
+        if straight.defect is None:
+            beating = search(straight, effort.part(BEAT_SHARE), seed)
         if beating.waypoints_en is not None:
             judged = problem.evaluate(beating.waypoints_en)
             beating_s = judged.time_s if judged.is_feasible else math.inf
-        if beating_s <= lower_bound_s(closed):
-            return replace(beating, lower_bound_s=bound_s)
+        if math.isfinite(beating_s) and beating_s <= lower_bound_s(closed):
+            return bounded(replace(beating, lower_bound_s=math.inf))
         sailing = search(closed, effort, seed)
+        if sailing.waypoints_en is None and math.isinf(beating_s):
+            if sailing.status is PlanStatus.INFEASIBLE and cut_off(make_world(closed)) is None:
+                # The wind closes what is sailed and the corridor what is beaten: no proof for a path of both.
+                reason = f"no path was found; without beats {sailing.reason}"
+                return replace(sailing, status=PlanStatus.TIMEOUT, reason=reason)
+            return sailing
         if sailing.waypoints_en is None:
-            return sailing if math.isinf(beating_s) else replace(beating, lower_bound_s=bound_s)
-        is_beating_faster = beating_s < problem.evaluate(sailing.waypoints_en).time_s
-        best = beating if is_beating_faster else sailing
-        return replace(best, lower_bound_s=min(bound_s, best.lower_bound_s))
+            return bounded(replace(beating, lower_bound_s=math.inf))
+        if beating_s < problem.evaluate(sailing.waypoints_en).time_s:
+            return bounded(replace(beating, lower_bound_s=math.inf))
+        return bounded(sailing)
 
     return both

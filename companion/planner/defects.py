@@ -65,6 +65,7 @@ def defect_of(p: Problem) -> str | None:
         (p.risk is None or (0.0 < p.risk.max_path_risk <= 1.0 and p.risk.correlation_time_s > 0.0),
          "risk needs 0 < max_path_risk <= 1 and correlation_time_s > 0"),
         (p.fence is None or not p.fence.is_empty, "the fence is empty"),
+        (p.fence_polygon is None or not p.fence_polygon.is_empty, "the fence less the clearance floor is empty"),
         (p.vessels_part is None or 0.0 < p.vessels_part < 1.0 - p.delta_s,
          "allocation.vessels is not between 0 and 1 - delta_s"),
         (p.beat is None or (0.0 < p.beat.no_go_half_rad < 0.5 * math.pi and 0.0 < p.beat.corridor_m < math.inf

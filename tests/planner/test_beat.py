@@ -150,3 +150,16 @@ def test_json_keeps_the_beat_and_refuses_nonsense() -> None:
         assert "beat" in answer.reason
     current = solve(problem(current={"set_deg": 90.0, "drift_mps": 0.2}))
     assert current.status is PlanStatus.INVALID
+
+
+def test_what_wind_and_corridor_close_between_them_is_not_proved_impossible() -> None:
+    wild = {"from_deg": 0.0, "speed_mps": 5.0, "sigma": {"model": "ar1", "sigma0_deg": 60.0, "sigma_inf_deg": 60.0,
+                                                         "rho_hz": 0.03}}
+    fence = "POLYGON ((-30 -30, 30 -30, 30 430, -30 430, -30 -30))"
+    narrow = BEAT | {"clearance_m": 32.0}
+    assert solve(problem(wind=wild, fence=fence, beat=None)).status is PlanStatus.INFEASIBLE
+    assert solve(problem(wind=wild, fence=fence, beat=narrow)).status is PlanStatus.TIMEOUT
+    floor = problem(fence=fence, beat=None, clearance_floor_m=32.0)
+    assert "clearance floor" in solve(floor).reason   # and not: no fence at all
+    wall = "POLYGON ((-31 200, 31 200, 31 220, -31 220, -31 200))"
+    assert solve(problem(wind=wild, fence=fence, obstacles=[wall], beat=narrow)).status is PlanStatus.INFEASIBLE
