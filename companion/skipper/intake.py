@@ -175,11 +175,12 @@ def _pass_gates(turn: Turn) -> None:
     while turn.gate is not None:
         gate, number = turn.gate, turn.state.gate
         left = distance_m(boat, gate.en_m)
-        counted = any(g == number for g in route.gate_of[: turn.state.index])
+        # What the old route counted for is void from a miss on: its items were passed on the wrong side.
+        counted = turn.state.missed_gate is None and any(g == number for g in route.gate_of[: turn.state.index])
         near = max(gate.radius_m, turn.config.grid_size_m)
         if not (turn.state.closest_m <= gate.radius_m or (counted and left <= near and not _is_last(turn))
                 or _is_near_enough(turn, gate, counted)):
-            if counted and left > near and turn.state.missed_gate != number and not _is_last(turn):
+            if counted and left > near and not _is_last(turn):
                 # The autopilot has left it behind and we were never near.
                 turn.update(missed=turn.state.missed + 1, missed_gate=number)
             return
@@ -191,6 +192,8 @@ def _pass_gates(turn: Turn) -> None:
         closest = turn.state.closest_m
         reached = (*turn.state.reached, gate.goal) if gate.ends_goal else turn.state.reached
         turn.update(gate=number + 1, reached=reached, missed_gate=None, closest_m=math.inf)
+        if gate.is_first and not gate.ends_goal:
+            turn.update(track=(boat,))   # the way here, back round the buoy after a miss, is not the rounding
         if gate.ends_goal:
             turn.update(track=())
             turn.say(Severity.NOTICE, "goal", f"{gate.name} reached, {min(left, closest):.1f} m from it", every_s=0.0)

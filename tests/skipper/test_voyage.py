@@ -157,6 +157,28 @@ def test_five_laps_of_the_regatta_course_without_missing_a_buoy(side):
         assert min(distance_m(place, p) for p in world.track) > 3.0
 
 
+def test_a_buoy_left_on_the_wrong_side_is_not_reached_before_it_is_rounded():
+    """Buoy course, seed 2, on the real ArduRover: missed, and a second later reached by the old route's count."""
+    places = [(0.0, 150.0), (-90.0, 75.0), (0.0, 0.0)]
+    start = (20.0, -40.0)
+    world = make(*(Goal(en_m=p, side=Side.PORT, name=f"buoy {n}") for n, p in enumerate(places)), obstacles=(),
+                 voyage={"home": start}, position=start, expansions=600, config={"grid_size_m": 30.0})
+    last = next(n for n, g in enumerate(world.skipper.gates) if g.ends_goal)
+    wrong = tuple((8.0 * math.sin(0.2 * n), 150.0 + 8.0 * math.cos(0.2 * n)) for n in range(12))   # clockwise
+
+    def comes_to_the_last_gate(w):
+        return w.state.gate == last and distance_m(w.position, w.skipper.gates[last].en_m) < 12.0
+
+    assert world.run(600, comes_to_the_last_gate)
+    while not said(world, "buoy missed"):
+        world.state = replace(world.state, track=wrong)
+        world.run(1)
+    world.run(3)
+    assert world.state.reached == ()
+    assert world.run(1500, is_done)
+    assert world.state.reached == (0, 1, 2)
+
+
 def test_several_goals_without_a_stop_between():
     goals = [Goal(en_m=p, radius_m=6.0) for p in ((150.0, 0.0), (150.0, 150.0), (0.0, 150.0))]
     world = make(*goals, obstacles=(), wind=lambda t: (math.radians(-45), 5.0))
