@@ -34,6 +34,7 @@ async def course(client: Client) -> list[float]:
     marks: list[float] = []
     client.answers["SYSTEM_TIME"] = lambda m: boot.append(m.time_boot_ms / 1000.0)
     client.answers["MISSION_ITEM_REACHED"] = lambda m: marks.append(boot[-1])
+    await client.wait("SYSTEM_TIME")
     await client.set_sail(COURSE)
     start = boot[-1]
     await client.wait("STATUSTEXT", 400.0, lambda m: m.text == "Mission Complete")
