@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
+from companion.planner.heap import sift_down, sift_up
 from companion.planner.rrtstar_kernels import TWD, first_hit, meets_target, turn_time, worst_no_go, wrap
 
 # Places in ``weight``: turning [s/rad], tack [s], gybe [s], tunnel [s per metre off the line], heuristic speed [m/s].
@@ -21,33 +22,15 @@ MAX_STEP_TURN = 0.5 * math.pi
 def _push(heap_f, heap_state, count, f, state):  # type: ignore[no-untyped-def]
     i = count[HEAP]
     count[HEAP] += 1
-    while i > 0:
-        up = (i - 1) >> 1
-        if heap_f[up] <= f:
-            break
-        heap_f[i], heap_state[i] = heap_f[up], heap_state[up]
-        i = up
     heap_f[i], heap_state[i] = f, state
+    sift_up(heap_f, heap_state, i)
 
 
 @njit(nogil=True, cache=True)
 def _pop(heap_f, heap_state, count):  # type: ignore[no-untyped-def]
     top = heap_state[0]
     count[HEAP] -= 1
-    n = count[HEAP]
-    f, state = heap_f[n], heap_state[n]
-    i = 0
-    while True:
-        child = 2 * i + 1
-        if child >= n:
-            break
-        if child + 1 < n and heap_f[child + 1] < heap_f[child]:
-            child += 1
-        if heap_f[child] >= f:
-            break
-        heap_f[i], heap_state[i] = heap_f[child], heap_state[child]
-        i = child
-    heap_f[i], heap_state[i] = f, state
+    sift_down(heap_f, heap_state, count[HEAP])
     return top
 
 

@@ -55,6 +55,15 @@ def test_there_and_back(place, east_m, north_m):
     assert math.dist(back, (east_m, north_m)) < 1e-3  # PROJ takes the last millimetre for the origin itself
 
 
+def test_a_hair_beyond_the_antimeridian_is_a_place():
+    """PROJ wraps a longitude only when it is well beyond 180 degrees; 0.2 micrometres are not."""
+    frame = frame_at(65.0, 180.0)
+    point = frame.geo_from_en(2e-07, 1.0)
+    assert math.dist(frame.en_from_geo(point), (0.0, 1.0)) < 1e-3
+    (lon_deg, _lat_deg), = frame.array_lonlat_from_en([[2e-07, 1.0]])
+    assert abs(lon_deg) <= 180.0
+
+
 def test_scalars_and_arrays_agree():
     frame = LocalFrame(GeoPoint(lat_deg=50.8, lon_deg=-1.3))
     lonlat = [[-1.31, 50.81], [-1.2, 50.7]]
