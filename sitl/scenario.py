@@ -96,6 +96,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     station_radius_m: float | None = None       # about their mean, of 95 % of 5 minutes' points at the last goal
     max_silence_s: float | None = 10.0        # without a status from the companion that says why
     max_replans_per_hour: float | None = None
+    max_tacks: int | None = None              # before the boat first comes within ``within_m`` of the last goal
     end_phase: str | None = None
     alerts: tuple[str, ...] = ()              # announced at least once, by code
     marks_rounded: int | None = None           # in order, each on its side

@@ -104,14 +104,15 @@ def contacts_and_clearance(positions_m: NDArray[np.float64], solid: BaseGeometry
     return entries, clearance
 
 
-def count_tacks(truth: Truth) -> tuple[int, int]:
-    """Return (tacks, gybes): settled changes of the side that the wind comes from."""
+def count_tacks(truth: Truth, until: int | None = None) -> tuple[int, int]:
+    """Return (tacks, gybes): settled changes of the side that the wind comes from, in the first ``until`` samples."""
     tacks = gybes = 0
     side = 0
     pending = 0
     since_s = -math.inf
     deepest = last_twa = 0.0
-    for t_s, heading, wind in zip(truth.t_s, truth.heading_rad, truth.twd_from_rad, strict=True):
+    samples = zip(truth.t_s, truth.heading_rad, truth.twd_from_rad, strict=True)
+    for t_s, heading, wind in itertools.islice(samples, until):
         twa = (heading - wind + math.pi) % (2.0 * math.pi) - math.pi
         now = 1 if twa > 0.0 else -1
         if side == 0:
@@ -230,6 +231,11 @@ def judge(
     if expect.max_replans_per_hour is not None and duration_s > 0.0:
         rate = float(summary.get("replans", 0)) * 3600.0 / duration_s
         check("replans per hour", rate <= expect.max_replans_per_hour, rate, f"at most {expect.max_replans_per_hour}")
+    if expect.max_tacks is not None:
+        # past the goal the autopilot does as it likes: a loiter may tack
+        there = np.flatnonzero(np.hypot(*(positions - goal_en_m).T) <= (expect.within_m or 0.0))
+        on_the_way, _ = count_tacks(truth, int(there[0]) if len(there) else None)
+        check("tacks on the way", on_the_way <= expect.max_tacks, on_the_way, f"at most {expect.max_tacks}")
     if expect.end_phase is not None:
         check("end phase", summary.get("end_phase") == expect.end_phase, summary.get("end_phase"), expect.end_phase)
     if expect.marks_rounded is not None:

@@ -62,6 +62,17 @@ def test_a_beat_has_tacks_and_a_run_has_gybes():
     assert count_tacks(_truth(run)) == (0, 1)
 
 
+def test_tacks_are_counted_on_the_way_only():
+    """Past the goal the autopilot loiters as it likes."""
+    late = [60.0] * 100 + [-60.0] * 60
+    expect = ExpectSpec(arrived=None, within_m=5.0, max_tacks=0)
+    def passed(goal_north_m):
+        return judge(scenario="s", seed=0, expect=expect, truth=_truth(late), solid=shapely.Polygon(),
+                     goal_en_m=(0.0, goal_north_m), summary={}, status_times_s=None, alerts=()).checks[-1].passed
+    assert passed(50.0)
+    assert not passed(500.0)
+
+
 def test_a_wobble_through_the_wind_is_no_tack():
     assert count_tacks(_truth([10.0] * 40 + [-5.0] * 4 + [10.0] * 40)) == (0, 0)
 
