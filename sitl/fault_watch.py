@@ -16,7 +16,9 @@ nothing on board could have prevented it:
 What counts as a mixture. The mission on the autopilot, up to the item that ends it, is at every moment one that was
 asked for as a whole, or a beginning of one that ends in a loiter at one of its own waypoints (what stands there while
 an upload without MAVFTP is under way), or there is none; anything else under way is a mixture, whatever the link and
-whoever lives. On a boat that was not armed yet a beginning without its end is a first upload on its way.
+whoever lives. On a boat that was not armed yet a beginning without its end is a first upload on its way. What a stranger
+leaves on board between the first and the last word of his own upload is his: for at most ``STRANGER_S``, and only if his
+mission follows at once.
 
 Silence is the time without a status that says why; it counts within a life of the companion: a dead process says
 nothing. That the process ends for want of an autopilot, with an error that names it, and is started again by its
@@ -50,6 +52,9 @@ REACTION_S = 6.0
 # From an autopilot that can be sailed again to a boat that steers [s]: two commands, each believed when the heartbeat
 # of the following second shows it, and the time to gather steerage way.
 RESUME_S = 10.0
+# A ground station's upload of one item on a link that loses nothing [s]: the count cuts the old mission short at once,
+# the item is written when it has been asked for.
+STRANGER_S = 1.0
 # What excuses a contact, in the words of the campaign's table.
 EXCUSES = {
     "false position": f"with the reported position wrong and clear, or right again for less than {REACTION_S:g} s",
@@ -165,11 +170,11 @@ class Watch:
     # ------------------------------------------------------------------------------------------ missions
     def mixture_s(self) -> float:
         """Return the longest time that the mission on board was a mixture [s]; a single sample counts 1 ms."""
-        return self._longest_s({"mixture"})
+        return self._longest_s("mixture")
 
     def held_back_s(self) -> float:
         """Return the longest time that a beginning of a mission, ended by a loiter, stood on board [s]."""
-        return self._longest_s({"closed"})
+        return self._longest_s("closed")
 
     def kind(self, key: MissionKey, *, was_armed: bool) -> str:
         """Return what the mission on board is: "whole", "closed", "begun", "mixture"."""
@@ -183,13 +188,24 @@ class Watch:
             return "begun"
         return "mixture"
 
-    def _longest_s(self, kinds: set[str]) -> float:
+    def _kinds(self) -> list[str]:
+        """Return the kind of each sample's mission."""
+        was_armed = itertools.accumulate(self.armed, bool.__or__)
+        kinds = [self.kind(key, was_armed=armed) for key, armed in zip(self.missions, was_armed, strict=True)]
+        for i in range(len(kinds) - 1, 0, -1):
+            if kinds[i - 1] == "mixture" and self.missions[i] in self.foreign:
+                since = i - 1
+                while since > 0 and kinds[since - 1] == "mixture":
+                    since -= 1
+                if self.t_s[i] - self.t_s[since] <= STRANGER_S:
+                    kinds[since:i] = ["stranger"] * (i - since)
+        return kinds
+
+    def _longest_s(self, wanted: str) -> float:
         longest = 0.0
         since_s: float | None = None
-        was_armed = False
-        for t_s, key, armed in zip(self.t_s, self.missions, self.armed, strict=True):
-            was_armed = was_armed or armed
-            if self.kind(key, was_armed=was_armed) not in kinds:
+        for t_s, kind in zip(self.t_s, self._kinds(), strict=True):
+            if kind != wanted:
                 since_s = None
                 continue
             since_s = t_s if since_s is None else since_s

@@ -138,6 +138,7 @@ class _World:
     observer: Observer | None = None
     ships: list[Moving] = field(default_factory=list)
     radio_port: int = 0   # of this machine, where the companion hears the event's radio
+    stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -363,7 +364,8 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
             await asyncio.sleep(event.every_s)
     elif event.kind == "foreign_mission":
         away = mission.frame().geo_from_en(event.east_m, event.north_m)
-        await _upload_foreign(world.shore.near, [waypoint(away)])
+        async with world.stranger:
+            await _upload_foreign(world.shore.near, [waypoint(away)])
 
 
 async def _sail_second(world: _World, event: EventSpec, mission: Mission, wind: Wind, seed: int) -> None:

@@ -170,6 +170,19 @@ def test_what_is_on_board_is_whole_or_a_beginning_that_ends_at_a_waypoint_of_its
         assert ghost.watch.mixture_s() > 0.0, items
 
 
+@pytest.mark.parametrize(("for_s", "then", "is_mixture"), [
+    (0.5, [item(16, 9, 9)], False), (3.0, [item(16, 9, 9)], True), (0.5, [item(16, 1, 1), item(17, 4, 4)], True)])
+def test_what_a_stranger_s_upload_leaves_on_board_for_a_moment_is_his(ghost, for_s, then, is_mixture):
+    """Seeds 744 and 949: his count had cut our mission to its first item, his own item was not written yet."""
+    ours = [item(16, 1, 1), item(16, 2, 2), item(17, 4, 4)]
+    ghost.watch.ours = {mission_key((i.command, i.x, i.y) for i in ours)}
+    ghost.watch.foreign = {((16, 9, 9),)}
+    for items, span_s in ((ours, 5.0), (ours[:1], for_s), (then, 5.0)):
+        ghost.items = items
+        ghost.at(0.0, 0.0, for_s=span_s)
+    assert (ghost.watch.mixture_s() > 0.0) == is_mixture
+
+
 def test_silence_counts_within_a_life_only(ghost):
     ghost.watch.lives = [(0.0, 10.0), (50.0, 70.0)]
     assert ghost.watch.silence_s([1.0, 2.0, 9.0, 51.0, 66.0, 69.0]) == 15.0
