@@ -16,9 +16,9 @@ nothing on board could have prevented it:
 What counts as a mixture. The mission on the autopilot, up to the item that ends it, is at every moment one that was
 asked for as a whole, or a beginning of one that ends in a loiter at one of its own waypoints (what stands there while
 an upload without MAVFTP is under way), or there is none; anything else under way is a mixture, whatever the link and
-whoever lives. On a boat that was not armed yet a beginning without its end is a first upload on its way. What a stranger
-leaves on board between the first and the last word of his own upload is his: for at most ``STRANGER_S``, and only if his
-mission follows at once.
+whoever lives. On a boat that was not armed yet a beginning without its end is a first upload on its way. What a
+stranger leaves on board between the first and the last word of his own upload is his: for at most ``STRANGER_S``, and
+only if his mission follows at once.
 
 Silence is the time without a status that says why; it counts within a life of the companion: a dead process says
 nothing. That the process ends for want of an autopilot, with an error that names it, and is started again by its
