@@ -14,19 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.planner.kernels import (
-    SLACK_RAD,
     Boat,
     Floats,
     Grid,
     is_free,
     jit,
-    meets_target,
     track,
     turn_time,
     walk,
-    worst_half,
+    walk_on,
     wound_at,
-    wrap,
 )
 from companion.planner.moves import fit_corners
 from companion.planner.proposals import MOST_POINTS, propose
@@ -81,31 +78,7 @@ def time_after(
         while last < n - 1 and math.hypot(xs[last] - xs[last - 1], ys[last] - ys[last - 1]) < b.room:
             last += 1
             tail -= 1
-    t, h = float(at[first]), float(course[first])
-    for i in range(first, last):
-        dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
-        length = math.hypot(dx, dy)
-        if length < 1e-9:
-            continue
-        a, v = track(b, dx, dy, t)
-        if v <= 1e-9 or abs(a) > b.max_twa + SLACK_RAD:
-            return math.inf
-        if b.room > 0.0:
-            wound += wrap(a - h)
-            if abs(wound) > b.most_turn + SLACK_RAD and i > 0:
-                return math.inf
-            if length >= b.room:
-                wound = 0.0
-        t1 = t + turn_time(b, h, a)
-        t2 = t1 + length / v
-        if abs(a) < worst_half(b, t1, t2) - SLACK_RAD:
-            return math.inf
-        if b.targets.shape[0] > 0 and (
-            meets_target(b, xs[i], ys[i], xs[i], ys[i], t, t1)
-            or meets_target(b, xs[i], ys[i], xs[i + 1], ys[i + 1], t1, t2)
-        ):
-            return math.inf
-        t, h = t2, a
+    t = walk_on(b, xs, ys, first, last, float(at[first]), float(course[first]), wound)
     if last < n - 1:
         t += float(at[on - 1] - at[on - tail + 1])
     return t

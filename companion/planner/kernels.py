@@ -321,10 +321,12 @@ def rasterise(edges: Floats, x0: float, y0: float, inv: float, nx: int, ny: int)
 
 
 @jit
-def walk(b: Boat, xs: Floats, ys: Floats, n: int, h0: float) -> float:
-    """Return the time [s] of the path of n points; inf where it breaks a limit of angles or turns or meets a target."""
-    t, h, wound = 0.0, h0, 0.0
-    for i in range(n - 1):
+def walk_on(b: Boat, xs: Floats, ys: Floats, first: int, last: int, t: float, h: float, wound: float) -> float:
+    """Return when the boat is at point ``last``, having come to ``first`` at ``t`` on TWA ``h``; inf as ``walk``.
+
+    ``wound`` is what it has turned since it last had room to settle [rad].
+    """
+    for i in range(first, last):
         dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
         length = math.hypot(dx, dy)
         if length < 1e-9:
@@ -349,3 +351,9 @@ def walk(b: Boat, xs: Floats, ys: Floats, n: int, h0: float) -> float:
             return math.inf
         t, h = t2, a
     return t
+
+
+@jit
+def walk(b: Boat, xs: Floats, ys: Floats, n: int, h0: float) -> float:
+    """Return the time [s] of the path of n points; inf where it breaks a limit of angles or turns or meets a target."""
+    return walk_on(b, xs, ys, 0, n - 1, 0.0, h0, 0.0)
