@@ -16,15 +16,16 @@ from pathlib import Path
 from typing import Any
 
 from companion.clock import now_s, run
-from companion.errors import JobError
+from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
 from companion.telemetry.recorder import DECISIONS, write_atomically
 from sitl.boats import Boat, RealBoat, SimulatedBoat
-from sitl.live_traffic import TRAFFIC, LiveTraffic
+from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
 from sitl.runner import TRUTH_EVERY_S, VERDICT, marks_of, solid_of
 from sitl.scenario import EventSpec, Scenario
+from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
 
@@ -117,7 +118,8 @@ async def _run(
     wind = scenario_wind(scenario, source, seed)
     frame = mission.frame()
     folder.mkdir(parents=True, exist_ok=True)
-    traffic = LiveTraffic(frame, wind, seed)
+    port = free_port()
+    others = Others(frame, wind, seed, port=port)
     async with contextlib.AsyncExitStack() as stack:
         boat: Boat
         if kind == "ardurover":
@@ -128,7 +130,7 @@ async def _run(
         if any(e.kind in LINK_EVENTS for e in scenario.events):
             relay = await stack.enter_async_context(Relay(boat.link, seed=seed))
             link = relay.link
-        feeds = ["--feed", traffic.feed] if any(e.kind in TRAFFIC for e in scenario.events) else []
+        feeds = ["--feed", f"udpin:127.0.0.1:{port}"] if any(e.kind in TRAFFIC for e in scenario.events) else []
         companion = _Companion([
             sys.executable, "-m", "companion.cli", "run", str(mission_path), "--link", link, "--out", str(folder),
             "--state", str(folder / "state.json"), "--seed", str(seed), "--speedup", f"{pace:g}",
@@ -139,8 +141,8 @@ async def _run(
         await companion.opened(folder / DECISIONS, pace)
         began_s = now_s()
         side = [
-            asyncio.create_task(_watch(boat, frame, truth, traffic, began_s), name="judge"),
-            *(asyncio.create_task(_event(e, began_s, boat, companion, traffic, relay), name=f"event {e.kind}")
+            asyncio.create_task(_watch(boat, frame, truth, others, began_s), name="judge"),
+            *(asyncio.create_task(_event(e, began_s, boat, frame, companion, others, relay), name=f"event {e.kind}")
               for e in scenario.events),
         ]
         try:
@@ -164,7 +166,7 @@ async def _run(
     return verdict
 
 
-async def _watch(boat: Boat, frame: LocalFrame, truth: Truth, traffic: LiveTraffic, began_s: float) -> None:
+async def _watch(boat: Boat, frame: LocalFrame, truth: Truth, others: Others, began_s: float) -> None:
     """Note where the boat is from the moment it sails, and how near the others come."""
     sails = False
     while True:
@@ -174,20 +176,28 @@ async def _watch(boat: Boat, frame: LocalFrame, truth: Truth, traffic: LiveTraff
             if sails:
                 here = frame.en_from_geo(fix.position)
                 truth.add(now_s(), here, fix.heading_rad, fix.speed_mps, fix.wind)
-                traffic.note(truth, here, now_s() - began_s)
+                others.note(truth, here, now_s() - began_s)
         await asyncio.sleep(TRUTH_EVERY_S)
 
 
 async def _event(
-    event: EventSpec, began_s: float, boat: Boat, companion: _Companion, traffic: LiveTraffic, relay: Relay | None
+    event: EventSpec, began_s: float, boat: Boat, frame: LocalFrame, companion: _Companion, others: Others,
+    relay: Relay | None,
 ) -> None:
     """Play one event; wind events are in the wind."""
     await asyncio.sleep(max(0.0, began_s + event.at_s - now_s()))
     if event.kind in TRAFFIC:
-        await traffic.play(event, began_s, boat)
+        await others.play(event, began_s, lambda: _ours(boat, frame))
     elif event.kind == "kill_companion":
         await companion.kill(event.restart_after_s)
     elif event.kind in LINK_EVENTS and relay is not None:
         await befall(relay.line, event)
     elif event.kind in boat.plays:
-        await boat.play(event, traffic.frame)
+        await boat.play(event, frame)
+
+
+def _ours(boat: Boat, frame: LocalFrame) -> tuple[Motion, float]:
+    fix = boat.fix()
+    if fix is None:
+        raise LinkError("where our boat is was not told yet")
+    return (frame.en_from_geo(fix.position), fix.velocity_en_mps), fix.heading_rad

@@ -22,12 +22,11 @@ from companion.app import SailOptions, at_once, sail
 from companion.clock import now_s
 from companion.errors import LinkError
 from companion.fold import Step
+from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission, load_mission
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link, LinkIdentity
 from companion.messages import MissionItem, Mode, waypoint
-from companion.planner import Plan, Problem
-from companion.planner.worker import DEFAULT_GRACE_S, InlinePlanner, failed
 from companion.telemetry.recorder import write_atomically
 from sitl.autopilot import (
     Autopilot,
@@ -39,26 +38,15 @@ from sitl.autopilot import (
     serve,
 )
 from sitl.autopilot.memory import MemoryEnd
+from sitl.fragile import FragilePlanner
+from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, befall
 from sitl.scenario import EventSpec, Scenario
-from sitl.ships import (
-    FIRST_MMSI,
-    Moving,
-    SecondBoat,
-    ais_report,
-    distance_m,
-    free_port,
-    intruder_of,
-    radio_report,
-    send_datagram,
-    ship_of,
-)
+from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
-from sitl.wind import Wind
 
 TRUTH_EVERY_S = 0.25
-OUR_LENGTH_M = 2.0    # what the second boat takes ours for
 MAX_TRUTH_SAMPLES = 20_000
 # Unix time of every simulated voyage's start: stamps must not depend on when it was run.
 EPOCH_S = 1_781_000_000.0
@@ -69,7 +57,6 @@ EXPANSIONS = 15_000
 
 # A companion that ended for want of an autopilot is started again after this long, as its service does [s].
 SERVICE_RESTART_S = 5.0
-PLANNER_START_S = 1.5
 
 OnStep = Callable[[Step], None]
 
@@ -84,43 +71,6 @@ class Observer(Protocol):
         """Take one life of the companion's process."""
 
 
-class FragilePlanner(InlinePlanner):
-    """The planner under the virtual clock, with the fates of the worker process: it dies, is replaced, and hangs."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._hangs_until_s = -math.inf
-        self._deaths = 0
-
-    def die(self) -> None:
-        """Kill it, in the middle of whatever it computes."""
-        self.is_alive = False
-        self._deaths += 1
-
-    def hang(self, until_s: float) -> None:
-        """Answer nothing until ``until_s``."""
-        self._hangs_until_s = until_s
-
-    async def plan(
-        self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
-        algorithm: str = "auto",
-    ) -> Plan:
-        """Plan as the worker would: a dead one is replaced first, a hung one when its time is over."""
-        if not self.is_alive:
-            await asyncio.sleep(PLANNER_START_S)
-            self.is_alive, self.restarts = True, self.restarts + 1
-        if now_s() < self._hangs_until_s:
-            await asyncio.sleep((budget_s or 0.0) + DEFAULT_GRACE_S)
-            self.restarts += 1
-            return failed("the planner's worker did not answer in time", seed=seed, algorithm=algorithm)
-        deaths = self._deaths
-        answer = await super().plan(
-            problem, budget_s=budget_s, expansions=expansions, seed=seed, algorithm=algorithm)
-        if deaths != self._deaths:
-            return failed("the planner's worker died", seed=seed, algorithm=algorithm)
-        return answer
-
-
 @dataclass(slots=True)
 class _World:
     """What a running scenario shares between its tasks."""
@@ -128,6 +78,7 @@ class _World:
     autopilot: Autopilot
     link: MemoryLink
     shore: MemoryLink
+    others: Others
     truth: Truth = field(default_factory=Truth)
     status_s: list[float] = field(default_factory=list)
     alerts: dict[str, int] = field(default_factory=dict)
@@ -136,8 +87,6 @@ class _World:
     set_sail_s: float | None = None
     planner: FragilePlanner = field(default_factory=FragilePlanner)
     observer: Observer | None = None
-    ships: list[Moving] = field(default_factory=list)
-    radio_port: int = 0   # of this machine, where the companion hears the event's radio
     stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
 
 
@@ -202,16 +151,15 @@ async def run_embedded(
         wind, seed=seed,
     )
     link = MemoryLink("companion", seed=seed)
-    world = _World(autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1), observer=observer,
-                   radio_port=radio_port)
     frame = mission.frame()
+    world = _World(
+        autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1), observer=observer,
+        others=Others(frame, wind, seed, port=radio_port, hear=autopilot.hear_vessel))
     folder.mkdir(parents=True, exist_ok=True)
     async with serve(autopilot, [link.far, world.shore.far]):
         side_tasks = [
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
             *(asyncio.create_task(_event(world, e, mission), name=f"event {e.kind}") for e in scenario.events),
-            *(asyncio.create_task(_sail_second(world, e, mission, wind, seed), name="second boat")
-              for e in scenario.events if e.kind == "second_boat"),
         ]
         await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions)
         for task in side_tasks:
@@ -297,7 +245,7 @@ def _collect_alerts(world: _World, folder: Path) -> None:
         world.alerts[code] = world.alerts.get(code, 0) + count
 
 
-async def _watch_truth(world: _World, frame: Any, limit_s: float) -> None:
+async def _watch_truth(world: _World, frame: LocalFrame, limit_s: float) -> None:
     # A day is watched once in four seconds: the judge looks between samples too, and its memory is bounded.
     every_s = max(TRUTH_EVERY_S, limit_s / MAX_TRUTH_SAMPLES)
     while True:
@@ -307,9 +255,7 @@ async def _watch_truth(world: _World, frame: Any, limit_s: float) -> None:
         if world.set_sail_s is not None:
             here = frame.en_from_geo(t.position)
             world.truth.add(now_s(), here, t.heading_rad, t.speed_mps, (t.twd_from_rad, t.tws_mps))
-            for ship in world.ships:
-                nearest = min(world.truth.vessels_m.get(str(ship.mmsi), math.inf), distance_m(ship, here, now_s()))
-                world.truth.vessels_m[str(ship.mmsi)] = round(nearest, 2)
+            world.others.note(world.truth, here, now_s())
         if world.observer is not None:
             world.observer.truth(now_s(), world.autopilot, world.link)
         await asyncio.sleep(every_s)
@@ -348,42 +294,18 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
         autopilot.set_battery(event.volts or 0.0)
     elif event.kind == "current":
         autopilot.set_current(math.radians(event.set_deg), event.drift_mps)
-    elif event.kind == "vessel":
-        ship = ship_of(event, len(world.ships))
-        world.ships.append(ship)
-        while event.is_on_ais:
-            autopilot.hear_vessel(ais_report(ship, mission.frame(), now_s()))
-            await asyncio.sleep(event.every_s)
-    elif event.kind == "intruder":
-        now, frame = autopilot.truth, mission.frame()
-        ours = frame.en_from_geo(now.position), now.velocity_en_mps
-        intruder = intruder_of(event, len(world.ships), now_s(), ours, now.heading_rad)
-        world.ships.append(intruder)
-        while world.radio_port:
-            send_datagram(radio_report(intruder, frame, now_s()), world.radio_port)
-            await asyncio.sleep(event.every_s)
+    elif event.kind in TRAFFIC:
+        await world.others.play(event, 0.0, lambda: _ours(autopilot, mission.frame()))
     elif event.kind == "foreign_mission":
         away = mission.frame().geo_from_en(event.east_m, event.north_m)
         async with world.stranger:
             await _upload_foreign(world.shore.near, [waypoint(away)])
 
 
-async def _sail_second(world: _World, event: EventSpec, mission: Mission, wind: Wind, seed: int) -> None:
-    """Sail the second boat from ``at_s`` on, and tell of it."""
-    await asyncio.sleep(max(0.0, event.at_s - now_s()))
-    frame = mission.frame()
-    boat = SecondBoat(FIRST_MMSI + len(world.ships), wind, seed, world.autopilot.truth.t_s,
-                      (event.east_m, event.north_m), (event.goal_east_m, event.goal_north_m))
-    world.ships.append(boat)
-    told_s = -math.inf
-    while True:
-        if world.radio_port and now_s() - told_s >= event.every_s:
-            send_datagram(radio_report(boat, frame, now_s()), world.radio_port)
-            told_s = now_s()
-        await asyncio.sleep(1.0)
-        now = world.autopilot.truth
-        boat.sail((frame.en_from_geo(now.position), now.velocity_en_mps), OUR_LENGTH_M)
-        world.truth.second_boat_m = boat.nearest_goal_m
+def _ours(autopilot: Autopilot, frame: LocalFrame) -> tuple[Motion, float]:
+    """Return how our boat truly moves, and its heading [rad]."""
+    now = autopilot.truth
+    return (frame.en_from_geo(now.position), now.velocity_en_mps), now.heading_rad
 
 
 def vane_fault(event: EventSpec) -> VaneFault:

@@ -18,9 +18,8 @@ from companion.traffic.feeds import open_feed
 from companion.traffic.nmea import NmeaDecoder
 from sitl.ardurover import find
 from sitl.autopilot import Vessel
-from sitl.boats import Fix
 from sitl.live import run_live
-from sitl.live_traffic import LiveTraffic, sentences
+from sitl.others import Others, sentences
 from sitl.relay import Relay, befall
 from sitl.scenario import EventSpec, load_scenario
 from sitl.ships import distance_m, free_port, ship_of
@@ -48,24 +47,15 @@ def test_a_receivers_sentence_says_where_the_ship_is(lat, lon, course, speed, mm
     assert abs(difference_rad(report.course_rad, math.radians(course))) <= math.radians(0.11)
 
 
-class Moored:
-    """A boat that lies at the origin; all that the traffic asks of it."""
-
-    plays = frozenset()
-    link = ""
-
-    def fix(self):
-        return Fix(position=ORIGIN, heading_rad=0.0, speed_mps=0.0, wind=(0.0, 5.0), sails=True)
-
-
 async def heard_for(seconds, event, began_s):
     """Play ``event`` and return what a companion's feed hears, and the judge's truth."""
-    traffic, reports, truth = LiveTraffic(FRAME, Constant(0.0, 5.0), 0), [], Truth()
-    async with open_feed(traffic.feed, reports.append):
-        playing = asyncio.create_task(traffic.play(event, began_s, Moored()))
+    port, reports, truth = free_port(), [], Truth()
+    others = Others(FRAME, Constant(0.0, 5.0), 0, port=port)
+    async with open_feed(f"udpin:127.0.0.1:{port}", reports.append):
+        playing = asyncio.create_task(others.play(event, began_s, lambda: (((0.0, 0.0), (0.0, 0.0)), 0.0)))
         for _ in range(seconds):
             await asyncio.sleep(1.0)
-            traffic.note(truth, (0.0, 0.0), now_s() - began_s)
+            others.note(truth, (0.0, 0.0), now_s() - began_s)
         playing.cancel()
     return reports, truth
 

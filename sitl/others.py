@@ -1,31 +1,29 @@
-"""The other vessels of a live run: sailed by the runner, told to the companion over a UDP feed, judged by hulls.
+"""The other vessels of a run: sailed as its scenario says, told to the companion, judged by hulls.
 
-AIS goes as a receiver gives it, NMEA sentences with a class A position report; an event's radio goes as JSON. The
-companion hears them on ``companion run --feed``. The times of ships count from the scenario's start, as everywhere.
+AIS goes to the autopilot where it takes it, else to the UDP feed as a receiver gives it, NMEA sentences with a class A
+position report; an event's radio goes to the feed as JSON. The times of ships count from the scenario's start.
 """
 
 from __future__ import annotations
 
 import asyncio
 import math
+from collections.abc import Callable
 from typing import Any
 
 from pyais import encode_dict
 
 from companion.clock import now_s
-from companion.errors import LinkError
 from companion.geo.frame import LocalFrame
 from sitl.autopilot import Vessel
-from sitl.boats import Boat
-from sitl.runner import OUR_LENGTH_M
 from sitl.scenario import EventSpec
 from sitl.ships import (
     FIRST_MMSI,
+    Motion,
     Moving,
     SecondBoat,
     ais_report,
     distance_m,
-    free_port,
     intruder_of,
     radio_report,
     send_datagram,
@@ -35,6 +33,7 @@ from sitl.verdict import Truth
 from sitl.wind import Wind
 
 TRAFFIC = frozenset({"vessel", "intruder", "second_boat"})
+OUR_LENGTH_M = 2.0    # what the second boat takes ours for
 _MPS_PER_KNOT = 1852.0 / 3600.0
 
 
@@ -56,19 +55,17 @@ def sentences(vessel: Vessel) -> bytes:
     return "".join(f"{line}\r\n" for line in encode_dict(said, talker_id="AI", sentence_type="VDM")).encode()
 
 
-class LiveTraffic:
-    """The vessels, and the port that the companion hears them on."""
+class Others:
+    """The vessels of one run."""
 
-    def __init__(self, frame: LocalFrame, wind: Wind, seed: int) -> None:
+    def __init__(
+        self, frame: LocalFrame, wind: Wind, seed: int, *, port: int, hear: Callable[[Vessel], None] | None = None
+    ) -> None:
+        """Tell of them at the UDP ``port`` of this machine (0: by nothing), AIS to ``hear`` if that is given."""
         self.frame, self._wind, self._seed = frame, wind, seed
-        self._port = free_port()
+        self._port, self._hear = port, hear or self._receive
         self._vessels: list[Moving] = []
         self._second: SecondBoat | None = None
-
-    @property
-    def feed(self) -> str:
-        """The name of the feed."""
-        return f"udpin:127.0.0.1:{self._port}"
 
     def note(self, truth: Truth, here_en_m: tuple[float, float], t_s: float) -> None:
         """Put the least distances so far into ``truth``; ``t_s`` is the scenario's time."""
@@ -79,49 +76,50 @@ class LiveTraffic:
         if self._second is not None:
             truth.second_boat_m = self._second.nearest_goal_m
 
-    async def play(self, event: EventSpec, began_s: float, boat: Boat) -> None:
+    async def play(self, event: EventSpec, began_s: float, ours: Callable[[], tuple[Motion, float]]) -> None:
         """Sail the vessel of ``event`` until cancelled, and tell of it every ``every_s``.
 
-        Raises:
-            LinkError: it starts from where our boat is, and that is not known.
+        Args:
+            event: one of ``TRAFFIC``, whose time has come.
+            began_s: when the scenario began, of the loop's clock [s].
+            ours: where our boat is, how it moves, and its heading [rad].
         """
         number = len(self._vessels)
         if event.kind == "vessel":
             ship = ship_of(event, number)
             self._vessels.append(ship)
             while event.is_on_ais:
-                self._send(sentences(ais_report(ship, self.frame, now_s() - began_s)))
+                self._hear(ais_report(ship, self.frame, now_s() - began_s))
                 await asyncio.sleep(event.every_s)
         elif event.kind == "intruder":
-            intruder = intruder_of(event, number, now_s() - began_s, *self._ours(boat))
+            intruder = intruder_of(event, number, now_s() - began_s, *ours())
             self._vessels.append(intruder)
-            while True:
-                self._send(radio_report(intruder, self.frame, now_s() - began_s))
+            while self._port:
+                self._tell(intruder, now_s() - began_s)
                 await asyncio.sleep(event.every_s)
         else:
-            await self._sail_second(event, number, began_s, boat)
+            second = SecondBoat(
+                FIRST_MMSI + number, self._wind, self._seed, now_s() - began_s, (event.east_m, event.north_m),
+                (event.goal_east_m, event.goal_north_m))
+            self._vessels.append(second)
+            self._second = second
+            await self._sail(second, event.every_s, began_s, ours)
 
-    async def _sail_second(self, event: EventSpec, number: int, began_s: float, boat: Boat) -> None:
-        second = SecondBoat(
-            FIRST_MMSI + number, self._wind, self._seed, now_s() - began_s, (event.east_m, event.north_m),
-            (event.goal_east_m, event.goal_north_m))
-        self._vessels.append(second)
-        self._second = second
+    async def _sail(
+        self, second: SecondBoat, every_s: float, began_s: float, ours: Callable[[], tuple[Motion, float]]
+    ) -> None:
         told_s = -math.inf
         next_s = now_s()
         while True:
-            if now_s() - told_s >= event.every_s:
+            if self._port and now_s() - told_s >= every_s:
                 told_s = now_s()
-                self._send(radio_report(second, self.frame, told_s - began_s))
+                self._tell(second, told_s - began_s)
             next_s += 1.0   # the model sails a second a call: a late timer is caught up with
             await asyncio.sleep(max(0.0, next_s - now_s()))
-            second.sail(self._ours(boat)[0], OUR_LENGTH_M)
+            second.sail(ours()[0], OUR_LENGTH_M)
 
-    def _ours(self, boat: Boat) -> tuple[tuple[tuple[float, float], tuple[float, float]], float]:
-        fix = boat.fix()
-        if fix is None:
-            raise LinkError("where our boat is was not told yet")
-        return (self.frame.en_from_geo(fix.position), fix.velocity_en_mps), fix.heading_rad
+    def _tell(self, vessel: Moving, t_s: float) -> None:
+        send_datagram(radio_report(vessel, self.frame, t_s), self._port)
 
-    def _send(self, data: bytes) -> None:
-        send_datagram(data, self._port)
+    def _receive(self, vessel: Vessel) -> None:
+        send_datagram(sentences(vessel), self._port)
