@@ -24,7 +24,8 @@ from companion.mavlink.link import Link, LinkIdentity
 from companion.mavlink.streams import Stream
 from companion.mavlink.transport import open_link
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
-from sitl.ardurover import ArduRover, require
+from sitl.ardurover import ArduRover
+from sitl.program import require
 from sitl.scenario import EventSpec, Scenario
 from sitl.ships import free_port
 from sitl.wind import Wind

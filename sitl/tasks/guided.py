@@ -153,7 +153,8 @@ def with_boat(
             return await job(facade, lambda: server.truth)
 
     async def real() -> Any:
-        from sitl.ardurover import ArduRover, require
+        from sitl.ardurover import ArduRover
+        from sitl.program import require
 
         async with (
             ArduRover(require(), ORIGIN, wind, heading_rad=heading_rad, speedup=speedup, model=model) as boat,

@@ -14,8 +14,9 @@ from companion import clock
 from companion.errors import InputError, JobError
 from companion.geo.angles import difference_rad
 from companion.mavlink.transport import open_link
-from sitl.ardurover import ArduRover, check, fetch, find, free_instance
+from sitl.ardurover import ArduRover, free_instance
 from sitl.autopilot import HOME
+from sitl.program import check, fetch, find
 from sitl.wind import Constant, Event, Scripted
 from tests.sitl.boats import Client, sail
 
