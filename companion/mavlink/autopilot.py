@@ -1,8 +1,6 @@
 """The autopilot as the application sees it: values in, orders out, each with an outcome and words.
 
-Lists here never hold home: ``items[0]`` is the autopilot's item 1. A mission changes places in one piece where the
-autopilot has MAVFTP (one restart of the present leg, nothing half written when the link dies), else by the item
-protocol, and is believed only after it was read back and compared.
+Lists here never hold home: ``items[0]`` is the autopilot's item 1.
 """
 
 from __future__ import annotations
@@ -10,9 +8,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import TracebackType
-from typing import Literal, Self
+from typing import Self
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
@@ -21,11 +19,9 @@ from companion.mavlink import codec
 from companion.mavlink.assembler import Value, VehicleAssembler
 from companion.mavlink.commands import CommandAnswer
 from companion.mavlink.frames import Message
-from companion.mavlink.ftp import FENCE_FILE, MISSION_FILE, RALLY_FILE, FtpRead, FtpWrite
-from companion.mavlink.items import ENDING, first_difference, pack_mission_dat, padded, sailed, unpack_mission_dat
 from companion.mavlink.link import Link
-from companion.mavlink.lists import ListClear, ListDownload, ListUpload
 from companion.mavlink.machines import Outcome
+from companion.mavlink.mission_lists import Lists, Method, ReadResult, TransferResult
 from companion.mavlink.params import ParamAnswer, ParamList, ParamRead, ParamSet, ParamTable, names_of
 from companion.mavlink.status_wire import status_messages
 from companion.messages import (
@@ -33,55 +29,16 @@ from companion.messages import (
     CompanionStatus,
     GeoPoint,
     MissionItem,
-    MissionState,
     MissionType,
     Mode,
 )
 
-Method = Literal["auto", "ftp", "items", "partial", "guarded"]
 OnValue = Callable[[Value], None]
 
 # How long the autopilot has to show what it acknowledged: its heartbeat and MISSION_CURRENT come once a second [s].
 CONFIRM_S = 2.5
 SET_CURRENT_TRIES = 3
-UPLOAD_TRIES = 2
 AUX_SAILBOAT_TACK = 63  # RC option number of DO_AUX_FUNCTION
-_FILES = {MissionType.MISSION: MISSION_FILE, MissionType.FENCE: FENCE_FILE, MissionType.RALLY: RALLY_FILE}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TransferResult:
-    """How an upload ended. OK means written, read back, equal, and made current where that was asked.
-
-    ``method`` is the protocol that carried it, ``duration_s`` what it took with the read-back, ``count`` how many items
-    (without home) the autopilot holds now, None when that is not known.
-    """
-
-    outcome: Outcome
-    text: str = ""
-    method: str = ""
-    duration_s: float = 0.0
-    count: int | None = None
-
-    @property
-    def is_ok(self) -> bool:
-        """The list is there."""
-        return self.outcome is Outcome.OK
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReadResult:
-    """How a download ended. ``items`` (without home) is None unless ``outcome`` is OK."""
-
-    outcome: Outcome
-    text: str = ""
-    items: tuple[MissionItem, ...] | None = None
-    home: MissionItem | None = None
-
-    @property
-    def is_ok(self) -> bool:
-        """The list was read."""
-        return self.outcome is Outcome.OK
 
 
 class Autopilot:
@@ -94,13 +51,10 @@ class Autopilot:
     def __init__(self, link: Link, *, timeout_s: float = 10.0) -> None:
         self.link = link
         self.assembler = VehicleAssembler()
-        self.version: codec.AutopilotVersion | None = None
-        self.home: GeoPoint | None = None
+        self._lists = Lists(link, lambda: self.assembler.status)
         self._timeout_s = timeout_s
         self._listeners: list[OnValue] = []
         self._version_asked = False
-        self._ftp_works: bool | None = None
-        self._ftp_seq: int | None = None
         self._text_id = 0
         self._status_turn = 0
         self._changed = asyncio.Event()
@@ -117,6 +71,11 @@ class Autopilot:
         self._unsubscribe()
 
     # -------------------------------------------------------------------------------------- values in
+    @property
+    def version(self) -> codec.AutopilotVersion | None:
+        """What it said of itself; None before."""
+        return self._lists.version
+
     @property
     def status(self) -> AutopilotStatus | None:
         """The newest status."""
@@ -136,9 +95,9 @@ class Autopilot:
         kind = message.get_type()
         if kind == "HOME_POSITION" and self.link.party.is_from_target(message):
             with contextlib.suppress(ValueError):
-                self.home = codec.geo_point(message.latitude, message.longitude) or self.home
+                self._lists.home = codec.geo_point(message.latitude, message.longitude) or self._lists.home
         elif kind == "AUTOPILOT_VERSION" and self.link.party.is_from_target(message):
-            self.version = codec.autopilot_version(message)
+            self._lists.version = codec.autopilot_version(message)
         if message.get_srcSystem() != self.link.party.target_system:
             return
         bad_before = self.assembler.dropped_by_type[kind]
@@ -276,18 +235,15 @@ class Autopilot:
     # ------------------------------------------------------------------------------------------- lists
     async def read_mission(self, *, method: Method = "items") -> ReadResult:
         """Read the mission; ``items`` is without home."""
-        async with self.link.lock("lists"):
-            return await self._read(MissionType.MISSION, method)
+        return await self._lists.read(MissionType.MISSION, method)
 
     async def read_fence(self) -> ReadResult:
         """Read the fence items."""
-        async with self.link.lock("lists"):
-            return await self._read(MissionType.FENCE, "items")
+        return await self._lists.read(MissionType.FENCE, "items")
 
     async def read_rally(self) -> ReadResult:
         """Read the rally points."""
-        async with self.link.lock("lists"):
-            return await self._read(MissionType.RALLY, "items")
+        return await self._lists.read(MissionType.RALLY, "items")
 
     async def upload_mission(
         self, items: Sequence[MissionItem], *, method: Method = "auto", keep_first: int = 0,
@@ -314,245 +270,30 @@ class Autopilot:
         began_s = now_s()
         if method == "auto" and not self._version_asked:
             await self.read_version()
-        async with self.link.lock("lists"):
-            result = TransferResult(outcome=Outcome.LINK, text="the link is silent")
-            for chosen in self._ways(items, method, keep_first, is_guarded=stopgap is not None):
-                if chosen == "ftp" and self._ftp_works is False:
-                    continue
-                if chosen == "items" and result.method == "guarded" and result.outcome is not Outcome.UNSUPPORTED:
-                    break   # what failed by a bad link is not tried again without the guard
-                if chosen == "guarded" and stopgap is not None:
-                    result = await self._upload_guarded(items, keep_first, stopgap)
-                else:
-                    result = await self._upload_once(items, chosen, keep_first)
-                if result.is_ok or self.link.is_lost:
-                    break
-                if chosen == "items" and result.outcome not in {Outcome.TIMEOUT, Outcome.MISMATCH}:
-                    break
+        result = await self._lists.write_mission(items, method, keep_first, stopgap)
         if result.is_ok and set_current is not None:
             answer = await self.set_current(set_current, reset=True)
             if not answer.is_ok:
-                result = TransferResult(
-                    outcome=answer.outcome, text=f"uploaded, but not made current: {answer.text}",
-                    method=result.method, count=result.count,
-                )
-        return self._timed(result, began_s)
+                result = replace(
+                    result, outcome=answer.outcome, text=f"uploaded, but not made current: {answer.text}")
+        return replace(result, duration_s=now_s() - began_s)
 
     async def upload_partial(self, start: int, items: Sequence[MissionItem]) -> TransferResult:
         """Replace items ``start``.. (1 is the first after home) by MISSION_WRITE_PARTIAL_LIST and read them back."""
-        began_s = now_s()
-        async with self.link.lock("lists"):
-            machine = ListUpload(self.link.party, MissionType.MISSION, items, first=start, partial=True)
-            written = await self.link.perform(machine)
-            if written.outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
-                return self._timed(
-                    TransferResult(outcome=written.outcome, text=written.text, method="partial"), began_s
-                )
-            read = await self._read(MissionType.MISSION, "items")
-        if read.items is None:
-            return self._timed(TransferResult(outcome=read.outcome, text=read.text, method="partial"), began_s)
-        difference = first_difference(items, read.items[start - 1:start - 1 + len(items)])
-        outcome = Outcome.MISMATCH if difference else Outcome.OK
-        result = TransferResult(outcome=outcome, text=difference, method="partial", count=len(read.items))
-        return self._timed(result, began_s)
+        return await self._lists.write_partial(start, items)
 
     async def upload_fence(self, items: Sequence[MissionItem]) -> TransferResult:
         """Put a fence on the autopilot (taken over in one piece at its end), read back and compare."""
-        return await self._upload_list(MissionType.FENCE, items)
+        return await self._lists.write(MissionType.FENCE, items)
 
     async def upload_rally(self, items: Sequence[MissionItem]) -> TransferResult:
         """Put rally points on the autopilot, read back and compare."""
-        return await self._upload_list(MissionType.RALLY, items)
+        return await self._lists.write(MissionType.RALLY, items)
 
     async def clear_mission(self) -> TransferResult:
         """Remove the mission; refused while it sails."""
-        return await self._clear(MissionType.MISSION)
+        return await self._lists.clear(MissionType.MISSION)
 
     async def clear_fence(self) -> TransferResult:
         """Remove the fence."""
-        return await self._clear(MissionType.FENCE)
-
-    # ------------------------------------------------------------------------------------------ inside
-    def _ways(
-        self, items: Sequence[MissionItem], method: Method, keep_first: int, *, is_guarded: bool,
-    ) -> tuple[Method, ...]:
-        """Return the protocols to try, in order: twice the chosen one, at last the plain one."""
-        if method != "auto":
-            return (method,) * UPLOAD_TRIES
-        plain: tuple[Method, ...] = ("guarded", "guarded", "items") if is_guarded else ("items", "items")
-        if self._ftp_works is not False and (self.version is None or self.version.has_ftp):
-            return "ftp", "ftp", *plain
-        if is_guarded:
-            return plain
-        total = self.status.mission_total if self.status else None
-        # a partial write may lengthen the list by one item at most, and leaves what stands behind it
-        is_ended = bool(items) and items[-1].command in ENDING
-        if is_ended and keep_first > 0 and total is not None and keep_first < len(items) <= total + 1:
-            return "partial", "items", "items"
-        return "items", "items"
-
-    def _running_total(self) -> int:
-        """Return how many items a write that does not clear leaves there: those of a mission under way."""
-        status = self.status
-        if status is None or not status.is_armed or status.mission_state is MissionState.NO_MISSION:
-            return 0
-        return status.mission_total or 0
-
-    def _home_item(self, items: Sequence[MissionItem]) -> MissionItem:
-        lat_e7, lon_e7 = codec.e7(self.home) if self.home else (items[0].lat_e7, items[0].lon_e7)
-        return MissionItem(command=wire.MAV_CMD_NAV_WAYPOINT, lat_e7=lat_e7, lon_e7=lon_e7, frame=0)
-
-    async def _upload_once(self, items: Sequence[MissionItem], method: Method, keep_first: int) -> TransferResult:
-        """Write by ``method``, read back, compare."""
-        party, kind, home = self.link.party, MissionType.MISSION, self._home_item(items)
-        sent = tuple(items)
-        if method == "ftp":
-            sent = padded(items, self._running_total())
-            data = pack_mission_dat((home, *sent), kind)
-            written = await self.link.perform(FtpWrite(party, MISSION_FILE, data, seq=self._next_ftp_seq()))
-            self._ftp_seq = written.next_seq
-            outcome, text = written.outcome, written.text
-            if outcome is Outcome.OK:
-                self._ftp_works = True
-            elif outcome in {Outcome.UNSUPPORTED, Outcome.REFUSED} and self._ftp_works is None:
-                self._ftp_works = False
-        elif method == "partial":
-            # not padded: every item written restarts the present leg
-            listed = await self.link.perform(
-                ListUpload(party, kind, sent[keep_first:], first=keep_first + 1, partial=True)
-            )
-            outcome, text = listed.outcome, listed.text
-        else:
-            listed = await self.link.perform(ListUpload(party, kind, (home, *sent)))
-            outcome, text = listed.outcome, listed.text
-        if outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
-            if self.link.is_lost:
-                outcome = Outcome.LINK
-            return TransferResult(outcome=outcome, text=text, method=method)
-        read = await self._read(kind, "ftp" if method == "ftp" else "items")
-        if read.items is None:
-            outcome = read.outcome if not self.link.is_lost else Outcome.LINK
-            return TransferResult(outcome=outcome, text=f"written, not read back: {read.text}", method=method)
-        difference = first_difference(sailed(sent), sailed(read.items))
-        if not difference and len(read.items) < len(sent):
-            difference = f"{len(sent)} items written, {len(read.items)} read back"
-        if difference:
-            return TransferResult(outcome=Outcome.MISMATCH, text=difference, method=method, count=len(read.items))
-        tail = len(read.items) - len(sent)
-        text = f"{tail} old items stand behind the end" if tail > 0 else ""
-        return TransferResult(outcome=Outcome.OK, text=text, method=method, count=len(read.items))
-
-    async def _upload_guarded(
-        self, items: Sequence[MissionItem], keep_first: int, stopgap: MissionItem,
-    ) -> TransferResult:
-        """Write behind a stopgap: close the mission there, write and check the rest, then open it by a single item."""
-        party, kind, seq = self.link.party, MissionType.MISSION, keep_first + 1
-        closed = (*items[:keep_first], stopgap, *items[seq:])
-        if len(closed) > seq:
-            done = await self.link.perform(ListUpload(party, kind, (stopgap,), first=seq, partial=True))
-            if done.outcome is not Outcome.OK:
-                unknown = done.ack == wire.MAV_MISSION_UNSUPPORTED
-                return self._guarded(Outcome.UNSUPPORTED if unknown else done.outcome, done.text)
-            total = self.status.mission_total if self.status else None
-            if total is not None and len(items) <= total + 1:
-                done = await self.link.perform(ListUpload(party, kind, closed[seq:], first=seq + 1, partial=True))
-            if total is None or len(items) > total + 1 or done.outcome is Outcome.REFUSED:
-                done = await self.link.perform(ListUpload(party, kind, (self._home_item(items), *closed)))
-            if done.outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
-                return self._guarded(done.outcome, done.text)
-            read = await self._read(kind, "items")
-            difference = first_difference(closed, (read.items or ())[:len(closed)])
-            if read.items is None or difference:
-                return self._guarded(Outcome.MISMATCH if read.items is not None else read.outcome, difference)
-        done = await self.link.perform(ListUpload(party, kind, (items[keep_first],), first=seq, partial=True))
-        if done.outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
-            return self._guarded(done.outcome, done.text)
-        read = await self._read(kind, "items")
-        if read.items is None:
-            return self._guarded(read.outcome, f"written, not read back: {read.text}")
-        difference = first_difference(sailed(items), sailed(read.items))
-        result = self._guarded(Outcome.MISMATCH if difference else Outcome.OK, difference)
-        return replace(result, count=len(read.items))
-
-    def _guarded(self, outcome: Outcome, text: str) -> TransferResult:
-        if outcome is Outcome.UNCONFIRMED:
-            outcome = Outcome.TIMEOUT   # it may not stand there: nothing is written behind it
-        if outcome is not Outcome.OK and self.link.is_lost:
-            outcome = Outcome.LINK
-        return TransferResult(outcome=outcome, text=text, method="guarded")
-
-    async def _upload_list(self, kind: MissionType, items: Sequence[MissionItem]) -> TransferResult:
-        began_s = now_s()
-        result = TransferResult(outcome=Outcome.LINK, text="the link is silent")
-        async with self.link.lock("lists"):
-            for _ in range(UPLOAD_TRIES):
-                written = await self.link.perform(ListUpload(self.link.party, kind, items))
-                if written.outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
-                    outcome = written.outcome if not self.link.is_lost else Outcome.LINK
-                    result = TransferResult(outcome=outcome, text=written.text, method="items")
-                else:
-                    read = await self._read(kind, "items")
-                    if read.items is None:
-                        result = TransferResult(outcome=read.outcome, text=read.text, method="items")
-                    else:
-                        difference = first_difference(items, read.items)
-                        result = TransferResult(
-                            outcome=Outcome.MISMATCH if difference else Outcome.OK, text=difference, method="items",
-                            count=len(read.items),
-                        )
-                if result.outcome not in {Outcome.TIMEOUT, Outcome.MISMATCH} or self.link.is_lost:
-                    break
-        return self._timed(result, began_s)
-
-    async def _clear(self, kind: MissionType) -> TransferResult:
-        began_s = now_s()
-        async with self.link.lock("lists"):
-            cleared = await self.link.perform(ListClear(self.link.party, kind))
-        return self._timed(TransferResult(outcome=cleared.outcome, text=cleared.text, method="items"), began_s)
-
-    async def _read(self, kind: MissionType, method: Method) -> ReadResult:
-        if method == "ftp":
-            result = await self._read_ftp(kind)
-            if result.is_ok or self.link.is_lost:
-                return result
-        read = await self.link.perform(ListDownload(self.link.party, kind))
-        if read.outcome is not Outcome.OK:
-            outcome = read.outcome if not self.link.is_lost else Outcome.LINK
-            return ReadResult(outcome=outcome, text=read.text)
-        return _without_home(kind, read.items)
-
-    async def _read_ftp(self, kind: MissionType) -> ReadResult:
-        read = await self.link.perform(FtpRead(self.link.party, _FILES[kind], seq=self._next_ftp_seq()))
-        self._ftp_seq = read.next_seq
-        if read.outcome is not Outcome.OK:
-            return ReadResult(outcome=read.outcome, text=read.text)
-        try:
-            found, start, items = unpack_mission_dat(read.data)
-        except ValueError as error:
-            return ReadResult(outcome=Outcome.MISMATCH, text=str(error))
-        if found is not kind or start != 0:
-            return ReadResult(outcome=Outcome.MISMATCH, text=f"the file holds {found.name} from item {start}")
-        return _without_home(kind, items)
-
-    def _next_ftp_seq(self) -> int:
-        """Return a request number that an earlier life of this program has not just used.
-
-        The autopilot answers a number that it has just answered by repeating that answer.
-        """
-        if self._ftp_seq is None:
-            self._ftp_seq = int(now_s() * 997.0) & 0xFFFF
-        return self._ftp_seq
-
-    @staticmethod
-    def _timed(result: TransferResult, began_s: float) -> TransferResult:
-        return TransferResult(
-            outcome=result.outcome, text=result.text, method=result.method, count=result.count,
-            duration_s=now_s() - began_s,
-        )
-
-
-def _without_home(kind: MissionType, items: tuple[MissionItem, ...]) -> ReadResult:
-    if kind is not MissionType.MISSION:
-        return ReadResult(outcome=Outcome.OK, items=items)
-    return ReadResult(outcome=Outcome.OK, items=items[1:], home=items[0] if items else None)
-
+        return await self._lists.clear(MissionType.FENCE)
