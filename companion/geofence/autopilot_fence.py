@@ -3,7 +3,7 @@
 Every keep-out zone holds its obstacles and stays inside what the planner keeps clear of; the keep-in zone lies
 inside the limits and holds all water that the planner may use. So the fence never lets through what the files
 forbid, and never stops a boat that is where its plan may put it. Both halves are proved on the items' own integers
-(``prove``), in the plane of longitude and latitude in which ArduPilot draws its polygons.
+(``fence_proof``), in the plane of longitude and latitude in which ArduPilot draws its polygons.
 """
 
 from __future__ import annotations
@@ -15,30 +15,26 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from companion.geofence.area import Area, parts
+from companion.geofence.area import Area
 from companion.geofence.fence_items import (
     MAX_FENCE_ITEMS,
     MAX_RING,
     STORAGE_BYTES,
-    items_to_zones,
     storage_bytes,
     zones_to_items,
 )
-from companion.geofence.findings import Severity
-from companion.geofence.rings import Findings
-from companion.geofence.shapes import Circle, Obstacle, Shape, Zone, ZoneKind, center_of, wrap_lon_deg
+from companion.geofence.fence_plane import EQUATOR_M, Plane, cut_by_rings, limits_in, plane_of, shape_in
+from companion.geofence.fence_proof import prove
+from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
 from companion.geofence.simplify import circle_round, enclosing_circle, grown_polygon, shrunk_polygon
 from companion.messages import GeoPoint, MissionItem
 
 # How much of the margin a simplification may use: the least that fits leaves the most room between plan and fence.
 STEPS = (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)
 RESERVE_M = 0.03      # rounding to 1e-7 degrees moves a vertex by at most 8 mm; the rest is for edges
-AUTOPILOT_METRES_PER_DEGREE = 111_318.845  # ArduPilot's sphere (LATLON_TO_M), which draws its circles
-EQUATOR_M, FLATTENING = 6_378_137.0, 1.0 / 298.257223563  # WGS 84
 
 
 class FenceStatus(enum.Enum):
@@ -71,64 +67,6 @@ class AutopilotFence:
 
 
 @dataclass(frozen=True)
-class _Plane:
-    """Longitude and latitude scaled to metres: straight lines stay straight, as on the autopilot.
-
-    Lengths are wrong by at most ``error`` (a fraction) within the area, ArduPilot's own sphere included.
-    """
-
-    lat_deg: float
-    lon_deg: float
-    error: float
-
-    @property
-    def scale(self) -> NDArray[np.float64]:
-        """Metres per degree of longitude and of latitude, on the ellipsoid."""
-        sin2 = math.sin(math.radians(self.lat_deg)) ** 2
-        e2 = FLATTENING * (2.0 - FLATTENING)
-        east = EQUATOR_M / math.sqrt(1.0 - e2 * sin2) * math.cos(math.radians(self.lat_deg))
-        north = EQUATOR_M * (1.0 - e2) / (1.0 - e2 * sin2) ** 1.5
-        return np.asarray(np.radians(np.array([east, north])))
-
-    def metres(self, polygon: Polygon) -> Polygon:
-        """Return a polygon of degrees in metres; longitudes are brought near the plane's."""
-        def scaled(coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
-            lonlat = coordinates[:, :2] - np.array([self.lon_deg, self.lat_deg])
-            lonlat[:, 0] -= 360.0 * np.round(np.median(lonlat[:, 0]) / 360.0)
-            return np.asarray(lonlat * self.scale)
-        return shapely.transform(shapely.force_2d(polygon), scaled)
-
-    def point(self, point: GeoPoint) -> tuple[float, float]:
-        lon = math.remainder(point.lon_deg - self.lon_deg, 360.0)
-        x, y = np.array([lon, point.lat_deg - self.lat_deg]) * self.scale
-        return float(x), float(y)
-
-    def degrees(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(xy / self.scale + np.array([self.lon_deg, self.lat_deg]))
-
-    def geo(self, x: float, y: float) -> GeoPoint:
-        lon, lat = self.degrees(np.array([[x, y]]))[0]
-        return GeoPoint(lat_deg=round(float(lat), 7), lon_deg=wrap_lon_deg(round(float(lon), 7)))
-
-
-def _plane(area: Area, near: GeoPoint) -> _Plane:
-    """Return the plane of the area. The scale's error grows with tan(latitude) times the extent."""
-    reach_deg = 0.0
-    shapes = [o.shape for o in area.solids] + [z.shape for z in area.fence.inclusions]
-    for shape in shapes:
-        if isinstance(shape, Circle):
-            lats = [shape.center.lat_deg - shape.radius_m / 1.1e5, shape.center.lat_deg + shape.radius_m / 1.1e5]
-        else:
-            lats = [float(shape.bounds[1]), float(shape.bounds[3])]
-        reach_deg = max(reach_deg, *(abs(lat - near.lat_deg) for lat in lats))
-    flat = math.tan(math.radians(min(85.0, abs(near.lat_deg) + reach_deg))) * math.radians(reach_deg)
-    scale = _Plane(near.lat_deg, near.lon_deg, 0.0).scale
-    cosine = np.array([math.cos(math.radians(near.lat_deg)), 1.0])
-    sphere = float(np.max(np.abs(scale / (AUTOPILOT_METRES_PER_DEGREE * cosine) - 1.0)))
-    return _Plane(near.lat_deg, near.lon_deg, flat + sphere + 1e-4)
-
-
-@dataclass(frozen=True)
 class _Solid:
     name: str
     polygon: Polygon           # the obstacle itself; a circle's is drawn around it
@@ -149,16 +87,16 @@ def fence_for_autopilot(
 
     if not area.solids and not area.fence.inclusions:
         return refuse(FenceStatus.EMPTY, "the area has neither obstacles nor a fence")
-    plane = _plane(area, inside[0])
+    plane = plane_of(area, inside[0])
     if plane.error > 0.1:
         return refuse(FenceStatus.TOO_LARGE, "the area reaches too far for a fence in one plane; cut it up")
     usable_m = margin_m / (1.0 + plane.error)
     if usable_m < 4.0 * RESERVE_M:
         return refuse(FenceStatus.NO_MARGIN, f"a margin of {margin_m:g} m leaves no room to simplify in")
     places = [plane.point(p) for p in inside]
-    limits, rim = _limits(area, plane, places)
+    limits, rim = limits_in(area, plane, places)
     solids, notes = _solids(area, plane, places, limits, margin_m)
-    limits = _cut_by_rings(area, plane, places, limits, notes)
+    limits = cut_by_rings(area, plane, places, limits, notes)
     if limits is not None and limits.is_empty:
         return refuse(FenceStatus.NO_WATER, "the start is not inside the fence")
     status, last = FenceStatus.NO_MARGIN, ""
@@ -194,36 +132,8 @@ def _sides(zone: Zone) -> int:
     return 1 if isinstance(zone.shape, Circle) else len(zone.shape.exterior.coords) - 1
 
 
-def _shape(shape: Shape, plane: _Plane, *, cover: bool) -> tuple[Polygon, tuple[float, float, float] | None]:
-    """Return a shape in the plane; a circle as (x, y, radius) too, its polygon drawn around or inside."""
-    if isinstance(shape, Circle):
-        x, y = plane.point(shape.center)
-        radius = shape.radius_m * (1.0 + plane.error if cover else 1.0 - plane.error)
-        return circle_round(x, y, radius, inside=not cover), (x, y, radius)
-    return plane.metres(shape), None
-
-
-def _limits(
-    area: Area, plane: _Plane, places: list[tuple[float, float]],
-) -> tuple[BaseGeometry | None, Circle | None]:
-    """Return the piece of the keep-in zones' intersection that holds the start, and the circle if it is one."""
-    limits: BaseGeometry | None = None
-    for zone in area.fence.inclusions:
-        polygon, _ = _shape(zone.shape, plane, cover=False)
-        if zone.margin_m:
-            polygon = shapely.buffer(polygon, -zone.margin_m * (1.0 + plane.error))
-        limits = polygon if limits is None else shapely.intersection(limits, polygon)
-    if limits is None:
-        return None, None
-    here = shapely.points(places[0])
-    piece = next((p for p in parts(limits) if shapely.covers(p, here)), Polygon())
-    only = area.fence.inclusions[0] if len(area.fence.inclusions) == 1 else None
-    rim = only.shape if only is not None and isinstance(only.shape, Circle) and not only.margin_m else None
-    return piece, rim
-
-
 def _solids(
-    area: Area, plane: _Plane, places: list[tuple[float, float]], limits: BaseGeometry | None, margin_m: float,
+    area: Area, plane: Plane, places: list[tuple[float, float]], limits: BaseGeometry | None, margin_m: float,
 ) -> tuple[list[_Solid], list[str]]:
     """Return the obstacles in the plane, holes filled, and those outside the limits left to the limits."""
     solids: list[_Solid] = []
@@ -233,11 +143,11 @@ def _solids(
         obstacles += [_island(ring, plane, i) for i, ring in enumerate(limits.interiors)]
     outside = 0
     for index, obstacle in enumerate(obstacles):
-        polygon, circle = _shape(obstacle.shape, plane, cover=True)
+        polygon, circle = shape_in(obstacle.shape, plane, cover=True)
         name = obstacle.name or f"obstacle {index + 1}"
         if polygon.interiors:
             if any(shapely.covers(Polygon(r), shapely.points(p)) for r in polygon.interiors for p in places):
-                continue  # the boat sails inside it: its hole is a limit (_cut_by_rings)
+                continue  # the boat sails inside it: its hole is a limit (cut_by_rings)
             notes.append(f"the water inside {name} is given up")
             polygon = Polygon(polygon.exterior)
         if limits is not None and not shapely.intersects(limits, polygon):
@@ -249,30 +159,13 @@ def _solids(
     return solids, notes
 
 
-def _island(ring: BaseGeometry, plane: _Plane, index: int) -> Obstacle:
+def _island(ring: BaseGeometry, plane: Plane, index: int) -> Obstacle:
     lonlat = plane.degrees(np.asarray(ring.coords)[:, :2])
     return Obstacle(shape=Polygon(lonlat), name=f"hole {index + 1} of the fence")
 
 
-def _cut_by_rings(
-    area: Area, plane: _Plane, places: list[tuple[float, float]], limits: BaseGeometry | None, notes: list[str],
-) -> BaseGeometry | None:
-    """Return the limits cut to the hole of any obstacle that surrounds the start: a lake in its shore."""
-    here = shapely.points(places[0])
-    for obstacle in area.solids:
-        polygon, _ = _shape(obstacle.shape, plane, cover=True)
-        for ring in polygon.interiors:
-            if shapely.covers(Polygon(ring), here):
-                hole = Polygon(ring)
-                if obstacle.margin_m:
-                    hole = shapely.buffer(hole, -obstacle.margin_m)
-                limits = hole if limits is None else shapely.intersection(limits, hole)
-                notes.append(f"the boat sails inside {obstacle.name or 'an obstacle'}: its shore is a keep-in zone")
-    return limits
-
-
 def _attempt(
-    plane: _Plane, solids: list[_Solid], limits: BaseGeometry | None, rim: Circle | None, tolerance_m: float,
+    plane: Plane, solids: list[_Solid], limits: BaseGeometry | None, rim: Circle | None, tolerance_m: float,
     usable_m: float,
 ) -> tuple[list[Zone] | None, str]:
     """Return zones that stick out by at most ``tolerance_m``, or why there are none."""
@@ -300,7 +193,7 @@ def _attempt(
     return zones, ""
 
 
-def _bulge_m(solids: list[_Solid], limits: BaseGeometry | None, plane: _Plane) -> float:
+def _bulge_m(solids: list[_Solid], limits: BaseGeometry | None, plane: Plane) -> float:
     """Return how far a straight line in longitude and latitude strays from one on the ground, for our longest edge."""
     rings = [s.polygon.exterior for s in solids] + ([limits.exterior] if isinstance(limits, Polygon) else [])
     edges = [np.diff(np.asarray(r.coords)[:, :2], axis=0) for r in rings]
@@ -328,7 +221,7 @@ def _groups(solids: list[_Solid], allowed: BaseGeometry) -> list[list[_Solid]]:
 
 
 def _keep_out(
-    plane: _Plane, group: list[_Solid], allowed: BaseGeometry, tolerance_m: float, reserve_m: float,
+    plane: Plane, group: list[_Solid], allowed: BaseGeometry, tolerance_m: float, reserve_m: float,
 ) -> Zone | None:
     """Return the cheapest zone round a group of obstacles: a circle, else a polygon."""
     name = " + ".join(s.name for s in group)
@@ -344,7 +237,7 @@ def _keep_out(
 
 
 def _keep_in(
-    plane: _Plane, limits: BaseGeometry, rim: Circle | None, tolerance_m: float, reserve_m: float,
+    plane: Plane, limits: BaseGeometry, rim: Circle | None, tolerance_m: float, reserve_m: float,
 ) -> Zone | None:
     """Return a zone inside the limits that holds all water ``tolerance_m`` inside them."""
     if rim is not None:
@@ -369,90 +262,6 @@ def _keep_in(
     return Zone(kind=ZoneKind.INCLUSION, shape=_rounded(polygon, plane), name="limits")
 
 
-def _rounded(polygon: Polygon, plane: _Plane) -> Polygon:
+def _rounded(polygon: Polygon, plane: Plane) -> Polygon:
     """Return the polygon in degrees on the wire's lattice."""
     return Polygon(np.round(plane.degrees(np.asarray(polygon.exterior.coords)[:, :2]), 7))
-
-
-def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: Sequence[GeoPoint]) -> str:
-    """Return why the items are not a proper fence for the area, "" when they are. Independent of how they were made.
-
-    Checked with shapely on the items as they go to the autopilot: every obstacle that the keep-in zones leave in
-    reach is covered by the keep-out zones; the keep-in zones lie inside the limits; no keep-out zone reaches water
-    farther than ``margin_m`` from every obstacle; all water of the start's piece that is ``margin_m`` inside the
-    limits stays inside the keep-in zones; no place is shut out.
-    """
-    findings = Findings()
-    zones, _ = items_to_zones(items, findings)
-    if any(f.severity is Severity.ERROR for f in findings):
-        return findings[0].text
-    plane = _plane(area, inside[0])
-    slack_m = 1e-6
-    keep_in: BaseGeometry | None = None
-    for zone in zones:
-        if zone.kind is ZoneKind.INCLUSION:
-            outer, _ = _shape(zone.shape, plane, cover=True)
-            keep_in = outer if keep_in is None else shapely.intersection(keep_in, outer)
-    out_small = shapely.union_all([
-        _inner(z.shape, plane) for z in zones if z.kind is ZoneKind.EXCLUSION
-    ] or [Polygon()])
-    obstacles = [(o, _shape(o.shape, plane, cover=True)[0]) for o in area.solids]
-    for obstacle, polygon in obstacles:
-        reach = polygon if keep_in is None else shapely.intersection(polygon, keep_in)
-        left = shapely.difference(reach, shapely.buffer(out_small, slack_m))
-        if shapely.area(left) > slack_m * max(1.0, float(polygon.length)):
-            return f"the keep-out zones do not hold {obstacle.name or 'an obstacle'}"
-    for zone in area.fence.inclusions:
-        polygon, _ = _shape(zone.shape, plane, cover=False)
-        if any(_within_rim(z, zone, margin_m, plane) for z in zones):
-            continue
-        reach = shapely.difference(keep_in, out_small) if keep_in is not None else None
-        if reach is None or not shapely.covers(shapely.buffer(polygon, slack_m), reach):
-            return f"the keep-in zone is not inside {zone.name or 'the limits'}"
-    margin = shapely.union_all([
-        shapely.buffer(p, max(margin_m, o.margin_m or 0.0), quad_segs=16) for o, p in obstacles
-    ] or [Polygon()])
-    limits, _ = _limits(area, plane, [plane.point(inside[0])])
-    limits = _cut_by_rings(area, plane, [plane.point(inside[0])], limits, [])
-    useful: BaseGeometry | None = None
-    if limits is not None:
-        useful = shapely.buffer(limits, -margin_m, quad_segs=16)
-        margin = shapely.union(margin, shapely.difference(shapely.box(*limits.buffer(1e4).bounds), useful))
-    for zone in zones:
-        outer, _ = _shape(zone.shape, plane, cover=True)
-        if zone.kind is ZoneKind.EXCLUSION and not shapely.covers(shapely.buffer(margin, slack_m), outer):
-            return f"the keep-out zone {zone.name or center_of(zone.shape)} reaches beyond the planner's margin"
-        inner = _inner(zone.shape, plane)
-        if zone.kind is ZoneKind.EXCLUSION or useful is None:
-            continue
-        if any(_within_rim(zone, rim, margin_m, plane) for rim in area.fence.inclusions):
-            continue
-        if not shapely.covers(shapely.buffer(inner, slack_m), _piece(useful, plane.point(inside[0]))):
-            return "the keep-in zone shuts out water that the planner may use"
-    for index, place in enumerate(inside):
-        point = shapely.points(plane.point(place))
-        shut = any(z.kind is ZoneKind.EXCLUSION and shapely.covers(_shape(z.shape, plane, cover=True)[0], point)
-                   for z in zones)
-        if shut or (keep_in is not None and not shapely.covers(keep_in, point)):
-            return f"the {'start' if index == 0 else f'goal {index}'} would be outside the autopilot's fence"
-    return ""
-
-
-def _within_rim(zone: Zone, rim: Zone, margin_m: float, plane: _Plane) -> bool:
-    """Whether a circle lies inside another by no more than the margin: their radii share one scale."""
-    if not (isinstance(zone.shape, Circle) and isinstance(rim.shape, Circle)) or rim.margin_m:
-        return False
-    (x0, y0), (x1, y1) = plane.point(zone.shape.center), plane.point(rim.shape.center)
-    apart_m = math.hypot(x1 - x0, y1 - y0) * (1.0 + plane.error)
-    spare_m = rim.shape.radius_m - zone.shape.radius_m
-    return zone.kind is ZoneKind.INCLUSION and apart_m <= spare_m <= margin_m - apart_m
-
-
-def _piece(useful: BaseGeometry, place: tuple[float, float]) -> BaseGeometry:
-    here = shapely.points(place)
-    return next((p for p in parts(useful) if shapely.covers(p, here)), useful)
-
-
-def _inner(shape: Shape, plane: _Plane) -> Polygon:
-    """Return a polygon inside the shape (a circle's is drawn inside it)."""
-    return _shape(shape, plane, cover=False)[0]
