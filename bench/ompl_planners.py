@@ -17,7 +17,7 @@ import sys
 import numpy as np
 
 from companion.planner import Problem
-from companion.planner import rrtstar_kernels as kernels
+from companion.planner import reference_kernels as kernels
 from companion.planner.rrtstar import simple_bound_s
 from companion.planner.rrtstar_world import bounds_of, world_of
 

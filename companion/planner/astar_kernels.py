@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from companion.planner.heap import sift_down, sift_up
-from companion.planner.rrtstar_kernels import TWD, first_hit, meets_target, turn_time, worst_no_go, wrap
+from companion.planner.reference_kernels import TWD, first_hit, meets_target, turn_time, worst_no_go, wrap
 
 # Places in ``weight``: turning [s/rad], tack [s], gybe [s], tunnel [s per metre off the line], heuristic speed [m/s].
 TURN, TACK_COST, GYBE_COST, TUNNEL, FAST = range(5)

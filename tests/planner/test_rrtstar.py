@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner import rrtstar_kernels as kernels
+from companion.planner.reference_kernels import first_hit, turn_time, wrap
+from companion.planner.reference_kernels import steer as steer_kernel
 from companion.planner.rrtstar import Tree, search
 from companion.planner.rrtstar_world import bounds_of, world_of
 from companion.planner.solve import Effort
@@ -35,7 +37,7 @@ def wind(from_deg=0.0, sigma=AR1):
 
 def steer(p, x, y, reach=1e9, heading=0.0, t=0.0, start=(0.0, 0.0)):
     w = world_of(p)
-    return kernels.steer(*start, heading, t, x, y, reach, w.number, w.no_go_model, w.table, w.polar, w.course)
+    return steer_kernel(*start, heading, t, x, y, reach, w.number, w.no_go_model, w.table, w.polar, w.course)
 
 
 # ------------------------------------------------------------------------------------- Algorithm 1
@@ -71,8 +73,8 @@ def test_whatever_it_steers_keeps_the_widened_zone_to_the_leg_s_end_and_comes_ne
     if not ok:
         return
     h = math.atan2(x, y)
-    twa = abs(kernels.wrap(h - p.wind.twd_from_rad))
-    end = t + kernels.turn_time(bearing, h, world_of(p).number) + math.hypot(x, y) / 1.5
+    twa = abs(wrap(h - p.wind.twd_from_rad))
+    end = t + turn_time(bearing, h, world_of(p).number) + math.hypot(x, y) / 1.5
     assert twa >= max(p.no_go_half_rad(t), p.no_go_half_rad(end)) - 1e-6
     assert math.dist((x, y), (tx, ty)) < 120.0
 
@@ -182,7 +184,7 @@ def test_first_hit_is_what_shapely_says(shapes, segment):
     line = shapely.LineString([(ax, ay), (bx, by)])
     border = p.solid.buffer(-0.5e-3, join_style="mitre").boundary
     distance = shapely.distance(border, line)
-    hit = kernels.first_hit(ax, ay, bx, by, w.edge, w.cell_first, w.cell_edge, w.grid, w.shape)
+    hit = first_hit(ax, ay, bx, by, w.edge, w.cell_first, w.cell_edge, w.grid, w.shape)
     if distance > 1e-6:
         assert hit > 1.0
     elif line.length > 1e-6 and line.crosses(border):
