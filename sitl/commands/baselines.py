@@ -31,7 +31,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.baselines import SCENARIOS, run_baselines
+    from sitl.figures import SCENARIOS, run_baselines
 
     return run_baselines(
         who=args.who, scenarios=args.scenarios or SCENARIOS, seeds=args.seeds, workers=args.workers,
