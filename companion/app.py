@@ -9,40 +9,35 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import platform
-import sys
-from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from collections.abc import Callable
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from companion import __version__
 from companion.clock import now_s
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
-from companion.errors import LinkError
 from companion.executor import Executor, Planner
 from companion.fold import Step, VoyageFold
 from companion.geofence import Mission
 from companion.geofence.autopilot_fence import fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.signing import SigningStore
 from companion.mavlink.tlog import stamp
 from companion.mavlink.transport import Transport
-from companion.messages import AisReport, CompanionStatus
+from companion.messages import CompanionStatus
+from companion.options import SailOptions
 from companion.plots.voyage import AREA
 from companion.skipper import Skipper
 from companion.skipper.actions import Severity
 from companion.skipper.state import Persisted, Phase
+from companion.telemetry.description import chart_record, voyage_record
 from companion.telemetry.recorder import STATE, Recorder, write_atomically
 from companion.telemetry.records import action_record, ais_record, outcome_record, track_row
 from companion.telemetry.status import companion_status
 from companion.telemetry.summary import VoyageFigures
-from companion.traffic.feeds import AisFeed, open_feed
+from companion.traffic.listening import Feeds
 from companion.wind import WindRoom
 
 STEP_S = 1.0
@@ -50,8 +45,6 @@ STEP_S = 1.0
 STATUS_EVERY_S = 2.0
 SYNC_EVERY_S = 5.0
 LOOP_WATCH_S = 0.1
-# More AIS reports than this between two steps are noise or an attack: the rest of them is dropped.
-FED_AT_MOST = 500
 # After arrival the boat loiters; the companion watches it for a moment before it ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
@@ -61,52 +54,6 @@ PARAMETERS = (
     "FENCE_ACTION", "WNDVN_TYPE", "WNDVN_SPEED_TYPE", "WNDVN_SPEED_MIN", "WNDVN_TRUE_FILT", "WNDVN_DIR_FILT",
     "WNDVN_SPEED_FILT", "WNDVN_DIR_OFS",
 )
-
-Offload = Callable[[Callable[[], None]], Awaitable[None]]
-
-
-async def in_thread(work: Callable[[], None]) -> None:
-    """Do disk work in a thread: a slow card must not hold the loop."""
-    await asyncio.to_thread(work)
-
-
-async def at_once(work: Callable[[], None]) -> None:
-    """Do disk work here: for the virtual clock, which has no threads."""
-    work()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SailOptions:
-    """How to sail, beside the mission.
-
-    Attributes:
-        seed: of the planner.
-        dry_run: look, plan, speak, touch nothing.
-        epoch_s: Unix time [s] of the loop's time 0, for stamps only.
-        expansions: plan with this effort instead of the mission's time budget (repeatable).
-        state_path: where the state for a restart is kept; None: in the voyage folder.
-        limit_s: end after this long [s].
-        wait_s: how long to wait for the autopilot's first heartbeat [s].
-        offload: where disk work is done.
-        is_durable: force files to the disk, against power cuts; a simulation has none.
-        signing: key and timestamp for a signed link.
-        budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
-        command: what was typed, for the record.
-    """
-
-    seed: int = 0
-    dry_run: bool = False
-    epoch_s: float = 0.0
-    expansions: int | None = None
-    state_path: Path | None = None
-    limit_s: float | None = None
-    wait_s: float = 30.0
-    offload: Offload = in_thread
-    is_durable: bool = True
-    signing: SigningStore | None = None
-    budget_scale: float = 1.0
-    command: str = ""
-
 
 OnStatus = Callable[[CompanionStatus, Step], None]
 
@@ -146,11 +93,7 @@ class _Shell:
         self._frames = 0
         self._announced: tuple[str, str] = ("", "")
         self._refusals: list[str] = []
-        self._feed_names = feeds_of(mission)
-        self._feeds: list[AisFeed] = []
-        self._fed: list[AisReport] = []
-        self._ais_dropped = 0
-        self._silent: set[str] = set()   # feeds of which it was said
+        self.feeds = Feeds()
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
@@ -177,7 +120,8 @@ class _Shell:
                 link.subscribe(self._on_message)
                 await self._wait_autopilot(link)
                 autopilot = await stack.enter_async_context(Autopilot(link))
-                await self._open_feeds(stack)
+                for text in await self.feeds.open(stack, feeds_of(self.mission), self.options.seed):
+                    self._refuse("AIS feed", text)
                 for text in self._refusals:
                     autopilot.say(int(Severity.WARNING), text)
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
@@ -222,30 +166,12 @@ class _Shell:
         self.recorder.decision(self._stamped(t_s, outcome_record(outcome)))
         self.fold.take_outcome(t_s, outcome)
 
-    async def _open_feeds(self, stack: contextlib.AsyncExitStack) -> None:
-        """Listen to the mission's AIS feeds; a feed that cannot be opened is told and does not stop the voyage."""
-        for number, name in enumerate(self._feed_names):
-            try:
-                feed = await stack.enter_async_context(
-                    open_feed(name, self._on_ais, seed=self.options.seed + number))
-            except LinkError as error:
-                self._refuse("AIS feed", str(error))
-            else:
-                self._feeds.append(feed)
-
-    def _on_ais(self, report: AisReport) -> None:
-        if len(self._fed) < FED_AT_MOST:
-            self._fed.append(report)
-        else:
-            self._ais_dropped += 1
-
     # --------------------------------------------------------------------------------------- steps
     def _tick(self, t_s: float) -> Step:
         """Fold what the feeds heard, after this step's messages as a replay does, and step."""
-        for report in self._fed:
+        for report in self.feeds.take():
             self.recorder.decision(self._stamped(t_s, ais_record(report)))
             self.fold.take(report)
-        self._fed.clear()
         return self.fold.tick(t_s)
 
     async def _steps(self, executor: Executor, link: Link) -> None:
@@ -305,7 +231,7 @@ class _Shell:
                 snapshot.t_s, {"kind": "phase", "phase": changed[0], "why": changed[1]}))
         self._announced = changed
         self.status = companion_status(step, self.voyage, self.figures, clearance_m, link.bytes_per_s()[1],
-                                       self._feeds, self._ais_dropped)
+                                       self.feeds.open_feeds, self.feeds.dropped)
         persisted = self.fold.skipper.persisted(step.state)
         if persisted != self._persisted:
             self._persisted = persisted
@@ -352,10 +278,7 @@ class _Shell:
 
     def _tell_silence(self, autopilot: Autopilot) -> None:
         """Say and record that a feed has fallen silent, and that it is heard again."""
-        for feed in self._feeds:
-            if feed.is_silent == (feed.name.text in self._silent):
-                continue
-            self._silent ^= {feed.name.text}
+        for feed in self.feeds.changed():
             text = f"AIS feed {'silent' if feed.is_silent else 'heard again'}: {feed.sentence()}"
             self.recorder.decision(self._stamped(
                 self._quantised(now_s())[1], {"kind": "feed", "silent": feed.is_silent, "text": text}))
@@ -393,37 +316,14 @@ class _Shell:
         self._refusals.append(text)
 
     def _write_description(self, link: str) -> None:
-        area, options = self.voyage.area, self.options
-        chart = {
-            "name": self.mission.name,
-            "origin": {"lat_deg": self.voyage.frame.origin.lat_deg, "lon_deg": self.voyage.frame.origin.lon_deg},
-            "goals": [
-                {"x": g.en_m[0], "y": g.en_m[1], "radius_m": g.radius_m, "name": g.name, "side": g.side.value}
-                for g in self.voyage.goals
-            ],
-            "obstacles": area.obstacles_wkt(0.0),
-            "grown": area.obstacles_wkt(self.config.margin_m),
-            "fence": area.fence_wkt(0.0),
-            "margin_m": self.config.margin_m,
-            "no_go_half_deg": self.mission.boat.no_go_half_deg,
-        }
+        chart = chart_record(self.mission, self.voyage, self.config.margin_m)
         write_atomically(self.recorder.folder / AREA, json.dumps(chart).encode())
-        self.recorder.voyage({
-            "mission": {"name": self.mission.name, "path": str(self.mission.path)},
-            "run": {
-                "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
-                "expansions": options.expansions, "epoch_s": options.epoch_s,
-                "started_utc": datetime.fromtimestamp(options.epoch_s + now_s(), UTC).isoformat(),
-            },
-            "permissions": {
-                name: getattr(self.fold.permissions, name) for name in type(self.fold.permissions).__slots__
-            },
-            "versions": {
-                "companion": __version__, "python": platform.python_version(), "machine": platform.machine(),
-                **{name: metadata.version(name) for name in ("numpy", "numba", "shapely", "pymavlink", "filterpy")},
-            },
-            "argv": sys.argv[1:],
-        })
+        options = self.options
+        self.recorder.voyage(voyage_record(self.mission, self.fold.permissions, {
+            "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
+            "expansions": options.expansions, "epoch_s": options.epoch_s,
+            "started_utc": datetime.fromtimestamp(options.epoch_s + now_s(), UTC).isoformat(),
+        }))
 
     def _summary(self) -> dict[str, Any]:
         state = self.fold.state
@@ -437,8 +337,8 @@ class _Shell:
             "end_phase": state.phase.value,
             "end_reason": self.end_reason,
             "end_why": state.why,
-            "ais_feeds": [feed.sentence() for feed in self._feeds],
-            "ais_dropped": self._ais_dropped,
+            "ais_feeds": [feed.sentence() for feed in self.feeds.open_feeds],
+            "ais_dropped": self.feeds.dropped,
             "records_dropped": self.recorder.dropped,
             "planner_restarts": self.planner.restarts,
             "loop_held_max_s": round(self.loop_held_s * self.options.budget_scale, 4),

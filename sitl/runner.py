@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from companion.app import SailOptions, at_once, sail
+from companion.app import sail
 from companion.clock import now_s
 from companion.errors import LinkError
 from companion.fold import Step
@@ -27,6 +27,7 @@ from companion.geofence import LocalArea, Mission, load_mission
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link, LinkIdentity
 from companion.messages import MissionItem, Mode, waypoint
+from companion.options import SailOptions, at_once
 from companion.telemetry.recorder import write_atomically
 from sitl.autopilot import (
     Autopilot,

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     signing = _signing(args.signing_key)
 
     def options() -> Any:
-        from companion.app import SailOptions
+        from companion.options import SailOptions
 
         return SailOptions(
             seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
