@@ -13,7 +13,7 @@ from companion.messages import Mode
 from companion.skipper.actions import Severity
 from companion.skipper.failsafe import CRITICAL
 from companion.skipper.helm import is_busy, set_mode
-from companion.skipper.state import Phase
+from companion.skipper.state import Fix, Phase
 from companion.skipper.turn import JUMP_M, Turn
 from companion.skipper.voyage import PointEn
 
@@ -28,26 +28,26 @@ SLOW_MPS = 1.0
 def follow(turn: Turn) -> None:
     """Add up the jumps; notice that the position is back where dead reckoning has it."""
     state, here, vehicle = turn.state, turn.snapshot.position_en_m, turn.snapshot.vehicle
-    if state.doubt is not None and turn.t_s - state.doubt[2] > MEMORY_S:
+    if state.doubt is not None and turn.t_s - state.doubt.t_s > MEMORY_S:
         turn.update(doubt=None)
     last, age = state.last_seen, turn.snapshot.vehicle_age_s
     if here is None or vehicle is None or last is None or age is None or turn.jump_m < JUMP_M:
         return
-    elapsed_s = turn.t_s - age - last[0]
-    before = state.doubt or (0.0, 0.0, turn.t_s)
-    east = before[0] + here[0] - last[1] - vehicle.velocity_en_mps[0] * elapsed_s
-    north = before[1] + here[1] - last[2] - vehicle.velocity_en_mps[1] * elapsed_s
+    elapsed_s = turn.t_s - age - last.t_s
+    before = (0.0, 0.0) if state.doubt is None else state.doubt.en_m
+    east = before[0] + here[0] - last.en_m[0] - vehicle.velocity_en_mps[0] * elapsed_s
+    north = before[1] + here[1] - last.en_m[1] - vehicle.velocity_en_mps[1] * elapsed_s
     if state.doubt is not None and math.hypot(east, north) < BACK_M:
         turn.update(doubt=None, back_s=turn.t_s, raised=tuple(r for r in state.raised if r.name != "position jump"))
         turn.say(Severity.NOTICE, "position back", "the position is back where it was reckoned: believed", every_s=0.0)
     else:
-        turn.update(doubt=(east, north, turn.t_s))
+        turn.update(doubt=Fix(t_s=turn.t_s, en_m=(east, north)))
 
 
 def other_place(turn: Turn) -> PointEn | None:
     """Return where the boat is if the position has jumped wrongly, None without a doubt."""
     here, doubt = turn.snapshot.position_en_m, turn.state.doubt
-    return None if here is None or doubt is None else (here[0] - doubt[0], here[1] - doubt[1])
+    return None if here is None or doubt is None else (here[0] - doubt.en_m[0], here[1] - doubt.en_m[1])
 
 
 def is_other_shut(turn: Turn) -> bool:
@@ -72,7 +72,7 @@ def stands_off(turn: Turn) -> bool:
         return False
     if not status.ekf_ok or status.system_status == CRITICAL:
         return False   # nor would it loiter then
-    if turn.t_s - state.doubt[2] > STAND_OFF_S or not is_other_shut(turn):
+    if turn.t_s - state.doubt.t_s > STAND_OFF_S or not is_other_shut(turn):
         return False
     if float(turn.voyage.area.clearance_m([here])[0]) < turn.config.margin_floor_m + LOITER_M:
         return False   # not here either: see Turn.is_way_shut

@@ -21,7 +21,7 @@ from companion.skipper.snapshot import (
     UploadOutcome,
     UploadResult,
 )
-from companion.skipper.state import PATIENT, Phase
+from companion.skipper.state import PATIENT, Fix, Phase
 from companion.skipper.turn import FRESH_S, Turn
 from companion.skipper.uploads import take_upload
 from companion.skipper.voyage import Side
@@ -128,7 +128,7 @@ def remember_fix(turn: Turn) -> None:
     """Keep the position for the next step's look at jumps."""
     here, age = turn.snapshot.position_en_m, turn.snapshot.vehicle_age_s
     if here is not None and age is not None and age <= FRESH_S:
-        turn.update(last_seen=(turn.t_s - age, here[0], here[1]))
+        turn.update(last_seen=Fix(t_s=turn.t_s - age, en_m=here))
 
 
 def notice_truncation(turn: Turn) -> None:
@@ -205,8 +205,8 @@ def _approach(turn: Turn) -> None:
     if boat is None or gate is None:
         return
     way = distance_m(boat, gate.en_m)
-    if last is not None and turn.t_s - last[0] <= 2.0 + FRESH_S and not turn.is_raised("position jump"):
-        way = min(way, leg_distance_m(gate.en_m, (last[1], last[2]), boat))
+    if last is not None and turn.t_s - last.t_s <= 2.0 + FRESH_S and not turn.is_raised("position jump"):
+        way = min(way, leg_distance_m(gate.en_m, last.en_m, boat))
     turn.update(closest_m=min(turn.state.closest_m, way))
 
 

@@ -86,6 +86,14 @@ class PendingUpload:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Fix:
+    """A position, or how far one has jumped, and when."""
+
+    t_s: float
+    en_m: PointEn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Raised:
     """A raised watchdog: since when, and since when its exit condition has held."""
 
@@ -164,9 +172,9 @@ class SkipperState:
     track: tuple[PointEn, ...] = ()     # near a buoy
     history_plan: int = -1
     history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
-    last_seen: tuple[float, float, float] | None = None          # t, east, north of the last position
+    last_seen: Fix | None = None        # the last position
     boot_s: float | None = None
-    doubt: tuple[float, float, float] | None = None   # a jump of the position: east, north [m], when
+    doubt: Fix | None = None            # the sum of the position's jumps, and the last one's time
     back_s: float = float("-inf")      # when it was back where it was reckoned: this step's jump is none
     failsafe_s: float = float("-inf")  # when the autopilot last said that it has lost its position
     after_operator: bool = False       # AUTO has come back: plan from where the boat is now

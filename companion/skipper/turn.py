@@ -149,10 +149,10 @@ class Turn:
         here, last, age = self.snapshot.position_en_m, self.state.last_seen, self.snapshot.vehicle_age_s
         if here is None or last is None or age is None or self.state.back_s == self.t_s:
             return 0.0
-        elapsed_s = self.t_s - age - last[0]
+        elapsed_s = self.t_s - age - last.t_s
         if elapsed_s > JUMP_MEMORY_S:
             return 0.0
-        return max(0.0, math.hypot(here[0] - last[1], here[1] - last[2]) - JUMP_MPS * max(elapsed_s, 0.0))
+        return max(0.0, math.dist(here, last.en_m) - JUMP_MPS * max(elapsed_s, 0.0))
 
     @property
     def speed_mps(self) -> float:
