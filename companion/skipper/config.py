@@ -88,7 +88,8 @@ class SkipperConfig:
     reread_s: float = 300.0            # the mission on board is read again this often
     upload_timeout_s: float = 60.0     # no outcome: counted as failed, the mission on the autopilot unknown
     read_timeout_s: float = 180.0      # a hundred items one by one, where every second message is lost
-    max_items: int = 600               # below the 655 of the smallest board; then the numbering starts again
+    # Then the numbering starts again: a transfer takes 7 ms an item, and the smallest board holds 655.
+    max_items: int = 200
     safe_end: SafeEnd = SafeEnd.LOITER
     loiter_radius_m: float = 15.0      # room the last item needs (measured: 12.1 m from the point)
     # patience
