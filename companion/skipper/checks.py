@@ -53,7 +53,12 @@ def _boat(report: Report, needs: Needs) -> None:
         name: value for name in ("SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE",
                                  "FENCE_ACTION") if (value := report.get(name)) is not None})
     margin = required_margin(limits, speed_mps=needs.speed_mps, hull=needs.hull)
-    if limits.sail_xtrack_max_m <= 0.0:
+    if not needs.can_tack:
+        if limits.sail_xtrack_max_m > 0.0:
+            report.add(Level.WARNING, "corridor", f"SAIL_XTRACK_MAX is {limits.sail_xtrack_max_m:g}, and this boat "
+                       "cannot tack", "when a shift closes a leg the autopilot tries to tack at that corridor's edge; "
+                       "at 0 it sails on, and the companion gybes round", name="SAIL_XTRACK_MAX", wanted=0.0)
+    elif limits.sail_xtrack_max_m <= 0.0:
         report.add(Level.WARNING, "corridor", "SAIL_XTRACK_MAX is 0: no corridor when a shift closes a leg",
                    "the autopilot then sails long boards to the layline, wherever that is; the companion reacts, but "
                    "if it dies nothing bounds the boat", name="SAIL_XTRACK_MAX",

@@ -47,6 +47,7 @@ class Needs:
     reach_m: float = 0.0                         # farthest place of the voyage from home
     has_fence: bool = False                      # the mission wants its fence on the autopilot
     sails: bool = True                           # False: a motor boat
+    can_tack: bool = True                        # False: it gybes round, and no corridor of tacks is of use
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -60,6 +60,7 @@ def test_a_boat_that_is_set_up_has_nothing_in_its_way():
     ({"WNDVN_TRUE_FILT": 0.01}, {}, "wind filter", Level.WARNING, "WNDVN_TRUE_FILT", 0.05),
     ({"SAIL_XTRACK_MAX": 30.0}, {}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
     ({"SAIL_XTRACK_MAX": 0.0}, {}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 7.0),
+    ({}, {"can_tack": False}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 0.0),
     ({"SAIL_NO_GO_ANGLE": 35.0}, {}, "no-go", Level.WARNING, "SAIL_NO_GO_ANGLE", 45.0),
     ({"SAIL_LOIT_RADIUS": 20.0}, {}, "loiter", Level.WARNING, "SAIL_LOIT_RADIUS", 6.0),
     ({"WP_RADIUS": 15.0}, {"margin_m": 30.0}, "waypoint radius", Level.WARNING, "WP_RADIUS", 3.0),
