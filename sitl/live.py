@@ -19,7 +19,9 @@ from companion.clock import now_s, run
 from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
+from companion.planner.warm import warm
 from companion.telemetry.recorder import DECISIONS, write_atomically
+from companion.wind.forecaster import Forecaster
 from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
@@ -123,6 +125,9 @@ async def _run(
     async with contextlib.AsyncExitStack() as stack:
         boat: Boat
         if kind == "ardurover":
+            # A disarmed boat drifts: the companion must not compile its kernels while it is afloat.
+            await asyncio.to_thread(warm)
+            Forecaster()
             boat = await stack.enter_async_context(RealBoat.start(scenario, mission, wind, program, pace, folder))
         else:
             boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace))
