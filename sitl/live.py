@@ -22,10 +22,11 @@ from companion.geofence import load_mission
 from companion.planner.warm import warm
 from companion.telemetry.recorder import DECISIONS, write_atomically
 from companion.wind.forecaster import Forecaster
+from sitl.autopilot import VaneFault
 from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
-from sitl.runner import TRUTH_EVERY_S, VERDICT, marks_of, solid_of
+from sitl.runner import TRUTH_EVERY_S, VERDICT, marks_of, solid_of, vane_fault
 from sitl.scenario import EventSpec, Scenario
 from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge
@@ -35,7 +36,8 @@ COMPANION_STOP_S = 20.0
 # Loading and compiling may take this long before the companion opens its voyage folder [s of real time].
 COMPANION_START_S = 300.0
 # What befalls the companion's process or its link, and what the wind is made of.
-OURS = TRAFFIC | LINK_EVENTS | {"kill_companion", "wind_shift", "wind_speed"}
+ON_THE_LINK = LINK_EVENTS | {"vane"}
+OURS = TRAFFIC | ON_THE_LINK | {"kill_companion", "wind_shift", "wind_speed"}
 
 
 class _Companion:
@@ -132,7 +134,7 @@ async def _run(
         else:
             boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace))
         relay, link = None, boat.link
-        if any(e.kind in LINK_EVENTS for e in scenario.events):
+        if any(e.kind in ON_THE_LINK for e in scenario.events):
             relay = await stack.enter_async_context(Relay(boat.link, seed=seed))
             link = relay.link
         feeds = ["--feed", f"udpin:127.0.0.1:{port}"] if any(e.kind in TRAFFIC for e in scenario.events) else []
@@ -197,6 +199,11 @@ async def _event(
         await companion.kill(event.restart_after_s)
     elif event.kind in LINK_EVENTS and relay is not None:
         await befall(relay.line, event)
+    elif event.kind == "vane" and relay is not None:
+        relay.vane.set(vane_fault(event))
+        if event.for_s is not None:
+            await asyncio.sleep(event.for_s)
+            relay.vane.set(VaneFault())
     elif event.kind in boat.plays:
         await boat.play(event, frame)
 

@@ -1,4 +1,7 @@
-"""A bad link for live runs: a relay between the companion and the autopilot's port that loses what it is told to."""
+"""A bad link for live runs: a relay between the companion and the autopilot's port that loses what it is told to.
+
+What the autopilot's own simulator cannot break, the vane, is broken here too.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from typing import Self
 from companion.mavlink.transport import open_link
 from sitl.autopilot import Impairment, MemoryLink
 from sitl.autopilot.memory import FrameStream
+from sitl.false_vane import FalseVane
 from sitl.scenario import EventSpec
 from sitl.ships import free_port
 
@@ -40,6 +44,7 @@ class Relay:
         port = free_port()
         self.link = f"udpin:127.0.0.1:{port}"
         self._companion, self._boat = open_link(f"udpout:127.0.0.1:{port}"), open_link(boat_link)
+        self.vane = FalseVane(seed=seed)
         self._frames = FrameStream()
         self._stack = contextlib.AsyncExitStack()
 
@@ -62,4 +67,4 @@ class Relay:
     def _from_boat(self, data: bytes) -> None:
         """Take a piece of the autopilot's stream: a fault befalls one frame, not two halves."""
         for frame in self._frames.take(data):
-            self.line.far.write(frame)
+            self.line.far.write(self.vane.pass_on(frame))

@@ -16,7 +16,8 @@ from companion.mavlink.transport import open_link
 from companion.messages import GeoPoint
 from companion.traffic.feeds import open_feed
 from companion.traffic.nmea import NmeaDecoder
-from sitl.autopilot import Vessel
+from sitl.autopilot import VaneFault, VaneState, Vessel
+from sitl.false_vane import FalseVane
 from sitl.live import run_live
 from sitl.others import Others, sentences
 from sitl.program import find
@@ -45,6 +46,39 @@ def test_a_receivers_sentence_says_where_the_ship_is(lat, lon, course, speed, mm
     assert report.position.lon_deg == pytest.approx(lon, abs=1e-4 / 60.0)
     assert report.speed_mps == pytest.approx(speed, abs=0.052)
     assert abs(difference_rad(report.course_rad, math.radians(course))) <= math.radians(0.11)
+
+
+def passed(vane, *messages):
+    packer = mav.MAVLink(None, srcSystem=1, srcComponent=1)
+    for message in messages:
+        frame = vane.pass_on(bytes(message.pack(packer)))
+    return frame, mav.MAVLink(None).parse_char(frame)
+
+
+@given(st.floats(0.0, 359.9), st.floats(-math.pi, math.pi), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0),
+       st.floats(2.0, 12.0))
+def test_a_vane_broken_on_the_link_says_what_a_broken_one_would(twd_deg, yaw, north, east, speed):
+    def attitude(yaw):
+        return mav.MAVLink_attitude_message(0, 0.0, 0.0, yaw, 0.0, 0.0, 0.0)
+
+    at_rest = mav.MAVLink_global_position_int_message(0, 0, 0, 0, 0, 0, 0, 0, 0)
+    way = mav.MAVLink_global_position_int_message(0, 0, 0, 0, 0, round(100 * north), round(100 * east), 0, 0)
+    wind = mav.MAVLink_wind_message(twd_deg, speed, 0.0)
+    vane = FalseVane(seed=0)
+    frame, _ = passed(vane, attitude(yaw), way, wind)
+    assert frame[9:-2] == bytes(wind.pack(mav.MAVLink(None, srcSystem=1, srcComponent=1)))[9:-2]   # untouched
+    vane.set(VaneFault(state=VaneState.FROZEN))
+    _, heard = passed(vane, wind)   # nothing has moved yet
+    assert abs(difference_rad(math.radians(heard.direction), math.radians(twd_deg))) < 1e-3
+    assert math.isclose(heard.speed, speed, abs_tol=1e-3)
+    vane.set(VaneFault())
+    passed(vane, attitude(yaw), at_rest, wind)
+    vane.set(VaneFault(state=VaneState.FROZEN))
+    _, heard = passed(vane, attitude(yaw + 0.5), mav.MAVLink_wind_message(twd_deg + 5.0, speed, 0.0))
+    assert abs(difference_rad(math.radians(heard.direction), math.radians(twd_deg) + 0.5)) < 1e-3   # it turns with her
+    vane.set(VaneFault(state=VaneState.OFFSET, value_rad=0.2))
+    _, heard = passed(vane, wind)
+    assert abs(difference_rad(math.radians(heard.direction), math.radians(twd_deg) + 0.2)) < 1e-3
 
 
 async def heard_for(seconds, event, began_s):
