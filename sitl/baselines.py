@@ -30,10 +30,10 @@ from companion.mavlink.machines import Outcome
 from companion.mavlink.transport import open_link
 from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
 from sitl.ardurover import ArduRover
+from sitl.ardurover_program import require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.config import Truth as Now
 from sitl.live import run_live
-from sitl.program import require
 from sitl.runner import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.scenario import load_scenario
 from sitl.verdict import Truth, Verdict, contacts_and_clearance, count_tacks

@@ -25,7 +25,7 @@ from companion.mavlink.streams import Stream
 from companion.mavlink.transport import open_link
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import ArduRover
-from sitl.program import require
+from sitl.ardurover_program import require
 from sitl.scenario import EventSpec, Scenario
 from sitl.ships import free_port
 from sitl.wind import Wind

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
 import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+
+from sitl.pool import in_processes
 
 FAILURES = Path("campaign-failures")
 
@@ -56,18 +55,6 @@ def sail_one(job: Job) -> dict[str, Any]:
     return {**verdict, "wall_s": time.perf_counter() - began}
 
 
-def run_jobs(jobs: Sequence[Job], workers: int | None) -> Iterator[dict[str, Any]]:
-    """Yield the records of ``jobs`` as they come."""
-    count = workers or os.cpu_count() or 1
-    if count == 1:
-        yield from map(sail_one, jobs)
-        return
-    # spawn: workers must not inherit a loop, threads or the kernels' locks
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(sail_one, job) for job in jobs]):
-            yield future.result()
-
-
 def run_campaign(
     scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, workers: int | None = None,
     json_path: Path | None = None, keep: Path | None = None,
@@ -79,7 +66,7 @@ def run_campaign(
     jobs = [Job(scenario=p, seed=first_seed + k, keep=keep) for p in scenarios for k in range(runs)]
     records: list[dict[str, Any]] = []
     began = time.perf_counter()
-    for record in run_jobs(jobs, workers):
+    for record in in_processes(sail_one, jobs, workers):
         records.append(record)
         print(json.dumps(record, separators=(",", ":")), flush=True)
         failed = sum(not r["passed"] for r in records)

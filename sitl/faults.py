@@ -9,15 +9,12 @@ counted, not required: a boat that the operator put in HOLD for half the voyage 
 from __future__ import annotations
 
 import json
-import os
 import statistics
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +22,7 @@ from companion.errors import InputError
 from companion.fold import Step
 from sitl.fault_draw import draw
 from sitl.fault_watch import EXCUSES, MAX_SILENCE_S, Watch, mission_key, operator_spans
+from sitl.pool import in_processes
 from sitl.scenario import load_scenario
 
 BASE = Path(__file__).parent / "scenarios" / "faults" / "rocks.toml"
@@ -89,25 +87,13 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
     }
 
 
-def run_seeds(seeds: Sequence[int], workers: int | None) -> Iterator[dict[str, Any]]:
-    """Yield the records of ``seeds`` as they come."""
-    count = workers or os.cpu_count() or 1
-    if count == 1:
-        yield from map(sail_seed, seeds)
-        return
-    # spawn: workers must not inherit a loop, threads or the kernels' locks
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(sail_seed, seed) for seed in seeds]):
-            yield future.result()
-
-
 def run_faults(
     *, runs: int, first_seed: int = 0, workers: int | None = None, json_path: Path | None = None,
 ) -> int:
     """Sail ``runs`` seeds, print those that failed and what was counted; return the exit code."""
     began_s = time.perf_counter()
     records: list[dict[str, Any]] = []
-    for record in run_seeds(range(first_seed, first_seed + runs), workers):
+    for record in in_processes(sail_seed, range(first_seed, first_seed + runs), workers):
         records.append(record)
         if not record["passed"]:
             print(f"\rFAILED seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(record['events'])})",

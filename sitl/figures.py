@@ -7,15 +7,14 @@ import math
 import statistics
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from companion.errors import JobError, LinkError
 from sitl.baselines import sail_alone, sail_ardurover, sail_companion, sail_companion_ardurover
+from sitl.pool import in_processes
 from sitl.scenario import load_scenario
 
 HERE = Path(__file__).parent / "scenarios"
@@ -53,15 +52,6 @@ def sail(job: Job) -> dict[str, Any]:
     return {**record, "wall_s": time.perf_counter() - began}
 
 
-def _jobs_done(jobs: Sequence[Job], workers: int) -> Iterator[dict[str, Any]]:
-    if workers == 1:
-        yield from map(sail, jobs)
-        return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(sail, job) for job in jobs]):
-            yield future.result()
-
-
 def run_baselines(
     *, who: Sequence[str], scenarios: Sequence[Path], seeds: int, workers: int, speedup: float, out: Path,
 ) -> int:
@@ -71,7 +61,7 @@ def run_baselines(
         Job(who=w, scenario=p, seed=s, speedup=speedup, set_sail=began.get((load_scenario(p).name, s)))
         for w in who for s in range(seeds) for p in scenarios]
     with out.open("a", encoding="utf-8") as file:
-        for n, record in enumerate(_jobs_done(jobs, workers), 1):
+        for n, record in enumerate(in_processes(sail, jobs, workers), 1):
             file.write(json.dumps(record, separators=(",", ":")) + "\n")
             file.flush()
             sys.stderr.write(f"\r{n}/{len(jobs)} sailed   ")

@@ -21,12 +21,11 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
 from companion.planner.warm import warm
 from companion.telemetry.recorder import DECISIONS, write_atomically
-from companion.wind.forecaster import Forecaster
-from sitl.autopilot import VaneFault
+from companion.wind.forecaster import compile_kernels
 from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
-from sitl.runner import TRUTH_EVERY_S, VERDICT, marks_of, solid_of, vane_fault
+from sitl.runner import TRUTH_EVERY_S, VERDICT, break_vane, marks_of, solid_of
 from sitl.scenario import EventSpec, Scenario
 from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge
@@ -129,7 +128,7 @@ async def _run(
         if kind == "ardurover":
             # A disarmed boat drifts: the companion must not compile its kernels while it is afloat.
             await asyncio.to_thread(warm)
-            Forecaster()
+            await asyncio.to_thread(compile_kernels)
             boat = await stack.enter_async_context(RealBoat.start(scenario, mission, wind, program, pace, folder))
         else:
             boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace))
@@ -200,10 +199,7 @@ async def _event(
     elif event.kind in LINK_EVENTS and relay is not None:
         await befall(relay.line, event)
     elif event.kind == "vane" and relay is not None:
-        relay.vane.set(vane_fault(event))
-        if event.for_s is not None:
-            await asyncio.sleep(event.for_s)
-            relay.vane.set(VaneFault())
+        await break_vane(relay.vane.set, event)
     elif event.kind in boat.plays:
         await boat.play(event, frame)
 

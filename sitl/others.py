@@ -62,7 +62,7 @@ class Others:
         self, frame: LocalFrame, wind: Wind, seed: int, *, port: int, hear: Callable[[Vessel], None] | None = None
     ) -> None:
         """Tell of them at the UDP ``port`` of this machine (0: by nothing), AIS to ``hear`` if that is given."""
-        self.frame, self._wind, self._seed = frame, wind, seed
+        self._frame, self._wind, self._seed = frame, wind, seed
         self._port, self._hear = port, hear or self._receive
         self._vessels: list[Moving] = []
         self._second: SecondBoat | None = None
@@ -89,7 +89,7 @@ class Others:
             ship = ship_of(event, number)
             self._vessels.append(ship)
             while event.is_on_ais:
-                self._hear(ais_report(ship, self.frame, now_s() - began_s))
+                self._hear(ais_report(ship, self._frame, now_s() - began_s))
                 await asyncio.sleep(event.every_s)
         elif event.kind == "intruder":
             intruder = intruder_of(event, number, now_s() - began_s, *ours())
@@ -119,7 +119,7 @@ class Others:
             second.sail(ours()[0], OUR_LENGTH_M)
 
     def _tell(self, vessel: Moving, t_s: float) -> None:
-        send_datagram(radio_report(vessel, self.frame, t_s), self._port)
+        send_datagram(radio_report(vessel, self._frame, t_s), self._port)
 
     def _receive(self, vessel: Vessel) -> None:
         send_datagram(sentences(vessel), self._port)

@@ -287,10 +287,7 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
     elif event.kind == "planner_hang":
         world.planner.hang(math.inf if event.for_s is None else now_s() + event.for_s)
     elif event.kind == "vane":
-        autopilot.set_vane(vane_fault(event))
-        if event.for_s is not None:
-            await asyncio.sleep(event.for_s)
-            autopilot.set_vane(VaneFault())
+        await break_vane(autopilot.set_vane, event)
     elif event.kind == "battery":
         autopilot.set_battery(event.volts or 0.0)
     elif event.kind == "current":
@@ -309,9 +306,12 @@ def _ours(autopilot: Autopilot, frame: LocalFrame) -> tuple[Motion, float]:
     return (frame.en_from_geo(now.position), now.velocity_en_mps), now.heading_rad
 
 
-def vane_fault(event: EventSpec) -> VaneFault:
-    """Return the vane's fault of an event."""
-    return VaneFault(state=VaneState(event.state or "ok"), value_rad=math.radians(event.value_deg))
+async def break_vane(set_vane: Callable[[VaneFault], None], event: EventSpec) -> None:
+    """Break the vane as ``event`` says, and mend it after ``for_s``."""
+    set_vane(VaneFault(state=VaneState(event.state or "ok"), value_rad=math.radians(event.value_deg)))
+    if event.for_s is not None:
+        await asyncio.sleep(event.for_s)
+        set_vane(VaneFault())
 
 
 async def _upload_foreign(end: MemoryEnd, items: list[MissionItem]) -> None:

@@ -30,7 +30,7 @@ _Z = np.array([normal_half_width(float(p)) for p in kernel.QUANTILE_P])
 
 
 @functools.cache
-def _compile() -> None:
+def compile_kernels() -> None:
     """Compile (or load) the kernels before the first reading, so that no reading waits for it."""
     state = kernel.new_state(CONSTANTS)
     kernel.update(state, CONSTANTS, kernel.prior_quantile(CONSTANTS), 0.0, 0.0, 1.0, 1.0)
@@ -46,7 +46,7 @@ class Forecaster(Base):
 
     def __init__(self, *, constants: kernel.Constants = CONSTANTS) -> None:
         super().__init__()
-        _compile()
+        compile_kernels()
         self._constants = constants
         self._state = kernel.new_state(constants)
         self._prior = self._state.quantile.copy()

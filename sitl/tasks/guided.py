@@ -154,7 +154,7 @@ def with_boat(
 
     async def real() -> Any:
         from sitl.ardurover import ArduRover
-        from sitl.program import require
+        from sitl.ardurover_program import require
 
         async with (
             ArduRover(require(), ORIGIN, wind, heading_rad=heading_rad, speedup=speedup, model=model) as boat,

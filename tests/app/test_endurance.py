@@ -40,9 +40,10 @@ def test_endurance_a_day_without_a_human(tmp_path):
             seen.append((step.snapshot.t_s, len(gc.get_objects()), resident_bytes()))
 
     verdict = run_virtual(run_embedded(load_scenario(SCENARIO), SCENARIO, 1, tmp_path, on_step=look))
+    sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
+    print(f"t s, objects, bytes: {seen[0]} to {seen[-1]}; files: {sizes}")   # shown by pytest -rA
     assert verdict.passed, verdict.checks
     assert len(seen) > 40
     assert seen[-1][1] - seen[0][1] < MAY_GROW, seen
     assert seen[-1][2] - seen[0][2] < MAY_GROW_BYTES, seen
-    sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
     assert all(sizes[name] <= most for name, most in AT_MOST.items()), sizes

@@ -1,6 +1,6 @@
 """The companion killed at seeded moments of one voyage, uploads included, and started again (issue 5, point 5).
 
-Every second kill is a power cut as well: the last lines of decisions.jsonl and track.csv are torn, and half a
+Two kills in three are a power cut as well: the last lines of decisions.jsonl and track.csv are torn, and half a
 state.json.new is left over. ``pytest -m campaign tests/app/test_restart.py`` kills at all 200 moments.
 """
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from companion.field.controllers import motor_commands
 from companion.geo.angles import wrap_pi
+from sitl.ardurover_program import find
 from sitl.motorboat import MotorBoat
-from sitl.program import find
 from sitl.tasks.motor import HABITS, run, run_ardurover
 
 

@@ -153,7 +153,7 @@ def test_shore_tools_against_the_simulated_autopilot(tmp_path):
 @pytest.mark.ardurover
 def test_shore_tools_against_the_real_ardurover(tmp_path):
     from sitl.ardurover import DEFAULTS, free_instance
-    from sitl.program import find
+    from sitl.ardurover_program import find
 
     program = find()
     if program is None:

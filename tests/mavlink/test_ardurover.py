@@ -14,10 +14,10 @@ from companion.mavlink.status_wire import StatusReader
 from companion.mavlink.transport import open_link
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, Mode, StatusText, waypoint
 from sitl.ardurover import ArduRover
+from sitl.ardurover_program import find
 from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot.memory import frames
-from sitl.program import find
 from sitl.wind import Constant
 
 PROGRAM = find()

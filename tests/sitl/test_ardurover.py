@@ -15,8 +15,8 @@ from companion.errors import InputError, JobError
 from companion.geo.angles import difference_rad
 from companion.mavlink.transport import open_link
 from sitl.ardurover import ArduRover, free_instance
+from sitl.ardurover_program import check, fetch, find
 from sitl.autopilot import HOME
-from sitl.program import check, fetch, find
 from sitl.wind import Constant, Event, Scripted
 from tests.sitl.boats import Client, sail
 

@@ -16,11 +16,11 @@ from companion.mavlink.transport import open_link
 from companion.messages import GeoPoint
 from companion.traffic.feeds import open_feed
 from companion.traffic.nmea import NmeaDecoder
+from sitl.ardurover_program import find
 from sitl.autopilot import VaneFault, VaneState, Vessel
 from sitl.false_vane import FalseVane
 from sitl.live import run_live
 from sitl.others import Others, sentences
-from sitl.program import find
 from sitl.relay import Relay, befall
 from sitl.scenario import EventSpec, load_scenario
 from sitl.ships import distance_m, free_port, ship_of
