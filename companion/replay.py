@@ -27,6 +27,7 @@ from companion.messages import MissionItem
 from companion.planner import Plan
 from companion.skipper import Skipper
 from companion.skipper.config import Permissions
+from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import (
     CommandOutcome,
     CommandResult,
@@ -36,8 +37,8 @@ from companion.skipper.snapshot import (
     UploadOutcome,
     UploadResult,
 )
-from companion.skipper.state import Persisted
-from companion.telemetry.recorder import DECISIONS, TLOG, TRACK, VOYAGE, jsonable, read_jsonl
+from companion.telemetry.names import DECISIONS, TLOG, TRACK, VOYAGE
+from companion.telemetry.recorder import jsonable, read_jsonl
 from companion.telemetry.records import action_record, ais_of
 from companion.wind import WindRoom
 
@@ -81,7 +82,7 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             raise InputError(str(folder), name, "is missing", "name a folder that `companion run` left")
     description = tomllib.loads((folder / VOYAGE).read_text(encoding="utf-8"))
     epoch_s = float(description["run"]["epoch_s"])
-    mission = load_mission(mission_path or Path(description["mission"]["path"]))
+    mission = load_mission(mission_path or _mission_path(folder, description["mission"]))
     skipper = Skipper(voyage=voyage_of(mission), config=config_of(mission))
     decisions = read_jsonl(folder / DECISIONS)
     rows = _rows(folder / TRACK)
@@ -121,6 +122,12 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
                 differences.append(Difference(t_s=t_s, recorded=theirs, replayed=mine))
     return ReplayReport(
         steps=steps, messages=messages, actions=actions, restarts=len(starts) - 1, differences=tuple(differences))
+
+
+def _mission_path(folder: Path, recorded: dict[str, Any]) -> Path:
+    """Return the voyage's own copy of its mission; where it has none, the place that the mission had."""
+    copy = folder / recorded.get("copy", "")
+    return copy if copy.is_file() else Path(recorded["path"])
 
 
 def _rows(path: Path) -> list[tuple[float, int, int]]:

@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.app import sail
 from companion.clock import now_s
+from companion.disk import Disk
 from companion.errors import LinkError
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
@@ -28,7 +29,7 @@ from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link, LinkIdentity
 from companion.messages import MissionItem, Mode, waypoint
 from companion.options import SailOptions, at_once
-from companion.telemetry.recorder import write_atomically
+from companion.telemetry.names import VERDICT
 from sitl.autopilot import (
     Autopilot,
     AutopilotConfig,
@@ -52,7 +53,6 @@ MAX_TRUTH_SAMPLES = 20_000
 # Unix time of every simulated voyage's start: stamps must not depend on when it was run.
 EPOCH_S = 1_781_000_000.0
 # The simulated boat lies still until it sails, so that every voyage starts where its mission says.
-VERDICT = "verdict.json"
 # Effort of one plan under the virtual clock, where time cannot stop it.
 EXPANSIONS = 15_000
 
@@ -174,7 +174,7 @@ async def run_embedded(
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
         status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
     )
-    write_atomically(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
+    Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict
 
 

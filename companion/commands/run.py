@@ -134,7 +134,8 @@ def _signing(path: Path | None) -> Any:
 def _report(folder: Path) -> None:
     """Draw the voyage; a picture that fails must not hide how the voyage ended."""
     try:
-        from companion.plots.voyage import PICTURE, plot_voyage, read_voyage
+        from companion.plots.voyage import plot_voyage, read_voyage
+        from companion.telemetry.names import PICTURE
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:

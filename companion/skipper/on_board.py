@@ -1,13 +1,20 @@
-"""The mission on the autopilot: read, compared, and known to be ours, empty, a mixture of ours, or foreign."""
+"""The mission on the autopilot: read, compared, and known to be ours, an earlier one of ours, a mixture, or foreign."""
 
 from __future__ import annotations
 
-from companion.messages import MissionItem, Mode
+from dataclasses import replace
+
+from companion.mavlink.items import mission_hash
+from companion.messages import Command, MissionItem, Mode
 from companion.skipper.actions import ReadMission, Severity
-from companion.skipper.route import held_back, is_mixture, is_same_mission
+from companion.skipper.mark import are_marked, marked
+from companion.skipper.route import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
+from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import OperatorWish
-from companion.skipper.state import Persisted, Phase
+from companion.skipper.state import Phase, Route
 from companion.skipper.turn import Turn
+
+REMEDY = "it is not resumed, and replaced only where [operator] replace_foreign allows it"
 
 
 def mission_is_known(turn: Turn) -> bool:
@@ -17,11 +24,10 @@ def mission_is_known(turn: Turn) -> bool:
         turn.update(wish=None, foreign="", replace_foreign=True)
         state = turn.state
     if state.foreign:
-        if turn.snapshot.permissions.may_replace_foreign:
+        if _may_replace(turn):
             turn.update(foreign="", route=None, replace_foreign=True)
             return True
-        phase = Phase.OPERATOR if state.sailing else Phase.WAITING
-        turn.phase(phase, f"{state.foreign}; it is not resumed and not replaced without permission")
+        turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{state.foreign}; {REMEDY}")
         return False
     if state.pending_upload is not None:
         return True
@@ -60,13 +66,11 @@ def _read(turn: Turn, text: str) -> None:
 
 
 def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
-    """Judge the mission that was read: ours, empty, a mixture of ours, or foreign."""
+    """Judge the mission that was read: ours, empty, a mixture of ours, an earlier one of ours, or foreign."""
     state = turn.state
     saved = state.adoptable
     turn.update(checked_mission=True, read_t_s=turn.t_s, adoptable=None)
-    routes = [r for r in (
-        state.route, state.unsure_route, saved.route if saved else None, saved.pending if saved else None,
-    ) if r is not None]
+    routes = [r for r in (state.route, state.unsure_route, *(saved.lists if saved else ())) if r is not None]
     for route in routes:
         if is_same_mission(items, route.items):
             turn.update(route=route, unsure_route=None)
@@ -86,20 +90,57 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
             turn.update(gate=saved.gate)
         return True
     if any(is_mixture(items, a.items, b.items) for a in routes for b in routes):
-        newest = state.unsure_route or (saved.pending if saved else None) or routes[0]
+        newest = state.unsure_route or (saved.pending or saved.unsure if saved else None) or routes[0]
         turn.say(Severity.WARNING, "mixture", "an upload was cut short: the mission is put right", every_s=0.0)
         if saved is not None:
             turn.update(gate=saved.gate, sailing=state.sailing or _under_way(turn))
         turn.update(route=state.route or newest, unsure_route=newest, repair=True)
         return True
-    if state.replace_foreign or turn.snapshot.permissions.may_replace_foreign:
+    # Under way we know what we have put there: a list of ours that we did not put there is somebody's order.
+    if not state.sailing and (mission_hash(items) in state.known or are_marked(items)):
+        _take_over(turn, items, saved)
+        return True
+    if state.replace_foreign or _may_replace(turn):
         turn.update(route=None, unsure_route=None, replace_foreign=True)
         return True
     text = f"the mission on the autopilot ({len(items)} items) is not ours"
     turn.update(foreign=text, route=None, unsure_route=None)
-    turn.say(Severity.ERROR, "foreign mission", turn.state.foreign, every_s=0.0)
-    turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{turn.state.foreign}; it is not resumed")
+    turn.say(Severity.ERROR, "foreign mission", f"{text}; {REMEDY}", every_s=0.0)
+    turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{text}; {REMEDY}")
     return False
+
+
+def _may_replace(turn: Turn) -> bool:
+    """Return whether a stranger's mission may be overwritten: not one that somebody brings while we sail."""
+    return turn.snapshot.permissions.may_replace_foreign and not turn.state.sailing
+
+
+def _take_over(turn: Turn, items: tuple[MissionItem, ...], saved: Persisted | None) -> None:
+    """Take a list of ours that is no list we know: an earlier voyage's, or one whose upload was not saved.
+
+    A boat that sails by it keeps it until there is a plan from where she is; else it is replaced.
+    """
+    gate = 0 if saved is None else saved.gate
+    if not _under_way(turn):
+        turn.update(route=None, unsure_route=None, gate=gate)
+        turn.say(Severity.NOTICE, "earlier mission", "the mission on board is an earlier one of ours: it is replaced",
+                 every_s=0.0)
+        return
+    turn.update(route=_route_of(turn, items), unsure_route=None)
+    _adopt(turn, saved or Persisted(voyage=turn.voyage.name, gate=gate, sailing=True, route=None, pending=None))
+
+
+def _route_of(turn: Turn, items: tuple[MissionItem, ...]) -> Route:
+    """Return a list that was read as the route that sails: where it leads is known, what for is not."""
+    whole = marked(effective(items))
+    home = turn.voyage.home_en_m or turn.boat_en or (0.0, 0.0)
+    points = tuple(
+        home if item.command == Command.NAV_RETURN_TO_LAUNCH else turn.voyage.frame.en_from_geo(item.point)
+        for item in whole)
+    facts = turn.blank_facts(NO_PLAN, turn.config.margin_m, turn.config.delta_s, HELD_BACK)
+    return replace(
+        facts, items=whole, points_en_m=points, leg_from_en_m=(points[0], *points[:-1]), gate_of=(-1,) * len(whole),
+        why="a mission of ours that was not saved")
 
 
 def _under_way(turn: Turn) -> bool:

@@ -33,8 +33,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run_virtual
     from companion.errors import InputError
+    from companion.telemetry.names import DECISIONS
     from companion.telemetry.progress import ProgressLine
-    from companion.telemetry.recorder import DECISIONS
     from sitl.runner import run_embedded
     from sitl.scenario import load_scenario
 
@@ -63,7 +63,8 @@ def run(args: argparse.Namespace) -> int:
 def draw(folder: Path) -> None:
     """Draw the voyage; a picture that fails must not hide the verdict."""
     try:
-        from companion.plots.voyage import PICTURE, plot_voyage, read_voyage
+        from companion.plots.voyage import plot_voyage, read_voyage
+        from companion.telemetry.names import PICTURE
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:

@@ -1,6 +1,7 @@
 """Whole voyages under the virtual clock: real MAVLink bytes between companion and simulated autopilot."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -103,8 +104,7 @@ def test_a_recorded_voyage_replays_exactly(voyage):
 
 
 def test_a_changed_record_does_not_replay(voyage, tmp_path):
-    for file in voyage[1].iterdir():
-        (tmp_path / file.name).write_bytes(file.read_bytes())
+    shutil.copytree(voyage[1], tmp_path, dirs_exist_ok=True)
     lines = (tmp_path / "decisions.jsonl").read_text().splitlines()
     kept = [line for line in lines if '"action":"UploadMission"' not in line]
     assert len(kept) < len(lines)

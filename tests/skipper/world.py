@@ -44,7 +44,8 @@ from companion.skipper.snapshot import (
     WindHealth,
     WindView,
 )
-from companion.skipper.state import Persisted, SkipperState
+from companion.skipper.saved import Persisted
+from companion.skipper.state import SkipperState
 from companion.skipper.voyage import Goal, Voyage
 
 FRAME = LocalFrame(GeoPoint(lat_deg=51.1, lon_deg=-1.3))
