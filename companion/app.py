@@ -32,17 +32,17 @@ from companion.skipper.actions import Severity
 from companion.skipper.state import Phase
 from companion.telemetry.logbook import Logbook
 from companion.telemetry.names import STATE
+from companion.telemetry.progress import DISK
 from companion.telemetry.radio import Radio
 from companion.telemetry.recorder import Recorder
 from companion.telemetry.records import ais_record, outcome_record
-from companion.telemetry.state_file import StateFile
+from companion.telemetry.state_file import StateFile, read_state
 from companion.telemetry.status import companion_status
 from companion.traffic.listening import Feeds
 from companion.wind import WindRoom
 
 STEP_S = 1.0
 TEND_EVERY_S = 5.0        # records are synced, and taken up again after trouble
-DISK = "disk"             # the alert of such trouble
 LOOP_WATCH_S = 0.1
 # After arrival the boat loiters; the companion watches it for a moment before it ends [s].
 LINGER_S = 5.0
@@ -71,6 +71,15 @@ async def sail(
     with recorder:
         shell = _Shell(mission, planner, recorder, options, on_status, stop or asyncio.Event())
         return await shell.run(transport)
+
+
+def has_arrived(mission: Mission, state_path: Path) -> bool:
+    """Return whether the saved state of ``mission`` has all its goals behind it."""
+    try:
+        saved = read_state(state_path)
+    except (OSError, ValueError):
+        return False
+    return Skipper(voyage=voyage_of(mission), config=config_of(mission)).has_arrived(saved)
 
 
 class _Shell:

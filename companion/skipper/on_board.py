@@ -127,7 +127,8 @@ def _take_over(turn: Turn, items: tuple[MissionItem, ...], saved: Persisted | No
                  every_s=0.0)
         return
     turn.update(route=_route_of(turn, items), unsure_route=None)
-    _adopt(turn, saved or Persisted(voyage=turn.voyage.name, gate=gate, sailing=True, route=None, pending=None))
+    _adopt(turn, saved or Persisted(voyage=turn.voyage.name, gate=gate, sailing=True, route=None, pending=None),
+           "an earlier one of ours: sailing on by it until there is a plan")
 
 
 def _route_of(turn: Turn, items: tuple[MissionItem, ...]) -> Route:
@@ -148,7 +149,7 @@ def _under_way(turn: Turn) -> bool:
     return status is not None and status.is_armed and status.mode is Mode.AUTO
 
 
-def _adopt(turn: Turn, saved: Persisted) -> None:
+def _adopt(turn: Turn, saved: Persisted, what: str = "ours") -> None:
     """Take over the mission that sails, without an upload."""
     status = turn.autopilot
     index = (status.mission_seq or 1) - 1 if status is not None else 0
@@ -157,4 +158,4 @@ def _adopt(turn: Turn, saved: Persisted) -> None:
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         sailing=_under_way(turn) or (saved.sailing and status is not None and status.is_armed),
     )
-    turn.say(Severity.NOTICE, "adopted", f"the mission on board is ours: taken over at item {index + 1}", every_s=0.0)
+    turn.say(Severity.NOTICE, "adopted", f"the mission on board is {what}, taken over at item {index + 1}", every_s=0.0)

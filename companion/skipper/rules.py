@@ -26,7 +26,7 @@ from companion.skipper.ladder import rungs
 from companion.skipper.launch import launch, start
 from companion.skipper.lookout import look_out
 from companion.skipper.on_board import mission_is_known
-from companion.skipper.sailing import sail
+from companion.skipper.sailing import ARRIVED_BEFORE, sail
 from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import OperatorWish, Snapshot
 from companion.skipper.state import PATIENT, ByField, Phase, SkipperState
@@ -34,7 +34,6 @@ from companion.skipper.turn import Turn
 from companion.skipper.voyage import Voyage
 from companion.skipper.watchdogs import watch
 
-ARRIVED_BEFORE = "all goals were reached before this start; --again sails the mission again"
 REBOOT_RACE_S = 15.0     # a mode change this long before a reboot shows was the reboot, not the operator
 
 

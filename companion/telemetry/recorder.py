@@ -91,7 +91,9 @@ class Recorder:
         self._wanted: dict[str, bytes] = {}        # whole files that the disk would not take
         self._row_t_s: float | None = None         # of the last row of the track that is on the disk
         self._gap: tuple[float | None, int] = (None, 0)   # since that row; so many were dropped before it
+        self._ended: dict[str, float | None] = {}         # files that have all that they may hold, since that row
         self._gone: tuple[str, ...] = ()                  # of older voyages, and not yet told
+        self._told: set[str] = set()                      # of those, which a record says to have ended
         self._tends = 0
 
     def __enter__(self) -> Self:
@@ -155,7 +157,9 @@ class Recorder:
         del self._wanted[name]
 
     def _append(self, name: str, data: bytes) -> bool:
-        if self.trouble or self._bytes[name] + len(data) > self._caps[name]:
+        if not self.trouble and self._bytes[name] + len(data) > self._caps[name] and name not in self._ended:
+            self._ended[name] = self._row_t_s
+        if self.trouble or name in self._ended:
             self.dropped += 1
             return False
         try:
@@ -177,6 +181,8 @@ class Recorder:
         if self._tends % TIDY_EVERY == 0:
             self._tidy()
         try:
+            if self.trouble:
+                self._disk.make_folder(self.folder)
             room = self._disk.room(self.folder)
             if room.is_short and self._shelf is not None:
                 self._gone += self._shelf.make_room(2 * room.reserve_bytes - room.free_bytes)
@@ -193,6 +199,9 @@ class Recorder:
         if self._gone and not self.trouble:
             self.decision({**stamps, "kind": "dropped", "voyages": list(self._gone)})
             self._gone = ()
+        for name in self._ended.keys() - self._told:
+            self._told.add(name)
+            self.decision({**stamps, "kind": "gap", "since_s": self._ended[name], "why": f"{name} is full"})
 
     def _tidy(self) -> None:
         if self._shelf is not None:

@@ -57,7 +57,7 @@ class StateFile:
     def load(self) -> Persisted | None:
         """Return the saved state, None when there is none that can be believed."""
         try:
-            return _read(self.path)
+            return read_state(self.path)
         except FileNotFoundError:
             return None
         except OSError as error:
@@ -77,7 +77,7 @@ class StateFile:
         names: list[str] = []
         for _, path in sorted(found, reverse=True)[:MOST_OTHERS]:
             with contextlib.suppress(OSError, ValueError):
-                names += [name for name in _read(path).names if name not in names]
+                names += [name for name in read_state(path).names if name not in names]
         return tuple(names)
 
     def _put_aside(self) -> str:
@@ -113,10 +113,14 @@ class StateFile:
             self._is_there, self.trouble = True, ""
 
     async def _write(self, data: bytes) -> None:
-        await self._offload(lambda: self._disk.replace(self.path, data, is_durable=self._is_durable))
+        def work() -> None:
+            self._disk.make_folder(self.path.parent)
+            self._disk.replace(self.path, data, is_durable=self._is_durable)
+
+        await self._offload(work)
 
 
-def _read(path: Path) -> Persisted:
+def read_state(path: Path) -> Persisted:
     """Read a state file.
 
     Raises:

@@ -1,0 +1,131 @@
+"""A disk that is full, sick or read-only under way: the boat sails on, says so, and records again when it can.
+
+Whole voyages under the virtual clock on a disk that fails as Linux says it (``sitl.sick_disk``); a real full file system
+and a real read-only one are in test_recorder.py and test_run_process.py.
+"""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from companion.clock import run_virtual
+from companion.mavlink.frames import Codec
+from companion.replay import replay
+from companion.telemetry.recorder import read_jsonl
+from sitl.runner import run_embedded
+from sitl.scenario import EventSpec, ExpectSpec, Scenario, WindSpec
+from tests.app.test_voyage import ROCK, SHORT_MISSION
+
+
+class Shore:
+    """Hears what the companion says on its link."""
+
+    def __init__(self):
+        self.link, self.bytes = None, bytearray()
+
+    def truth(self, t_s, autopilot, link):
+        if self.link is None:
+            self.link, write = link, link.near.write
+            link.near.write = lambda data: (self.bytes.extend(data), write(data))[1]
+
+    def life(self, start_s, end_s):
+        pass
+
+    @property
+    def said(self):
+        messages = Codec(1, 191).feed(bytes(self.bytes))
+        return "".join(m.text for m in messages if m.get_type() == "STATUSTEXT")   # in parts of 50 letters
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("short")
+    (folder / "mission.toml").write_text(SHORT_MISSION)
+    (folder / "rock.wkt").write_text(ROCK)
+    return folder
+
+
+def sail(short, out, *events, limit_s=600.0):
+    scenario = Scenario(name="short", mission="mission.toml", limit_s=limit_s, events=events,
+                        wind=WindSpec(sd_deg=6.0), expect=ExpectSpec(min_clearance_m=2.0))
+    shore = Shore()
+    verdict = run_virtual(run_embedded(scenario, short / "scenario.toml", 1, out, expansions=4000, observer=shore))
+    return verdict, shore
+
+
+@pytest.mark.parametrize("state", ["full", "sick", "read_only"])
+def test_a_voyage_outlives_its_disk_and_is_recorded_again_when_it_is_well(state, short, tmp_path):
+    """The state's OSError ended the companion, the boat under way (issue 12, point 13)."""
+    verdict, shore = sail(short, tmp_path, EventSpec(at_s=40.5, kind="disk", state=state, for_s=30.0))
+    assert verdict.passed, verdict.checks
+    summary = json.loads((tmp_path / "summary.json").read_bytes())
+    assert summary["arrived"] is True
+    assert summary["records_dropped"] > 100
+    assert summary["disk_trouble"] == ""
+    gaps = [d for d in read_jsonl(tmp_path / "decisions.jsonl") if d["kind"] == "gap"]
+    assert len(gaps) == 1
+    assert 38.0 <= gaps[0]["since_s"] <= 46.0
+    assert gaps[0]["t_s"] - gaps[0]["since_s"] < 40.0
+    assert gaps[0]["dropped"] == summary["records_dropped"]
+    assert "nothing is recorded" in shore.said
+    assert "sailing on" in shore.said
+    assert "the disk is well again" in shore.said
+    report = replay(tmp_path)
+    assert not report.differences
+    assert report.steps > 30
+    assert report.unrecorded > 20
+
+
+def test_started_again_on_a_full_disk_it_takes_over_by_the_mark_in_its_mission(short, tmp_path):
+    """Not even the restart got through: exit code 1, again and again (issue 12, point 13)."""
+    verdict, _ = sail(
+        short, tmp_path, EventSpec(at_s=20.0, kind="disk", state="full"),
+        EventSpec(at_s=70.0, kind="kill_companion", restart_after_s=4.0))
+    assert verdict.passed, verdict.checks
+    assert not (tmp_path / "summary.json").exists() or json.loads((tmp_path / "summary.json").read_bytes())
+
+
+def test_a_disk_that_is_never_well_from_the_beginning(short, tmp_path):
+    verdict, shore = sail(short, tmp_path / "v", EventSpec(at_s=0.0, kind="disk", state="read_only"))
+    assert verdict.passed, verdict.checks
+    assert "no state for a restart is saved: Read-only file system" in shore.said
+
+
+def test_a_voyage_is_replayed_where_its_mission_is_no_more(short, tmp_path, monkeypatch):
+    """It could be replayed only in the folder that it was sailed from (issue 13, point 12)."""
+    there = tmp_path / "there"
+    shutil.copytree(short, there / "missions")
+    (there / "missions/shore").mkdir()
+    (there / "missions/rock.wkt").rename(there / "missions/shore/rock.wkt")
+    mission = SHORT_MISSION.replace('"rock.wkt"', '"shore/rock.wkt", "../rock.wkt"').replace(
+        "[operator]", '[boat]\npolar = "own.csv"\n[operator]')
+    (there / "missions/mission.toml").write_text(mission.replace('name = "short"\n', "", 1))
+    (there / "rock.wkt").write_text(ROCK.replace("-1.31", "-1.33"))
+    (there / "missions/own.csv").write_text(POLAR)
+    verdict, _ = sail(there / "missions", there / "voyage")
+    assert verdict.passed, verdict.checks
+    with (there / "voyage/track.csv").open() as track:   # she sailed by her own polar, 2.5 kn at best
+        assert max(float(row["sog_mps"] or 0.0) for row in csv.DictReader(track)) < 1.4
+    here = tmp_path / "elsewhere"
+    shutil.move(there / "voyage", here)
+    shutil.rmtree(there)
+    monkeypatch.chdir(tmp_path)
+    report = replay(Path("elsewhere"))
+    assert report.steps > 60
+    assert not report.differences
+    from companion import cli
+
+    assert cli.main(["replay", "elsewhere"]) == 0
+    assert cli.main(["report", "elsewhere"]) == 0
+
+
+POLAR = """TWA\\TWS;4;6;10
+0;0.0;0.0;0.0
+45;1.4;1.8;2.1
+90;1.8;2.2;2.5
+135;1.7;2.1;2.4
+180;1.3;1.7;2.1
+"""
