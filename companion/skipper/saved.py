@@ -43,7 +43,7 @@ class Persisted:
     @property
     def names(self) -> tuple[str, ...]:
         """The same by their hashes (``companion.mavlink.items.mission_hash``)."""
-        return tuple(mission_hash(route.items) for route in self.lists)
+        return tuple(dict.fromkeys(mission_hash(route.items) for route in self.lists))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""

@@ -15,7 +15,8 @@ from sitl.wind import Constant
 
 # A keelboat, slower than the simulator's own hull on every course; knots.
 SLOW = Polar(
-    twa_rad=np.radians([30.0, 45.0, 60.0, 90.0, 120.0, 150.0, 180.0]), tws_mps=np.array([6.0, 10.0, 16.0]) * MPS_PER_KNOT,
+    twa_rad=np.radians([30.0, 45.0, 60.0, 90.0, 120.0, 150.0, 180.0]),
+    tws_mps=MPS_PER_KNOT * np.array([6.0, 10.0, 16.0]),
     speed_mps_table=MPS_PER_KNOT * np.array([
         [1.0, 1.4, 1.8], [2.4, 3.2, 3.6], [2.9, 3.8, 4.3], [3.2, 4.2, 4.9], [3.1, 4.3, 5.2], [2.6, 3.7, 4.8],
         [2.2, 3.2, 4.3]]))
@@ -48,7 +49,8 @@ def test_a_boat_faster_than_the_wind_reaches_what_her_polar_says():
 
 
 def test_the_polar_is_of_the_wind_over_the_water():
-    with_stream = steady_mps(boat(SLOW, 5.0, 90.0, current_en=(0.0, -1.0)), 90.0)   # carried away from the wind: less of it
+    # carried away from the wind there is less of it
+    with_stream = steady_mps(boat(SLOW, 5.0, 90.0, current_en=(0.0, -1.0)), 90.0)
     assert with_stream == pytest.approx(SLOW.speed_mps(math.radians(90.0), 4.0), abs=0.02)
 
 
