@@ -127,11 +127,11 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
             )
 
         summary = run_loop(_sail(mission, transport, folder, options, args.speedup, out), speedup=args.speedup)
-    _report(folder, err)
     arrived = bool(summary.get("arrived"))
     if arrived and summary.get("arrived_before"):
         out.write(f"not sailed: {mission.name} had arrived before this start; --again sails it again\n{folder}\n")
         return 1
+    _report(folder, err)
     end = "arrived" if arrived else f"not arrived: {summary.get('end_reason')}, {summary.get('end_why')}"
     out.write(f"{end}; {summary.get('time_s') or 0.0:.0f} s, {summary['tacks']} tacks, {summary['replans']} replans\n")
     if summary["records_dropped"]:

@@ -11,12 +11,18 @@ from pathlib import Path
 
 import pytest
 
+from companion import app, cli
 from companion.clock import run_virtual
+from companion.geofence import load_mission
 from companion.mavlink.frames import Codec
+from companion.options import SailOptions, at_once
+from companion.planner.worker import InlinePlanner
 from companion.replay import replay
 from companion.telemetry.recorder import read_jsonl
+from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.runner import run_embedded
 from sitl.scenario import EventSpec, ExpectSpec, Scenario, WindSpec
+from sitl.wind import Constant
 
 # A reach of 200 m past a rock.
 MISSION = """
@@ -117,6 +123,25 @@ def test_a_disk_that_is_never_well_from_the_beginning(short, tmp_path):
     assert "no state for a restart is saved: Read-only file system" in shore.said
 
 
+def test_a_dry_run_leaves_the_state_of_a_voyage_that_is_interrupted(short, tmp_path):
+    """It wrote its own in the place of it, and the voyage could not be taken up again."""
+    state = tmp_path / "state.json"
+    sail(short, tmp_path, EventSpec(at_s=60.0, kind="kill_companion"), limit_s=65.0)
+    before = state.read_bytes()
+    mission = load_mission(short / "mission.toml")
+
+    async def dry():
+        autopilot = Autopilot(AutopilotConfig(home=mission.origin, is_warm=True), Constant(0.0, 5.0), seed=1)
+        wires = MemoryLink("dry", seed=1)
+        async with serve(autopilot, [wires.far]):
+            return await app.sail(mission, wires.near, InlinePlanner(), tmp_path / "dry", SailOptions(
+                dry_run=True, limit_s=50.0, offload=at_once, is_durable=False, state_path=state, expansions=2000))
+
+    summary = run_virtual(dry())
+    assert summary["end_why"].startswith("a plan is ready")
+    assert state.read_bytes() == before
+
+
 def test_a_voyage_is_replayed_where_its_mission_is_no_more(short, tmp_path, monkeypatch):
     """It could be replayed only in the folder that it was sailed from (issue 13, point 12)."""
     there = tmp_path / "there"
@@ -139,8 +164,6 @@ def test_a_voyage_is_replayed_where_its_mission_is_no_more(short, tmp_path, monk
     report = replay(Path("elsewhere"))
     assert report.steps > 60
     assert not report.differences
-    from companion import cli
-
     assert cli.main(["replay", "elsewhere"]) == 0
     assert cli.main(["report", "elsewhere", "--json"]) == 0
 

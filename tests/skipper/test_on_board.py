@@ -6,7 +6,7 @@ import pytest
 
 from companion.messages import MissionItem, Mode, StatusText
 from companion.skipper import actions as act
-from companion.skipper.config import ALL_PERMITTED
+from companion.skipper.config import ALL_PERMITTED, DRY_RUN
 from companion.skipper.geometry import distance_m
 from companion.skipper.route import is_same_mission
 from companion.skipper.saved import Persisted
@@ -56,6 +56,20 @@ def test_an_earlier_mission_on_a_boat_that_lies_still_is_replaced(how):
     assert said(world, "earlier mission")
     assert world.run(1500, is_done)
     assert distance_m(world.position, (-250.0, 60.0)) < 40.0
+
+
+def test_a_dry_run_plans_beside_an_earlier_mission_and_leaves_it_there():
+    world = make()
+    assert world.run(1500, is_done)
+    there = world.mission
+    world.armed, world.mode, world.pending, world.permissions = False, Mode.MANUAL, [], DRY_RUN
+    moved = skipper(voyage(Goal(en_m=(-250.0, 60.0)), obstacles=ISLANDS))
+    world.skipper, world.state = moved, moved.initial()
+    before = len(world.actions)
+    world.run(60)
+    assert world.state.why == "a plan is ready; waiting for permission to upload it"
+    assert world.mission == there
+    assert not {type(a) for _, a in world.actions[before:]} & {act.UploadMission, act.SetMode, act.Arm, act.SetCurrent}
 
 
 def test_an_earlier_mission_that_somebody_has_changed_is_his():
