@@ -130,7 +130,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     arrived = bool(summary.get("arrived"))
     if arrived and summary.get("arrived_before"):
         out.write(f"not sailed: {mission.name} had arrived before this start; --again sails it again\n{folder}\n")
-        return 1
+        return 2   # as for any other order that gets no better by trying again
     _report(folder, err)
     end = "arrived" if arrived else f"not arrived: {summary.get('end_reason')}, {summary.get('end_why')}"
     out.write(f"{end}; {summary.get('time_s') or 0.0:.0f} s, {summary['tacks']} tacks, {summary['replans']} replans\n")

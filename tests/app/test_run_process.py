@@ -145,6 +145,6 @@ def test_the_second_mission_sails_from_wherever_it_is_started(first, link, folde
     # and once more: it has arrived, and says what would sail it again
     run = subprocess.run(command("second.toml", link), cwd=tmp_path, capture_output=True, text=True, check=False,
                          stdin=subprocess.DEVNULL, timeout=PATIENCE_S)
-    assert run.returncode == 1
+    assert run.returncode == 2
     assert run.stdout.splitlines()[-2] == "not sailed: second had arrived before this start; --again sails it again"
     assert Path(tmp_path / run.stdout.splitlines()[-1]).is_dir()
