@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 if TYPE_CHECKING:
     from companion.telemetry.console import Console
@@ -63,7 +63,10 @@ def run(args: argparse.Namespace) -> int:
     from companion import kernel_cache
     from companion.telemetry.console import Console
 
-    with _outliving_the_terminal(), Console(sys.stdout) as out, Console(sys.stderr) as err:
+    with (
+        _outliving_the_terminal(), Console(sys.stdout) as out, Console(sys.stderr) as err,
+        contextlib.redirect_stderr(cast("TextIO", err)),   # what is logged must not wait for a terminal either
+    ):
         kernels = kernel_cache.keep_usable(os.environ)
         if kernels is not None:
             os.environ[kernel_cache.VARIABLE] = str(kernels)

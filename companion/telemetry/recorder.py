@@ -12,6 +12,7 @@ record of the gap. They stop before the disk is quite full: the state for a rest
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import math
 import os
@@ -100,6 +101,8 @@ class Recorder:
         self._tidy()
         try:
             self._open()
+        except BlockingIOError as error:
+            raise JobError(f"{self.folder}: {error.strerror}; name another folder with --out") from error
         except OSError as error:
             if is_mistake(error):
                 raise JobError(f"cannot write the voyage to {self.folder}: {reason(error)}") from error
@@ -109,6 +112,9 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        with contextlib.suppress(OSError):   # the last moment for what the disk would not take
+            for name in list(self._wanted):
+                self._write_wanted(name)
         self._close()
         self._lock.release()
 
@@ -232,7 +238,7 @@ class Recorder:
             except OSError:
                 is_ours = True   # a file system without locks
             if not is_ours:
-                raise JobError(f"another companion is recording in {self.folder}; name another folder with --out")
+                raise BlockingIOError(errno.EWOULDBLOCK, "another companion is recording there")
         for name in (DECISIONS, TRACK, TLOG):
             path = self.folder / name
             if name != TLOG:  # whose readers find the next frame by themselves
