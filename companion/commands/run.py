@@ -130,18 +130,24 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
             )
 
         summary = run_loop(_sail(mission, transport, folder, options, args.speedup, out), speedup=args.speedup)
-    arrived = bool(summary.get("arrived"))
-    if arrived and summary.get("arrived_before"):
-        out.write(f"not sailed: {mission.name} had arrived before this start; --again sails it again\n{folder}\n")
-        return 2   # as for any other order that gets no better by trying again
-    _report(folder, err)
-    end = "arrived" if arrived else f"not arrived: {summary.get('end_reason')}, {summary.get('end_why')}"
-    out.write(f"{end}; {summary.get('time_s') or 0.0:.0f} s, {summary['tacks']} tacks, {summary['replans']} replans\n")
+    if not summary["arrived_before"]:
+        _report(folder, err)
+    code, text = last_words(mission.name, summary)
+    out.write(f"{text}\n{folder}\n")
+    return code
+
+
+def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
+    """Return the exit code and what is said of a voyage at its end."""
+    if summary["arrived_before"]:
+        # an order that gets no better by trying again
+        return 2, f"not sailed: {name} had arrived before this start; --again sails it again"
+    end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
+    text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {summary['tacks']} tacks, {summary['replans']} replans"
     if summary["records_dropped"]:
-        out.write(f"{summary['records_dropped']} records are missing{'; ' * bool(summary['disk_trouble'])}"
-                  f"{summary['disk_trouble']}\n")
-    out.write(f"{folder}\n")
-    return 0 if arrived else 1
+        missing = f"{summary['records_dropped']} records are missing"
+        text += "\n" + "; ".join(part for part in (missing, summary["disk_trouble"]) if part)
+    return 0 if summary["arrived"] else 1, text
 
 
 @contextlib.contextmanager

@@ -13,6 +13,7 @@ import pytest
 
 from companion import app, cli
 from companion.clock import run_virtual
+from companion.commands.run import last_words
 from companion.geofence import load_mission
 from companion.mavlink.frames import Codec
 from companion.options import SailOptions, at_once
@@ -121,6 +122,20 @@ def test_a_disk_that_is_never_well_from_the_beginning(short, tmp_path):
     verdict, shore = sail(short, tmp_path / "v", EventSpec(at_s=0.0, kind="disk", state="read_only"))
     assert verdict.passed, verdict.checks
     assert "no state for a restart is saved: Read-only file system" in shore.said
+
+
+def test_a_mission_that_has_arrived_says_what_would_sail_it_again(short, tmp_path):
+    """It ended with "arrived; 0 s" (issue 13, point 1)."""
+    assert sail(short, tmp_path)[0].passed
+    first = json.loads((tmp_path / "summary.json").read_bytes())
+    assert last_words("reach", first)[0] == 0
+    assert last_words("reach", first)[1].startswith("arrived; ")
+    sail(short, tmp_path)      # another boat, the same state
+    again = json.loads((tmp_path / "summary.json").read_bytes())
+    assert again["arrived_before"] is True
+    assert again["uploads"] == 0
+    assert last_words("reach", again) == (
+        2, "not sailed: reach had arrived before this start; --again sails it again")
 
 
 def test_a_dry_run_leaves_the_state_of_a_voyage_that_is_interrupted(short, tmp_path):

@@ -1,6 +1,6 @@
 """``companion run`` as a process beside ``sitl boat``: what no output, no signal of a terminal and no disk may end.
 
-One boat, three runs, several checks in each: a process takes seconds to start.
+One boat, two runs, several checks in each: a process takes seconds to start.
 """
 
 import json
@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
@@ -29,7 +28,7 @@ radius_m = 10.0
 arm = true
 set_auto = true
 """
-PATIENCE_S = 120.0
+PATIENCE_S = 200.0
 COMPANION = [sys.executable, "-m", "companion.cli"]
 
 
@@ -142,9 +141,3 @@ def test_the_second_mission_sails_from_wherever_it_is_started(first, link, folde
     said = [d["code"] for d in records(voyage / "decisions.jsonl") if d.get("action") == "Announce"]
     assert "adopted" in said or "earlier mission" in said
     assert "foreign mission" not in said
-    # and once more: it has arrived, and says what would sail it again
-    run = subprocess.run(command("second.toml", link), cwd=tmp_path, capture_output=True, text=True, check=False,
-                         stdin=subprocess.DEVNULL, timeout=PATIENCE_S)
-    assert run.returncode == 2
-    assert run.stdout.splitlines()[-2] == "not sailed: second had arrived before this start; --again sails it again"
-    assert Path(tmp_path / run.stdout.splitlines()[-1]).is_dir()
