@@ -36,7 +36,7 @@ from companion.telemetry.progress import DISK
 from companion.telemetry.radio import Radio
 from companion.telemetry.recorder import Recorder
 from companion.telemetry.records import ais_record, outcome_record
-from companion.telemetry.state_file import StateFile, read_state
+from companion.telemetry.state_file import StateFile
 from companion.telemetry.status import companion_status
 from companion.traffic.listening import Feeds
 from companion.wind import WindRoom
@@ -65,21 +65,11 @@ async def sail(
 
     Raises:
         LinkError: no autopilot was heard within ``options.wait_s``.
-        JobError: the folder cannot be written.
+        JobError: the folder's name cannot be one, or another companion is recording there.
     """
-    recorder = Recorder(folder, disk=options.disk, shelf=options.shelf, is_durable=options.is_durable)
-    with recorder:
+    with Recorder(folder, disk=options.disk, shelf=options.shelf, is_durable=options.is_durable) as recorder:
         shell = _Shell(mission, planner, recorder, options, on_status, stop or asyncio.Event())
         return await shell.run(transport)
-
-
-def has_arrived(mission: Mission, state_path: Path) -> bool:
-    """Return whether the saved state of ``mission`` has all its goals behind it."""
-    try:
-        saved = read_state(state_path)
-    except (OSError, ValueError):
-        return False
-    return Skipper(voyage=voyage_of(mission), config=config_of(mission)).has_arrived(saved)
 
 
 class _Shell:

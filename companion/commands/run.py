@@ -182,9 +182,15 @@ def _asked(mission: Any, state_path: Path, err: Console) -> bool | None:
     """Return whether a mission that has arrived is sailed again: what a terminal answers; None: it is not wanted."""
     if not (state_path.is_file() and sys.stdin is not None and sys.stdin.isatty() and err.isatty()):
         return False
-    from companion.app import has_arrived
+    from companion.compose import config_of, voyage_of
+    from companion.skipper import Skipper
+    from companion.telemetry.state_file import read_state
 
-    if not has_arrived(mission, state_path):
+    try:
+        saved = read_state(state_path)
+    except (OSError, ValueError):
+        return False   # the voyage says what is wrong with it
+    if not Skipper(voyage=voyage_of(mission), config=config_of(mission)).has_arrived(saved):
         return False
     day = datetime.fromtimestamp(state_path.stat().st_mtime, UTC)
     err.write(f"{mission.name} has arrived already ({day:%d %b %Y %H:%M} UTC). Sail it again? [y/N] ")

@@ -55,7 +55,7 @@ def test_one_that_has_not_is_sailed_on_without_a_question(terminal, mission, tmp
     save(tmp_path / "state.json", gate=0)
     with Console(terminal[1]) as console:
         assert _asked(mission, tmp_path / "state.json", console) is False
-        (tmp_path / "state.json").write_text("[" * 100_000)     # the voyage says what is wrong with it
+        (tmp_path / "state.json").write_text("[" * 100_000)
         assert _asked(mission, tmp_path / "state.json", console) is False
         assert _asked(mission, tmp_path / "none.json", console) is False
 
