@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -113,6 +113,11 @@ class LocalArea:
     polygons: tuple[Polygon, ...]
     own_margins_m: tuple[float, ...]
     limits: BaseGeometry | None
+
+    @functools.cached_property
+    def unfenced(self) -> LocalArea:
+        """The obstacles alone: for a boat that has got outside the limits."""
+        return self if self.limits is None else replace(self, limits=None)
 
     @functools.cached_property
     def solid(self) -> BaseGeometry:

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
 from companion.mavlink import codec
 from companion.mavlink.frames import Drop, Message
 from companion.messages import (
@@ -174,7 +176,13 @@ class VehicleAssembler:
                 self._status,
                 battery_v=None if message.voltage_battery == 0xFFFF else message.voltage_battery / 1e3,
                 battery_remaining=message.battery_remaining / 100.0 if 0 <= message.battery_remaining <= 100 else None,
+                battery_failed=codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_BATTERY),
+                receiver_lost=codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_RC_RECEIVER),
             )
+        elif kind == "RC_CHANNELS":
+            self._status = replace(self._status, rc_us=codec.rc_us(message))
+        elif kind == "HOME_POSITION":
+            self._status = replace(self._status, home=codec.geo_point(message.latitude, message.longitude))
         elif kind == "FENCE_STATUS":
             self._status = replace(self._status, fence_breached=bool(message.breach_status))
             self._fence_s = t_s

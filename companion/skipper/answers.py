@@ -82,9 +82,12 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     first = turn.state.index if pending.from_index is None else pending.from_index + 1
     points = route.points_en_m[first:-1]
     ends = [n for n in range(first, len(route.items) - 1) if route.gate_of[n] == pending.gate]
-    if not points or pending.gate < 0 or not ends or pending.lead_in:
+    if not points or not ends or pending.lead_in or route.bound_for != pending.facts.bound_for:
         return False
-    points = route.points_en_m[first:ends[0] + 1]
+    if pending.gate >= 0:
+        points = route.points_en_m[first:ends[0] + 1]
+    elif not pending.facts.bound_for:
+        return False
     problem = pending.problem
     # A vessel that the old route was planned clear of need not be kept so far from; it is held against its own discs.
     old = replace(problem.resolved, targets=()).evaluate(np.asarray([pending.start_en_m, *points]))
@@ -264,6 +267,6 @@ def hold(turn: Turn, why: str) -> None:
     route = replace(
         state.route, items=(*state.route.items[:keep], end), points_en_m=(*state.route.points_en_m[:keep], place),
         leg_from_en_m=(*state.route.leg_from_en_m[:keep], boat), gate_of=(*state.route.gate_of[:keep], -1),
-        rung="hold", risk=None, cost_s=None, why=f"{why}; loitering with {room:.0f} m of room",
+        rung="hold", risk=None, cost_s=None, bound_for="", why=f"{why}; loitering with {room:.0f} m of room",
     )
     upload(turn, route, keep + 1, route.why)

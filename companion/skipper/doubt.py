@@ -11,7 +11,7 @@ import math
 
 from companion.messages import Mode
 from companion.skipper.actions import Severity
-from companion.skipper.failsafe import CRITICAL
+from companion.skipper.causes import CRITICAL
 from companion.skipper.helm import is_busy, set_mode
 from companion.skipper.state import Fix, Phase
 from companion.skipper.turn import JUMP_M, Turn

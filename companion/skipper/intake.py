@@ -99,6 +99,14 @@ def take_events(turn: Turn) -> None:
             turn.update(wish=event)
 
 
+def count_time(turn: Turn) -> None:
+    """Count how long the voyage has been under way."""
+    state, status = turn.state, turn.autopilot
+    sails = state.sailing and not state.over and status is not None and status.is_armed
+    passed_s = turn.t_s - state.last_step_s if sails and math.isfinite(state.last_step_s) else 0.0
+    turn.update(under_way_s=state.under_way_s + max(0.0, passed_s), last_step_s=turn.t_s)
+
+
 def locate(turn: Turn) -> None:
     """Say where the boat is on its route: the autopilot's count, our own count, gates passed, way made good."""
     state, status = turn.state, turn.autopilot

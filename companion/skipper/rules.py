@@ -10,12 +10,15 @@ from dataclasses import dataclass, field
 
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
+from companion.skipper.adrift import warn_adrift
+from companion.skipper.causes import PERSON
 from companion.skipper.config import SkipperConfig
 from companion.skipper.doubt import follow
-from companion.skipper.failsafe import has_stopped
+from companion.skipper.failsafe import follow_answer, follow_stops, take_over
 from companion.skipper.gates import Gate, gates_of
-from companion.skipper.helm import hand_back, is_busy, repair
+from companion.skipper.helm import is_busy
 from companion.skipper.intake import (
+    count_time,
     locate,
     notice_truncation,
     remember_fix,
@@ -23,15 +26,15 @@ from companion.skipper.intake import (
     take_outcomes,
 )
 from companion.skipper.ladder import rungs
-from companion.skipper.launch import launch, start
+from companion.skipper.launch import finished, launch, start
 from companion.skipper.lookout import look_out
 from companion.skipper.on_board import mission_is_known
 from companion.skipper.sailing import sail
 from companion.skipper.snapshot import OperatorWish, Snapshot
-from companion.skipper.state import PATIENT, ByField, Persisted, Phase, SkipperState
+from companion.skipper.state import PATIENT, ByField, Persisted, Phase, Signs, SkipperState
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import Voyage
-from companion.skipper.watchdogs import watch
+from companion.skipper.watch import watch
 
 REBOOT_RACE_S = 15.0     # a mode change this long before a reboot shows was the reboot, not the operator
 
@@ -51,18 +54,22 @@ class Skipper:
         """Return the first state; with ``persisted`` the mission on the autopilot may be adopted by its content."""
         if persisted is not None and (persisted.voyage != self.voyage.name or persisted.gate > len(self.gates)):
             return SkipperState(why="the saved state is of another voyage")
-        return SkipperState(adoptable=persisted)
+        return SkipperState(adoptable=persisted, under_way_s=0.0 if persisted is None else persisted.under_way_s)
 
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
         turn = Turn(self.voyage, self.config, self.gates, state, snapshot)
         take_events(turn)
         take_outcomes(turn)
+        follow_stops(turn)
+        follow_answer(turn)
         follow(turn)
         locate(turn)
         look_out(turn)
+        count_time(turn)
         fresh = watch(turn)
         _decide(turn, fresh)
+        warn_adrift(turn)
         remember_fix(turn)
         return turn.state, tuple(turn.actions)
 
@@ -82,7 +89,7 @@ class Skipper:
             return state.adoptable
         return Persisted(
             voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route, pending=pending,
-            own_mode=state.own_mode,
+            own_mode=state.own_mode, under_way_s=60.0 * (state.under_way_s // 60.0),
         )
 
 
@@ -101,12 +108,10 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
     notice_truncation(turn)
     if not mission_is_known(turn):
         return
-    if turn.state.phase is Phase.DONE:
-        if not repair(turn):
-            hand_back(turn)
-        return
     if turn.state.wish is OperatorWish.HOLD and not turn.state.sailing:
-        turn.phase(Phase.WAITING, "the operator asked to hold")
+        turn.phase(Phase.WAITING, "the operator asked to hold: waiting until he lets go on")
+    elif turn.gate is None and not turn.state.sailing:
+        finished(turn)
     elif turn.state.route is None:
         start(turn)
     elif not turn.state.sailing:
@@ -121,7 +126,7 @@ def _rebooted(turn: Turn) -> None:
     keeps = turn.state.phase is Phase.OPERATOR and since is not None and turn.t_s - since > REBOOT_RACE_S
     turn.update(
         checked_mission=False, read_since_s=turn.t_s, own_mode=None, steering_until_s=None, pending_command=None,
-        by_field=ByField(),
+        by_field=ByField(), answering="", stop=None, signs=Signs(),
     )
     if not keeps:
         turn.update(sailing=False, operator_since_s=None)
@@ -147,23 +152,29 @@ def _operator_has_it(turn: Turn) -> bool:
             operator_since_s=turn.t_s, pending_plan=None, own_mode=None, steering_until_s=None, pending_command=None,
             by_field=ByField(),
         )
-        if has_stopped(turn):
-            turn.update(own_mode=Mode.HOLD, operator_since_s=None, after_operator=True, plan_retry=PATIENT)
-            turn.say(Severity.WARNING, "position failsafe",
-                     "stopped by the autopilot's position failsafe: sailing on when the position is back", every_s=0.0)
+        if take_over(turn):
             return False
-        what = "disarmed" if not status.is_armed else f"mode {status.mode.name if status.mode is not None else '?'}"
-        turn.phase(Phase.OPERATOR, f"{what}, not by us: the companion does nothing until AUTO comes back")
+        turn.phase(Phase.OPERATOR, f"{_taken(turn)}, not by us: the companion does nothing until AUTO comes back")
         turn.say(Severity.NOTICE, "operator", turn.state.why, every_s=0.0)
         return True
     if gone or status.mode is not Mode.AUTO:
-        mode = status.mode.name if status.mode is not None else "unknown"
-        turn.phase(Phase.OPERATOR, f"mode {mode}{'' if status.is_armed else ', disarmed'}: waiting for AUTO")
+        if gone and take_over(turn):   # its sign came later than the change of mode
+            return False
+        turn.phase(Phase.OPERATOR, f"{_taken(turn)}: waiting for AUTO")
         return True
     since = state.operator_since_s if state.operator_since_s is not None else turn.t_s
     turn.update(
         operator_since_s=None, checked_mission=False, read_since_s=turn.t_s, after_operator=True, plan_retry=PATIENT,
+        answering="",
     )
     turn.phase(Phase.WAITING, "AUTO is back: comparing the mission on board")
     turn.say(Severity.NOTICE, "operator back", f"AUTO is back after {turn.t_s - since:.0f} s", every_s=0.0)
     return False
+
+
+def _taken(turn: Turn) -> str:
+    """Return in words what she was put into, and by which failsafe if by one."""
+    status, stop = turn.autopilot, turn.state.stop
+    mode = status.mode.name if status is not None and status.mode is not None else "unknown"
+    what = f"mode {mode}" if status is None or status.is_armed else f"mode {mode}, disarmed"
+    return what if stop is None or stop.cause == PERSON else f"{what} by the {stop.cause} failsafe"

@@ -56,6 +56,7 @@ class Route:
     vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
     cost_s: float | None = None
     why: str = ""
+    bound_for: str = ""                # the errand that its end serves; empty: the goals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,6 +112,32 @@ class Retry:
 
 
 PATIENT = Retry()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """She was being sailed and no longer is: since when, what she was put into, and by what (``causes``).
+
+    ``before_s`` is when she was last seen being sailed: the change of mode is between the two.
+    """
+
+    t_s: float
+    before_s: float
+    mode: Mode | None
+    is_armed: bool
+    cause: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signs:
+    """What tells a failsafe from a person: when each cause last showed, and when the sticks or the switch moved."""
+
+    seen_s: tuple[tuple[str, float], ...] = ()
+    standing: tuple[str, ...] = ()        # signs that are up now
+    rc_us: tuple[int, ...] = ()           # of the channels that a person moves, as they last rested
+    rc_moved_s: float = float("-inf")
+    helm: tuple[Mode | None, bool] | None = None   # mode and arming as last heard, and when
+    helm_s: float = float("-inf")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,9 +203,18 @@ class SkipperState:
     boot_s: float | None = None
     doubt: Fix | None = None            # the sum of the position's jumps, and the last one's time
     back_s: float = float("-inf")      # when it was back where it was reckoned: this step's jump is none
-    failsafe_s: float = float("-inf")  # when the autopilot last said that it has lost its position
+    signs: Signs = Signs()
+    stop: Stop | None = None           # she is not being sailed though she was
+    answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
+    sent_home: bool = False            # ... which put her into RTL
     after_operator: bool = False       # AUTO has come back: plan from where the boat is now
     after_restart: bool = False
+    under_way_s: float = 0.0           # how long the voyage has been under way ...
+    last_step_s: float = float("-inf")  # ... counted from step to step
+    home_reached: bool = False         # the way home that follows the last goal is sailed
+    over: str = ""                     # why the voyage is over: what is left is to watch her loiter; empty: it is not
+    arrived: bool = False              # ... with all goals reached, and home where the mission ends there
+    rest_en_m: PointEn | None = None   # where she loiters since
     replace_foreign: bool = False      # permission was given to overwrite what is on board
     repair: bool = False               # the mission on board is a mixture of ours
     rebooted: bool = False             # in this very step
@@ -207,13 +243,14 @@ class Persisted:
     route: Route | None
     pending: Route | None
     own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
+    under_way_s: float = 0.0           # how long the voyage has been under way, in whole minutes
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""
         return {
             "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
             "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
-            "own_mode": None if self.own_mode is None else self.own_mode.name,
+            "own_mode": None if self.own_mode is None else self.own_mode.name, "under_way_s": self.under_way_s,
         }
 
     @classmethod
@@ -226,6 +263,7 @@ class Persisted:
                 voyage=str(data["voyage"]), gate=int(data["gate"]), sailing=bool(data["sailing"]),
                 route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
                 own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
+                under_way_s=float(data.get("under_way_s", 0.0)),
             )
         except (KeyError, TypeError, IndexError, AttributeError) as error:
             raise ValueError(f"the saved state is damaged: {error!r}") from error
@@ -247,7 +285,7 @@ def _route_to_dict(route: Route | None) -> dict[str, Any] | None:
         "points": [list(p) for p in route.points_en_m],
         "from": [list(p) for p in route.leg_from_en_m],
         "gates": list(route.gate_of),
-        **{name: getattr(route, name) for name in (*_FIGURES, *_VESSEL_FIGURES)},
+        **{name: getattr(route, name) for name in (*_FIGURES, *_VESSEL_FIGURES)}, "bound_for": route.bound_for,
     }
 
 
@@ -266,4 +304,5 @@ def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
         raise ValueError("the saved state is damaged: its lists differ in length")
     return Route(items=items, points_en_m=points, leg_from_en_m=starts, gate_of=gates,
                  **{name: data[name] for name in _FIGURES},
-                 vessel_risk=float(data.get("vessel_risk", 0.0)), vessels_part=float(data.get("vessels_part", 0.0)))
+                 vessel_risk=float(data.get("vessel_risk", 0.0)), vessels_part=float(data.get("vessels_part", 0.0)),
+                 bound_for=str(data.get("bound_for", "")))

@@ -1,7 +1,7 @@
 """Failsafes: the links to the shore, the battery, a knock-down, the position, and what a breached fence does.
 
-The order of things follows ArduRover's ``failsafe_trigger``: the radio is looked at in every loop, the ground station ten
-times a second, both act through one place, and whoever looks next acts for the other, under its own name.
+The order of things follows ArduRover's ``failsafe_trigger``: the radio is looked at in every loop, the ground
+station ten times a second, both act through one place, and whoever looks next acts for the other, under its own name.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ from companion.skipper.snapshot import (
     WindView,
 )
 from companion.skipper.state import Persisted, SkipperState
-from companion.skipper.voyage import Goal, Voyage
+from companion.skipper.voyage import Goal, Refuge, Voyage
 
 FRAME = LocalFrame(GeoPoint(lat_deg=51.1, lon_deg=-1.3))
 HORIZONS = (0.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
@@ -59,7 +59,8 @@ def area(*polygons, limits=None) -> LocalArea:
 def voyage(*goals: Goal, obstacles=(), limits=None, laps=1, home=(0.0, 0.0), refuges=()) -> Voyage:
     boat = Boat(polar=ardurover_sitl(), turn_rate_radps=0.8)
     return Voyage(name="test", frame=FRAME, goals=goals or (Goal(en_m=(0.0, 300.0)),), laps=laps,
-                  area=area(*obstacles, limits=limits), boat=boat, home_en_m=home, refuges=refuges)
+                  area=area(*obstacles, limits=limits), boat=boat, home_en_m=home,
+                  refuges=tuple(Refuge(name=f"{n + 1}", en_m=p) for n, p in enumerate(refuges)))
 
 
 def forecast(t_s: float, twd_rad: float, tws_mps: float = 5.0, sigma_rad: float = 0.05) -> WindForecast:
