@@ -185,7 +185,8 @@ async def run_embedded(
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
-        status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission), **ends_of(mission),
+        status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
+        **ends_of(mission),
     )
     write_atomically(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict

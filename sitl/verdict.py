@@ -211,7 +211,8 @@ def judge(
         check("contacts", bool(truth.t_s) and contacts <= expect.contacts, contacts if truth.t_s else None,
               f"at most {expect.contacts}")
     if expect.within_m is not None:
-        check(f"distance to the {expect.ends_at}, m", end_distance <= expect.within_m, end_distance, f"at most {expect.within_m}")
+        check(f"distance to the {expect.ends_at}, m", end_distance <= expect.within_m, end_distance,
+              f"at most {expect.within_m}")
     if expect.refuge_within_m is not None:
         nearest = min((float(np.min(np.hypot(*(positions - p).T))) for p in refuges_en_m), default=math.inf)
         check("nearest to a refuge, m", nearest <= expect.refuge_within_m, nearest, f"at most {expect.refuge_within_m}")

@@ -37,7 +37,7 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
     if pending is None or pending.request_id != outcome.request_id:
         return
     turn.update(pending_plan=None)
-    if turn.state.phase in {Phase.OPERATOR, Phase.DONE} or turn.is_taken:
+    if turn.state.phase is Phase.OPERATOR or turn.is_taken:
         return   # the operator may have taken the boat in this very step
     if turn.state.sailing and not turn.state.checked_mission:
         return
@@ -258,7 +258,7 @@ def _tail_only(turn: Turn) -> bool:
 def hold(turn: Turn, why: str) -> None:
     """Loiter in the roomiest place near the boat, by a mission that ends there at once."""
     boat, wind, state = turn.boat_en, turn.wind_mean, turn.state
-    turn.phase(Phase.HOLDING if state.sailing else Phase.WAITING, why)
+    turn.phase(Phase.HOLDING if state.sailing else Phase.WAITING, f"waiting for a plan: {why}")
     if boat is None or not state.sailing or state.route is None or state.index >= len(state.route.items) - 1:
         return   # not under way, or already in the safe end of the mission
     place, room = loiter_place(turn.voyage, turn.config, boat, wind[0] if wind else 0.0)

@@ -119,7 +119,7 @@ def take_over(turn: Turn) -> bool:
     turn.update(
         own_mode=stop.mode, operator_since_s=None, after_operator=True, plan_retry=PATIENT, answering=cause.name,
         sent_home=stop.mode in HOMEWARD)
-    turn.phase(Phase.HOLDING, waits_for(turn) or "stopped: planning from where she is")
+    turn.phase(Phase.HOLDING, waits_for(turn) or "stopped: waiting for a plan from where she is")
     turn.say(Severity.WARNING, f"{cause.name} failsafe",
              f"put into {stop.mode.name} by the autopilot's {cause.name} failsafe: {cause.answer.value}", every_s=0.0)
     return True

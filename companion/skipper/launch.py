@@ -93,7 +93,8 @@ def launch(turn: Turn) -> None:
         return
     turn.update(sailing=False)
     if stale:
-        wait_s = max(state.plan_retry.not_before_s, state.upload_retry.not_before_s) - turn.t_s
+        earliest_s = state.last_plan_s + turn.config.no_go_replan_interval_s
+        wait_s = max(state.plan_retry.not_before_s, state.upload_retry.not_before_s, earliest_s) - turn.t_s
         if wait_s > 0.0:
             why = f"the next try in {wait_s:.0f} s to plan anew"
         elif request(turn, ReplanReason.START, text=f"{stale}, before setting sail"):
@@ -141,7 +142,7 @@ def _look_at_home(turn: Turn) -> None:
 
 
 def _stale(turn: Turn) -> str:
-    """Return why the plan no longer fits, in words; empty: it does, or is too young to be asked for again."""
+    """Return why the plan no longer fits, in words; empty: it does, or what has changed may wait."""
     boat, leg, wind, route = turn.boat_en, turn.leg(), turn.wind_mean, turn.state.route
     if boat is None or leg is None or wind is None or route is None or turn.snapshot.wind.forecast is None:
         return ""
@@ -149,7 +150,7 @@ def _stale(turn: Turn) -> str:
     clear_m = turn.voyage.area.path_clearance_m([boat, leg[1]])
     if clear_m < min(config.margin_floor_m, config.margin_m):
         where = f"{max(0.0, clear_m):.0f} m from {turn.voyage.area.nearest_name(boat)} on the way to the first waypoint"
-        return f"she lies or has drifted {where}" if age_s > config.no_go_replan_interval_s else ""
+        return f"she lies or has drifted {where}"
     if age_s < STALE_S:
         return ""
     off_m = min(leg_distance_m(boat, *leg), distance_m(boat, leg[0]))

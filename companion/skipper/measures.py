@@ -72,6 +72,8 @@ def _progress(turn: Turn) -> float | None:
     """Way made good in the window; None before the window is full or while there is a reason to stand still."""
     if turn.is_raised("becalmed") or not turn.ahead() or not turn.state.history:
         return None
+    if turn.state.route is None or turn.state.history_plan != turn.state.route.plan_id:
+        return None   # the history is of the plan before
     old = turn.state.history[0]
     if turn.t_s - old[0] < PROGRESS_WINDOW_S:
         return None

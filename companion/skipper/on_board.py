@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from companion.messages import MissionItem, Mode
 from companion.skipper.actions import ReadMission, Severity
+from companion.skipper.causes import STOPPING
 from companion.skipper.route import held_back, is_mixture, is_same_mission
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Persisted, Phase
@@ -21,7 +22,7 @@ def mission_is_known(turn: Turn) -> bool:
             turn.update(foreign="", route=None, replace_foreign=True)
             return True
         phase = Phase.OPERATOR if state.sailing else Phase.WAITING
-        turn.phase(phase, f"{state.foreign}; it is not resumed and not replaced without permission")
+        turn.phase(phase, f"{state.foreign}; it is not resumed, and waiting for permission to replace it")
         return False
     if state.pending_upload is not None:
         return True
@@ -45,10 +46,10 @@ def mission_is_known(turn: Turn) -> bool:
         if state.pending_read is None and turn.t_s >= state.read_retry.not_before_s:
             _read(turn, "whose mission is on board?")
         if not state.sailing:
-            turn.phase(Phase.WAITING, "reading the mission on the autopilot")
+            turn.phase(Phase.WAITING, "waiting for the mission on the autopilot to be read")
         else:
             # Under way nothing is changed on a mission that may not be ours; what is there sails on.
-            turn.phase(state.phase, "reading the mission on board before anything is changed on it")
+            turn.phase(state.phase, "waiting for the mission on board to be read: nothing is changed on it before")
         return False
     return _compare(turn, items)
 
@@ -98,7 +99,8 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
     text = f"the mission on the autopilot ({len(items)} items) is not ours"
     turn.update(foreign=text, route=None, unsure_route=None)
     turn.say(Severity.ERROR, "foreign mission", turn.state.foreign, every_s=0.0)
-    turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{turn.state.foreign}; it is not resumed")
+    turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING,
+               f"{turn.state.foreign}; it is not resumed, and waiting for permission to replace it")
     return False
 
 
@@ -112,7 +114,8 @@ def _adopt(turn: Turn, saved: Persisted) -> None:
     status = turn.autopilot
     index = (status.mission_seq or 1) - 1 if status is not None else 0
     turn.update(
-        gate=saved.gate, index=index, own_index=index, after_restart=True, own_mode=saved.own_mode,
+        gate=saved.gate, index=index, own_index=index, own_mode=saved.own_mode,
+        after_operator=saved.own_mode in STOPPING,   # she has drifted since
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         sailing=_under_way(turn) or (saved.sailing and status is not None and status.is_armed),
     )

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
-from companion.skipper.adrift import warn_adrift
 from companion.skipper.causes import PERSON
 from companion.skipper.config import SkipperConfig
 from companion.skipper.doubt import follow
@@ -32,6 +31,7 @@ from companion.skipper.on_board import mission_is_known
 from companion.skipper.sailing import sail
 from companion.skipper.snapshot import OperatorWish, Snapshot
 from companion.skipper.state import PATIENT, ByField, Persisted, Phase, Signs, SkipperState
+from companion.skipper.stopped import speak_of_stop
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import Voyage
 from companion.skipper.watch import watch
@@ -69,7 +69,7 @@ class Skipper:
         count_time(turn)
         fresh = watch(turn)
         _decide(turn, fresh)
-        warn_adrift(turn)
+        speak_of_stop(turn)
         remember_fix(turn)
         return turn.state, tuple(turn.actions)
 
@@ -101,7 +101,7 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         age = turn.snapshot.heartbeat_age_s
         heard = "never heard" if age is None else f"silent for {age:.0f} s"
         phase = Phase.WAITING if not state.sailing else turn.state.phase
-        turn.phase(phase, f"the autopilot is {heard}; what it has sails on")
+        turn.phase(phase, f"waiting to hear the autopilot: {heard}; what it has sails on")
         return
     if _operator_has_it(turn):
         return
@@ -130,7 +130,7 @@ def _rebooted(turn: Turn) -> None:
     )
     if not keeps:
         turn.update(sailing=False, operator_since_s=None)
-        turn.phase(Phase.WAITING, "the autopilot rebooted")
+        turn.phase(Phase.WAITING, "the autopilot rebooted: waiting for its mission to be read")
 
 
 def _operator_has_it(turn: Turn) -> bool:
@@ -165,9 +165,9 @@ def _operator_has_it(turn: Turn) -> bool:
     since = state.operator_since_s if state.operator_since_s is not None else turn.t_s
     turn.update(
         operator_since_s=None, checked_mission=False, read_since_s=turn.t_s, after_operator=True, plan_retry=PATIENT,
-        answering="",
+        answering="", history=(),
     )
-    turn.phase(Phase.WAITING, "AUTO is back: comparing the mission on board")
+    turn.phase(Phase.WAITING, "AUTO is back: waiting for the mission on board to be compared")
     turn.say(Severity.NOTICE, "operator back", f"AUTO is back after {turn.t_s - since:.0f} s", every_s=0.0)
     return False
 

@@ -78,7 +78,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     if turn.state.wish is OperatorWish.HOLD:
         if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
             hold(turn, "the operator asked to hold")
-        turn.phase(Phase.HOLDING, "holding: the operator asked for it")
+        turn.phase(Phase.HOLDING, "the operator asked to hold: waiting until he lets her go on")
         return
     if turn.state.pending_upload is None:
         _consider(turn, fresh)
@@ -89,7 +89,7 @@ def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
     """Out of a stop that nobody asked for, or a LOITER of ours: plan from where the boat is now, then AUTO."""
     why = waits_for(turn)
     if why or repair(turn):
-        turn.phase(Phase.HOLDING, why or "the mission is put right before sailing on")
+        turn.phase(Phase.HOLDING, why or "waiting for the mission to be put right before sailing on")
         return
     bound = errand(turn)
     if bound is not None and not bound.has_place and not is_at_rest(turn):
@@ -104,7 +104,7 @@ def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
         turn.phase(Phase.HOLDING, f"no plan yet from where the boat has drifted to: waiting for one{again}")
     else:
         hand_back(turn)
-        turn.phase(Phase.HOLDING, "asking for AUTO: sailing on")
+        turn.phase(Phase.HOLDING, "waiting for the autopilot to take AUTO: sailing on")
 
 
 def _is_outside(turn: Turn) -> bool:
@@ -117,7 +117,7 @@ def _stay(turn: Turn, bound: Errand) -> None:
     """Loiter where there is room near by."""
     if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
         hold(turn, bound.sentence)
-    turn.phase(Phase.HOLDING, bound.sentence)
+    turn.phase(Phase.HOLDING, f"{bound.sentence}; waiting for the loiter's upload")
 
 
 def _send_heading(turn: Turn) -> None:
@@ -191,14 +191,14 @@ def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
             own_mode=None if refused else Mode.GUIDED)
         return False
     turn.act(SteerHeading(heading_rad=heading_rad, text="out of irons"))
-    turn.phase(turn.state.phase, f"in irons: bearing away to {math.degrees(heading_rad) % 360.0:.0f}°")
+    turn.phase(turn.state.phase, f"in irons: waiting for her to bear away to {math.degrees(heading_rad) % 360.0:.0f}°")
     return True
 
 
 def _name(turn: Turn) -> None:
     """Name what the boat is doing, with the sentence why."""
     state, route = turn.state, turn.state.route
-    if route is None or state.phase is Phase.DONE:
+    if route is None:
         return
     step = f" ({route.rung})" if route.rung else ""
     if state.pending_plan is not None:

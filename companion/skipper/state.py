@@ -208,7 +208,6 @@ class SkipperState:
     answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
     sent_home: bool = False            # ... which put her into RTL
     after_operator: bool = False       # AUTO has come back: plan from where the boat is now
-    after_restart: bool = False
     under_way_s: float = 0.0           # how long the voyage has been under way ...
     last_step_s: float = float("-inf")  # ... counted from step to step
     home_reached: bool = False         # the way home that follows the last goal is sailed

@@ -103,6 +103,7 @@ class World:
     position_offset: tuple[float, float] = (0.0, 0.0)
     system_status: int = 4
     ekf_ok: bool = True
+    shown: dict = field(default_factory=dict)   # what else the status shows
     drift_mps: float = 0.0      # along the heading, while nobody sails
     uploads_fail: Callable[[int], UploadResult] = lambda n: UploadResult.OK
     planner: Callable | None = None
@@ -270,7 +271,7 @@ class World:
         status = AutopilotStatus(
             t_s=self.t, boot_s=self.boot_s + self.t, mode=self.mode, is_armed=self.armed, ekf_ok=self.ekf_ok,
             system_status=self.system_status,
-            mission_seq=self.seq, mission_total=len(self.mission), mission_state=self.mission_state)
+            mission_seq=self.seq, mission_total=len(self.mission), mission_state=self.mission_state, **self.shown)
         out = Snapshot(
             t_s=self.t, vehicle=vehicle, vehicle_age_s=0.1, position_en_m=here, autopilot=status, autopilot_age_s=0.2,
             heartbeat_age_s=self.heartbeat_age, permissions=self.permissions,
@@ -329,6 +330,8 @@ def check_invariants(before, after, snapshot, actions) -> None:
         if after.phase is Phase.OPERATOR:
             assert isinstance(action, (act.Announce, act.CancelPlan, act.ReadMission)), action
     assert after.why
+    if after.phase in {Phase.WAITING, Phase.HOLDING}:
+        assert "wait" in after.why, f"{after.phase.value}, and not said for what: {after.why}"
     ids = [getattr(a, n) for a in actions for n in ("request_id", "upload_id", "read_id", "command_id")
            if hasattr(a, n) and not isinstance(a, act.CancelPlan)]
     assert len(ids) == len(set(ids))

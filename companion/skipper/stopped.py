@@ -1,4 +1,4 @@
-"""A boat that is not being sailed, in words: why, where she drifts, what she meets and when, and what to press.
+"""A boat that somebody or something has stopped, in words: where she drifts, what she meets and when, what to press.
 
 A failsafe's stop is told every minute for as long as it lasts, whoever may end it. A person who has stopped her knows
 that; he is told only when she drifts onto something.
@@ -21,7 +21,7 @@ MOVES_MPS = 0.15      # slower than this the fixes' noise tells no drift
 PATIENCE_S = 30.0     # an answer that is on its way is given this long before it is spoken of
 
 
-def warn_adrift(turn: Turn) -> None:
+def speak_of_stop(turn: Turn) -> None:
     """Say how she drifts while a stop lasts."""
     stop = turn.state.stop
     if stop is None or turn.autopilot is None or turn.t_s - stop.t_s <= (
