@@ -104,7 +104,7 @@ def needs_of(mission: Mission | None) -> Needs:
         goal_radius_m=min(goal.radius_m for goal in mission.goals), loiter_radius_m=config.loiter_radius_m,
         speed_mps=boat.polar.max_speed_mps(mission.wind.preview_speed_mps or 5.0), hull=boat.hull,
         reach_m=max(math.hypot(*place) for place in places), has_fence=mission.operator.upload_fence,
-        can_tack=boat.can_tack,
+        can_tack=boat.can_tack, has_refuge=bool(mission.refuges),
     )
 
 
