@@ -14,7 +14,7 @@ from sitl.autopilot.memory import MemoryEnd
 from sitl.scenario import EventSpec
 
 BEAT_S = 1.0
-PERSONS = frozenset({"mode", "arm", "disarm"})
+PERSONS = frozenset({"mode", "arm", "disarm", "set_current"})
 FAILURES = frozenset({"radio_lost", "station", "knockdown", "battery"})
 
 
@@ -30,6 +30,8 @@ async def play(event: EventSpec, autopilot: Autopilot, station: MemoryEnd) -> No
         autopilot.arm(force=False)
     elif event.kind == "disarm":
         autopilot.disarm()
+    elif event.kind == "set_current":
+        autopilot.helm.set_current(event.seq, resets=False)
     elif event.kind == "battery":
         autopilot.set_battery(event.volts or 0.0)
     elif event.kind == "radio_lost":

@@ -19,6 +19,7 @@ EventKind = Literal[
     "wind_speed",        # tws_mps, over_s
     "mode",              # mode: a person's choice, by name; by: radio (the mode switch), else the ground station
     "arm", "disarm",     # by the ground station
+    "set_current",       # seq: the ground station makes an item of the mission current
     "reboot",            # the autopilot restarts
     "link_cut",          # for_s (none: for good)
     "link_quality",      # loss, duplicate, reorder, delay_s, corrupt
@@ -76,6 +77,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     restart_after_s: float | None = None
     volts: float | None = None
     roll_deg: float = 0.0
+    seq: int = 1
     set_deg: float = 0.0
     drift_mps: float = 0.0
     course_deg: float = 0.0
