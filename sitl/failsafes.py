@@ -31,7 +31,11 @@ async def play(event: EventSpec, autopilot: Autopilot, station: MemoryEnd) -> No
     elif event.kind == "disarm":
         autopilot.disarm()
     elif event.kind == "set_current":
+        until_s = now_s() + (event.for_s or 0.0)
         autopilot.helm.set_current(event.seq, resets=False)
+        while now_s() < until_s:
+            await asyncio.sleep(BEAT_S)
+            autopilot.helm.set_current(event.seq, resets=False)
     elif event.kind == "battery":
         autopilot.set_battery(event.volts or 0.0)
     elif event.kind == "radio_lost":

@@ -19,7 +19,7 @@ EventKind = Literal[
     "wind_speed",        # tws_mps, over_s
     "mode",              # mode: a person's choice, by name; by: radio (the mode switch), else the ground station
     "arm", "disarm",     # by the ground station
-    "set_current",       # seq: the ground station makes an item of the mission current
+    "set_current",       # seq, for_s: the ground station makes an item of the mission current, and insists
     "reboot",            # the autopilot restarts
     "link_cut",          # for_s (none: for good)
     "link_quality",      # loss, duplicate, reorder, delay_s, corrupt
