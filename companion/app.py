@@ -261,7 +261,7 @@ class _Shell:
     async def _upload_fence(self, autopilot: Autopilot) -> None:
         """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
         mission = self.mission
-        places = [p.point for p in (*mission.goals, *mission.refuges)] + ([mission.start] if mission.start else [])
+        places = [*mission.places, *([mission.start] if mission.start else [])]
         fence = fence_for_autopilot(mission.area, mission.margin_m, inside=places)
         record: dict[str, Any] = {"kind": "fence", "status": fence.status.name, "text": fence.reason}
         trouble = "" if fence.items or fence.status is FenceStatus.EMPTY else fence.reason

@@ -98,7 +98,7 @@ def needs_of(mission: Mission | None) -> Needs:
     from companion.compose import boat_of, config_of
 
     boat, config, frame = boat_of(mission), config_of(mission), mission.frame()
-    places = [frame.en_from_geo(place.point) for place in (*mission.goals, *mission.refuges)]
+    places = [frame.en_from_geo(place) for place in mission.places]
     return Needs(
         no_go_half_rad=boat.no_go_half_rad, margin_m=config.margin_m, margin_floor_m=config.margin_floor_m,
         goal_radius_m=min(goal.radius_m for goal in mission.goals), loiter_radius_m=config.loiter_radius_m,

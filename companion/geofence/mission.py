@@ -87,6 +87,11 @@ class Mission:
         """The origin of the mission's local frame: the start, or the first goal."""
         return self.start or self.goals[0].point
 
+    @property
+    def places(self) -> tuple[GeoPoint, ...]:
+        """Where she may be bound for: the goals and the refuges."""
+        return (*(g.point for g in self.goals), *(r.point for r in self.refuges))
+
     def frame(self) -> LocalFrame:
         """Return the mission's local frame."""
         return LocalFrame(self.origin)

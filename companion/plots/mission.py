@@ -149,7 +149,7 @@ def draw_area(axes: Axes, local: LocalArea, margin_m: float) -> list[Handle]:
 
 def _draw_autopilot(axes: Axes, mission: Mission, frame: LocalFrame) -> list[Handle]:
     """Draw the autopilot's own fence where there is one."""
-    inside = [*([mission.start] if mission.start else []), *(p.point for p in (*mission.goals, *mission.refuges))]
+    inside = [*([mission.start] if mission.start else []), *mission.places]
     result = fence_for_autopilot(mission.area, mission.margin_m, inside=inside)
     if result.status is not FenceStatus.OK:
         return []
@@ -252,14 +252,15 @@ def _extent(
 def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
     """Return what came of the plans, one line each."""
     out = []
-    for goal, answer in zip(mission.goals, plans, strict=False):
-        name = goal.name or "goal"
+    names = [*(goal.name or "goal" for goal in mission.goals), "home"]
+    for name, answer in zip(names, plans, strict=False):
         if answer.has_path:
             out.append(f"{name}: {answer.cost_s:.0f} s in {len(answer.legs)} legs")
         else:
             out.append(f"{name}: no path ({answer.status.value}): {answer.reason}")
     if len(out) > 1 and all(p.has_path for p in plans):
-        out.insert(0, f"{sum(p.cost_s for p in plans):.0f} s to all {len(plans)} goals")
+        out.insert(0, f"{sum(p.cost_s for p in plans):.0f} s to all {min(len(plans), len(mission.goals))} goals"
+                   + (" and home" if len(plans) > len(mission.goals) else ""))
     if plans and any(g.rounding for g in mission.goals):
         out.append("the preview sails to the marks; on which side they are left is the skipper's part")
     return out
