@@ -18,7 +18,7 @@ def mission_is_known(turn: Turn) -> bool:
         turn.update(wish=None, foreign="", replace_foreign=True)
         state = turn.state
     if state.foreign:
-        if turn.snapshot.permissions.may_replace_foreign:
+        if _may_replace(turn):
             turn.update(foreign="", route=None, replace_foreign=True)
             return True
         phase = Phase.OPERATOR if state.sailing else Phase.WAITING
@@ -93,7 +93,7 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
             turn.update(gate=saved.gate, sailing=state.sailing or _under_way(turn))
         turn.update(route=state.route or newest, unsure_route=newest, repair=True)
         return True
-    if state.replace_foreign or turn.snapshot.permissions.may_replace_foreign:
+    if state.replace_foreign or _may_replace(turn):
         turn.update(route=None, unsure_route=None, replace_foreign=True)
         return True
     text = f"the mission on the autopilot ({len(items)} items) is not ours"
@@ -102,6 +102,11 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
     turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING,
                f"{turn.state.foreign}; it is not resumed, and waiting for permission to replace it")
     return False
+
+
+def _may_replace(turn: Turn) -> bool:
+    """Return whether a stranger's mission may be overwritten: not one that somebody brings while we sail."""
+    return turn.snapshot.permissions.may_replace_foreign and not turn.state.sailing
 
 
 def _under_way(turn: Turn) -> bool:
