@@ -18,6 +18,7 @@ AUTOPILOT = 1         # the component whose texts are signs
 # What a failsafe puts a boat into; RTL and LOITER sail, but not where the voyage wants her.
 HOMEWARD = frozenset({Mode.RTL, Mode.SMART_RTL})
 STOPPING = frozenset({Mode.HOLD, Mode.LOITER, *HOMEWARD})
+EMPTY = " is critical "   # in the battery's words, when the second of its limits is passed
 OVER = "cleared"      # ends a text that says that something is over
 
 

@@ -16,6 +16,7 @@ from companion.skipper.actions import Severity
 from companion.skipper.causes import (
     BY_NAME,
     CRITICAL,
+    EMPTY,
     HOMEWARD,
     PERSON,
     RECEIVER,
@@ -41,6 +42,8 @@ def note(turn: Turn, text: StatusText) -> None:
     cause = told_by(text)
     if cause:
         turn.update(signs=_seen(turn.state.signs, cause, turn.t_s))
+    if cause == "battery" and EMPTY in text.text:
+        turn.update(battery_critical=True)
 
 
 def _seen(signs: Signs, cause: str, t_s: float) -> Signs:
@@ -60,6 +63,8 @@ def follow_stops(turn: Turn) -> None:
         if cause not in before.standing and not of_filter:
             signs = _seen(signs, cause, turn.t_s)
     helm = (status.mode, status.is_armed)
+    if status.battery_failed is False and "battery" in before.standing:
+        turn.update(battery_critical=False)
     turn.update(signs=replace(signs, standing=up, helm=helm, helm_s=turn.t_s))
     stop = turn.state.stop
     if status.is_armed and status.mode not in STOPPING:

@@ -139,11 +139,22 @@ def _reboot(turn: Turn) -> float | None:
     return float(turn.state.rebooted)
 
 
-def _battery(turn: Turn) -> float | None:
+def _battery(turn: Turn, name: str, *, is_below: bool) -> float | None:
+    """Return the charge, no more than the row's entry where the autopilot's own limit is passed."""
     status = turn.autopilot
-    if status is None or status.battery_remaining is None:
+    if status is None:
         return None
-    return 100.0 * status.battery_remaining
+    charge = None if status.battery_remaining is None else 100.0 * status.battery_remaining
+    return min(charge if charge is not None else 100.0, BY_NAME[name].enter) if is_below else charge
+
+
+def _battery_low(turn: Turn) -> float | None:
+    is_below = turn.autopilot is not None and bool(turn.autopilot.battery_failed)
+    return _battery(turn, "battery low", is_below=is_below)
+
+
+def _battery_critical(turn: Turn) -> float | None:
+    return _battery(turn, "battery critical", is_below=turn.state.battery_critical)
 
 
 def _time(turn: Turn) -> float | None:
@@ -168,6 +179,6 @@ _MEASURES: dict[str, Callable[[Turn], float | None]] = {
     "becalmed": _becalmed, "in irons": _irons, "vessel too near": _too_near, "no progress": _progress,
     "heading against course": _heading, "off the corridor": _corridor, "stuck waypoint": _stuck,
     "mission ended": _ended, "fence breach": _breach, "foreign mission": _foreign, "reboot": _reboot,
-    "battery low": _battery, "battery critical": _battery, "out of time": _time, "dragged off": _dragged,
+    "battery low": _battery_low, "battery critical": _battery_critical, "out of time": _time, "dragged off": _dragged,
     "planner dead": _planner,
 }

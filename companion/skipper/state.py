@@ -204,6 +204,7 @@ class SkipperState:
     doubt: Fix | None = None            # the sum of the position's jumps, and the last one's time
     back_s: float = float("-inf")      # when it was back where it was reckoned: this step's jump is none
     signs: Signs = Signs()
+    battery_critical: bool = False     # by the autopilot's own limit (BATT_CRT_VOLT, BATT_CRT_MAH)
     stop: Stop | None = None           # she is not being sailed though she was
     answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
     sent_home: bool = False            # ... which put her into RTL

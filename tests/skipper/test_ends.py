@@ -11,6 +11,7 @@ from companion.skipper.config import SafeEnd
 from companion.skipper.geometry import distance_m
 from companion.skipper.state import Persisted, Phase
 from companion.skipper.voyage import Goal
+from tests.skipper.test_failsafe import text
 from tests.skipper.test_voyage import is_done, make, said
 from tests.skipper.world import FRAME, restarted
 
@@ -245,3 +246,17 @@ def test_a_wind_that_turned_before_sailing_is_named():
     assert world.run(120, lambda w: "waiting for the operator" in w.state.why)
     turned[0] = math.radians(60.0)
     assert world.run(200, lambda w: "the wind has turned" in w.state.why)
+
+
+def test_a_monitor_that_knows_no_charge_tells_by_the_autopilots_limits():
+    world = make(Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(), voyage={"refuges": ((60.0, 90.0),)})
+    assert world.run(60, lambda w: w.state.sailing)
+    world.shown["battery_failed"] = True
+    text(world, "Battery 1 is low 10.40V used 0 mAh")
+    world.run(15)
+    assert said(world, "battery low")
+    assert not said(world, "battery critical")
+    text(world, "Battery 1 is critical 9.70V used 0 mAh")
+    assert world.run(300, lambda w: "at the refuge 1" in w.state.why)
+    world.shown["battery_failed"] = False      # changed, and the autopilot restarted
+    assert world.run(600, is_done)
