@@ -117,6 +117,7 @@ class AutopilotStatus:
     battery_failed: bool | None = None   # its battery failsafe has spoken, or the monitor is ill
     receiver_lost: bool | None = None    # it hears no transmitter
     fence_breached: bool | None = None
+    fence_breaches: int | None = None    # since the boot; outside the home circle one more every 20 m
     last_reached_seq: int | None = None
     rc_us: tuple[int, ...] = ()          # what the receiver hears, by channel from 1 [us]
     home: GeoPoint | None = None

@@ -184,7 +184,8 @@ class VehicleAssembler:
         elif kind == "HOME_POSITION":
             self._status = replace(self._status, home=codec.geo_point(message.latitude, message.longitude))
         elif kind == "FENCE_STATUS":
-            self._status = replace(self._status, fence_breached=bool(message.breach_status))
+            self._status = replace(
+                self._status, fence_breached=bool(message.breach_status), fence_breaches=int(message.breach_count))
             self._fence_s = t_s
         else:
             return []
@@ -201,7 +202,7 @@ class VehicleAssembler:
             )
         if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
             self._fence_s = None
-            self._status = replace(self._status, fence_breached=None)
+            self._status = replace(self._status, fence_breached=None, fence_breaches=None)
 
 
 class _Stale(Exception):  # noqa: N818 - a signal inside this module

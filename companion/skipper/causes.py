@@ -57,7 +57,7 @@ TABLE: tuple[Cause, ...] = (
     Cause(name="battery", texts=("Battery ",), shown="SYS_STATUS: battery not healthy", answer=Answer.SHELTER,
           press="AUTO to sail on, MANUAL to take her",
           why="what is left takes her to a place that was chosen for it"),
-    Cause(name="fence", texts=(), shown="FENCE_STATUS: breached", answer=Answer.SAIL_ON,
+    Cause(name="fence", texts=(), shown="FENCE_STATUS: breached, or one breach more", answer=Answer.SAIL_ON,
           press="AUTO to let the mission sail her back, MANUAL to take her",
           why="a sailboat in HOLD drifts on outside, RTL sails straight; no new action follows while a breach lasts"),
     Cause(name="shore link", texts=("Radio Failsafe", "GCS Failsafe"), shown="HEARTBEAT critical with the filter well",

@@ -62,10 +62,12 @@ def follow_stops(turn: Turn) -> None:
         of_filter = cause == SHORE and turn.t_s - dict(signs.seen_s).get("position", -math.inf) <= FILTER_S
         if cause not in before.standing and not of_filter:
             signs = _seen(signs, cause, turn.t_s)
+    if None not in {before.breaches, status.fence_breaches} and status.fence_breaches != before.breaches:
+        signs = _seen(signs, "fence", turn.t_s)   # outside already, and the autopilot acts again
     helm = (status.mode, status.is_armed)
     if status.battery_failed is False and "battery" in before.standing:
         turn.update(battery_critical=False)
-    turn.update(signs=replace(signs, standing=up, helm=helm, helm_s=turn.t_s))
+    turn.update(signs=replace(signs, standing=up, breaches=status.fence_breaches, helm=helm, helm_s=turn.t_s))
     stop = turn.state.stop
     if status.is_armed and status.mode not in STOPPING:
         turn.update(stop=None)

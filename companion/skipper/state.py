@@ -134,6 +134,7 @@ class Signs:
 
     seen_s: tuple[tuple[str, float], ...] = ()
     standing: tuple[str, ...] = ()        # signs that are up now
+    breaches: int | None = None           # of the fence, as last counted
     rc_us: tuple[int, ...] = ()           # of the channels that a person moves, as they last rested
     rc_moved_s: float = float("-inf")
     helm: tuple[Mode | None, bool] | None = None   # mode and arming as last heard, and when

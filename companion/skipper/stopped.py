@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from companion.geo.angles import wrap_two_pi
+from companion.messages import Mode
 from companion.skipper.actions import Severity
 from companion.skipper.causes import BY_NAME, HOMEWARD, PERSON
 from companion.skipper.drift import DriftAhead, drift_ahead
@@ -18,6 +19,8 @@ from companion.skipper.voyage import Area, PointEn
 
 EVERY_S = 60.0
 MOVES_MPS = 0.15      # slower than this the fixes' noise tells no drift
+CARRIED_MPS = 3.0     # faster than this a disarmed boat is towed or carried
+LOITER_M = 20.0       # so near to where RTL ends it loiters there
 PATIENCE_S = 30.0     # an answer that is on its way is given this long before it is spoken of
 
 
@@ -31,7 +34,7 @@ def speak_of_stop(turn: Turn) -> None:
     here, vehicle = turn.snapshot.position_en_m, turn.snapshot.vehicle
     ahead = None if here is None or vehicle is None else _ahead(turn, here, vehicle.velocity_en_mps)
     meets = ahead is not None and not ahead.is_clear
-    if stop.cause == PERSON and not (meets and ahead is not None and ahead.speed_mps >= MOVES_MPS):
+    if stop.cause == PERSON and not (meets and ahead is not None and MOVES_MPS <= ahead.speed_mps <= CARRIED_MPS):
         return
     mode = stop.mode.name if stop.mode is not None else "an unknown mode"
     by = "a person" if stop.cause == PERSON else f"the {stop.cause} failsafe"
@@ -42,14 +45,19 @@ def speak_of_stop(turn: Turn) -> None:
 
 
 def _ahead(turn: Turn, here: PointEn, velocity: tuple[float, float]) -> DriftAhead:
-    """Follow the drift; in RTL the straight way to where the autopilot takes her. Outside the fence it is left out."""
+    """Follow the drift; in RTL the straight way to where the autopilot takes her. A loiter goes nowhere.
+
+    Outside the fence the fence is left out.
+    """
     status, area = turn.snapshot.autopilot, _water(turn, here)
     floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
     speed = math.hypot(*velocity)
     homeward = status is not None and status.mode in HOMEWARD
     far_m = status.waypoint_distance_m if status is not None and homeward else None
     course = status.target_bearing_rad if status is not None else None
-    if course is None or far_m is None or far_m < 1.0:
+    if status is not None and (status.mode is Mode.LOITER or (homeward and (far_m is None or far_m < LOITER_M))):
+        return drift_ahead(area, here, (0.0, 0.0), floor_m=floor_m)
+    if course is None or far_m is None:
         return drift_ahead(area, here, velocity, floor_m=floor_m)
     way = (speed * math.sin(course), speed * math.cos(course))
     return drift_ahead(area, here, way, floor_m=floor_m, horizon_s=max(1.0, far_m / max(speed, MOVES_MPS)))
@@ -71,14 +79,14 @@ def _where(turn: Turn, here: PointEn, ahead: DriftAhead) -> str:
     vehicle, outside_m = turn.snapshot.vehicle, _outside_m(turn, here)
     place = "" if vehicle is None else f" at {vehicle.position.lat_deg:.5f}, {vehicle.position.lon_deg:.5f}"
     fence = f", {outside_m:.0f} m outside the fence" if outside_m > 0.0 else ""
-    if turn.autopilot is not None and turn.autopilot.mode in HOMEWARD:
+    if turn.autopilot is not None and turn.autopilot.mode in HOMEWARD and ahead.speed_mps > 0.0:
         course = math.degrees(wrap_two_pi(math.atan2(*ahead.velocity_en_mps)))
         way = f"sailing straight home, {course:03.0f}°"
         if ahead.floor_s is not None:
             meets = f"onto {ahead.name}" if ahead.contact_s is not None else f"past {ahead.name}"
             way += f", {meets} in {ahead.contact_s if ahead.contact_s is not None else ahead.floor_s:.0f} s"
     else:
-        way = ahead.sentence() if ahead.speed_mps >= MOVES_MPS else "lying still"
+        way = ahead.sentence() if ahead.speed_mps >= MOVES_MPS else "staying there"
     return f": {way}{place}{fence}"
 
 

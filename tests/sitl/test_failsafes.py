@@ -181,3 +181,20 @@ def test_a_breach_is_told_at_once() -> None:
         assert c.autopilot.truth.mode is Mode.HOLD
 
     sail(job, is_moored=True, FENCE_TYPE=4.0, FENCE_ACTION=2.0)
+
+
+def test_outside_the_home_circle_there_is_a_new_breach_every_20_m() -> None:
+    """Measured on 4.5.2: FENCE_STATUS stays breached, its count rises, and the action is taken again."""
+    async def job(c: Client) -> None:
+        assert await c.ask(mav.MAV_CMD_DO_FENCE_ENABLE, 1) == 0
+        await c.set_sail([(500.0, 0.0)])
+        await c.wait("FENCE_STATUS", 200.0, lambda m: m.breach_status == 1)
+        assert c.autopilot.truth.mode is Mode.HOLD
+        c.autopilot.set_mode(Mode.AUTO)
+        # the second circle is passed within the ten seconds of recovery, the third is not
+        third = await c.wait("FENCE_STATUS", 60.0, lambda m: m.breach_count == 3)
+        assert third.breach_status == 1
+        assert c.autopilot.truth.mode is Mode.HOLD
+        assert c.autopilot.truth.east_m == pytest.approx(342.0, abs=6.0)
+
+    sail(job, is_moored=True, FENCE_ACTION=2.0)

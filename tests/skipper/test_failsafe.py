@@ -83,6 +83,20 @@ def test_a_sign_long_before_or_after_belongs_to_nothing():
     assert world.state.phase is Phase.OPERATOR
 
 
+def test_another_breach_while_she_is_outside_is_a_sign_too():
+    """The home circle: a new breach every 20 m farther out, FENCE_STATUS breached all the while."""
+    world = under_way()
+    world.shown |= {"fence_breached": True, "fence_breaches": 1}
+    world.run(60)
+    stop(world)
+    world.run(2)
+    assert world.state.phase is Phase.OPERATOR
+    world.shown["fence_breaches"] = 2
+    world.run(2)
+    assert world.state.stop.cause == "fence"
+    assert world.run(20, lambda w: w.mode is Mode.AUTO)
+
+
 def test_a_critical_heartbeat_tells_when_the_text_was_lost():
     world = under_way()
     stop(world)
@@ -282,6 +296,17 @@ def test_a_person_is_told_of_a_drift_only_when_it_leads_onto_something():
     world.heading = 0.0
     world.run(10)
     assert "HOLD by a person" in drifts(world)[0][1]
+
+
+def test_a_loiter_and_the_end_of_rtl_are_no_drift():
+    world = under_way(goals=(Goal(en_m=(0.0, 260.0), radius_m=8.0),), obstacles=(ISLAND,), wind=lambda t: (1.5, 5.0))
+    world.position, world.heading, world.drift_mps = (0.0, 20.0), 0.0, 2.0
+    world.set_mode(Mode.LOITER)
+    world.run(30)
+    world.set_mode(Mode.RTL)
+    world.shown |= {"waypoint_distance_m": 8.0, "target_bearing_rad": 0.0}
+    world.run(30)
+    assert drifts(world) == []
 
 
 def test_a_boat_that_was_never_sailed_is_no_stop():
