@@ -21,8 +21,9 @@ from companion.compose import config_of, estimator_of, feeds_of, permissions_of,
 from companion.executor import Executor, Planner
 from companion.fold import Step, VoyageFold
 from companion.geofence import Mission
-from companion.geofence.autopilot_fence import fence_for_autopilot
+from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.commands import CommandAnswer
 from companion.mavlink.link import Link
 from companion.mavlink.transport import Transport
 from companion.messages import CompanionStatus
@@ -44,14 +45,15 @@ from companion.wind import WindRoom
 STEP_S = 1.0
 TEND_EVERY_S = 5.0        # records are synced, and taken up again after trouble
 LOOP_WATCH_S = 0.1
-# After arrival the boat loiters; the companion watches it for a moment before it ends [s].
+# With ``exit_on_arrival`` the loiter is watched for a moment before the program ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
+FENCE_TRIES = 5
 # Parameters that the plan and the wind depend on; asked at the start and after a reboot.
 PARAMETERS = (
     "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "SAIL_LOIT_RADIUS", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE",
     "FENCE_ACTION", "WNDVN_TYPE", "WNDVN_SPEED_TYPE", "WNDVN_SPEED_MIN", "WNDVN_TRUE_FILT", "WNDVN_DIR_FILT",
-    "WNDVN_SPEED_FILT", "WNDVN_DIR_OFS",
+    "WNDVN_SPEED_FILT", "WNDVN_DIR_OFS", "MODE_CH", "RCMAP_ROLL", "RCMAP_THROTTLE",
 )
 
 OnStatus = Callable[[CompanionStatus, Step], None]
@@ -61,7 +63,7 @@ async def sail(
     mission: Mission, transport: Transport, planner: Planner, folder: Path, options: SailOptions,
     *, on_status: OnStatus | None = None, stop: asyncio.Event | None = None,
 ) -> dict[str, Any]:
-    """Sail ``mission`` until it is done, stopped or out of time; return the summary.
+    """Sail ``mission`` and watch the boat at its end until stopped or out of time; return the summary.
 
     Raises:
         LinkError: no autopilot was heard within ``options.wait_s``.
@@ -188,12 +190,12 @@ class _Shell:
             step = self._tick(t_s)
             await self._after_step(step, link)
             executor.submit(step.actions)
-            if step.state.phase is Phase.DONE:
+            if step.state.phase is Phase.DONE and self.options.exit_on_arrival:
                 done_s = t_s if done_s is None else done_s
                 # an upload under way is brought to its end: what stays on the autopilot is one plan
                 is_busy = step.state.pending_upload is not None
                 if t_s - done_s >= (LINGER_BUSY_S if is_busy else LINGER_S):
-                    self.end_reason = "arrived"
+                    self.end_reason = "arrived" if step.state.arrived else "over"
                     return
             else:
                 done_s = None
@@ -258,15 +260,30 @@ class _Shell:
     async def _upload_fence(self, autopilot: Autopilot) -> None:
         """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
         mission = self.mission
-        places = [g.point for g in mission.goals] + ([mission.start] if mission.start else [])
+        places = [*mission.places, *([mission.start] if mission.start else [])]
         fence = fence_for_autopilot(mission.area, mission.margin_m, inside=places)
         record: dict[str, Any] = {"kind": "fence", "status": fence.status.name, "text": fence.reason}
+        trouble = "" if fence.items or fence.status is FenceStatus.EMPTY else fence.reason
         if fence.items:
             done = await autopilot.upload_fence(fence.items)
             record |= {"outcome": done.outcome.value, "text": done.text, "count": len(fence.items)}
+            trouble = "" if done.is_ok else done.text or done.outcome.value
             if done.is_ok:
-                record["enabled"] = (await autopilot.enable_fence()).outcome.value
+                enabled = await self._enable_fence(autopilot)
+                record["enabled"] = enabled.outcome.value
+                trouble = "" if enabled.is_ok else enabled.text or enabled.outcome.value
+        if trouble:
+            autopilot.say(int(Severity.ERROR), f"the fence is not in force: {trouble}")
         self.log.note(self.log.now_s(), record)
+
+    async def _enable_fence(self, autopilot: Autopilot) -> CommandAnswer:
+        """Switch the fence on; ArduRover refuses it for the moment in which it takes a new one in."""
+        for _ in range(FENCE_TRIES - 1):
+            answer = await autopilot.enable_fence()
+            if answer.is_ok:
+                return answer
+            await asyncio.sleep(STEP_S)
+        return await autopilot.enable_fence()
 
     async def _watch_loop(self) -> None:
         """Measure how long the event loop was held: a timer that fires late was kept waiting by somebody."""
@@ -292,8 +309,8 @@ class _Shell:
         goals = len(self.voyage.legs)
         return {
             "mission": self.mission.name,
-            "arrived": state.phase is Phase.DONE,
-            "arrived_before": self._arrived_before,
+            "arrived": state.arrived,
+            "arrived_before": self._arrived_before and not state.sailing,
             **self.log.figures.to_dict(),
             "goals_reached": min(goals, len(state.reached)),
             "goals": goals,

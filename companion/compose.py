@@ -10,7 +10,7 @@ from companion.boat import Boat, Polar, ardurover_sitl, constant, read_polar
 from companion.errors import InputError
 from companion.geofence import Mission
 from companion.skipper.config import Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
-from companion.skipper.voyage import Goal, Side, Voyage
+from companion.skipper.voyage import Goal, Refuge, Side, Voyage
 from companion.traffic import TargetLimits
 from companion.traffic.feeds import parse_feed
 from companion.wind import Estimator, make
@@ -63,6 +63,8 @@ def voyage_of(mission: Mission) -> Voyage:
     return Voyage(
         name=mission.name, frame=frame, goals=goals, area=mission.area.local(frame), boat=boat_of(mission),
         laps=mission.skipper.laps,
+        refuges=tuple(
+            Refuge(name=r.name, en_m=frame.en_from_geo(r.point), radius_m=r.radius_m) for r in mission.refuges),
     )
 
 
@@ -81,6 +83,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "replan_policy": ReplanPolicy(options.replan),
         "guidance": Guidance(options.guidance),
         "station_s": options.station_s,
+        "voyage_timeout_s": options.voyage_timeout_s,
         "min_replan_interval_s": options.min_replan_s,
         "traffic_clearance_m": mission.traffic.safe_distance_m,
         "traffic_time_s": mission.traffic.safe_time_s,

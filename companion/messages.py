@@ -97,7 +97,7 @@ class VehicleState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutopilotStatus:
-    """What the autopilot says of itself (HEARTBEAT, MISSION_CURRENT, NAV_CONTROLLER_OUTPUT, EKF, SYS_STATUS)."""
+    """What the autopilot says of itself (HEARTBEAT, MISSION_CURRENT, NAV_CONTROLLER_OUTPUT, SYS_STATUS and others)."""
 
     t_s: float
     boot_s: float | None = None
@@ -114,8 +114,13 @@ class AutopilotStatus:
     cross_track_m: float | None = None  # positive: the boat is to the RIGHT of its leg (the wire has the reverse)
     battery_v: float | None = None
     battery_remaining: float | None = None
+    battery_failed: bool | None = None   # its battery failsafe has spoken, or the monitor is ill
+    receiver_lost: bool | None = None    # it hears no transmitter
     fence_breached: bool | None = None
+    fence_breaches: int | None = None    # since the boot; outside the home circle one more every 20 m
     last_reached_seq: int | None = None
+    rc_us: tuple[int, ...] = ()          # what the receiver hears, by channel from 1 [us]
+    home: GeoPoint | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

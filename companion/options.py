@@ -35,6 +35,7 @@ class SailOptions:
         expansions: plan with this effort instead of the mission's time budget (repeatable).
         state_path: where the state for a restart is kept; None: in the voyage folder.
         limit_s: end after this long [s].
+        exit_on_arrival: end when the voyage is over, for harnesses; on the water the loiter is watched until told.
         wait_s: how long to wait for the autopilot's first heartbeat [s].
         offload: where disk work is done.
         is_durable: force files to the disk, against power cuts; a simulation has none.
@@ -52,6 +53,7 @@ class SailOptions:
     expansions: int | None = None
     state_path: Path | None = None
     limit_s: float | None = None
+    exit_on_arrival: bool = False
     wait_s: float = 30.0
     offload: Offload = in_thread
     is_durable: bool = True

@@ -155,7 +155,7 @@ class SimulatedBoat:
 class RealBoat:
     """The real ArduRover; the harness of ``sitl.ardurover`` knows the truth and turns the simulator's knobs."""
 
-    plays = OPERATORS | {"battery", "current", "gps_jump", "gps_lost"}
+    plays = OPERATORS | {"battery", "current", "gps_jump", "gps_lost", "radio_lost", "arm", "disarm"}
 
     def __init__(self, rover: ArduRover) -> None:
         self._rover = rover
@@ -194,6 +194,13 @@ class RealBoat:
             rover.reboot()
         elif event.kind == "foreign_mission":
             await _upload_foreign(rover.shore_link, event, frame)
+        elif event.kind in {"arm", "disarm"}:
+            rover.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, float(event.kind == "arm"))
+        elif event.kind == "radio_lost":
+            rover.set_parameter("SIM_RC_FAIL", 1.0)
+            if event.for_s is not None:
+                await asyncio.sleep(event.for_s)
+                rover.set_parameter("SIM_RC_FAIL", 0.0)
         elif event.kind == "battery":
             rover.set_parameter("SIM_BATT_VOLTAGE", event.volts or 0.0)
         elif event.kind == "current":

@@ -26,7 +26,7 @@ from companion.wind.forecaster import compile_kernels
 from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
-from sitl.runner import TRUTH_EVERY_S, break_vane, marks_of, solid_of
+from sitl.runner import TRUTH_EVERY_S, break_vane, ends_of, marks_of, solid_of
 from sitl.scenario import EventSpec, Scenario
 from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge
@@ -141,7 +141,8 @@ async def _run(
         companion = _Companion([
             sys.executable, "-m", "companion.cli", "run", str(mission_path), "--link", link, "--out", str(folder),
             "--state", str(folder / "state.json"), "--seed", str(seed), "--speedup", f"{pace:g}",
-            "--limit", f"{scenario.limit_s:g}", *feeds,
+            "--limit", f"{scenario.limit_s:g}", *feeds, *(["--exit-on-arrival"] if scenario.exit_on_arrival else []),
+            *(["--dry-run"] if scenario.dry_run else []),
         ])
         await companion.start()
         # The scenario's clock starts when the companion does its first work, as it does on the embedded autopilot.
@@ -167,7 +168,7 @@ async def _run(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=truth,
         solid=solid_of(mission.area.local(frame)), goal_en_m=frame.en_from_geo(mission.goals[-1].point),
         summary=summary, status_times_s=None, alerts=summary.get("alerts", {}), errors=errors,
-        marks=marks_of(mission),
+        marks=marks_of(mission), **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict

@@ -40,6 +40,7 @@ from sitl.autopilot import (
     serve,
 )
 from sitl.autopilot.memory import MemoryEnd
+from sitl.failsafes import FAILURES, PERSONS, play
 from sitl.fragile import FragilePlanner
 from sitl.hull import own_polar
 from sitl.others import TRAFFIC, Others
@@ -81,6 +82,7 @@ class _World:
     autopilot: Autopilot
     link: MemoryLink
     shore: MemoryLink
+    station: MemoryLink      # a ground station that beats, where a scenario has one
     others: Others
     truth: Truth = field(default_factory=Truth)
     status_s: list[float] = field(default_factory=list)
@@ -109,6 +111,15 @@ def marks_of(mission: Mission) -> list[tuple[tuple[float, float], str]]:
     frame = mission.frame()
     lap = [(frame.en_from_geo(g.point), g.rounding) for g in mission.goals if g.rounding is not None]
     return lap * mission.skipper.laps
+
+
+def ends_of(mission: Mission) -> dict[str, Any]:
+    """Return where a voyage may end beside its last goal: home, which is where she is armed, and the refuges."""
+    frame = mission.frame()
+    return {
+        "home_en_m": frame.en_from_geo(mission.start or mission.origin),
+        "refuges_en_m": [frame.en_from_geo(r.point) for r in mission.refuges],
+    }
 
 
 def permitted(mission: Mission) -> Mission:
@@ -157,10 +168,12 @@ async def run_embedded(
     link = MemoryLink("companion", seed=seed)
     frame = mission.frame()
     world = _World(
-        autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1), observer=observer,
+        autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1),
+        station=MemoryLink("station", seed=seed + 2), observer=observer,
         others=Others(frame, wind, seed, port=radio_port, hear=autopilot.hear_vessel))
     folder.mkdir(parents=True, exist_ok=True)
-    async with serve(autopilot, [link.far, world.shore.far]):
+    station = [world.station.far] if any(e.kind == "station" for e in scenario.events) else []
+    async with serve(autopilot, [link.far, world.shore.far, *station]):
         side_tasks = [
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
             *(asyncio.create_task(_event(world, e, mission), name=f"event {e.kind}") for e in scenario.events),
@@ -176,6 +189,7 @@ async def run_embedded(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
         status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
+        **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict
@@ -191,6 +205,7 @@ async def _sail_and_restart(
     options = SailOptions(
         seed=seed, epoch_s=EPOCH_S, expansions=expansions, offload=at_once, is_durable=False,
         state_path=folder / STATE, disk=world.disk, command=f"sitl run {scenario.name}",
+        exit_on_arrival=scenario.exit_on_arrival, dry_run=scenario.dry_run,
     )
 
     def on_status(status: Any, step: Step) -> None:  # noqa: ARG001 - the interface has both
@@ -269,8 +284,8 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
     """Make one event happen; wind events are in the wind already, kills in the companion's loop."""
     await asyncio.sleep(max(0.0, event.at_s - now_s()))
     autopilot, link = world.autopilot, world.link
-    if event.kind == "mode":
-        autopilot.set_mode(Mode[event.mode or "HOLD"])
+    if event.kind in PERSONS | FAILURES:
+        await play(event, autopilot, world.station.near)
     elif event.kind == "reboot":
         autopilot.reboot()
     elif event.kind in LINK_EVENTS:
@@ -296,8 +311,6 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
             world.disk.become("ok")
     elif event.kind == "vane":
         await break_vane(autopilot.set_vane, event)
-    elif event.kind == "battery":
-        autopilot.set_battery(event.volts or 0.0)
     elif event.kind == "current":
         autopilot.set_current(math.radians(event.set_deg), event.drift_mps)
     elif event.kind in TRAFFIC:

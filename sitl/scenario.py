@@ -17,7 +17,9 @@ from companion.errors import InputError
 EventKind = Literal[
     "wind_shift",        # veer_deg, over_s
     "wind_speed",        # tws_mps, over_s
-    "mode",              # mode: the operator's choice, by name
+    "mode",              # mode: a person's choice, by name; by: radio (the mode switch), else the ground station
+    "arm", "disarm",     # by the ground station
+    "set_current",       # seq, for_s: the ground station makes an item of the mission current, and insists
     "reboot",            # the autopilot restarts
     "link_cut",          # for_s (none: for good)
     "link_quality",      # loss, duplicate, reorder, delay_s, corrupt
@@ -30,6 +32,9 @@ EventKind = Literal[
     "disk",              # state: full | sick | read_only | ok; for_s: the companion's
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
+    "radio_lost",        # for_s: the transmitter is out of range
+    "station",           # for_s: a ground station is heard, from then on no more
+    "knockdown",         # roll_deg, for_s
     "current",           # set_deg, drift_mps
     "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
     "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
@@ -58,6 +63,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     over_s: float = 0.0
     tws_mps: float | None = None
     mode: str | None = None
+    by: Literal["radio", "station"] = "station"
     for_s: float | None = None
     loss: float = 0.0
     duplicate: float = 0.0
@@ -71,6 +77,8 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     value_deg: float = 0.0
     restart_after_s: float | None = None
     volts: float | None = None
+    roll_deg: float = 0.0
+    seq: int = 1
     set_deg: float = 0.0
     drift_mps: float = 0.0
     course_deg: float = 0.0
@@ -89,7 +97,9 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     arrived: bool | None = True
     contacts: int | None = 0
-    within_m: float | None = None             # last position to the last goal
+    within_m: float | None = None             # last position to the last goal, or to what ``ends_at`` names
+    ends_at: Literal["goal", "home", "refuge"] = "goal"   # home: where she was armed; the nearest refuge
+    refuge_within_m: float | None = None      # of a refuge, at some moment
     max_time_s: float | None = None
     min_clearance_m: float | None = None
     min_vessel_distance_m: float | None = None  # from the boat to each vessel's hull
@@ -114,6 +124,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     start_heading_deg: float | None = None
     has_ftp: bool = True                      # the embedded autopilot offers MAVFTP; else items go one by one
     is_service: bool = False                  # a companion that heard no autopilot is started again
+    exit_on_arrival: bool = True              # else the boat is watched in its loiter until the limit
+    dry_run: bool = False                     # the companion may only look
     wind: WindSpec = msgspec.field(default_factory=WindSpec)
     parameters: dict[str, float] = {}
     events: tuple[EventSpec, ...] = ()

@@ -183,12 +183,15 @@ def judge(
     alerts: Iterable[str],
     errors: Sequence[str] = (),
     marks: Sequence[tuple[tuple[float, float], str]] = (),
+    home_en_m: tuple[float, float] = (0.0, 0.0),
+    refuges_en_m: Sequence[tuple[float, float]] = (),
 ) -> Verdict:
     """Hold a run against what its scenario expects."""
+    ends = {"goal": [goal_en_m], "home": [home_en_m], "refuge": refuges_en_m}[expect.ends_at]
     positions = truth.positions_m()
     contacts, clearance = contacts_and_clearance(positions, solid)
     tacks, gybes = count_tacks(truth)
-    end_distance = float(math.dist(truth.en_m[-1], goal_en_m)) if truth.en_m else math.inf
+    end_distance = min((math.dist(truth.en_m[-1], p) for p in ends), default=math.inf) if truth.en_m else math.inf
     duration_s = truth.t_s[-1] - truth.t_s[0] if truth.t_s else 0.0
     sailed_m = float(np.sum(np.hypot(*np.diff(positions, axis=0).T))) if len(positions) > 1 else 0.0
     silence_s = None
@@ -208,7 +211,11 @@ def judge(
         check("contacts", bool(truth.t_s) and contacts <= expect.contacts, contacts if truth.t_s else None,
               f"at most {expect.contacts}")
     if expect.within_m is not None:
-        check("distance to the goal, m", end_distance <= expect.within_m, end_distance, f"at most {expect.within_m}")
+        check(f"distance to the {expect.ends_at}, m", end_distance <= expect.within_m, end_distance,
+              f"at most {expect.within_m}")
+    if expect.refuge_within_m is not None:
+        nearest = min((float(np.min(np.hypot(*(positions - p).T))) for p in refuges_en_m), default=math.inf)
+        check("nearest to a refuge, m", nearest <= expect.refuge_within_m, nearest, f"at most {expect.refuge_within_m}")
     if expect.max_time_s is not None:
         check("time, s", duration_s <= expect.max_time_s, duration_s, f"at most {expect.max_time_s}")
     if expect.min_clearance_m is not None:

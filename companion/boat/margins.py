@@ -33,6 +33,7 @@ class AutopilotLimits:
     wp_radius_m: float = 2.0
     turn_radius_m: float = 0.9
     fence_action: int | None = None  # None: no fence guards this obstacle; 0 report .. 4, see FENCE_ACTION
+    rc_channels: tuple[int, ...] = (1, 3, 8)  # of the rudder, the throttle and the mode switch, from 1
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.sail_no_go_angle_rad < math.pi / 2.0:
@@ -58,6 +59,8 @@ class AutopilotLimits:
             wp_radius_m=float(params.get("WP_RADIUS", default.wp_radius_m)),
             turn_radius_m=float(params.get("TURN_RADIUS", default.turn_radius_m)),
             fence_action=int(params.get("FENCE_ACTION", 1.0)) if fenced else None,
+            rc_channels=tuple(int(params.get(name, channel)) for name, channel in zip(
+                ("RCMAP_ROLL", "RCMAP_THROTTLE", "MODE_CH"), default.rc_channels, strict=True)),
         )
 
     def planned_no_go_rad(self, *, pad_rad: float = DEFAULT_PAD_RAD) -> float:

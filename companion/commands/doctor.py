@@ -98,13 +98,13 @@ def needs_of(mission: Mission | None) -> Needs:
     from companion.compose import boat_of, config_of
 
     boat, config, frame = boat_of(mission), config_of(mission), mission.frame()
-    places = [frame.en_from_geo(goal.point) for goal in mission.goals]
+    places = [frame.en_from_geo(place) for place in mission.places]
     return Needs(
         no_go_half_rad=boat.no_go_half_rad, margin_m=config.margin_m, margin_floor_m=config.margin_floor_m,
         goal_radius_m=min(goal.radius_m for goal in mission.goals), loiter_radius_m=config.loiter_radius_m,
         speed_mps=boat.polar.max_speed_mps(mission.wind.preview_speed_mps or 5.0), hull=boat.hull,
         reach_m=max(math.hypot(*place) for place in places), has_fence=mission.operator.upload_fence,
-        can_tack=boat.can_tack,
+        can_tack=boat.can_tack, has_refuge=bool(mission.refuges),
     )
 
 

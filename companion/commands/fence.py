@@ -127,7 +127,7 @@ def places(args: argparse.Namespace) -> tuple[GeoPoint | None, tuple[GeoPoint, .
     if Path(args.file).suffix.lower() == ".toml":
         mission = load_mission(args.file)
         start = start or mission.origin
-        goals = goals or tuple(g.point for g in mission.goals)
+        goals = goals or mission.places
         margin_m = mission.margin_m if margin_m is None else margin_m
     return start, goals, margin_m
 

@@ -109,8 +109,12 @@ def _preview(mission: Mission, args: argparse.Namespace) -> None:
 
 
 def _plans(mission: Mission, boat: Boat, tws_mps: float, twd_from_rad: float) -> list[Plan]:
-    """Return the planner's way from goal to goal, first lap, in a steady wind."""
+    """Return the planner's way from goal to goal, first lap, in a steady wind; and home, where the mission ends there.
+
+    Home is taken to be the start: the autopilot's is where it was armed.
+    """
     from companion.planner import Problem, plan
+    from companion.skipper.errands import HOME_RADIUS_M
 
     if mission.start is None:
         return []
@@ -120,12 +124,15 @@ def _plans(mission: Mission, boat: Boat, tws_mps: float, twd_from_rad: float) ->
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     limits = boat.problem_boat(tws_mps)
     plans = []
-    for goal in mission.goals:
-        east_m, north_m = frame.en_from_geo(goal.point)
+    targets = [(goal.point, goal.radius_m) for goal in mission.goals]
+    if mission.skipper.end == "home":
+        targets.append((mission.start, HOME_RADIUS_M))
+    for point, radius_m in targets:
+        east_m, north_m = frame.en_from_geo(point)
         problem = Problem.from_json({
             "id": mission.name, "title": mission.name,
             "start": {"x": here[0], "y": here[1], "heading_deg": heading_deg % 360.0},
-            "goal": {"x": east_m, "y": north_m, "radius": goal.radius_m},
+            "goal": {"x": east_m, "y": north_m, "radius": radius_m},
             "obstacles": local.obstacles_wkt(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here),
             "wind": {"from_deg": math.degrees(twd_from_rad), "speed_mps": tws_mps, "sigma": {"model": "none"}},
             "boat": limits, "delta_s": mission.risk.delta_s,

@@ -49,6 +49,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--wait", type=float, default=30.0, metavar="S",
                         help="give up when no autopilot is heard for this long (default: 30)")
     parser.add_argument("--limit", type=float, metavar="S", help="end after this many seconds")
+    parser.add_argument("--exit-on-arrival", action="store_true",
+                        help="end when the voyage is over; by default the boat is watched in its loiter until SIGINT "
+                        "or SIGTERM")
     parser.add_argument("--feed", action="append", default=[], metavar="FEED",
                         help="hear other vessels here too, besides the mission's [traffic] feeds: udpin:HOST:PORT, "
                         "tcp:HOST:PORT, /dev/NAME:BAUD; may be given more than once")
@@ -126,7 +129,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
                 seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
                 expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
                 wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
-                shelf=shelf, is_again=again, command=" ".join(sys.argv),
+                exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, command=" ".join(sys.argv),
             )
 
         summary = run_loop(_sail(mission, transport, folder, options, args.speedup, out), speedup=args.speedup)

@@ -27,6 +27,7 @@ from companion.geofence.options import (
     GoalOptions,
     MissionOptions,
     OperatorOptions,
+    RefugeOptions,
     RiskOptions,
     SkipperOptions,
     StartOptions,
@@ -53,6 +54,15 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RefugePoint:
+    """A safe place to wait in: there inside ``radius_m``."""
+
+    point: GeoPoint
+    radius_m: float
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Mission:
     """A mission that holds together: its files were read, its goals lie in free water.
 
@@ -64,6 +74,7 @@ class Mission:
     start: GeoPoint | None
     area: Area
     path: Path
+    refuges: tuple[RefugePoint, ...] = ()
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -75,6 +86,11 @@ class Mission:
     def origin(self) -> GeoPoint:
         """The origin of the mission's local frame: the start, or the first goal."""
         return self.start or self.goals[0].point
+
+    @property
+    def places(self) -> tuple[GeoPoint, ...]:
+        """Where she may be bound for: the goals and the refuges."""
+        return (*(g.point for g in self.goals), *(r.point for r in self.refuges))
 
     def frame(self) -> LocalFrame:
         """Return the mission's local frame."""
@@ -154,13 +170,18 @@ def load_mission(path: str | Path) -> Mission:
             for g in options.goal
         ),
         start=GeoPoint(lat_deg=options.start.lat, lon_deg=options.start.lon) if options.start else None,
-        area=area, path=path, findings=findings,
+        area=area, path=path, findings=findings, refuges=tuple(_refuge(r, n) for n, r in enumerate(options.refuge)),
     )
     if mission.polar_path is not None and not mission.polar_path.is_file():
         raise InputError(source, "[boat] polar", f"no such file: {mission.polar_path}",
                          'write a file beside the mission, "ardurover" or a speed in m/s')
     check_places(mission)
     return mission
+
+
+def _refuge(refuge: RefugeOptions, number: int) -> RefugePoint:
+    point = GeoPoint(lat_deg=refuge.lat, lon_deg=refuge.lon)
+    return RefugePoint(point=point, radius_m=refuge.radius_m, name=refuge.name or f"{number + 1}")
 
 
 def parse_options(text: str, source: str) -> MissionOptions:
@@ -184,7 +205,9 @@ def parse_options(text: str, source: str) -> MissionOptions:
 def dump_options(options: MissionOptions) -> str:
     """Return the options as TOML, leaving out what has its default."""
     data = _without_defaults(options)
-    order = ["name", "description", "start", "goal", "area", "wind", "risk", "boat", "operator", "skipper", "traffic"]
+    order = [
+        "name", "description", "start", "goal", "refuge", "area", "wind", "risk", "boat", "operator", "skipper",
+        "traffic"]
     return tomli_w.dumps({k: data[k] for k in order if k in data})
 
 
@@ -221,9 +244,9 @@ def _place(path: str) -> str:
     if not match:
         return ""
     table, index, key, rest = match.groups()
-    if index is not None and table == "goal":
+    if index is not None and table in {"goal", "refuge"}:
         number = f" {int(index) + 1}" if index.isdigit() else ""
-        return f"[[goal]]{number} {key or ''}{rest}".rstrip()
+        return f"[[{table}]]{number} {key or ''}{rest}".rstrip()
     if key is None and table not in tables():
         return f"{table}{f'[{index}]' if index else ''}"
     return f"[{table}] {key or ''}{rest}".rstrip()
@@ -307,11 +330,12 @@ def load_area(options: AreaOptions, mission_path: Path, origin: GeoPoint) -> tup
 
 
 def check_places(mission: Mission) -> None:
-    """Raise InputError if the start or a goal is too far off, inside an obstacle, or outside the fence."""
+    """Raise InputError if the start, a goal or a refuge is too far off, in an obstacle, or outside the fence."""
     frame = mission.frame()
     local = mission.area.local(frame)
     source = str(mission.path)
     places = [(f"[[goal]] {i + 1}", g.point) for i, g in enumerate(mission.goals)]
+    places += [(f"[[refuge]] {i + 1}", r.point) for i, r in enumerate(mission.refuges)]
     if mission.start is not None:
         places.insert(0, ("[start]", mission.start))
     for place, point in places:

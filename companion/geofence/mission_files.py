@@ -10,7 +10,7 @@ from companion.geofence.findings import Finding, Severity
 from companion.geofence.formats import write
 from companion.geofence.losses import Losses, Written
 from companion.geofence.mission import Mission, dump_options
-from companion.geofence.options import AreaOptions, GoalOptions, MissionOptions, StartOptions
+from companion.geofence.options import AreaOptions, GoalOptions, MissionOptions, RefugeOptions, StartOptions
 from companion.geofence.shapes import Circle, Zone, ZoneKind
 from companion.messages import Command, GeoPoint, waypoint
 
@@ -23,6 +23,7 @@ def document_of(mission: Mission) -> Document:
         items=tuple(waypoint(g.point) for g in mission.goals),
         item_names=tuple(g.name for g in mission.goals) if any(g.name for g in mission.goals) else (),
         home=mission.start,
+        rally=tuple(waypoint(r.point, command=Command.NAV_RALLY_POINT) for r in mission.refuges),
     )
 
 
@@ -60,8 +61,8 @@ def mission_files(
 ) -> MissionFiles:
     """Return the files of a mission made from a drawing.
 
-    Goals are ``goals``, or the document's waypoints in order; the start is ``start``, or its home. Its zones, and
-    those of ``land``, become the area. Raises ValueError when there is no goal.
+    Goals are ``goals``, or the document's waypoints in order; the start is ``start``, or its home; its rally points
+    are refuges. Its zones, and those of ``land``, become the area. Raises ValueError when there is no goal.
     """
     losses = Losses()
     goal_options = [GoalOptions(lat=g.lat_deg, lon=g.lon_deg) for g in goals] or _goals(document, losses)
@@ -84,8 +85,6 @@ def mission_files(
     if limits.zones:
         file_name, written = _area_file(limits, f"{stem}-fence")
         files[file_name], fence_name = written.data, file_name
-    if document.rally:
-        losses.drop("rally points are", len(document.rally))
     if document.tracks:
         losses.drop("tracks are", len(document.tracks))
     defaults = AreaOptions()
@@ -93,6 +92,7 @@ def mission_files(
     options = MissionOptions(
         name=name, goal=tuple(goal_options),
         start=StartOptions(lat=home.lat_deg, lon=home.lon_deg) if home is not None else None,
+        refuge=tuple(RefugeOptions(lat=r.point.lat_deg, lon=r.point.lon_deg) for r in document.rally),
         area=AreaOptions(
             obstacles=obstacle_names, fence=fence_name, margin_m=margin,
             margin_floor_m=min(defaults.margin_floor_m, margin),

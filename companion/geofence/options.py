@@ -28,6 +28,15 @@ class GoalOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     name: str = ""
 
 
+class RefugeOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[[refuge]]``: a safe place to wait in, where a critical battery or a voyage out of time leads."""
+
+    lat: Latitude
+    lon: Longitude
+    radius_m: Annotated[float, Meta(gt=0.0, le=5000.0)] = 15.0
+    name: str = ""
+
+
 class StartOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """``[start]``: for checks, previews and simulations. The boat itself starts where it is."""
 
@@ -100,6 +109,7 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     replan: Literal["waypoint", "forecast"] = "waypoint"
     """At each waypoint, or also when the wind leaves what was forecast."""
     end: Literal["loiter", "home"] = "loiter"
+    """After the last goal: loiter there, or plan the way to the autopilot's home and loiter there."""
     autopilot_beats: bool = True
     """Where the water is clear by its corridor, leave the beat to the autopilot: it follows each shift at once."""
     guidance: Literal["plan", "heading", "field"] = "plan"
@@ -123,6 +133,7 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     off_track_m: Positive = 30.0
     """Replan when the boat is this far from its leg."""
     voyage_timeout_s: Positive | None = None
+    """Under way for longer than this the goals are given up: to the nearest refuge, or home, or a loiter near by."""
 
 
 class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -144,6 +155,7 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     name: str = ""
     description: str = ""
     start: StartOptions | None = None
+    refuge: tuple[RefugeOptions, ...] = ()
     area: AreaOptions = AreaOptions()
     risk: RiskOptions = RiskOptions()
     boat: BoatOptions = BoatOptions()
@@ -160,5 +172,6 @@ def tables() -> dict[str, tuple[str, ...]]:
         if isinstance(field.default, Struct):
             known[field.name] = type(field.default).__struct_fields__
     known["goal"] = GoalOptions.__struct_fields__
+    known["refuge"] = RefugeOptions.__struct_fields__
     known["start"] = StartOptions.__struct_fields__
     return known

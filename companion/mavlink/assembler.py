@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
 from companion.mavlink import codec
 from companion.mavlink.frames import Drop, Message
 from companion.messages import (
@@ -174,9 +176,16 @@ class VehicleAssembler:
                 self._status,
                 battery_v=None if message.voltage_battery == 0xFFFF else message.voltage_battery / 1e3,
                 battery_remaining=message.battery_remaining / 100.0 if 0 <= message.battery_remaining <= 100 else None,
+                battery_failed=codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_BATTERY),
+                receiver_lost=codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_RC_RECEIVER),
             )
+        elif kind == "RC_CHANNELS":
+            self._status = replace(self._status, rc_us=codec.rc_us(message))
+        elif kind == "HOME_POSITION":
+            self._status = replace(self._status, home=codec.geo_point(message.latitude, message.longitude))
         elif kind == "FENCE_STATUS":
-            self._status = replace(self._status, fence_breached=bool(message.breach_status))
+            self._status = replace(
+                self._status, fence_breached=bool(message.breach_status), fence_breaches=int(message.breach_count))
             self._fence_s = t_s
         else:
             return []
@@ -193,7 +202,7 @@ class VehicleAssembler:
             )
         if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
             self._fence_s = None
-            self._status = replace(self._status, fence_breached=None)
+            self._status = replace(self._status, fence_breached=None, fence_breaches=None)
 
 
 class _Stale(Exception):  # noqa: N818 - a signal inside this module

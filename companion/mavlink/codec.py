@@ -165,6 +165,20 @@ def ekf_ok(message: Message) -> bool:
     return message.flags & _EKF_NEEDED == _EKF_NEEDED and not message.flags & _EKF_FORBIDDEN
 
 
+def has_failed(message: Message, sensor: int) -> bool | None:
+    """Return whether SYS_STATUS calls a sensor that is switched on ill, None when it is not there or off."""
+    if not message.onboard_control_sensors_enabled & sensor:
+        return None
+    return not message.onboard_control_sensors_health & sensor
+
+
+def rc_us(message: Message) -> tuple[int, ...]:
+    """Return the channels of RC_CHANNELS from the first on [us]; a channel that is not there is 0."""
+    count = min(int(message.chancount), 18)
+    raw = (int(getattr(message, f"chan{n + 1}_raw")) for n in range(count))
+    return tuple(0 if value == 0xFFFF else value for value in raw)
+
+
 def cross_track_m(message: Message) -> float:
     """Return the cross track of NAV_CONTROLLER_OUTPUT [m], positive when the boat is right of its leg."""
     return -number(message.xtrack_error, -1e6, 1e6, "xtrack_error")

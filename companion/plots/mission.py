@@ -64,7 +64,8 @@ def save_mission(
     handles += _draw_autopilot(axes, mission, frame)
     legs = [np.asarray(p.waypoints_en) for p in plans if p.has_path]
     places = [*([start] if start is not None else []), *goals]
-    extent = _extent(local, places, legs)
+    refuges = [(frame.en_from_geo(r.point), f"refuge {r.name}") for r in mission.refuges]
+    extent = _extent(local, [*places, *(place for place, _ in refuges)], legs)
     handles += _draw_laylines(axes, places, twd_from_rad, beat_rad, extent)
     for leg in legs:
         axes.plot(leg[:, 0], leg[:, 1], "-", color=PATH, lw=1.8, zorder=6, solid_joinstyle="round")
@@ -72,6 +73,9 @@ def save_mission(
     if legs:
         handles.append(Line2D([], [], color=PATH, lw=1.8, label="plan in this wind, held steady"))
     _draw_marks(axes, mission, start, goals)
+    for place, name in refuges:
+        axes.plot(*place, "P", color=GOAL, ms=8, mec="black", mew=0.6, zorder=8)
+        axes.annotate(name, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
     _finish(axes, extent, twd_from_rad, tws_mps, handles)
     words = _words(mission, plans)
     subtitle = words[0] if words else mission.options.description
@@ -145,7 +149,7 @@ def draw_area(axes: Axes, local: LocalArea, margin_m: float) -> list[Handle]:
 
 def _draw_autopilot(axes: Axes, mission: Mission, frame: LocalFrame) -> list[Handle]:
     """Draw the autopilot's own fence where there is one."""
-    inside = [*([mission.start] if mission.start else []), *(g.point for g in mission.goals)]
+    inside = [*([mission.start] if mission.start else []), *mission.places]
     result = fence_for_autopilot(mission.area, mission.margin_m, inside=inside)
     if result.status is not FenceStatus.OK:
         return []
@@ -248,14 +252,15 @@ def _extent(
 def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
     """Return what came of the plans, one line each."""
     out = []
-    for goal, answer in zip(mission.goals, plans, strict=False):
-        name = goal.name or "goal"
+    names = [*(goal.name or "goal" for goal in mission.goals), "home"]
+    for name, answer in zip(names, plans, strict=False):
         if answer.has_path:
             out.append(f"{name}: {answer.cost_s:.0f} s in {len(answer.legs)} legs")
         else:
             out.append(f"{name}: no path ({answer.status.value}): {answer.reason}")
     if len(out) > 1 and all(p.has_path for p in plans):
-        out.insert(0, f"{sum(p.cost_s for p in plans):.0f} s to all {len(plans)} goals")
+        out.insert(0, f"{sum(p.cost_s for p in plans):.0f} s to all {min(len(plans), len(mission.goals))} goals"
+                   + (" and home" if len(plans) > len(mission.goals) else ""))
     if plans and any(g.rounding for g in mission.goals):
         out.append("the preview sails to the marks; on which side they are left is the skipper's part")
     return out

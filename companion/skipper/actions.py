@@ -25,7 +25,9 @@ class ReplanReason(enum.Enum):
     OPERATOR_BACK = "operator_back"
     REBOOT = "reboot"
     OBSTACLE = "obstacle"              # the area or the traffic changed
-    REFUGE = "refuge"                  # the battery is critical
+    REFUGE = "refuge"                  # the battery is critical, or the voyage out of time
+    HOME = "home"                      # all goals are reached, or the autopilot wants her home
+    REST = "rest"                      # dragged off the place where she loiters
     OPERATOR_WISH = "operator_wish"
     RETRY = "retry"                    # a step of the ladder after nothing was found
     MISMATCH = "mismatch"              # the mission on the autopilot is not the one that was uploaded

@@ -37,7 +37,7 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
     if pending is None or pending.request_id != outcome.request_id:
         return
     turn.update(pending_plan=None)
-    if turn.state.phase in {Phase.OPERATOR, Phase.DONE} or turn.is_taken:
+    if turn.state.phase is Phase.OPERATOR or turn.is_taken:
         return   # the operator may have taken the boat in this very step
     if turn.state.sailing and not turn.state.checked_mission:
         return
@@ -82,9 +82,12 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     first = turn.state.index if pending.from_index is None else pending.from_index + 1
     points = route.points_en_m[first:-1]
     ends = [n for n in range(first, len(route.items) - 1) if route.gate_of[n] == pending.gate]
-    if not points or pending.gate < 0 or not ends or pending.lead_in:
+    if not points or not ends or pending.lead_in or route.bound_for != pending.facts.bound_for:
         return False
-    points = route.points_en_m[first:ends[0] + 1]
+    if pending.gate >= 0:
+        points = route.points_en_m[first:ends[0] + 1]
+    elif not pending.facts.bound_for:
+        return False
     problem = pending.problem
     # A vessel that the old route was planned clear of need not be kept so far from; it is held against its own discs.
     old = replace(problem.resolved, targets=()).evaluate(np.asarray([pending.start_en_m, *points]))
@@ -255,7 +258,7 @@ def _tail_only(turn: Turn) -> bool:
 def hold(turn: Turn, why: str) -> None:
     """Loiter in the roomiest place near the boat, by a mission that ends there at once."""
     boat, wind, state = turn.boat_en, turn.wind_mean, turn.state
-    turn.phase(Phase.HOLDING if state.sailing else Phase.WAITING, why)
+    turn.phase(Phase.HOLDING if state.sailing else Phase.WAITING, f"waiting for a plan: {why}")
     if boat is None or not state.sailing or state.route is None or state.index >= len(state.route.items) - 1:
         return   # not under way, or already in the safe end of the mission
     place, room = loiter_place(turn.voyage, turn.config, boat, wind[0] if wind else 0.0)
@@ -264,6 +267,6 @@ def hold(turn: Turn, why: str) -> None:
     route = replace(
         state.route, items=(*state.route.items[:keep], end), points_en_m=(*state.route.points_en_m[:keep], place),
         leg_from_en_m=(*state.route.leg_from_en_m[:keep], boat), gate_of=(*state.route.gate_of[:keep], -1),
-        rung="hold", risk=None, cost_s=None, why=f"{why}; loitering with {room:.0f} m of room",
+        rung="hold", risk=None, cost_s=None, bound_for="", why=f"{why}; loitering with {room:.0f} m of room",
     )
     upload(turn, route, keep + 1, route.why)

@@ -221,7 +221,7 @@ def keeps_station(turn: Turn) -> bool:
         return False
     place = turn.gates[-1].en_m
     off = "" if boat is None else f", {distance_m(boat, place):.0f} m off"
-    turn.phase(Phase.HOLDING, f"keeping station for {left_s:.0f} s more{off}")
+    turn.phase(Phase.HOLDING, f"keeping station: waiting {left_s:.0f} s more{off}")
     if turn.config.guidance is not Guidance.FIELD or not turn.steers:
         hand_back(turn)   # out of GUIDED, where the goal was reached by headings
         return True

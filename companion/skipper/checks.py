@@ -28,7 +28,7 @@ def examine(seen: Examined, needs: Needs) -> tuple[Finding, ...]:
             _wind(report)
         _navigation(report, needs)
         fence(report, seen, needs)
-        failsafes(report)
+        failsafes(report, needs)
         identity(report, seen)
     signing(report, seen)
     version(report, seen)

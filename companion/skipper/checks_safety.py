@@ -10,7 +10,10 @@ CIRCLE_BIT = 2               # FENCE_TYPE: the circle around home
 POLYGON_BIT = 4
 RATES_HZ = {"WIND": 0.9, "GLOBAL_POSITION_INT": 0.9, "ATTITUDE": 0.9, "MISSION_CURRENT": 0.4, "EKF_STATUS_REPORT": 0.4}
 OLDEST = (4, 2)              # before it the boat is steered by L1 and the upwind corridor differs
-MODES_FS = {0: "nothing", 1: "RTL", 2: "HOLD", 3: "SmartRTL or RTL or HOLD", 4: "SmartRTL or HOLD"}
+MODES_FS = {0: "nothing", 1: "RTL", 2: "HOLD", 3: "SmartRTL or RTL or HOLD", 4: "SmartRTL or HOLD", 5: "a disarming",
+            6: "LOITER or HOLD"}
+ADRIFT = frozenset({2, 4, 5})   # what leaves a sailboat to drift: her sails are eased and nobody steers
+DRIFTS = "a sailboat in HOLD eases her sails and drifts, out of a fence and onto whatever is there"
 
 
 def fence(report: Report, seen: Examined, needs: Needs) -> None:
@@ -36,19 +39,24 @@ def fence(report: Report, seen: Examined, needs: Needs) -> None:
                    "the last line of defence is missing", name="FENCE_ENABLE", wanted=1.0)
     if on and action is not None:
         does = MODES_FS.get(int(action), f"action {action:g}")
-        level = Level.WARNING if action == 0 else Level.INFO
+        drifts = needs.sails and int(action) in ADRIFT
+        level = Level.ERROR if drifts else Level.WARNING if action == 0 else Level.INFO
         report.add(level, "fence action", f"on a breach: {does}" if action else "on a breach: only a report",
-                   "the fence stops nothing" if action == 0 else "HOLD coasts about 10 m on at 3 m/s, RTL about 7 m",
-                   name="FENCE_ACTION", wanted=1.0 if action == 0 else None)
+                   "the fence stops nothing" if action == 0 else DRIFTS if drifts else
+                   "it coasts about 7 m on at 3 m/s and sails straight home; with [operator] set_auto the companion "
+                   "plans the way back inside", name="FENCE_ACTION", wanted=1.0 if action == 0 or drifts else None)
 
 
-def failsafes(report: Report) -> None:
+def failsafes(report: Report, needs: Needs) -> None:
     """Look at what the autopilot does when something is lost."""
     radio, station, action = report.get("FS_THR_ENABLE"), report.get("FS_GCS_ENABLE"), report.get("FS_ACTION")
+    drifts = needs.sails and action is not None and int(action) in ADRIFT
+    bad = Level.ERROR if drifts else Level.WARNING
+    drift = f"; {DRIFTS}" if drifts else ""
     does = MODES_FS.get(int(action), f"action {action:g}") if action is not None else "an action that was not read"
     if radio == 1.0:
-        report.add(Level.WARNING, "radio failsafe", f"FS_THR_ENABLE is 1: out of RC range the boat goes to {does}",
-                   "a voyage beyond RC range ends there; 2 continues the mission in AUTO", name="FS_THR_ENABLE",
+        report.add(bad, "radio failsafe", f"FS_THR_ENABLE is 1: out of RC range the boat goes to {does}",
+                   f"a voyage beyond RC range ends there; 2 continues the mission in AUTO{drift}", name="FS_THR_ENABLE",
                    wanted=2.0)
     elif radio == 0.0:
         report.add(Level.INFO, "radio failsafe", "FS_THR_ENABLE is 0: losing the RC does nothing",
@@ -61,23 +69,36 @@ def failsafes(report: Report) -> None:
         quirk = station == 2.0 and radio not in {None, 0.0, 2.0}
         if station != 2.0 or quirk:
             report.add(
-                Level.WARNING, "station failsafe",
+                bad, "station failsafe",
                 f"FS_GCS_ENABLE is {station:g}: losing the ground station means {does}",
                 "with FS_THR_ENABLE 1 'continue in AUTO' is ignored: set that to 2" if quirk else
-                "a voyage beyond its range ends there; 2 continues the mission in AUTO",
+                f"a voyage beyond its range ends there; 2 continues the mission in AUTO{drift}",
                 name="FS_THR_ENABLE" if quirk else "FS_GCS_ENABLE", wanted=2.0)
-    if report.get("FS_EKF_ACTION") == 0:
-        report.add(Level.WARNING, "EKF failsafe", "FS_EKF_ACTION is 0: a lost position does nothing",
-                   "the boat sails on by a position that is wrong", name="FS_EKF_ACTION", wanted=1.0)
+    if report.get("FS_EKF_ACTION") in {0.0, 2.0}:
+        report.add(Level.WARNING, "EKF failsafe", f"FS_EKF_ACTION is {report.get('FS_EKF_ACTION'):g}: a lost position "
+                   "stops nothing", "the boat sails on by a position that is wrong; in HOLD she drifts, and with "
+                   "[operator] set_auto sails on when it is back", name="FS_EKF_ACTION", wanted=1.0)
     crash, angle = report.get("FS_CRASH_CHECK"), report.get("CRASH_ANGLE")
     if crash not in {None, 0.0} or angle not in {None, 0.0}:
         report.add(Level.WARNING, "crash check", "FS_CRASH_CHECK or CRASH_ANGLE is on",
                    "a becalmed or heeled sailboat looks crashed and is disarmed", wanted=0.0,
                    name="FS_CRASH_CHECK" if crash else "CRASH_ANGLE")
-    low = report.get("BATT_FS_LOW_ACT")
-    if low == 0.0 and (report.get("BATT_MONITOR") or 0.0) > 0.0:
+    _battery(report, needs)
+
+
+def _battery(report: Report, needs: Needs) -> None:
+    if not (report.get("BATT_MONITOR") or 0.0) > 0.0:
+        return
+    for name in ("BATT_FS_LOW_ACT", "BATT_FS_CRT_ACT"):
+        action = report.get(name)
+        if action is not None and needs.sails and int(action) in ADRIFT:
+            report.add(Level.ERROR, "battery failsafe", f"{name} is {action:g}: a low battery means "
+                       f"{MODES_FS[int(action)]}", DRIFTS, name=name, wanted=1.0)
+    if report.get("BATT_FS_LOW_ACT") == 0.0:
+        leads = "makes for the mission's refuge" if needs.has_refuge else (
+            "would make for a refuge, if the mission named one ([[refuge]])")
         report.add(Level.INFO, "battery failsafe", "BATT_FS_LOW_ACT is 0: a low battery does nothing on the autopilot",
-                   "the companion says so and can go to a refuge", name="BATT_FS_LOW_ACT")
+                   f"the companion says so, and at 10 % {leads}", name="BATT_FS_LOW_ACT")
 
 
 def identity(report: Report, seen: Examined) -> None:

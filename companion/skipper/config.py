@@ -26,10 +26,10 @@ class Guidance(enum.Enum):
 
 
 class SafeEnd(enum.Enum):
-    """The last item of every mission."""
+    """How the voyage ends. Every mission ends in a NAV_LOITER_UNLIM; none in RTL, whose way nobody looks at."""
 
-    LOITER = "loiter"          # NAV_LOITER_UNLIM at the goal or at a place with room to leeward
-    RETURN = "return"          # NAV_RETURN_TO_LAUNCH
+    LOITER = "loiter"          # at the last goal, or near it at a place with room to leeward
+    RETURN = "return"          # at home, the way there planned like any other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,3 +108,4 @@ class SkipperConfig:
     # boat that loiters where it is.
     guidance: Guidance = Guidance.PLAN
     station_s: float = 0.0             # how long to stay at the last goal
+    voyage_timeout_s: float | None = None  # under way for longer than this the goals are given up; None: never

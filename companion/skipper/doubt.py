@@ -11,7 +11,7 @@ import math
 
 from companion.messages import Mode
 from companion.skipper.actions import Severity
-from companion.skipper.failsafe import CRITICAL
+from companion.skipper.causes import CRITICAL
 from companion.skipper.helm import is_busy, set_mode
 from companion.skipper.state import Fix, Phase
 from companion.skipper.turn import JUMP_M, Turn
@@ -77,7 +77,8 @@ def stands_off(turn: Turn) -> bool:
     if float(turn.voyage.area.clearance_m([here])[0]) < turn.config.margin_floor_m + LOITER_M:
         return False   # not here either: see Turn.is_way_shut
     if status.mode is Mode.LOITER and state.own_mode is Mode.LOITER:
-        turn.phase(Phase.HOLDING, "the position jumped and the other place is not clear ahead: loitering")
+        turn.phase(Phase.HOLDING, "the position jumped and the other place is not clear ahead: waiting in a loiter "
+                   "until it can be believed")
         return True
     if not turn.is_raised("position jump") or is_busy(turn, Mode.LOITER.name):
         return False

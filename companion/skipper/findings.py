@@ -46,6 +46,7 @@ class Needs:
     hull: Hull = field(default_factory=Hull)
     reach_m: float = 0.0                         # farthest place of the voyage from home
     has_fence: bool = False                      # the mission wants its fence on the autopilot
+    has_refuge: bool = False                     # the mission names a place for a critical battery
     sails: bool = True                           # False: a motor boat
     can_tack: bool = True                        # False: it gybes round, and no corridor of tacks is of use
 

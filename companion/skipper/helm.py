@@ -77,7 +77,7 @@ def repair(turn: Turn) -> bool:
     if route is None:
         turn.update(repair=False)
         return False
-    turn.phase(state.phase, "the mission on board is a mixture of two of ours: uploading it whole")
+    turn.phase(state.phase, "waiting for the mission on board, a mixture of two of ours, to be uploaded whole")
     if state.pending_upload is None and turn.t_s >= state.upload_retry.not_before_s:
         index = min(state.index, len(route.items) - 1)
         turn.update(repair=False)

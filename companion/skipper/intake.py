@@ -100,6 +100,14 @@ def take_events(turn: Turn) -> None:
             turn.update(wish=event)
 
 
+def count_time(turn: Turn) -> None:
+    """Count how long the voyage has been under way."""
+    state, status = turn.state, turn.autopilot
+    sails = state.sailing and not state.over and status is not None and status.is_armed
+    passed_s = turn.t_s - state.last_step_s if sails and math.isfinite(state.last_step_s) else 0.0
+    turn.update(under_way_s=state.under_way_s + max(0.0, passed_s), last_step_s=turn.t_s)
+
+
 def locate(turn: Turn) -> None:
     """Say where the boat is on its route: the autopilot's count, our own count, gates passed, way made good."""
     state, status = turn.state, turn.autopilot
@@ -251,7 +259,7 @@ def _remember(turn: Turn) -> None:
             turn.update(track=(*turn.state.track[-399:], boat))
     elif turn.state.track:
         turn.update(track=())
-    history = turn.state.history
+    history = turn.state.history if ahead else ()   # at rest no way is made
     if history and turn.t_s - history[-1][0] < HISTORY_STEP_S:
         return
     left = 0.0
@@ -259,8 +267,9 @@ def _remember(turn: Turn) -> None:
     for following in ahead:
         left += distance_m(point, following)
         point = following
-    # A new plan may be longer or shorter: progress is measured within one plan.
-    if turn.state.history_plan != (turn.state.route.plan_id if turn.state.route is not None else -1):
-        history = ()
     plan_id = turn.state.route.plan_id if turn.state.route is not None else -1
+    if history and turn.state.history_plan != plan_id:
+        # A new plan may be longer or shorter: what it changed is no way made good, nor lost.
+        longer = left - history[-1][3]
+        history = tuple((t_s, east, north, togo + longer) for t_s, east, north, togo in history)
     turn.update(history=(*history, (turn.t_s, boat[0], boat[1], left))[-HISTORY_KEPT:], history_plan=plan_id)

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 from companion.boat import required_margin
 from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode
 from companion.skipper.actions import ReplanReason, Severity
+from companion.skipper.config import SafeEnd
+from companion.skipper.errands import home_trouble
 from companion.skipper.geometry import distance_m, leg_distance_m
 from companion.skipper.helm import arm, make_current, repair, set_mode
-from companion.skipper.planning import request
+from companion.skipper.planning import lacks, request
 from companion.skipper.snapshot import WindHealth
 from companion.skipper.state import Phase
 from companion.skipper.turn import Turn
 from companion.skipper.uploads import upload
 
+ARRIVED_BEFORE = "all goals were reached before this start; --again sails the mission again"
 STALE_S = 60.0           # a plan that waits for permission is renewed no more often than this
 
 
@@ -21,7 +26,7 @@ def start(turn: Turn) -> None:
     """Get a first plan on board."""
     state, snapshot = turn.state, turn.snapshot
     if state.pending_upload is not None:
-        turn.phase(Phase.WAITING, "uploading the first plan")
+        turn.phase(Phase.WAITING, "waiting for the first plan's upload")
         return
     if state.pending_plan is not None:
         turn.phase(Phase.NEW_CALCULATION, "making the first plan")
@@ -53,7 +58,16 @@ def start(turn: Turn) -> None:
     if request(turn, ReplanReason.START):
         turn.phase(Phase.NEW_CALCULATION, "making the first plan")
     else:
-        turn.phase(Phase.WAITING, "no problem can be stated yet")
+        turn.phase(Phase.WAITING, f"waiting for {lacks(turn) or 'the next try: no problem can be stated'}")
+
+
+def finished(turn: Turn) -> None:
+    """Nothing is left to sail: all goals were reached before this start. Watch her if she is under way."""
+    status = turn.autopilot
+    if status is not None and status.is_armed and status.mode is Mode.AUTO and turn.state.route is not None:
+        turn.update(sailing=True, own_index=turn.state.index)
+        return
+    turn.phase(Phase.DONE, ARRIVED_BEFORE)
 
 
 def launch(turn: Turn) -> None:
@@ -63,21 +77,31 @@ def launch(turn: Turn) -> None:
         return
     if repair(turn):
         return
+    stale = _stale(turn)
     if state.pending_upload is not None or state.pending_plan is not None:
-        turn.phase(Phase.WAITING, "renewing the plan before setting sail")
+        what = "a new plan" if state.pending_plan is not None else "a new plan's upload"
+        turn.phase(Phase.WAITING, f"waiting for {what} before setting sail" + (f": {stale}" if stale else ""))
         return
     if status.mode is Mode.AUTO and status.is_armed:
         turn.update(sailing=True, history=(), own_index=state.index)
         turn.phase(Phase.STANDARD, "under way")
         turn.say(Severity.NOTICE, "under way", "AUTO and armed: under way", every_s=0.0)
         _look_at_margin(turn)
+        _look_at_home(turn)
         if status.mission_state in {MissionState.COMPLETE, MissionState.NOT_STARTED, MissionState.PAUSED}:
             make_current(turn, state.index + 1)
         return
     turn.update(sailing=False)
-    if _is_stale(turn) and turn.t_s >= max(state.plan_retry.not_before_s, state.upload_retry.not_before_s):
-        request(turn, ReplanReason.START, text="the boat drifted or the wind turned before setting sail")
-        turn.phase(Phase.WAITING, "renewing the plan before setting sail")
+    if stale:
+        earliest_s = state.last_plan_s + turn.config.no_go_replan_interval_s
+        wait_s = max(state.plan_retry.not_before_s, state.upload_retry.not_before_s, earliest_s) - turn.t_s
+        if wait_s > 0.0:
+            why = f"the next try in {wait_s:.0f} s to plan anew"
+        elif request(turn, ReplanReason.START, text=f"{stale}, before setting sail"):
+            why = "a new plan before setting sail"
+        else:
+            why = lacks(turn) or "the next try: no problem can be stated"
+        turn.phase(Phase.WAITING, f"waiting for {why}: {stale}")
         return
     may = turn.snapshot.permissions
     mode = status.mode.name if status.mode is not None else "unknown"
@@ -89,10 +113,12 @@ def launch(turn: Turn) -> None:
     elif status.is_armed and status.mode is not Mode.AUTO:
         turn.phase(Phase.WAITING, f"armed in {mode}: waiting for the operator to give AUTO")
     elif status.mode is not Mode.AUTO:
-        turn.phase(Phase.WAITING, "asking for AUTO" if may.may_set_mode else "waiting for the operator to set AUTO")
+        who = "the autopilot to take AUTO" if may.may_set_mode else "the operator to set AUTO"
+        turn.phase(Phase.WAITING, f"waiting for {who}")
         set_mode(turn, Mode.AUTO, "setting sail")
     else:
-        turn.phase(Phase.WAITING, "arming" if may.may_arm else "ready: waiting for the operator to arm")
+        who = "the autopilot to arm" if may.may_arm else "the operator to arm"
+        turn.phase(Phase.WAITING, f"ready: waiting for {who}")
         arm(turn)
 
 
@@ -108,16 +134,27 @@ def _look_at_margin(turn: Turn) -> None:
                  f"the margin is {turn.config.margin_m:g} m; the autopilot's habits ask for {asked.describe()}")
 
 
-def _is_stale(turn: Turn) -> bool:
-    """Return whether the plan no longer fits: the boat has drifted off its leg or behind something, the wind turned."""
+def _look_at_home(turn: Turn) -> None:
+    """Say so when the mission wants to end at home and that cannot be."""
+    trouble = home_trouble(turn) if turn.config.safe_end is SafeEnd.RETURN else ""
+    if trouble:
+        turn.say(Severity.WARNING, "home", f"{trouble}: the voyage ends in a loiter at its last goal", every_s=0.0)
+
+
+def _stale(turn: Turn) -> str:
+    """Return why the plan no longer fits, in words; empty: it does, or what has changed may wait."""
     boat, leg, wind, route = turn.boat_en, turn.leg(), turn.wind_mean, turn.state.route
     if boat is None or leg is None or wind is None or route is None or turn.snapshot.wind.forecast is None:
-        return False
+        return ""
     age_s, config = turn.t_s - turn.state.last_plan_s, turn.config
-    if turn.voyage.area.path_clearance_m([boat, leg[1]]) < min(config.margin_floor_m, config.margin_m):
-        return age_s > config.no_go_replan_interval_s
+    clear_m = turn.voyage.area.path_clearance_m([boat, leg[1]])
+    if clear_m < min(config.margin_floor_m, config.margin_m):
+        where = f"{max(0.0, clear_m):.0f} m from {turn.voyage.area.nearest_name(boat)} on the way to the first waypoint"
+        return f"she lies or has drifted {where}"
     if age_s < STALE_S:
-        return False
-    off = min(leg_distance_m(boat, *leg), distance_m(boat, leg[0]))
-    return off > turn.config.grid_size_m or (
-        abs(difference_rad(wind[0], route.plan_twd_from_rad)) > turn.config.wind_change_rad)
+        return ""
+    off_m = min(leg_distance_m(boat, *leg), distance_m(boat, leg[0]))
+    if off_m > config.grid_size_m:
+        return f"she has drifted {off_m:.0f} m off the first leg"
+    turned = abs(difference_rad(wind[0], route.plan_twd_from_rad))
+    return f"the wind has turned {math.degrees(turned):.0f}°" if turned > config.wind_change_rad else ""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from companion.mavlink.items import mission_hash
 from companion.messages import Command, MissionItem, Mode
 from companion.skipper.actions import ReadMission, Severity
+from companion.skipper.causes import STOPPING
 from companion.skipper.mark import are_marked, marked
 from companion.skipper.route import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
 from companion.skipper.saved import Persisted
@@ -14,7 +15,7 @@ from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase, Route
 from companion.skipper.turn import Turn
 
-REMEDY = "it is not resumed, and replaced only where [operator] replace_foreign allows it"
+REMEDY = "it is not resumed; waiting for [operator] replace_foreign, or an order, to allow its replacement"
 
 
 def mission_is_known(turn: Turn) -> bool:
@@ -51,10 +52,10 @@ def mission_is_known(turn: Turn) -> bool:
         if state.pending_read is None and turn.t_s >= state.read_retry.not_before_s:
             _read(turn, "whose mission is on board?")
         if not state.sailing:
-            turn.phase(Phase.WAITING, "reading the mission on the autopilot")
+            turn.phase(Phase.WAITING, "waiting for the mission on the autopilot to be read")
         else:
             # Under way nothing is changed on a mission that may not be ours; what is there sails on.
-            turn.phase(state.phase, "reading the mission on board before anything is changed on it")
+            turn.phase(state.phase, "waiting for the mission on board to be read: nothing is changed on it before")
         return False
     return _compare(turn, items)
 
@@ -154,7 +155,8 @@ def _adopt(turn: Turn, saved: Persisted, what: str = "ours") -> None:
     status = turn.autopilot
     index = (status.mission_seq or 1) - 1 if status is not None else 0
     turn.update(
-        gate=saved.gate, index=index, own_index=index, after_restart=True, own_mode=saved.own_mode,
+        gate=saved.gate, index=index, own_index=index, own_mode=saved.own_mode,
+        after_operator=saved.own_mode in STOPPING,   # she has drifted since
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         sailing=_under_way(turn) or (saved.sailing and status is not None and status.is_armed),
     )

@@ -9,6 +9,8 @@ from companion.errors import InputError
 from companion.planner import Problem
 from companion.skipper.actions import CancelPlan, ReplanReason, RequestPlan, Severity
 from companion.skipper.beating import problem_beat
+from companion.skipper.errands import Errand, errand, gate_for, homeward
+from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m, moved
 from companion.skipper.judge import half_width_rad
 from companion.skipper.ladder import Rung, rungs
@@ -27,28 +29,26 @@ def request(
 ) -> bool:
     """Ask for a plan from item ``from_index`` of the route or, with None, from the boat; False when it cannot be.
 
-    The gate planned for is the one after the gate that item ``from_index`` completes or leads to.
+    It is planned for where she is bound for on an errand, else for the gate after the one that item ``from_index``
+    completes or leads to, and behind the last one home where the mission ends there. ``lacks`` says why not.
     """
     steps = rungs(turn.config)
     step = steps[min(rung, len(steps) - 1)]
-    forecast = turn.snapshot.wind.forecast
-    if forecast is None or turn.gate is None:
+    forecast, start, aimed = turn.snapshot.wind.forecast, _start(turn, from_index), _target(turn, from_index)
+    if forecast is None or start is None or aimed is None:
         return False
-    start = _start(turn, from_index)
-    gate = _gate_after(turn, from_index)
-    if start is None or gate is None:
-        return False
+    target, gate, bound = aimed
     wind = turn.wind_mean
     floor_m = min(turn.config.margin_floor_m, step.margin_m)
     start = repaired(
         turn.voyage, start, margin_m=step.margin_m, floor_m=floor_m, twd_from_rad=wind[0] if wind else None)
-    aim = _aim(turn, gate, start, step)
+    aim = _aim(turn, target, gate, start, step)
     number = turn.new_id()
     shared = shares(turn, start.en_m, start.after_s, rung, step.delta_s)
     name = ", ".join(part for part in (step.name, "start repaired" if start.text else "") if part)
     try:
         problem = Problem.from_json(problem_dict(
-            turn.voyage, turn.gates[gate], start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
+            turn.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
             delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
             beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk,
         ))
@@ -61,7 +61,7 @@ def request(
         turn.blank_facts(number, step.margin_m, shared.delta_s, name),
         plan_twd_from_rad=problem.wind.twd_from_rad,
         plan_half_width_rad=half_width_rad(forecast, start.after_s + 60.0, turn.config.wind_change_level),
-        vessels_part=shared.part or 0.0,
+        vessels_part=shared.part or 0.0, bound_for=bound.name if bound is not None and not step.nearer_goal else "",
     )
     if turn.state.pending_plan is not None:
         turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
@@ -100,6 +100,28 @@ def _start(turn: Turn, from_index: int | None) -> Start | None:
     )
 
 
+def lacks(turn: Turn, from_index: int | None = None) -> str:
+    """Return what is missing for a plan in words; empty: nothing, or what ``request`` says itself."""
+    if turn.snapshot.wind.forecast is None:
+        return "a wind forecast"
+    if _start(turn, from_index) is None:
+        return "a position to plan from"
+    if _target(turn, from_index) is None:
+        return "a goal: none is left"
+    return ""
+
+
+def _target(turn: Turn, from_index: int | None) -> tuple[Gate, int, Errand | None] | None:
+    """Return what to plan for: the gate, its number (-1: it completes none), and the errand that it is for."""
+    bound = errand(turn)
+    number = None if bound is not None else _gate_after(turn, from_index)
+    if bound is None and number is None:
+        bound = homeward(turn)
+    if bound is not None:
+        return (gate_for(turn, bound), -1, bound) if bound.has_place else None
+    return None if number is None else (turn.gates[number], number, None)
+
+
 def _gate_after(turn: Turn, from_index: int | None) -> int | None:
     """Return the gate that a plan from there is for: the first not completed before or at that item."""
     gate, route = turn.state.gate, turn.state.route
@@ -109,27 +131,20 @@ def _gate_after(turn: Turn, from_index: int | None) -> int | None:
     return gate if gate < len(turn.gates) else None
 
 
-def seeks_refuge(turn: Turn) -> bool:
-    """Return whether the boat makes for a refuge instead of its goal."""
-    return turn.is_raised("battery critical") and bool(turn.voyage.refuges)
-
-
-def _aim(turn: Turn, gate: int, start: Start, step: Rung) -> Aim:
-    if seeks_refuge(turn):
-        place = min(turn.voyage.refuges, key=lambda p: distance_m(start.en_m, p))
-        return Aim(en_m=place, radius_m=turn.config.announce_m, gate=-1)
+def _aim(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
     if step.nearer_goal:
-        return _nearer(turn, gate, start, step)
-    return aim_at(turn.voyage, turn.config, turn.gates, gate, start.en_m)
+        return _nearer(turn, target, gate, start, step)
+    aim = aim_at(turn.voyage, turn.config, (target,), 0, start.en_m)
+    return replace(aim, gate=gate if aim.gate == 0 else -1)
 
 
-def _nearer(turn: Turn, gate: int, start: Start, step: Rung) -> Aim:
+def _nearer(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
     """Return a safe place that is nearer than the goal: a refuge, or a roomy place on the way."""
-    target = turn.gates[gate].en_m
-    left = distance_m(start.en_m, target)
-    course = bearing_rad(start.en_m, target)
-    candidates = [p for p in turn.voyage.refuges if distance_m(start.en_m, p) < left]
-    candidates.sort(key=lambda p: distance_m(p, target))
+    left = distance_m(start.en_m, target.en_m)
+    course = bearing_rad(start.en_m, target.en_m)
+    refuges = [r.en_m for r in turn.voyage.refuges]
+    candidates = [p for p in refuges if p != target.en_m and distance_m(start.en_m, p) < left]
+    candidates.sort(key=lambda p: distance_m(p, target.en_m))
     candidates += [
         moved(start.en_m, course + side, share * left)
         for share in (0.75, 0.5, 0.35, 0.2) for side in (0.0, 0.35, -0.35, 0.8, -0.8)
@@ -137,4 +152,4 @@ def _nearer(turn: Turn, gate: int, start: Start, step: Rung) -> Aim:
     for place in candidates:
         if float(turn.voyage.area.clearance_m([place])[0]) >= step.margin_m + turn.config.loiter_radius_m:
             return Aim(en_m=place, radius_m=turn.config.loiter_radius_m, gate=-1)
-    return Aim(en_m=target, radius_m=turn.gates[gate].radius_m, gate=gate)
+    return Aim(en_m=target.en_m, radius_m=target.radius_m, gate=gate)

@@ -24,7 +24,9 @@ from companion.skipper.judge import half_width_rad, mean_twd_rad
 from companion.skipper.snapshot import Snapshot
 from companion.skipper.voyage import PointEn, Voyage
 
-REPAIR_RINGS_M = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0)
+# The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
+REPAIR_RINGS_M = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 140.0, 210.0, 320.0, 480.0, 720.0, 1080.0,
+                  1620.0, 2430.0, 3645.0)
 REPAIR_DIRECTIONS = 24
 NOTCH = 2.0     # radius of the notch as a multiple of what the start lacks: room to turn out of it
 LEG_SAVING = 8e-5   # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
@@ -111,10 +113,11 @@ def repaired(
 
     Down to ``floor_m`` the margin around it gets a notch, so that the plan begins where the boat is. Nearer than
     that, or inside, the plan begins in free water and a lead-in goes there: from the boat to the nearest free point
-    on a line that never comes nearer to the obstacle than the boat is now; of equally near ones the one that is not
-    upwind.
+    on a line that never comes nearer to the obstacle than the boat is now, nor nearer than ``floor_m`` to any that it
+    is clear of; of equally near ones the one that is not upwind.
     """
     here = float(voyage.area.clearance_m([start.en_m])[0])
+    solid_m = min(floor_m, float(voyage.area.unfenced.clearance_m([start.en_m])[0])) - HAIR_M
     if here >= margin_m:
         return start
     if here >= floor_m:
@@ -130,6 +133,8 @@ def repaired(
                 continue
             way = np.linspace(start.en_m, place, 9)
             if float(np.min(voyage.area.clearance_m(way))) < here - HAIR_M:
+                continue
+            if solid_m > 0.0 and voyage.area.unfenced.path_clearance_m(way) < solid_m:
                 continue
             upwind = twd_from_rad is not None and abs(difference_rad(course, twd_from_rad)) < math.radians(55.0)
             cost = ring_m * (3.0 if upwind else 1.0) + abs(difference_rad(course, start.heading_rad))

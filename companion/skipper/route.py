@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from companion.messages import Command, MissionItem, waypoint
-from companion.skipper.config import SafeEnd, SkipperConfig
+from companion.skipper.config import SkipperConfig
 from companion.skipper.geometry import distance_m, moved
 from companion.skipper.state import Route
 from companion.skipper.voyage import PointEn, Voyage
@@ -98,9 +98,7 @@ def loiter_place(
 def end_item(
     voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float,
 ) -> tuple[MissionItem, PointEn]:
-    """Return the item that ends the mission and where it is."""
-    if config.safe_end is SafeEnd.RETURN:
-        return MissionItem(command=Command.NAV_RETURN_TO_LAUNCH), voyage.home_en_m or end_en
+    """Return the loiter that ends the mission and where it is."""
     place, _ = loiter_place(voyage, config, end_en, twd_from_rad)
     return waypoint(voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM), place
 
@@ -178,7 +176,7 @@ def held_back(items: Sequence[MissionItem], route: Route) -> Route | None:
             return replace(
                 route, items=(*route.items[:n], items[n]), points_en_m=(*route.points_en_m[:n], point),
                 leg_from_en_m=(*route.leg_from_en_m[:n], route.leg_from_en_m[min(n, len(route.items) - 1)]),
-                gate_of=(*route.gate_of[:n], -1), rung=HELD_BACK, risk=None, cost_s=None,
+                gate_of=(*route.gate_of[:n], -1), rung=HELD_BACK, risk=None, cost_s=None, bound_for="",
                 why="an upload was cut short: the mission ends in a loiter on the way",
             )
     return None

@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
+from companion.skipper.causes import PERSON
 from companion.skipper.config import SkipperConfig
 from companion.skipper.doubt import follow
-from companion.skipper.failsafe import has_stopped
+from companion.skipper.failsafe import follow_answer, follow_stops, take_over
 from companion.skipper.gates import Gate, gates_of
-from companion.skipper.helm import hand_back, is_busy, repair
+from companion.skipper.helm import is_busy
 from companion.skipper.intake import (
+    count_time,
     locate,
     notice_truncation,
     remember_fix,
@@ -23,16 +25,17 @@ from companion.skipper.intake import (
     take_outcomes,
 )
 from companion.skipper.ladder import rungs
-from companion.skipper.launch import launch, start
+from companion.skipper.launch import finished, launch, start
 from companion.skipper.lookout import look_out
 from companion.skipper.on_board import mission_is_known
-from companion.skipper.sailing import ARRIVED_BEFORE, sail
+from companion.skipper.sailing import sail
 from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import OperatorWish, Snapshot
-from companion.skipper.state import PATIENT, ByField, Phase, SkipperState
+from companion.skipper.state import PATIENT, ByField, Phase, Signs, SkipperState
+from companion.skipper.stopped import speak_of_stop
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import Voyage
-from companion.skipper.watchdogs import watch
+from companion.skipper.watch import watch
 
 REBOOT_RACE_S = 15.0     # a mode change this long before a reboot shows was the reboot, not the operator
 
@@ -58,7 +61,8 @@ class Skipper:
             return SkipperState(known=known)
         if not self.fits(persisted):
             return SkipperState(why="the saved state is of another voyage", known=(*known, *persisted.names))
-        return SkipperState(adoptable=persisted, known=known)
+        return SkipperState(
+            adoptable=persisted, known=known, under_way_s=persisted.under_way_s, arrived=persisted.arrived)
 
     def fits(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage."""
@@ -66,19 +70,23 @@ class Skipper:
         return persisted.voyage == self.voyage.name and max(gates) <= len(self.gates)
 
     def has_arrived(self, persisted: Persisted) -> bool:
-        """Return whether a saved state of this voyage has all its goals behind it."""
-        return self.fits(persisted) and persisted.gate == len(self.gates)
+        """Return whether a saved state is one of this voyage, sailed to its end."""
+        return self.fits(persisted) and persisted.arrived
 
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
         turn = Turn(self.voyage, self.config, self.gates, state, snapshot)
         take_events(turn)
         take_outcomes(turn)
+        follow_stops(turn)
+        follow_answer(turn)
         follow(turn)
         locate(turn)
         look_out(turn)
+        count_time(turn)
         fresh = watch(turn)
         _decide(turn, fresh)
+        speak_of_stop(turn)
         remember_fix(turn)
         return turn.state, tuple(turn.actions)
 
@@ -99,6 +107,7 @@ class Skipper:
             voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route,
             pending=state.pending_upload.route if state.pending_upload is not None else None,
             unsure=state.unsure_route, own_mode=state.own_mode,
+            under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived,
         )
 
 
@@ -110,21 +119,17 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         age = turn.snapshot.heartbeat_age_s
         heard = "never heard" if age is None else f"silent for {age:.0f} s"
         phase = Phase.WAITING if not state.sailing else turn.state.phase
-        turn.phase(phase, f"the autopilot is {heard}; what it has sails on")
+        turn.phase(phase, f"waiting to hear the autopilot: {heard}; what it has sails on")
         return
     if _operator_has_it(turn):
         return
     notice_truncation(turn)
     if not mission_is_known(turn):
         return
-    if turn.state.phase is Phase.DONE:
-        if not repair(turn):
-            hand_back(turn)
-        return
-    if turn.gate is None and not turn.state.sailing:
-        turn.phase(Phase.DONE, ARRIVED_BEFORE)
-    elif turn.state.wish is OperatorWish.HOLD and not turn.state.sailing:
-        turn.phase(Phase.WAITING, "the operator asked to hold")
+    if turn.state.wish is OperatorWish.HOLD and not turn.state.sailing:
+        turn.phase(Phase.WAITING, "the operator asked to hold: waiting until he lets go on")
+    elif turn.gate is None and not turn.state.sailing:
+        finished(turn)
     elif turn.state.route is None:
         start(turn)
     elif not turn.state.sailing:
@@ -139,11 +144,11 @@ def _rebooted(turn: Turn) -> None:
     keeps = turn.state.phase is Phase.OPERATOR and since is not None and turn.t_s - since > REBOOT_RACE_S
     turn.update(
         checked_mission=False, read_since_s=turn.t_s, own_mode=None, steering_until_s=None, pending_command=None,
-        by_field=ByField(),
+        by_field=ByField(), answering="", stop=None, signs=Signs(),
     )
     if not keeps:
         turn.update(sailing=False, operator_since_s=None)
-        turn.phase(Phase.WAITING, "the autopilot rebooted")
+        turn.phase(Phase.WAITING, "the autopilot rebooted: waiting for its mission to be read")
 
 
 def _operator_has_it(turn: Turn) -> bool:
@@ -165,23 +170,29 @@ def _operator_has_it(turn: Turn) -> bool:
             operator_since_s=turn.t_s, pending_plan=None, own_mode=None, steering_until_s=None, pending_command=None,
             by_field=ByField(),
         )
-        if has_stopped(turn):
-            turn.update(own_mode=Mode.HOLD, operator_since_s=None, after_operator=True, plan_retry=PATIENT)
-            turn.say(Severity.WARNING, "position failsafe",
-                     "stopped by the autopilot's position failsafe: sailing on when the position is back", every_s=0.0)
+        if take_over(turn):
             return False
-        what = "disarmed" if not status.is_armed else f"mode {status.mode.name if status.mode is not None else '?'}"
-        turn.phase(Phase.OPERATOR, f"{what}, not by us: the companion does nothing until AUTO comes back")
+        turn.phase(Phase.OPERATOR, f"{_taken(turn)}, not by us: the companion does nothing until AUTO comes back")
         turn.say(Severity.NOTICE, "operator", turn.state.why, every_s=0.0)
         return True
     if gone or status.mode is not Mode.AUTO:
-        mode = status.mode.name if status.mode is not None else "unknown"
-        turn.phase(Phase.OPERATOR, f"mode {mode}{'' if status.is_armed else ', disarmed'}: waiting for AUTO")
+        if gone and take_over(turn):   # its sign came later than the change of mode
+            return False
+        turn.phase(Phase.OPERATOR, f"{_taken(turn)}: waiting for AUTO")
         return True
     since = state.operator_since_s if state.operator_since_s is not None else turn.t_s
     turn.update(
         operator_since_s=None, checked_mission=False, read_since_s=turn.t_s, after_operator=True, plan_retry=PATIENT,
+        answering="", history=(),
     )
-    turn.phase(Phase.WAITING, "AUTO is back: comparing the mission on board")
+    turn.phase(Phase.WAITING, "AUTO is back: waiting for the mission on board to be compared")
     turn.say(Severity.NOTICE, "operator back", f"AUTO is back after {turn.t_s - since:.0f} s", every_s=0.0)
     return False
+
+
+def _taken(turn: Turn) -> str:
+    """Return in words what she was put into, and by which failsafe if by one."""
+    status, stop = turn.autopilot, turn.state.stop
+    mode = status.mode.name if status is not None and status.mode is not None else "unknown"
+    what = f"mode {mode}" if status is None or status.is_armed else f"mode {mode}, disarmed"
+    return what if stop is None or stop.cause == PERSON else f"{what} by the {stop.cause} failsafe"

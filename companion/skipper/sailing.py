@@ -6,19 +6,22 @@ import math
 
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
-from companion.skipper.actions import CancelPlan, ReplanReason, Severity, SteerHeading
+from companion.skipper.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.answers import hold
 from companion.skipper.beating import IRONS_MEMORY_S
 from companion.skipper.by_field import heading as by_field_heading
-from companion.skipper.by_field import keeps_station, last_resort
+from companion.skipper.by_field import last_resort
+from companion.skipper.causes import STOPPING
 from companion.skipper.config import Guidance
 from companion.skipper.doubt import stands_off
+from companion.skipper.errands import Errand, errand, is_at_rest
 from companion.skipper.failsafe import waits_for
 from companion.skipper.geometry import distance_m
 from companion.skipper.headings import desired_heading_rad
 from companion.skipper.helm import check_current, hand_back, is_busy, make_current, repair, set_mode
 from companion.skipper.manoeuvre import bear_away_rad
 from companion.skipper.planning import request
+from companion.skipper.rest import comes_to_rest, rest
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase
 from companion.skipper.traffic import near
@@ -26,7 +29,6 @@ from companion.skipper.triggers import find_trigger, is_buoy
 from companion.skipper.turn import Turn
 from companion.traffic.plans import MIN_INTERVAL_S
 
-ARRIVED_BEFORE = "all goals were reached before this start; --again sails the mission again"
 STEER_S = 25.0               # bearing away longer than this has failed
 SAILS_MPS = 0.8              # out of irons
 SAILS_TWA_RAD = math.radians(60.0)
@@ -37,13 +39,15 @@ ROUTINE = frozenset({
 
 def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     """Act for one step under way."""
-    if turn.gate is None:
-        if not keeps_station(turn):
-            _finish(turn)
+    bound = errand(turn)
+    if bound is None and (turn.gate is None or turn.state.over):
+        rest(turn)
+        return
+    if bound is not None and comes_to_rest(turn, bound):
         return
     if stands_off(turn):
         return
-    stopped = turn.state.own_mode in {Mode.HOLD, Mode.LOITER}
+    stopped = turn.state.own_mode in STOPPING
     if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:
         _sail_on(turn, fresh)
         return
@@ -68,10 +72,13 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         check_current(turn)
     if turn.is_raised("stuck waypoint") and turn.state.own_index > turn.state.index:
         make_current(turn, turn.state.own_index + 1)
+    if bound is not None and not bound.has_place:
+        _stay(turn, bound)
+        return
     if turn.state.wish is OperatorWish.HOLD:
         if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
             hold(turn, "the operator asked to hold")
-        turn.phase(Phase.HOLDING, "holding: the operator asked for it")
+        turn.phase(Phase.HOLDING, "the operator asked to hold: waiting until he lets her go on")
         return
     if turn.state.pending_upload is None:
         _consider(turn, fresh)
@@ -79,20 +86,38 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
 
 
 def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
-    """Out of a HOLD that nobody asked for, or a LOITER of ours: plan from where the boat is now, then AUTO."""
+    """Out of a stop that nobody asked for, or a LOITER of ours: plan from where the boat is now, then AUTO."""
     why = waits_for(turn)
     if why or repair(turn):
-        turn.phase(Phase.HOLDING, why or "the mission is put right before sailing on")
+        turn.phase(Phase.HOLDING, why or "waiting for the mission to be put right before sailing on")
         return
-    if turn.state.pending_upload is None:
+    bound = errand(turn)
+    if bound is not None and not bound.has_place and not is_at_rest(turn):
+        _stay(turn, bound)
+    elif turn.state.pending_upload is None:
         _consider(turn, fresh)
     if turn.state.pending_plan is not None or turn.state.pending_upload is not None:
-        turn.phase(Phase.HOLDING, "planning from where the boat has drifted to")
-    elif turn.state.after_operator and turn.is_way_shut:
-        turn.phase(Phase.HOLDING, "no plan yet from where the boat has drifted to")
+        turn.phase(Phase.HOLDING, "waiting for the plan from where the boat has drifted to, and for its upload")
+    elif turn.state.after_operator and (turn.is_way_shut or _is_outside(turn)):
+        wait_s = turn.state.plan_retry.not_before_s - turn.t_s
+        again = f"; trying again in {wait_s:.0f} s" if wait_s > 0.0 else ""
+        turn.phase(Phase.HOLDING, f"no plan yet from where the boat has drifted to: waiting for one{again}")
     else:
         hand_back(turn)
-        turn.phase(Phase.HOLDING, "asking for AUTO: sailing on")
+        turn.phase(Phase.HOLDING, "waiting for the autopilot to take AUTO: sailing on")
+
+
+def _is_outside(turn: Turn) -> bool:
+    """Return whether she is where no mission may lead: outside the fence, or over something."""
+    here = turn.snapshot.position_en_m
+    return here is not None and float(turn.voyage.area.clearance_m([here])[0]) <= 0.0
+
+
+def _stay(turn: Turn, bound: Errand) -> None:
+    """Loiter where there is room near by."""
+    if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
+        hold(turn, bound.sentence)
+    turn.phase(Phase.HOLDING, f"{bound.sentence}; waiting for the loiter's upload")
 
 
 def _send_heading(turn: Turn) -> None:
@@ -113,17 +138,6 @@ def _send_heading(turn: Turn) -> None:
         turn.act(SteerHeading(heading_rad=told[0], text=told[1]))
     if status.mission_seq is not None and status.mission_seq < turn.state.index + 1:
         make_current(turn, turn.state.index + 1)
-
-
-def _finish(turn: Turn) -> None:
-    route = turn.state.route
-    if turn.state.pending_plan is not None:
-        turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
-        turn.update(pending_plan=None)
-    end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
-    done = f"all {len(turn.voyage.legs)} goals reached" if turn.state.reached else ARRIVED_BEFORE
-    turn.phase(Phase.DONE, f"{done}{end}")
-    turn.say(Severity.NOTICE, "done", turn.state.why, every_s=0.0)
 
 
 def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
@@ -177,14 +191,14 @@ def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
             own_mode=None if refused else Mode.GUIDED)
         return False
     turn.act(SteerHeading(heading_rad=heading_rad, text="out of irons"))
-    turn.phase(turn.state.phase, f"in irons: bearing away to {math.degrees(heading_rad) % 360.0:.0f}°")
+    turn.phase(turn.state.phase, f"in irons: waiting for her to bear away to {math.degrees(heading_rad) % 360.0:.0f}°")
     return True
 
 
 def _name(turn: Turn) -> None:
     """Name what the boat is doing, with the sentence why."""
     state, route = turn.state, turn.state.route
-    if route is None or state.phase is Phase.DONE:
+    if route is None:
         return
     step = f" ({route.rung})" if route.rung else ""
     if state.pending_plan is not None:
@@ -192,11 +206,13 @@ def _name(turn: Turn) -> None:
         return
     raised = ", ".join(r.name for r in state.raised)
     tail = f"; {raised}" if raised else ""
-    gate = turn.gate
+    gate, bound = turn.gate, errand(turn)
     if not turn.ahead():
         wait = state.plan_retry.not_before_s - turn.t_s
-        again = f"; trying again in {wait:.0f} s" if wait > 0.0 else ""
-        turn.phase(Phase.HOLDING, f"loitering in the mission's safe end{again}{tail}")
+        again = f", trying again in {wait:.0f} s" if wait > 0.0 else ""
+        turn.phase(Phase.HOLDING, f"loitering in the mission's safe end: waiting for a plan{again}{tail}")
+    elif bound is not None:
+        turn.phase(Phase.STANDARD, f"item {state.index + 1} of {len(route.items)} {bound.sentence}{step}{tail}")
     elif gate is not None and is_buoy(gate) and gate.buoy_en_m is not None and turn.boat_en is not None and (
         distance_m(turn.boat_en, gate.buoy_en_m) < 4.0 * distance_m(gate.en_m, gate.buoy_en_m)
     ):

@@ -15,8 +15,9 @@ MAX_ITEMS = 2000       # no autopilot holds more
 _NUMBERS = ("plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s",
             "vessel_risk", "vessels_part")
 _MAYBE = ("risk", "cost_s")
-_WORDS = ("rung", "why")
-_DEFAULTS = {"vessel_risk": 0.0, "vessels_part": 0.0}   # of states that were saved before there were any
+_WORDS = ("rung", "why", "bound_for")
+# of states that were saved before there were any
+_DEFAULTS: dict[str, Any] = {"vessel_risk": 0.0, "vessels_part": 0.0, "bound_for": ""}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +35,8 @@ class Persisted:
     pending: Route | None
     unsure: Route | None = None
     own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
+    under_way_s: float = 0.0           # how long the voyage has been under way, in whole minutes
+    arrived: bool = False              # nothing is left to sail, the way home included
 
     @property
     def lists(self) -> tuple[Route, ...]:
@@ -51,6 +54,7 @@ class Persisted:
             "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
             "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
             "unsure": _route_to_dict(self.unsure), "own_mode": None if self.own_mode is None else self.own_mode.name,
+            "under_way_s": self.under_way_s, "arrived": self.arrived,
         }
 
     @classmethod
@@ -68,6 +72,7 @@ class Persisted:
                 route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
                 unsure=_route_from_dict(data.get("unsure")),
                 own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
+                under_way_s=_number(data.get("under_way_s", 0.0)), arrived=_truth(data.get("arrived", False)),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
@@ -104,7 +109,7 @@ def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
     figures: dict[str, Any] = {
         **{name: _number(values[name]) for name in _NUMBERS},
         **{name: None if data[name] is None else _number(data[name]) for name in _MAYBE},
-        **{name: _words(data[name]) for name in _WORDS},
+        **{name: _words(values[name]) for name in _WORDS},
     }
     return Route(items=items, points_en_m=points, leg_from_en_m=starts, gate_of=gates,
                  plan_id=_whole(data["plan_id"], -1, 10**12), **figures)

@@ -59,6 +59,7 @@ class Route:
     vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
     cost_s: float | None = None
     why: str = ""
+    bound_for: str = ""                # the errand that its end serves; empty: the goals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,6 +115,33 @@ class Retry:
 
 
 PATIENT = Retry()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """She was being sailed and no longer is: since when, what she was put into, and by what (``causes``).
+
+    ``before_s`` is when she was last seen being sailed: the change of mode is between the two.
+    """
+
+    t_s: float
+    before_s: float
+    mode: Mode | None
+    is_armed: bool
+    cause: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signs:
+    """What tells a failsafe from a person: when each cause last showed, and when the sticks or the switch moved."""
+
+    seen_s: tuple[tuple[str, float], ...] = ()
+    standing: tuple[str, ...] = ()        # signs that are up now
+    breaches: int | None = None           # of the fence, as last counted
+    rc_us: tuple[int, ...] = ()           # of the channels that a person moves, as they last rested
+    rc_moved_s: float = float("-inf")
+    helm: tuple[Mode | None, bool] | None = None   # mode and arming as last heard, and when
+    helm_s: float = float("-inf")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,9 +208,18 @@ class SkipperState:
     boot_s: float | None = None
     doubt: Fix | None = None            # the sum of the position's jumps, and the last one's time
     back_s: float = float("-inf")      # when it was back where it was reckoned: this step's jump is none
-    failsafe_s: float = float("-inf")  # when the autopilot last said that it has lost its position
+    signs: Signs = Signs()
+    battery_critical: bool = False     # by the autopilot's own limit (BATT_CRT_VOLT, BATT_CRT_MAH)
+    stop: Stop | None = None           # she is not being sailed though she was
+    answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
+    sent_home: bool = False            # ... which put her into RTL
     after_operator: bool = False       # AUTO has come back: plan from where the boat is now
-    after_restart: bool = False
+    under_way_s: float = 0.0           # how long the voyage has been under way ...
+    last_step_s: float = float("-inf")  # ... counted from step to step
+    home_reached: bool = False         # the way home that follows the last goal is sailed
+    over: str = ""                     # why the voyage is over: what is left is to watch her loiter; empty: it is not
+    arrived: bool = False              # ... with all goals reached, and home where the mission ends there
+    rest_en_m: PointEn | None = None   # where she loiters since
     replace_foreign: bool = False      # permission was given to overwrite what is on board
     repair: bool = False               # the mission on board is a mixture of ours
     rebooted: bool = False             # in this very step

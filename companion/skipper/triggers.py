@@ -9,10 +9,10 @@ from companion.geo.angles import difference_rad
 from companion.skipper.actions import ReplanReason, Severity
 from companion.skipper.beating import is_left_to_beat, may_restart_leg
 from companion.skipper.config import Guidance, ReplanPolicy
+from companion.skipper.errands import HOME, Errand, Kind, errand, homeward
 from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m
 from companion.skipper.judge import predicted_beat
-from companion.skipper.planning import seeks_refuge
 from companion.skipper.route import NO_PLAN, path_length_m
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase, Route
@@ -45,31 +45,51 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
     state, config = turn.state, turn.config
     if turn.boat_en is None or turn.snapshot.wind.forecast is None or turn.is_raised("becalmed"):
         return None
+    bound = errand(turn)
+    if state.over if bound is None else not bound.has_place:
+        return None
     if state.after_operator:
-        return Trigger(reason=ReplanReason.OPERATOR_BACK, text="the operator gave the boat back")
+        text = f"stopped by the {state.answering} failsafe" if state.answering else "the operator gave the boat back"
+        return Trigger(reason=ReplanReason.OPERATOR_BACK, text=text)
     if state.route is not None and state.route.plan_id == NO_PLAN:
         # It need not lead to our goals: nothing is planned but another way, and that as soon as the wind is known.
         if turn.snapshot.wind.record_s < config.wind_settle_s:
             return None
         return Trigger(reason=ReplanReason.MISMATCH, text="the mission on board is of no plan that is known",
                        interval_s=config.min_replan_interval_s)
-    if "battery critical" in fresh and turn.voyage.refuges:
-        return Trigger(reason=ReplanReason.REFUGE, text="the battery is critical", urgent=True)
+    changed = _errand(turn, bound)
+    if changed is not None:
+        return changed
     if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:
         return Trigger(reason=ReplanReason.OPERATOR_WISH, text="the operator asked for it")
-    if state.missed_gate is not None:
+    if state.missed_gate is not None and bound is None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
     if turn.config.guidance is Guidance.FIELD and turn.steers:
-        return _at_end(turn) or _extension(turn)   # the mission on board need not be the way that is sailed
+        return _at_end(turn) or _extension(turn, bound)   # the mission on board need not be the way that is sailed
     trigger = _traffic(turn)
     if trigger is None and not turn.is_raised("wind untrusted"):
         trigger = _no_go(turn)
     trigger = trigger or _position(turn)
-    if seeks_refuge(turn):
-        return trigger
-    return trigger or _extension(turn) or _wind(turn) or _waypoint(turn)
+    return trigger or _extension(turn, bound) or _wind(turn) or _waypoint(turn)
+
+
+REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST}
+
+
+def _errand(turn: Turn, bound: Errand | None) -> Trigger | None:
+    """She is bound for somewhere else than her route leads to: an errand that begins, or one that is over."""
+    route = turn.state.route
+    leads_to = route.bound_for if route is not None else ""
+    is_first = turn.state.plan_retry.failures == 0   # then the wait between two tries counts
+    interval_s = 0.0 if is_first else turn.config.min_replan_interval_s
+    if bound is not None and leads_to != bound.name:
+        return Trigger(reason=REASONS[bound.kind], text=bound.sentence, urgent=is_first, interval_s=interval_s)
+    if bound is None and leads_to and not (leads_to == HOME and homeward(turn) is not None) and not turn.state.over:
+        return Trigger(reason=ReplanReason.NEXT_GOAL, text=f"no longer bound for {leads_to}: sailing on",
+                       urgent=is_first, interval_s=interval_s)
+    return None
 
 
 def _traffic(turn: Turn) -> Trigger | None:
@@ -130,7 +150,9 @@ def _position(turn: Turn) -> Trigger | None:
 
 def _at_end(turn: Turn) -> Trigger | None:
     """The mission on board is at its end and goals remain."""
-    if (turn.is_raised("mission ended") or not turn.ahead()) and not seeks_refuge(turn):
+    if errand(turn) is not None or turn.state.over:
+        return None
+    if turn.is_raised("mission ended") or not turn.ahead():
         reason = ReplanReason.RETRY if turn.state.phase is Phase.HOLDING else ReplanReason.NEXT_GOAL
         return Trigger(reason=reason, text="at the end of the mission with goals left", interval_s=turn.config.settle_s)
     return None
@@ -162,19 +184,24 @@ def _wind(turn: Turn) -> Trigger | None:
     return None
 
 
-def _extension(turn: Turn) -> Trigger | None:
-    """The mission ends soon and goals remain: plan on from its last waypoint."""
+def _extension(turn: Turn, bound: Errand | None) -> Trigger | None:
+    """The mission ends soon and goals remain, or the rest of an errand's way: plan on from its last waypoint."""
     route, boat, last = turn.state.route, turn.boat_en, turn.last_waypoint()
     if route is None or boat is None or last < turn.state.index:
         return None
     ends = route.gate_of[last]
-    if ends >= len(turn.gates) - 1:
+    if bound is not None or route.bound_for == HOME:
+        bound = bound or homeward(turn)
+        if bound is None or distance_m(route.points_en_m[last], bound.en_m) <= bound.radius_m + turn.config.announce_m:
+            return None
+    elif ends >= len(turn.gates) - 1 and homeward(turn) is None:
         return None
     left = path_length_m([boat, *turn.ahead()])
     if left > turn.config.look_ahead_s * max(turn.speed_mps, 1.0) or not may_restart_leg(turn):
         return None
     return Trigger(
-        reason=ReplanReason.NEXT_GOAL, text=f"the mission reaches {left:.0f} m ahead, goals remain", from_index=last,
+        reason=ReplanReason.NEXT_GOAL, text=f"the mission reaches {left:.0f} m ahead, there is more to sail",
+        from_index=last,
         interval_s=turn.config.settle_s)
 
 

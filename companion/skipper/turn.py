@@ -23,6 +23,7 @@ from companion.skipper.actions import (
     UploadFence,
     UploadMission,
 )
+from companion.skipper.causes import STOPPING
 from companion.skipper.config import Guidance, Permissions, SkipperConfig
 from companion.skipper.gates import Gate
 from companion.skipper.problem import wind_mean, wind_now
@@ -137,7 +138,7 @@ class Turn:
         if here is None or leg is None or vehicle is None or not self.state.sailing:
             return False
         goes_to = leg[1]
-        if self.state.own_mode in {Mode.HOLD, Mode.LOITER}:   # stopped, and drifting or turning
+        if self.state.own_mode in STOPPING:   # drifting, turning, or on a way that is not ours
             east, north = vehicle.velocity_en_mps
             goes_to = (here[0] + DRIFT_LOOK_S * east, here[1] + DRIFT_LOOK_S * north)
         area, floor_m = self.voyage.area, min(self.config.margin_floor_m, self.config.margin_m)

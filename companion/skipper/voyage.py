@@ -54,6 +54,15 @@ class Area(Protocol):
         """Return the smallest distance of a polyline (n, 2) to obstacles and limits [m], at most 0 on contact."""
         ...
 
+    @property
+    def unfenced(self) -> Area:
+        """The obstacles alone: for a boat that has got outside the limits."""
+        ...
+
+    def nearest_name(self, point_en: ArrayLike) -> str:
+        """Return what the nearest obstacle or limit to a point is called; empty in open water."""
+        ...
+
     def obstacles_wkt(self, margin_m: float = 0.0) -> list[str]:
         """Return the obstacles grown by the margin as WKT POLYGONs."""
         ...
@@ -64,8 +73,17 @@ class Area(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Refuge:
+    """A safe place to wait in: there within ``radius_m``."""
+
+    name: str
+    en_m: PointEn
+    radius_m: float = 15.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Voyage:
-    """Goals in their order, sailed ``laps`` times, in ``area``; ``refuges`` are safe places to wait in."""
+    """Goals in their order, sailed ``laps`` times, in ``area``."""
 
     name: str
     frame: LocalFrame
@@ -73,7 +91,7 @@ class Voyage:
     area: Area = field(compare=False)
     boat: Boat = field(compare=False)
     laps: int = 1
-    refuges: tuple[PointEn, ...] = ()
+    refuges: tuple[Refuge, ...] = ()
     home_en_m: PointEn | None = None
 
     def __post_init__(self) -> None:

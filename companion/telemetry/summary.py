@@ -10,7 +10,6 @@ from companion.fold import Step
 from companion.geo.angles import wrap_pi
 from companion.messages import Mode
 from companion.skipper.actions import Announce, RequestPlan, UploadMission
-from companion.skipper.state import Phase
 from companion.traffic import TrafficCounts
 
 # Inside the no-go zone for longer than a tack takes [s] is an entry, not a tack.
@@ -23,11 +22,12 @@ DISTANCE_STEP_M = 0.5
 
 @dataclass(slots=True)
 class VoyageFigures:
-    """Accumulates; ``take`` once a step. Time and distance count from the first step under way (armed, AUTO).
+    """Accumulates; ``take`` once a step.
 
-    ``promised_risk`` is the largest probability, at any instant of any plan that was sailed, of being forced into
-    the no-go zone or too near to a vessel (1 - delta_s); ``path_risk`` the largest of a whole plan's, as if nobody
-    replanned on the way. What vessels have of both is beside them.
+    Time and distance count from the first step under way (armed, AUTO) to the end of the voyage, clearance and contacts
+    for as long as the boat is watched. ``promised_risk`` is the largest probability, at any instant of any plan that
+    was sailed, of being forced into the no-go zone or too near to a vessel (1 - delta_s); ``path_risk`` the largest of
+    a whole plan's, as if nobody replanned on the way. What vessels have of both is beside them.
     """
 
     first_s: float | None = None
@@ -77,19 +77,19 @@ class VoyageFigures:
                 self.path_risk = max(self.path_risk or 0.0, route.risk)
         autopilot = snapshot.autopilot
         sails = autopilot is not None and autopilot.is_armed and autopilot.mode in {Mode.AUTO, Mode.GUIDED}
-        if step.state.phase is Phase.DONE:
-            return
-        if sails and self.first_s is None:
+        if sails and self.first_s is None and not step.state.over:
             self.first_s = snapshot.t_s
         if self.first_s is None:
             return
-        self.last_s = snapshot.t_s
-        if snapshot.position_en_m is not None:
-            self._move(snapshot.position_en_m)
         if clearance_m is not None:
             self.min_clearance_m = min(self.min_clearance_m, clearance_m)
             self.contacts += clearance_m <= 0.0 and not self._touching
             self._touching = clearance_m <= 0.0
+        if step.state.over:
+            return   # what follows is a loiter
+        self.last_s = snapshot.t_s
+        if snapshot.position_en_m is not None:
+            self._move(snapshot.position_en_m)
         self._wind(step)
 
     def _move(self, here: tuple[float, float]) -> None:

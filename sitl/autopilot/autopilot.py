@@ -26,8 +26,9 @@ from sitl.autopilot.links import LOOP_S, Link
 from sitl.autopilot.parameter_server import ParameterServer
 from sitl.autopilot.parameters import Parameters
 from sitl.autopilot.ports import Ports
+from sitl.autopilot.radio import Radio
 from sitl.autopilot.storage import Storage
-from sitl.autopilot.telemetry import POSITION_MODES
+from sitl.autopilot.telemetry import BUILDERS, POSITION_MODES
 from sitl.autopilot.traffic import Traffic, Vessel
 from sitl.autopilot.transfer import TransferServer
 from sitl.autopilot.vehicle import Vehicle
@@ -66,6 +67,7 @@ class Autopilot:
             polar=config.polar,
         )
         self.battery_v = config.battery_v
+        self.roll_rad = 0.0
         self._reboots = 0
         self._boot_at_s = -WARM_BOOT_S if config.is_warm else 0.0
         self._debt_s = 0.0
@@ -98,6 +100,7 @@ class Autopilot:
         self.transfers = TransferServer(self.storage)
         self.ftp = FtpServer(self)
         self.traffic = Traffic(self)
+        self.radio = Radio(self)
         self.failsafe = Failsafe(self)
         self.parameter_server = ParameterServer(self)
         self._texts = iter(_BOOT_TEXTS)
@@ -220,6 +223,11 @@ class Autopilot:
         """Send on every port."""
         self.ports.broadcast(message)
 
+    def mode_changed(self) -> None:
+        """Tell a change of mode at once."""
+        self.broadcast(BUILDERS[mav.MAVLINK_MSG_ID_HEARTBEAT](self))
+        self.failsafe.mode_changed()
+
     def parameter_changed(self, name: str) -> None:
         """Act on a parameter that somebody set."""
         if name in {"SIM_WIND_SPD", "SIM_WIND_DIR"}:
@@ -259,7 +267,7 @@ class Autopilot:
     @property
     def ekf_ready(self) -> bool:
         """Whether the position can be used."""
-        return self.boot_s >= EKF_READY_S and bool(self.failsafe.ekf_flags & mav.EKF_POS_HORIZ_ABS)
+        return self.boot_s >= EKF_READY_S and bool(self.failsafe.ekf.flags & mav.EKF_POS_HORIZ_ABS)
 
     @property
     def ekf_flags(self) -> int:
@@ -268,14 +276,14 @@ class Autopilot:
             return 0x400
         if self.boot_s < 6.5:
             return 0
-        return self.failsafe.ekf_flags if self.boot_s >= EKF_READY_S else 0xA7
+        return self.failsafe.ekf.flags if self.boot_s >= EKF_READY_S else 0xA7
 
     @property
     def system_status(self) -> int:
         """HEARTBEAT.system_status."""
         if self.failsafe.is_active:
             return int(mav.MAV_STATE_CRITICAL)
-        return int(mav.MAV_STATE_ACTIVE if self.is_armed else mav.MAV_STATE_STANDBY)
+        return int(mav.MAV_STATE_STANDBY if self.helm.mode is Mode.HOLD else mav.MAV_STATE_ACTIVE)
 
     def arm(self, *, force: bool) -> bool:
         """Arm; False, with the reasons announced behind the acknowledgement, when refused."""
@@ -362,12 +370,16 @@ class Autopilot:
         self.storage.restore(storage, mission, fence)
 
     def set_mode(self, mode: Mode) -> bool:
-        """The operator's switch."""
+        """A person's choice at the ground station."""
         return self.helm.set_mode(int(mode))
 
     def set_battery(self, volts: float) -> None:
         """Change the battery's voltage."""
         self.battery_v = volts
+
+    def set_roll(self, roll_rad: float) -> None:
+        """Knock the boat down, or right it; no other effect than what the autopilot makes of it."""
+        self.roll_rad = roll_rad
 
     @property
     def battery_percent(self) -> int:
@@ -391,7 +403,7 @@ class Autopilot:
     @property
     def gps_lost(self) -> bool:
         """Whether there is no fix."""
-        return self.failsafe.gps_lost
+        return self.failsafe.ekf.gps_lost
 
     def hear_vessel(self, vessel: Vessel) -> None:
         """An AIS receiver at the autopilot heard a vessel."""

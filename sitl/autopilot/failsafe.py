@@ -1,4 +1,8 @@
-"""Failsafes: loss of the ground station, low battery, no position, and what a breached fence does."""
+"""Failsafes: the links to the shore, the battery, a knock-down, the position, and what a breached fence does.
+
+The order of things follows ArduRover's ``failsafe_trigger``: the radio is looked at in every loop, the ground
+station ten times a second, both act through one place, and whoever looks next acts for the other, under its own name.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +13,22 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
 from sitl.autopilot.config import GpsFault
+from sitl.autopilot.ekf import Ekf
 from sitl.autopilot.telemetry import POSITION_MODES
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot
 
 _CHECK_S = 0.1
-# Measured on the real one, with FS_EKF_THRESH 0.8: a jump of 30 m, and a receiver switched off.
-GLITCH_FLAG = 0x8000
-GLITCH_SEEN_S, JUMP_TAKEN_S, JUMP_FAILSAFE_S, JUMP_OVER_S = 1.5, 3.8, 4.8, 11.0
-LOST_FAILSAFE_S, LOST_STOPPED_S = 8.3, 15.3
+RADIO, STATION = 1, 2
+_NAMES = {RADIO: "Radio", STATION: "GCS"}
+_GOES_ON = {RADIO: "FS_THR_ENABLE", STATION: "FS_GCS_ENABLE"}   # 2: the mission goes on in AUTO
+_RTL, _SMART = 1, 3
+_BATTERY = (("low", "BATT_LOW_VOLT", "BATT_FS_LOW_ACT"), ("critical", "BATT_CRT_VOLT", "BATT_FS_CRT_ACT"))
+# Of the battery's actions the first in this list that was taken stays: a later one that stands behind it is not taken.
+_BATTERY_ORDER = (5, 2, 6, 1, 4, 3, 0)
+GIVE_UP_M = 100.0   # AC_FENCE_GIVE_UP_DISTANCE: farther outside than this a breach means HOLD, whatever is set
+RECOVERY_S = 10.0   # AC_FENCE_MANUAL_RECOVERY_TIME_MIN
 
 
 class Failsafe:
@@ -26,40 +36,38 @@ class Failsafe:
 
     def __init__(self, autopilot: Autopilot) -> None:
         self._a = autopilot
+        self.ekf = Ekf(autopilot)
         self._gcs_heard_s: float | None = None
-        self._gcs_acted = False
-        self._battery_since_s: float | None = None
-        self._battery_acted = False
-        self._ekf_acted = False
-        self._fault = GpsFault()
-        self._fault_s = -math.inf
+        self._lost = self._acted = 0           # bits of the links
+        self._lost_since_s = 0.0
+        self._battery_since_s: dict[int, float] = {}
+        self.battery_level = 0                 # that was said: 1 low, 2 critical; it never falls
+        self._battery_action: int | None = None
         self._due_s = 0.0
         self._recovery_until_s = -math.inf
 
     @property
     def is_active(self) -> bool:
-        """Whether a failsafe has acted and not cleared."""
-        return self._gcs_acted or self._ekf_acted
+        """Whether a failsafe has acted and not cleared, as HEARTBEAT tells it: of links and position only."""
+        return bool(self._acted) or self.ekf.has_acted
 
     @property
     def due_s(self) -> float:
         """When to look again."""
         a = self._a
+        get = a.parameters.get
         watching = (
             (self._gcs_heard_s is not None and a.parameters.flag("FS_GCS_ENABLE"))
-            or 0.0 < a.battery_v < a.parameters.get("BATT_LOW_VOLT") or self._ekf_acted
-            or self._fault.is_lost or self._is_resisting
+            or a.radio.is_switched_off or self._lost
+            or 0.0 < a.battery_v < max(get("BATT_LOW_VOLT"), get("BATT_CRT_VOLT"))
+            or a.roll_rad != 0.0 or self.ekf.is_watching
         )
         return self._due_s if watching else math.inf
 
     def heard(self, sender: tuple[int, int]) -> None:
         """A heartbeat; that of SYSID_MYGCS counts, from any component."""
-        if sender[0] != self._a.parameters.flag("SYSID_MYGCS"):
-            return
-        self._gcs_heard_s = self._a.t_s
-        if self._gcs_acted:
-            self._gcs_acted = False
-            self._a.announce(mav.MAV_SEVERITY_INFO, "GCS Failsafe Cleared")
+        if sender[0] == self._a.parameters.flag("SYSID_MYGCS"):
+            self._gcs_heard_s = self._a.t_s
 
     def update(self) -> None:
         """Look at what may be lost."""
@@ -67,98 +75,95 @@ class Failsafe:
         if a.t_s < self._due_s - 1e-9:
             return
         self._due_s = a.t_s + _CHECK_S
-        self._watch_gcs()
+        self._watch_links()
         self._watch_battery()
-        self._watch_ekf()
-
-    # ------------------------------------------------------------------------------------------ position
-    @property
-    def gps_lost(self) -> bool:
-        """Whether there is no fix."""
-        return self._fault.is_lost
-
-    @property
-    def _is_resisting(self) -> bool:
-        return self._fault.is_resisted and self._a.t_s - self._fault_s < JUMP_OVER_S + 1.0
+        self._watch_roll()
+        self.ekf.update()
 
     def set_gps(self, fault: GpsFault) -> None:
         """Break or mend the position."""
-        self._fault, self._fault_s = fault, self._a.t_s
         self._due_s = self._a.t_s
-        if not fault.is_resisted:
-            self._take_position()
+        self.ekf.set_gps(fault)
 
-    def _take_position(self) -> None:
-        self._a.vehicle.set_position_error(self._fault.east_m, self._fault.north_m)
-
-    @property
-    def ekf_flags(self) -> int:
-        """EKF_STATUS_REPORT.flags of a boat whose EKF was ready."""
-        age_s = self._a.t_s - self._fault_s
-        if self._fault.is_lost:
-            if age_s >= LOST_STOPPED_S:
-                return 0xA7
-            return 0x8027 if age_s >= LOST_FAILSAFE_S else 0x833F
-        return 0x33F | (GLITCH_FLAG if self._is_resisting and age_s >= GLITCH_SEEN_S else 0)
-
-    def _watch_ekf(self) -> None:
-        a, age_s = self._a, self._a.t_s - self._fault_s
-        bad = self._fault.is_lost and age_s >= LOST_FAILSAFE_S - 1e-9
-        if self._fault.is_resisted:
-            if age_s >= JUMP_TAKEN_S - 1e-9:
-                self._take_position()
-            bad = bad or JUMP_FAILSAFE_S - 1e-9 <= age_s < JUMP_OVER_S
-        if bad and not self._ekf_acted:
-            self._ekf_acted = True
-            a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF variance")
-            a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF failsafe")
-            if a.is_armed and a.parameters.flag("FS_EKF_ACTION") and a.helm.mode in POSITION_MODES:
-                a.helm.set_mode(Mode.HOLD)
-        elif self._ekf_acted and not bad:
-            self._ekf_acted = False
-            a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF failsafe cleared")
-
-    def _watch_gcs(self) -> None:
+    # ----------------------------------------------------------------------------------- links to the shore
+    def _watch_links(self) -> None:
         a = self._a
         get = a.parameters.flag
-        if self._gcs_heard_s is None or not get("FS_GCS_ENABLE") or self._gcs_acted:
-            return
-        wait_s = a.parameters.get("FS_GCS_TIMEOUT") + a.parameters.get("FS_TIMEOUT")
-        if a.t_s - self._gcs_heard_s < wait_s - 1e-9:
-            return
-        self._gcs_acted = True
-        # measured: with FS_THR_ENABLE the radio check acts, under its own name and by its own rule
-        by_radio = get("FS_THR_ENABLE")
-        a.announce(mav.MAV_SEVERITY_WARNING, "Radio Failsafe" if by_radio else "GCS Failsafe")
-        goes_on = get("FS_THR_ENABLE") == 2 if by_radio else get("FS_GCS_ENABLE") == 2
-        if a.helm.mode is Mode.AUTO and goes_on:
-            a.announce(mav.MAV_SEVERITY_WARNING, "Failsafe - Continuing Auto Mode")
-        elif a.is_armed:
-            self._act(get("FS_ACTION"))
+        if get("FS_THR_ENABLE"):
+            self._trigger(RADIO, is_lost=a.radio.has_failed)
+        if self._gcs_heard_s is not None and get("FS_GCS_ENABLE"):
+            self._trigger(STATION, is_lost=a.t_s - self._gcs_heard_s >= a.parameters.get("FS_GCS_TIMEOUT") - 1e-9)
 
+    def _trigger(self, link: int, *, is_lost: bool) -> None:
+        a, before = self._a, self._lost
+        self._lost = before | link if is_lost else before & ~link
+        if not before and self._lost:
+            self._lost_since_s = a.t_s
+        if self._acted and not self._lost:
+            a.announce(mav.MAV_SEVERITY_INFO, f"{_NAMES[link]} Failsafe Cleared")
+        self._acted &= self._lost
+        waited = a.t_s - self._lost_since_s >= a.parameters.get("FS_TIMEOUT") - 1e-9
+        if self._acted or not self._lost or not waited or a.helm.mode in {Mode.RTL, Mode.HOLD}:
+            return
+        self._acted = self._lost
+        a.announce(mav.MAV_SEVERITY_WARNING, f"{_NAMES[link]} Failsafe")
+        if a.helm.mode is Mode.AUTO and a.parameters.flag(_GOES_ON[link]) == 2:
+            a.announce(mav.MAV_SEVERITY_WARNING, "Failsafe - Continuing Auto Mode")
+        else:
+            self._act(a.parameters.flag("FS_ACTION"))
+
+    # --------------------------------------------------------------------------------------------- battery
     def _watch_battery(self) -> None:
         a = self._a
-        if not 0.0 < a.battery_v < a.parameters.get("BATT_LOW_VOLT"):
-            self._battery_since_s = None
+        if not a.is_armed:
             return
-        if self._battery_since_s is None:
-            self._battery_since_s = a.t_s
-        if not self._battery_acted and a.t_s - self._battery_since_s >= a.parameters.get("BATT_LOW_TIMER"):
-            self._battery_acted = True
-            a.announce(mav.MAV_SEVERITY_WARNING, f"Battery 1 is low {a.battery_v:.2f}V used 0 mAh")
-            if a.is_armed:
-                self._act(a.parameters.flag("BATT_FS_LOW_ACT"))
+        level = 0
+        for n, (_, limit, _) in enumerate(_BATTERY, start=1):
+            if not 0.0 < a.battery_v < a.parameters.get(limit):
+                self._battery_since_s.pop(n, None)
+            elif a.t_s - self._battery_since_s.setdefault(n, a.t_s) >= a.parameters.get("BATT_LOW_TIMER") - 1e-9:
+                level = n
+        if level > self.battery_level:
+            self.battery_level = level
+            kind, _, action = _BATTERY[level - 1]
+            a.announce(mav.MAV_SEVERITY_WARNING, f"Battery 1 is {kind} {a.battery_v:.2f}V used 0 mAh")
+            self._act_for_battery(a.parameters.flag(action))
+
+    def _act_for_battery(self, action: int) -> None:
+        before = self._battery_action
+        if before is not None and _BATTERY_ORDER.index(action) > _BATTERY_ORDER.index(before):
+            return
+        self._battery_action = action
+        self._act(action)
+
+    # ------------------------------------------------------------------------------------------ knock-down
+    def _watch_roll(self) -> None:
+        a = self._a
+        check, angle_deg = a.parameters.flag("FS_CRASH_CHECK"), a.parameters.flag("CRASH_ANGLE")
+        if not check or not angle_deg or not a.is_armed or a.helm.mode not in POSITION_MODES:
+            return
+        if abs(a.roll_rad) > math.radians(angle_deg):
+            a.announce(mav.MAV_SEVERITY_EMERGENCY, "Crash: Going to HOLD")
+            a.helm.set_mode(Mode.HOLD)
+            if check == 2:
+                self._disarm()
 
     def _act(self, action: int) -> None:
         helm = self._a.helm
-        if action in {1, 3, 4} and helm.set_mode(Mode.RTL):
+        if action in {_RTL, _SMART, 4} and helm.set_mode(Mode.SMART_RTL if action == 4 else Mode.RTL):
             return
-        if action in {1, 2, 3, 4}:
+        if action == 6 and helm.set_mode(Mode.LOITER):
+            return
+        if action in {1, 2, 3, 4, 6}:
             helm.set_mode(Mode.HOLD)
         elif action == 5:
-            self._a.disarm()
-            self._a.ports.after_ack()
+            self._disarm()
 
+    def _disarm(self) -> None:
+        self._a.disarm()
+        self._a.ports.after_ack()
+
+    # ----------------------------------------------------------------------------------------------- fence
     def watch_fence(self) -> None:
         """Compare the position with the fence: avoidance near it, action when a breach begins."""
         a = self._a
@@ -174,17 +179,19 @@ class Failsafe:
         avoiding = a.parameters.flag("AVOID_ENABLE") & 1 and not fence.is_breached and a.is_armed
         fence.is_limiting = bool(avoiding) and clearance <= reach
         a.vehicle.avoid(near=fence.is_limiting, ease=fence.is_limiting and clearance <= margin)
-        if begins and a.is_armed:
-            self._fence_breached()
+        if begins:
+            a.broadcast(fence.status_message())
+            if a.is_armed and a.t_s >= self._recovery_until_s:
+                self._fence_breached(-clearance)
 
-    def _fence_breached(self) -> None:
-        """A breach began: change mode by FENCE_ACTION, and leave ten seconds to whoever steers then."""
-        a = self._a
-        if a.t_s < self._recovery_until_s:
-            return
-        action = a.parameters.flag("FENCE_ACTION")
-        if action == 0:
-            return
-        self._recovery_until_s = a.t_s + 10.0
-        self._act({1: 1, 2: 2, 3: 3, 4: 4}.get(action, 2))
-        a.announce(mav.MAV_SEVERITY_INFO, "Manual recovery started")
+    def _fence_breached(self, outside_m: float) -> None:
+        """A breach began: change mode by FENCE_ACTION."""
+        action = self._a.parameters.flag("FENCE_ACTION")
+        if action != 0:
+            self._act(action if outside_m <= GIVE_UP_M else 2)
+
+    def mode_changed(self) -> None:
+        """Leave ten seconds to whoever steers now, if the mode was changed outside the fence, by anybody."""
+        if self._a.fence.is_breached:
+            self._recovery_until_s = self._a.t_s + RECOVERY_S
+            self._a.announce(mav.MAV_SEVERITY_INFO, "Manual recovery started")

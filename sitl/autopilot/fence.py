@@ -15,6 +15,7 @@ from sitl.autopilot.items import Item
 
 CHECK_S = 0.1
 TYPE_CIRCLE, TYPE_POLYGON = 2, 4
+BACKUP_M = 20.0   # so much farther outside the home circle there is another one: a new breach and a new action
 _POLYGONS = {mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: 1.0, mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: -1.0}
 _CIRCLES = {mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: 1.0, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: -1.0}
 
@@ -93,6 +94,8 @@ class Fence:
         self.breach_ms = 0
         self.is_limiting = False
         self._types = TYPE_POLYGON
+        self._circle_clear_m = math.inf
+        self._circle_m = math.inf         # how far outside the home circle the next breach of it begins
 
     @property
     def is_present(self) -> bool:
@@ -115,22 +118,29 @@ class Fence:
         Zones are intersected: outside any inclusion zone is forbidden, also when there are several.
         """
         self._types = types
-        found = math.inf
+        found = self._circle_clear_m = math.inf
         if types & TYPE_POLYGON:
             for zone in self._zones:
                 found = min(found, zone.clearance_m(*position))
         if types & TYPE_CIRCLE and home is not None:
-            found = min(found, radius_m - math.dist(position, home))
+            self._circle_clear_m = radius_m - math.dist(position, home)
+            found = min(found, self._circle_clear_m)
         return found
 
     def judge(self, clearance_m: float, boot_ms: int) -> bool:
         """Note the state; True when a breach begins."""
         was = self.is_breached
         self.is_breached = clearance_m < 0.0
-        if self.is_breached and not was:
+        farther = -self._circle_clear_m >= self._circle_m
+        if self._circle_clear_m >= 0.0:
+            self._circle_m = math.inf
+        elif farther or self._circle_m == math.inf:
+            self._circle_m = BACKUP_M - self._circle_clear_m
+        if self.is_breached and (farther or not was):
             self.breach_count += 1
             self.breach_type = mav.FENCE_BREACH_BOUNDARY
-            self.breach_ms = boot_ms
+            if not was:
+                self.breach_ms = boot_ms
             return True
         if not self.is_breached:
             self.breach_type = 0

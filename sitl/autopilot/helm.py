@@ -77,6 +77,7 @@ class Helm:
         a.vehicle.clear_tack()
         self.mode = mode
         self._has_limits = self._has_limits or mode in NAVIGATING
+        a.mode_changed()
         self._is_waiting = False
         self._corner_passed = False
         if mode is Mode.AUTO:

@@ -49,6 +49,10 @@ def _sys_status(a: Autopilot) -> Any:
     healthy = (_SENSORS_HEALTHY & ~_FENCE_BIT) | (0 if fence.is_breached else _FENCE_BIT)
     if a.gps_lost:
         healthy &= ~mav.MAV_SYS_STATUS_SENSOR_GPS
+    if a.failsafe.battery_level:
+        healthy &= ~mav.MAV_SYS_STATUS_SENSOR_BATTERY
+    if a.radio.has_failed:
+        healthy &= ~mav.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
     percent = a.battery_percent
     return mav.MAVLink_sys_status_message(
         present, enabled, healthy, 0, round(a.battery_v * 1000), 0, percent, 0, 0,
@@ -58,7 +62,7 @@ def _sys_status(a: Autopilot) -> Any:
 
 def _attitude(a: Autopilot) -> Any:
     s = a.vehicle.state
-    return mav.MAVLink_attitude_message(a.boot_ms, 0.0, 0.0, float(s[k.S_YAW]), 0.0, 0.0, float(s[k.S_RATE]))
+    return mav.MAVLink_attitude_message(a.boot_ms, a.roll_rad, 0.0, float(s[k.S_YAW]), 0.0, 0.0, float(s[k.S_RATE]))
 
 
 def _global_position(a: Autopilot) -> Any:
@@ -249,9 +253,6 @@ _FIXED: dict[int, Callable[[Autopilot], Any]] = {
     mav.MAVLINK_MSG_ID_SCALED_PRESSURE2: lambda a: mav.MAVLink_scaled_pressure2_message(
         a.boot_ms, 1013.25, 0.0, 3269
     ),
-    mav.MAVLINK_MSG_ID_RC_CHANNELS: lambda a: mav.MAVLink_rc_channels_message(
-        a.boot_ms, 8, 1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, *([0] * 10), 255
-    ),
     mav.MAVLINK_MSG_ID_RC_CHANNELS_SCALED: lambda a: mav.MAVLink_rc_channels_scaled_message(
         a.boot_ms, 0, *([0] * 8), 255
     ),
@@ -262,6 +263,12 @@ _FIXED: dict[int, Callable[[Autopilot], Any]] = {
     ) if a.boot_s > 4.2 else None,
     mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda _: _EXTENDED_STATE,
 }
+
+def _rc_channels(a: Autopilot) -> Any:
+    channels = a.radio.channels_us
+    return mav.MAVLink_rc_channels_message(
+        a.boot_ms, len(channels), *channels, *([0] * (18 - len(channels))), 255)
+
 
 BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
     **_FIXED,
@@ -284,6 +291,7 @@ BUILDERS: dict[int, Callable[[Autopilot], Any]] = {
     mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: _origin,
     mav.MAVLINK_MSG_ID_BATTERY_STATUS: _battery,
     mav.MAVLINK_MSG_ID_FENCE_STATUS: _fence_status,
+    mav.MAVLINK_MSG_ID_RC_CHANNELS: _rc_channels,
     mav.MAVLINK_MSG_ID_SIMSTATE: _simstate,
     mav.MAVLINK_MSG_ID_HIGH_LATENCY2: _high_latency2,
     mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,

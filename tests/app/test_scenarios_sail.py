@@ -3,18 +3,24 @@
 The short list runs by default; all of them, and more seeds, with ``-m campaign``.
 """
 
+import json
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from companion.clock import run_virtual
+from companion.replay import replay
 from sitl.runner import run_embedded
 from sitl.scenario import load_scenario
 
 FOLDER = Path("sitl/scenarios")
 # One of each kind: a calm plan, weather, sensor, link, autopilot, operator, process.
 QUICK = ("upwind", "shift", "frozen-vane", "gps-jump", "upload-cut", "reboot", "operator", "foreign-mission", "killed",
-         "narrow-channel", "two-channels", "packet-loss")
+         "narrow-channel", "two-channels", "packet-loss", "home", "fence-hold", "station-lost", "mode-switch",
+         "knocked-down", "out-of-time", "at-rest", "watched")
+# What is folded again from the record: the new inputs of a failsafe's answer and of a watched rest among them.
+REPLAYED = {"station-lost", "mode-switch", "at-rest", "watched"}
 ALL = sorted(p.stem for p in FOLDER.glob("*.toml") if p.stem != "endurance")
 
 
@@ -27,6 +33,8 @@ def sail(name, seed, out):
 @pytest.mark.parametrize("name", QUICK)
 def test_scenario(name, tmp_path):
     sail(name, 0, tmp_path)
+    if name in REPLAYED:
+        assert not replay(tmp_path).differences
 
 
 @pytest.mark.campaign
@@ -46,3 +54,21 @@ def test_a_foreign_mission_is_said_once_in_a_while_not_each_second(tmp_path):
     text = (tmp_path / "decisions.jsonl").read_text()
     assert text.count('"code":"foreign mission"') <= 30
     assert text.count('"code":"operator back"') == 0
+
+
+def test_after_arrival_the_companion_stays_until_it_is_told_to_end(tmp_path):
+    sail("out-of-time", 0, tmp_path / "left")
+    assert summary(tmp_path / "left")["end_reason"] == "over"
+    path = FOLDER / "upwind.toml"
+    scenario = msgspec.structs.replace(load_scenario(path), exit_on_arrival=False, limit_s=600.0)
+    verdict = run_virtual(run_embedded(scenario, path, 0, tmp_path / "stayed"))
+    assert verdict.passed, verdict.checks
+    stayed = summary(tmp_path / "stayed")
+    assert (stayed["end_reason"], stayed["end_phase"], stayed["arrived"]) == ("out of time", "done", True)
+    assert stayed["time_s"] < 450.0     # the voyage's, not the watch's
+    tracked = (tmp_path / "stayed" / "track.csv").read_text().count("\n")
+    assert tracked > 590                # a row a second, to the end of the watch
+
+
+def summary(folder):
+    return json.loads((folder / "summary.json").read_text())

@@ -47,6 +47,8 @@ def test_parameters_by_their_ardupilot_names():
     assert math.degrees(limits.planned_no_go_rad()) == pytest.approx(37.0)
     assert limits.fence_action == 2
     assert AutopilotLimits.from_params({"FENCE_ACTION": 2.0}).fence_action is None
+    assert limits.rc_channels == (1, 3, 8)
+    assert AutopilotLimits.from_params({"RCMAP_ROLL": 2.0, "MODE_CH": 5.0}).rc_channels == (2, 3, 5)
 
 
 @given(st.floats(0.0, 10.0), st.floats(0.0, 100.0), st.floats(0.0, 40.0), st.floats(0.0, math.pi))

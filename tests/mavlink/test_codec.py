@@ -276,3 +276,34 @@ def test_a_text_with_a_lost_chunk_comes_out_with_a_gap():
     assembler.take(0.0, heard(chunks[0]))
     assert assembler.take(0.1, heard(chunks[2])) == []
     assert [v.text for v in assembler.expire(3.0)] == ["a" * 50 + "[...]" + "c" * 20]
+
+
+def last(assembler, message):
+    values = assembler.take(0.0, heard(message))
+    return values[-1] if values else None
+
+
+def test_what_tells_a_failsafe_from_a_person_reaches_the_status():
+    assembler = VehicleAssembler()
+    last(assembler, wire.MAVLink_heartbeat_message(11, 3, 209, 10, 4, 3))
+    every = 0x1331DC2F
+    battery, receiver = wire.MAV_SYS_STATUS_SENSOR_BATTERY, wire.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+
+    def told(enabled, health):
+        return last(assembler, wire.MAVLink_sys_status_message(
+            every, enabled, health, 0, 12600, 0, 90, 0, 0, 0, 0, 0, 0))
+
+    well = told(every, every)
+    assert (well.battery_failed, well.receiver_lost) == (False, False)
+    ill = told(every, every & ~battery & ~receiver)
+    assert (ill.battery_failed, ill.receiver_lost) == (True, True)
+    off = told(every & ~battery & ~receiver, 0)
+    assert (off.battery_failed, off.receiver_lost) == (None, None)
+    sticks = last(assembler, wire.MAVLink_rc_channels_message(
+        1000, 4, 1500, 1501, 0xFFFF, 1800, *([0] * 14), 255))
+    assert sticks.rc_us == (1500, 1501, 0, 1800)
+    home = last(assembler, wire.MAVLink_home_position_message(
+        508170000, -13100000, 0, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0))
+    assert home.home == GeoPoint(lat_deg=50.817, lon_deg=-1.31)
+    breach = last(assembler, wire.MAVLink_fence_status_message(1, 3, 3, 0, 1))
+    assert (breach.fence_breached, breach.fence_breaches) == (True, 3)

@@ -73,9 +73,10 @@ def test_an_old_tail_behind_the_end_is_dead():
     assert not ends_safely(tail)
 
 
-def test_the_way_home_can_be_the_end():
-    made = route([(0, 100)], config=replace(CONFIG, safe_end=SafeEnd.RETURN))
-    assert made.items[-1].command == Command.NAV_RETURN_TO_LAUNCH
+@pytest.mark.parametrize("end", list(SafeEnd))
+def test_every_mission_ends_in_a_loiter_and_none_in_rtl(end):
+    made = route([(0, 100)], config=replace(CONFIG, safe_end=end))
+    assert made.items[-1].command == Command.NAV_LOITER_UNLIM
     assert ends_safely(made.items)
 
 

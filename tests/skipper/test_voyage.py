@@ -571,11 +571,14 @@ def test_a_position_failsafe_is_no_operator_and_the_boat_sails_on(text):
     assert world.clearance() > 0.0
 
 
-@pytest.mark.parametrize("texts", [(), ("Radio Failsafe",), ("EKF failsafe cleared",)])
-def test_hold_without_a_position_failsafe_is_the_operators(texts):
+@pytest.mark.parametrize("texts", [(), ("PreArm: Battery 1 low voltage failsafe",), ("EKF failsafe cleared",)])
+def test_hold_without_a_sign_of_a_failsafe_is_the_operators(texts):
     world = make()
     world.run(60)
-    stopped_by_failsafe(world, *texts)
+    world.set_mode(Mode.HOLD)
+    world.drift_mps = 1.0
+    world.events += [StatusText(t_s=world.t, severity=2, text=text) for text in texts]
+    world.run(12)
     assert world.state.phase is Phase.OPERATOR
     world.run(60)
     assert world.mode is Mode.HOLD

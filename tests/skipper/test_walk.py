@@ -170,6 +170,8 @@ EVENTS = {
     "battery low": status(battery_remaining=0.15),
     "battery critical": status(battery_remaining=0.02),
     "planner dead": lambda s: replace(s, planner_alive=False),
+    "out of time": lambda s: replace(s, t_s=s.t_s + 7300.0),
+    "dragged off": lambda s: replace(s, position_en_m=(s.position_en_m[0] + 60.0, s.position_en_m[1])),
     # modes and arming
     **{f"mode {mode.name}": status(mode=mode) for mode in Mode},
     "mode unknown": status(mode=None),
@@ -269,7 +271,7 @@ def test_a_plan_that_comes_with_the_takeover_is_not_uploaded():
 # ------------------------------------------------------------------------------------------ watchdogs
 # The state each is looked for in, and whether its own event alone raises it within its time.
 # Those that need a track behind them are looked at one by one below and in the voyages.
-TRACKS = {"no progress", "stuck waypoint", "position jump", "reboot"}
+TRACKS = {"no progress", "stuck waypoint", "position jump", "reboot", "out of time", "dragged off"}
 
 
 @pytest.mark.parametrize("dog", [d for d in TABLE if d.name not in TRACKS], ids=lambda dog: dog.name)

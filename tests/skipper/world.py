@@ -46,7 +46,7 @@ from companion.skipper.snapshot import (
     WindView,
 )
 from companion.skipper.state import SkipperState
-from companion.skipper.voyage import Goal, Voyage
+from companion.skipper.voyage import Goal, Refuge, Voyage
 
 FRAME = LocalFrame(GeoPoint(lat_deg=51.1, lon_deg=-1.3))
 HORIZONS = (0.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
@@ -60,7 +60,8 @@ def area(*polygons, limits=None) -> LocalArea:
 def voyage(*goals: Goal, obstacles=(), limits=None, laps=1, home=(0.0, 0.0), refuges=()) -> Voyage:
     boat = Boat(polar=ardurover_sitl(), turn_rate_radps=0.8)
     return Voyage(name="test", frame=FRAME, goals=goals or (Goal(en_m=(0.0, 300.0)),), laps=laps,
-                  area=area(*obstacles, limits=limits), boat=boat, home_en_m=home, refuges=refuges)
+                  area=area(*obstacles, limits=limits), boat=boat, home_en_m=home,
+                  refuges=tuple(Refuge(name=f"{n + 1}", en_m=p) for n, p in enumerate(refuges)))
 
 
 def forecast(t_s: float, twd_rad: float, tws_mps: float = 5.0, sigma_rad: float = 0.05) -> WindForecast:
@@ -103,6 +104,7 @@ class World:
     position_offset: tuple[float, float] = (0.0, 0.0)
     system_status: int = 4
     ekf_ok: bool = True
+    shown: dict = field(default_factory=dict)   # what else the status shows
     drift_mps: float = 0.0      # along the heading, while nobody sails
     uploads_fail: Callable[[int], UploadResult] = lambda n: UploadResult.OK
     planner: Callable | None = None
@@ -270,7 +272,7 @@ class World:
         status = AutopilotStatus(
             t_s=self.t, boot_s=self.boot_s + self.t, mode=self.mode, is_armed=self.armed, ekf_ok=self.ekf_ok,
             system_status=self.system_status,
-            mission_seq=self.seq, mission_total=len(self.mission), mission_state=self.mission_state)
+            mission_seq=self.seq, mission_total=len(self.mission), mission_state=self.mission_state, **self.shown)
         out = Snapshot(
             t_s=self.t, vehicle=vehicle, vehicle_age_s=0.1, position_en_m=here, autopilot=status, autopilot_age_s=0.2,
             heartbeat_age_s=self.heartbeat_age, permissions=self.permissions,
@@ -329,6 +331,8 @@ def check_invariants(before, after, snapshot, actions) -> None:
         if after.phase is Phase.OPERATOR:
             assert isinstance(action, (act.Announce, act.CancelPlan, act.ReadMission)), action
     assert after.why
+    if after.phase in {Phase.WAITING, Phase.HOLDING}:
+        assert "wait" in after.why, f"{after.phase.value}, and not said for what: {after.why}"
     ids = [getattr(a, n) for a in actions for n in ("request_id", "upload_id", "read_id", "command_id")
            if hasattr(a, n) and not isinstance(a, act.CancelPlan)]
     assert len(ids) == len(set(ids))

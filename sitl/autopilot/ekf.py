@@ -1,0 +1,81 @@
+"""The position filter as far as it fails: jumps, lost fixes, and the failsafe that follows."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from companion.messages import Mode
+from sitl.autopilot.config import GpsFault
+from sitl.autopilot.telemetry import POSITION_MODES
+
+if TYPE_CHECKING:
+    from sitl.autopilot.autopilot import Autopilot
+
+# Measured on the real one, with FS_EKF_THRESH 0.8: a jump of 30 m, and a receiver switched off.
+GLITCH_FLAG = 0x8000
+GLITCH_SEEN_S, JUMP_TAKEN_S, JUMP_FAILSAFE_S, JUMP_OVER_S = 1.5, 3.8, 4.8, 11.0
+LOST_FAILSAFE_S, LOST_STOPPED_S = 8.3, 15.3
+
+
+class Ekf:
+    """Believes a position, or resists it for a while; its failsafe acts once and never restores a mode."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._a = autopilot
+        self._fault = GpsFault()
+        self._fault_s = -math.inf
+        self.has_acted = False
+
+    @property
+    def gps_lost(self) -> bool:
+        """Whether there is no fix."""
+        return self._fault.is_lost
+
+    @property
+    def is_watching(self) -> bool:
+        """Whether something is due soon."""
+        return self.has_acted or self._fault.is_lost or self._is_resisting
+
+    @property
+    def _is_resisting(self) -> bool:
+        return self._fault.is_resisted and self._a.t_s - self._fault_s < JUMP_OVER_S + 1.0
+
+    def set_gps(self, fault: GpsFault) -> None:
+        """Break or mend the position."""
+        self._fault, self._fault_s = fault, self._a.t_s
+        if not fault.is_resisted:
+            self._take_position()
+
+    def _take_position(self) -> None:
+        self._a.vehicle.set_position_error(self._fault.east_m, self._fault.north_m)
+
+    @property
+    def flags(self) -> int:
+        """EKF_STATUS_REPORT.flags of a boat whose EKF was ready."""
+        age_s = self._a.t_s - self._fault_s
+        if self._fault.is_lost:
+            if age_s >= LOST_STOPPED_S:
+                return 0xA7
+            return 0x8027 if age_s >= LOST_FAILSAFE_S else 0x833F
+        return 0x33F | (GLITCH_FLAG if self._is_resisting and age_s >= GLITCH_SEEN_S else 0)
+
+    def update(self) -> None:
+        """Look at the filter."""
+        a, age_s = self._a, self._a.t_s - self._fault_s
+        bad = self._fault.is_lost and age_s >= LOST_FAILSAFE_S - 1e-9
+        if self._fault.is_resisted:
+            if age_s >= JUMP_TAKEN_S - 1e-9:
+                self._take_position()
+            bad = bad or JUMP_FAILSAFE_S - 1e-9 <= age_s < JUMP_OVER_S
+        if bad and not self.has_acted:
+            self.has_acted = True
+            a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF variance")
+            a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF failsafe")
+            if a.is_armed and a.parameters.flag("FS_EKF_ACTION") and a.helm.mode in POSITION_MODES:
+                a.helm.set_mode(Mode.HOLD)
+        elif self.has_acted and not bad:
+            self.has_acted = False
+            a.announce(mav.MAV_SEVERITY_CRITICAL, "EKF failsafe cleared")

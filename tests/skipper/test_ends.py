@@ -1,0 +1,262 @@
+"""Where it ends: home, refuges, the voyage's time, the loiter that is watched, a voyage finished before."""
+
+import math
+
+import pytest
+from shapely.geometry import box
+
+from companion.messages import GeoPoint, Mode
+from companion.skipper import actions as act
+from companion.skipper.config import SafeEnd
+from companion.skipper.geometry import distance_m
+from companion.skipper.state import Persisted, Phase
+from companion.skipper.voyage import Goal
+from tests.skipper.test_failsafe import text
+from tests.skipper.test_voyage import is_done, make, said
+from tests.skipper.world import FRAME, restarted
+
+ISLAND = box(-60, 80, 60, 120)
+BEHIND = Goal(en_m=(0.0, 220.0), radius_m=8.0)
+ASIDE = {"wind": lambda t: (1.5, 5.0)}
+
+
+def homeward(home=(0.0, 0.0), goals=(BEHIND,), obstacles=(ISLAND,), **more):
+    world = make(*goals, obstacles=obstacles, config={"safe_end": SafeEnd.RETURN, **more.pop("config", {})},
+                 **{**ASIDE, **more})
+    world.shown["home"] = FRAME.geo_from_en(*home) if isinstance(home, tuple) else home
+    return world
+
+
+def charged(world, share):
+    world.shown["battery_remaining"] = share
+
+
+# ------------------------------------------------------------------------------------------------------- home
+def test_the_way_home_is_planned_round_the_island_and_ends_in_a_loiter():
+    world = homeward()
+    assert world.run(900, is_done)
+    assert world.state.arrived
+    assert "; home" in world.state.why
+    assert distance_m(world.position, (0.0, 0.0)) < 30.0
+    assert world.clearance() > 5.0
+    reasons = [a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)]
+    assert act.ReplanReason.NEXT_GOAL in reasons          # on from the last goal, before she is there
+    world.run(60)
+    assert world.state.phase is Phase.DONE
+
+
+@pytest.mark.parametrize(("home", "words"), [
+    ((0.0, 100.0), "not in free water"), ((0.0, 75.0), "5 m from o0"),
+    (GeoPoint(lat_deg=40.0, lon_deg=-1.3), "km from"), (None, "has not told where home is"),
+])
+def test_a_home_that_cannot_be_sailed_to_is_told_at_the_start_and_at_the_end(home, words):
+    world = homeward(home)
+    assert world.run(900, is_done)
+    assert any(words in entry[2] for entry in said(world, "home"))
+    assert words in world.state.why
+    assert not world.state.arrived
+    assert distance_m(world.position, BEHIND.en_m) < 40.0
+
+
+def test_without_a_plan_home_she_holds_at_the_last_goal_and_says_what_she_waits_for():
+    world = homeward()
+    assert world.run(300, lambda w: w.position[1] > 100.0)
+    world.planner = lambda problem, seed: None
+    assert world.run(300, lambda w: w.state.gate == 1)
+    world.run(60)
+    assert world.state.phase in {Phase.HOLDING, Phase.NEW_CALCULATION}
+    world.planner = None
+    assert world.run(900, is_done)
+    assert world.state.arrived
+
+
+def test_killed_on_the_way_home_she_goes_on_and_knows_the_end():
+    world = homeward()
+    assert world.run(600, lambda w: w.state.gate == 1)
+    world.run(20)
+    restarted(world)
+    assert world.run(600, is_done)
+    assert world.state.arrived
+    restarted(world)
+    world.run(10)
+    assert world.state.phase is Phase.DONE
+    assert world.state.home_reached
+
+
+# ---------------------------------------------------------------------------------------------------- refuges
+def test_the_nearest_refuge_and_on_when_the_battery_is_charged():
+    world = make(Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(), voyage={"refuges": ((60.0, 90.0), (300.0, 60.0))})
+    assert world.run(60, lambda w: w.state.sailing)
+    world.run(30)
+    charged(world, 0.08)
+    assert world.run(300, lambda w: "at the refuge 1" in w.state.why)
+    assert "until the battery is charged" in world.state.why
+    assert distance_m(world.position, (60.0, 90.0)) < 30.0
+    plans = world.count(act.RequestPlan)
+    world.run(120)
+    assert world.count(act.RequestPlan) == plans
+    assert not said(world, "mission ended")
+    charged(world, 0.16)
+    assert world.run(600, is_done)
+    assert world.state.arrived
+
+
+def test_a_refuge_without_a_way_is_passed_over_for_the_next():
+    ring = box(40, 70, 80, 110).difference(box(45, 75, 75, 105))
+    world = make(Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(ring,),
+                 voyage={"refuges": ((60.0, 90.0), (250.0, 60.0))})
+    assert world.run(60, lambda w: w.state.sailing)
+    world.run(10)
+    charged(world, 0.08)
+    assert world.run(900, lambda w: "at the refuge 2" in w.state.why)
+
+
+def test_a_critical_battery_without_a_refuge_sails_home_where_the_mission_ends_there_else_on():
+    home = homeward(goals=(Goal(en_m=(500.0, 0.0), radius_m=8.0),), obstacles=())
+    assert home.run(60, lambda w: w.state.sailing)
+    home.run(60)
+    charged(home, 0.08)
+    assert home.run(300, lambda w: "at home: the battery is critical" in w.state.why)
+    on = make(Goal(en_m=(300.0, 0.0), radius_m=8.0), obstacles=())
+    charged(on, 0.08)
+    assert on.run(600, is_done)
+    assert said(on, "battery critical")
+
+
+# ------------------------------------------------------------------------------------------------------- time
+@pytest.mark.parametrize(("more", "where"), [
+    ({"voyage": {"refuges": ((120.0, 60.0),)}}, (120.0, 60.0)), ({"config": {"safe_end": SafeEnd.RETURN}}, (0.0, 0.0)),
+    ({}, None),
+])
+def test_out_of_time_the_goals_are_given_up(more, where):
+    config = {"voyage_timeout_s": 60.0, **more.pop("config", {})}
+    world = make(Goal(en_m=(900.0, 0.0), radius_m=8.0), obstacles=(), config=config, **more)
+    world.shown["home"] = FRAME.geo_from_en(0.0, 0.0)
+    assert world.run(200, lambda w: bool(said(w, "out of time")))
+    under_way_s = world.state.under_way_s
+    assert under_way_s == pytest.approx(60.0, abs=2.0)
+    here = world.position
+    assert world.run(300, is_done)
+    assert not world.state.arrived
+    assert "out of time: 0 of 1 goals reached" in world.state.why
+    assert distance_m(world.position, where or here) < 40.0
+    world.run(60)
+    assert world.state.phase is Phase.DONE
+
+
+def test_the_time_under_way_survives_a_kill_to_the_minute():
+    world = make(Goal(en_m=(900.0, 0.0), radius_m=8.0), obstacles=(), config={"voyage_timeout_s": 200.0})
+    assert world.run(300, lambda w: w.state.under_way_s > 130.0)
+    restarted(world)
+    assert world.state.under_way_s == 120.0
+    assert world.run(100, lambda w: bool(said(w, "out of time")))
+
+
+# -------------------------------------------------------------------------------------------------- the loiter
+def arrived(*goals, **more):
+    world = make(*goals, **{**ASIDE, **more})
+    assert world.run(900, is_done)
+    return world
+
+
+def test_dragged_off_behind_the_island_the_way_back_is_planned():
+    world = arrived(BEHIND, obstacles=(ISLAND,))
+    world.run(30)
+    world.position, world.track = (0.0, 20.0), []
+    world.run(60)
+    assert said(world, "dragged off")
+    assert world.run(300, lambda w: distance_m(w.position, BEHIND.en_m) < 20.0 and w.state.phase is Phase.DONE)
+    assert world.clearance() > 0.0
+    assert act.ReplanReason.REST in [a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)]
+
+
+def test_dragged_off_over_clear_water_the_autopilots_loiter_goes_back_alone():
+    world = arrived(BEHIND, obstacles=())
+    plans = world.count(act.RequestPlan)
+    world.position = (180.0, 240.0)
+    world.run(40)
+    assert said(world, "dragged off")
+    assert world.run(200, lambda w: not w.state.raised)
+    assert world.count(act.RequestPlan) == plans
+    assert world.state.phase is Phase.DONE
+
+
+def test_stopped_by_the_fence_at_rest_she_is_given_back_to_the_loiter():
+    world = arrived(BEHIND, obstacles=())
+    world.set_mode(Mode.HOLD)
+    world.shown["fence_breached"] = True
+    assert world.run(30, lambda w: w.mode is Mode.AUTO and w.state.phase is Phase.DONE)
+
+
+def test_a_battery_that_is_critical_at_rest_leads_to_the_refuge():
+    world = arrived(BEHIND, obstacles=(), voyage={"refuges": ((120.0, 160.0),)})
+    charged(world, 0.05)
+    assert world.run(300, lambda w: "at the refuge" in w.state.why)
+    assert world.state.arrived
+
+
+def test_a_person_takes_her_at_rest_and_gives_her_back():
+    world = arrived(BEHIND, obstacles=())
+    world.set_mode(Mode.MANUAL)
+    world.run(20)
+    assert world.state.phase is Phase.OPERATOR
+    world.set_mode(Mode.AUTO)
+    assert world.run(20, is_done)
+
+
+def test_at_rest_nothing_complains_of_progress_irons_or_the_corridor():
+    world = arrived(BEHIND, obstacles=())
+    before = len(world.log)
+    world.run(600)
+    assert {entry[1] for entry in world.log[before:]} <= {"done"}
+
+
+# --------------------------------------------------------------------------------------------- before sailing
+def test_a_voyage_that_was_finished_before_says_so_and_asks_for_nothing():
+    world = arrived(BEHIND, obstacles=())
+    saved = Persisted.from_dict(world.skipper.persisted(world.state).to_dict())
+    world.state, world.pending = world.skipper.initial(saved), []
+    world.armed, world.mode = False, Mode.MANUAL
+    plans = world.count(act.RequestPlan)
+    world.run(120)
+    assert "--again" in world.state.why
+    assert world.count(act.RequestPlan) == plans
+    assert not world.armed
+
+
+def test_a_plan_that_went_stale_says_why_it_is_renewed_and_is_not_sailed():
+    world = make(Goal(en_m=(0.0, 220.0), radius_m=8.0), obstacles=(ISLAND,), **ASIDE)
+    world.permissions = type(world.permissions)(may_upload=True)
+    assert world.run(120, lambda w: bool(w.mission) and "waiting for the operator" in w.state.why)
+    world.position, world.track = (0.0, 130.0), []
+    world.planner = lambda problem, seed: None
+    world.permissions = type(world.permissions)(may_upload=True, may_set_mode=True, may_arm=True)
+    assert world.run(60, lambda w: "next try in" in w.state.why and "o0" in w.state.why)
+    world.run(20)
+    assert not world.armed
+    world.planner = None
+    assert world.run(900, is_done)
+    assert world.clearance() > 0.0
+
+
+def test_a_wind_that_turned_before_sailing_is_named():
+    turned = [0.0]
+    world = make(Goal(en_m=(300.0, 0.0), radius_m=8.0), obstacles=(), wind=lambda t: (turned[0], 5.0))
+    world.permissions = type(world.permissions)(may_upload=True)
+    assert world.run(120, lambda w: "waiting for the operator" in w.state.why)
+    turned[0] = math.radians(60.0)
+    assert world.run(200, lambda w: "the wind has turned" in w.state.why)
+
+
+def test_a_monitor_that_knows_no_charge_tells_by_the_autopilots_limits():
+    world = make(Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(), voyage={"refuges": ((60.0, 90.0),)})
+    assert world.run(60, lambda w: w.state.sailing)
+    world.shown["battery_failed"] = True
+    text(world, "Battery 1 is low 10.40V used 0 mAh")
+    world.run(15)
+    assert said(world, "battery low")
+    assert not said(world, "battery critical")
+    text(world, "Battery 1 is critical 9.70V used 0 mAh")
+    assert world.run(300, lambda w: "at the refuge 1" in w.state.why)
+    world.shown["battery_failed"] = False      # changed, and the autopilot restarted
+    assert world.run(600, is_done)
