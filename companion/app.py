@@ -18,12 +18,14 @@ import numpy as np
 
 from companion.clock import now_s
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
+from companion.errors import LinkError
 from companion.executor import Executor, Planner
 from companion.fold import Step, VoyageFold
 from companion.geofence import Mission
 from companion.geofence.autopilot_fence import fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.link import Link
+from companion.mavlink.census import LISTEN_S, type_words, yields_to
+from companion.mavlink.link import OWN_COMPONENT, Link, LinkIdentity
 from companion.mavlink.tlog import stamp
 from companion.mavlink.transport import Transport
 from companion.messages import CompanionStatus
@@ -48,12 +50,10 @@ LOOP_WATCH_S = 0.1
 # After arrival the boat loiters; the companion watches it for a moment before it ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
-# Parameters that the plan and the wind depend on; asked at the start and after a reboot.
-PARAMETERS = (
-    "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "SAIL_LOIT_RADIUS", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE",
-    "FENCE_ACTION", "WNDVN_TYPE", "WNDVN_SPEED_TYPE", "WNDVN_SPEED_MIN", "WNDVN_TRUE_FILT", "WNDVN_DIR_FILT",
-    "WNDVN_SPEED_FILT", "WNDVN_DIR_OFS",
-)
+# A parameter that is not answered is asked for again after this long [s].
+PARAMETER_AGAIN_S = 10.0
+# A second companion on the boat is said this often [s].
+COMPANY_EVERY_S = 60.0
 
 OnStatus = Callable[[CompanionStatus, Step], None]
 
@@ -90,14 +90,19 @@ class _Shell:
         self.end_reason = "stopped"
         self.loop_held_s = 0.0
         self._persisted: Persisted | None = None
+        self._adopted: Persisted | None = None     # the state of an earlier life
         self._frames = 0
         self._announced: tuple[str, str] = ("", "")
         self._refusals: list[str] = []
         self.feeds = Feeds()
+        self._system: int | None = None            # of our autopilot
+        self._neighbours: tuple[str, ...] = ()
+        self._company_s = -COMPANY_EVERY_S
+        self._autopilot: Autopilot | None = None
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
-        persisted = self._load_state()
+        persisted = self._adopted = self._load_state()
         self.fold = VoyageFold(
             Skipper(voyage=self.voyage, config=self.config),
             WindRoom(estimator=estimator_of(self.mission)),
@@ -114,12 +119,16 @@ class _Shell:
         }))
         try:
             async with (
-                Link(transport, sink=self._on_frame, signing=self.options.signing) as link,
+                Link(
+                    transport, sink=self._on_frame, signing=self.options.signing, is_starting=True,
+                    identity=LinkIdentity(token=self.options.token), target_system=self._named(persisted),
+                    objection=self.fold.objection, stamp=self._stamped_s, on_fault=self._on_fault,
+                ) as link,
                 contextlib.AsyncExitStack() as stack,
             ):
                 link.subscribe(self._on_message)
                 await self._wait_autopilot(link)
-                autopilot = await stack.enter_async_context(Autopilot(link))
+                autopilot = self._autopilot = await stack.enter_async_context(Autopilot(link))
                 for text in await self.feeds.open(stack, feeds_of(self.mission), self.options.seed):
                     self._refuse("AIS feed", text)
                 for text in self._refusals:
@@ -127,12 +136,12 @@ class _Shell:
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
                                     expansions=self.options.expansions,
                                     budget_scale=self.options.budget_scale, config=self.config)
-                if self.fold.permissions.may_upload_fence:
-                    await self._upload_fence(autopilot)
                 async with asyncio.TaskGroup() as group:
                     tasks = [
                         group.create_task(executor.run(), name="executor"),
+                        group.create_task(self._keep_identity(autopilot, link), name="identity"),
                         group.create_task(self._keep_parameters(autopilot, link), name="parameters"),
+                        group.create_task(self._keep_fence(autopilot), name="fence"),
                         group.create_task(self._send_status(autopilot), name="radio status"),
                         group.create_task(self._sync(), name="disk sync"),
                         group.create_task(self._watch_loop(), name="loop watch"),
@@ -151,15 +160,29 @@ class _Shell:
     # -------------------------------------------------------------------------------------- inputs
     def _quantised(self, t_s: float) -> tuple[int, float]:
         """Return a stamp [µs since 1970] as a tlog keeps it, and the loop time [s] that it stands for."""
-        stamp_us = int((self.options.epoch_s + t_s) * 1e6) & ~3
+        stamp_us = 4 * round((self.options.epoch_s + t_s) * 1e6 / 4.0)
         return stamp_us, stamp_us / 1e6 - self.options.epoch_s
+
+    def _stamped_s(self, t_s: float) -> float:
+        return self._quantised(t_s)[1]
+
+    def _named(self, persisted: Persisted | None) -> int | None:
+        """Return the system id of our autopilot: as named, or as of the voyage that goes on; None: not known."""
+        return self.mission.autopilot.system or (persisted.system if persisted is not None else None)
 
     def _on_frame(self, t_s: float, frame: bytes) -> None:
         self.recorder.frame(stamp(self._quantised(t_s)[0], frame))
 
     def _on_message(self, t_s: float, message: Any) -> None:
-        self._frames += 1
-        self.fold.message(self._quantised(t_s)[1], message)
+        if self._system is None or message.get_srcSystem() == self._system:   # not a command of somebody ashore
+            self._frames += 1
+            self.fold.message(t_s, message)
+
+    def _on_fault(self, text: str) -> None:
+        """Record and say a fault of whoever listens on the link; the link itself goes on."""
+        if self._autopilot is not None:
+            self._autopilot.say(int(Severity.ERROR), text)
+        self.recorder.decision(self._stamped(self._quantised(now_s())[1], {"kind": "fault", "text": text}))
 
     def _on_outcome(self, outcome: Any) -> None:
         t_s = self._quantised(now_s())[1]
@@ -167,8 +190,14 @@ class _Shell:
         self.fold.take_outcome(t_s, outcome)
 
     # --------------------------------------------------------------------------------------- steps
-    def _tick(self, t_s: float) -> Step:
+    def _tick(self, t_s: float, link: Link) -> Step:
         """Fold what the feeds heard, after this step's messages as a replay does, and step."""
+        if self._named(self._adopted) is None and link.has_autopilot:
+            heard = tuple(f"system {s.system}, {type_words(s.vehicle_type)}" for s in link.neighbours())
+            if heard != self._neighbours:
+                self._neighbours = heard
+                self.recorder.decision(self._stamped(t_s, {"kind": "neighbours", "heard": list(heard)}))
+                self.fold.neighbours(heard)
         for report in self.feeds.take():
             self.recorder.decision(self._stamped(t_s, ais_record(report)))
             self.fold.take(report)
@@ -180,7 +209,7 @@ class _Shell:
         while True:
             t_s = self._quantised(now_s())[1]
             self.fold.planner_alive(self.planner.is_alive)
-            step = self._tick(t_s)
+            step = self._tick(t_s, link)
             await self._after_step(step, link)
             executor.submit(step.actions)
             if step.state.phase is Phase.DONE:
@@ -203,15 +232,32 @@ class _Shell:
                 return
 
     async def _wait_autopilot(self, link: Link) -> None:
-        """Wait for the first heartbeat, and say meanwhile that nobody is heard."""
-        waiting = asyncio.create_task(link.wait_autopilot(self.options.wait_s), name="first heartbeat")
+        """Wait until our autopilot is found and nobody else sails it, and say meanwhile that nobody is heard.
+
+        Raises:
+            LinkError: it is not found, or another companion is at work.
+        """
+        waiting = asyncio.create_task(self._find(link), name="whose boat")
         try:
             while not (await asyncio.wait([waiting], timeout=STEP_S))[0]:
-                step = self._tick(self._quantised(now_s())[1])
+                step = self._tick(self._quantised(now_s())[1], link)
                 await self._after_step(step, link)
             await waiting
         finally:
             waiting.cancel()
+
+    async def _find(self, link: Link) -> None:
+        self._system = (await link.wait_autopilot(self.options.wait_s)).target_system
+        self.recorder.decision(self._stamped(self._quantised(now_s())[1], {
+            "kind": "autopilot", "system": self._system, "unheard": link.unheard}))
+        if self._named(self._adopted) is not None:
+            await asyncio.sleep(LISTEN_S)   # without a name the link has listened this long already
+        other = link.other_companion()
+        if other is not None and yields_to(self.options.token, other):
+            raise LinkError(
+                f"{link.transport.name}: another companion is at work on this boat (component {OWN_COMPONENT} of "
+                f"system {self._system}): stop it first, two would give her different orders")
+        link.started()
 
     async def _after_step(self, step: Step, link: Link) -> None:
         """Record the step; nothing of it is carried out before what a restart needs is on the disk."""
@@ -246,15 +292,44 @@ class _Shell:
         return {"t_s": t_s, "utc": utc.replace("+00:00", "Z"), **record}
 
     # ----------------------------------------------------------------------------------- companions
+    async def _keep_identity(self, autopilot: Autopilot, link: Link) -> None:
+        """Ask who the autopilot is, again after each gap and reboot; the fold hears the answer as a message."""
+        while True:
+            if link.is_alive and self.fold.wants_uid(now_s()):
+                await autopilot.read_version()
+            await asyncio.sleep(STEP_S)
+
     async def _keep_parameters(self, autopilot: Autopilot, link: Link) -> None:
         """Read the parameters that matter, again after each reboot; the fold hears them as messages."""
-        reboots = -1
+        asked_s: dict[str, float] = {}
+        reboots = 0
         while True:
-            if reboots != link.stats.reboots and link.is_alive:
+            if reboots != link.stats.reboots:
                 reboots = link.stats.reboots
-                for name in PARAMETERS:
+                asked_s.clear()
+            for name in self.fold.unread:
+                if link.is_alive and now_s() - asked_s.get(name, -PARAMETER_AGAIN_S) >= PARAMETER_AGAIN_S:
+                    asked_s[name] = now_s()
                     await autopilot.get_parameter(name)
             await asyncio.sleep(STEP_S)
+
+    async def _keep_fence(self, autopilot: Autopilot) -> None:
+        """Upload the fence once the autopilot is known to be ours; given up, and begun again, when it is not."""
+        upload: asyncio.Task[None] | None = None
+        try:
+            while self.fold.permissions.may_upload_fence:
+                is_ours = self.fold.state.is_ours
+                if upload is None and is_ours:
+                    upload = asyncio.create_task(self._upload_fence(autopilot), name="fence upload")
+                elif upload is not None and upload.done():
+                    return upload.result()
+                elif upload is not None and not is_ours:
+                    upload.cancel()
+                    upload = None
+                await asyncio.sleep(STEP_S)
+        finally:
+            if upload is not None:
+                upload.cancel()
 
     async def _upload_fence(self, autopilot: Autopilot) -> None:
         """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
@@ -274,6 +349,7 @@ class _Shell:
             if self.status is not None:
                 autopilot.send_status(self.status)
             self._tell_silence(autopilot)
+            self._tell_company(autopilot)
             await asyncio.sleep(STATUS_EVERY_S)
 
     def _tell_silence(self, autopilot: Autopilot) -> None:
@@ -283,6 +359,15 @@ class _Shell:
             self.recorder.decision(self._stamped(
                 self._quantised(now_s())[1], {"kind": "feed", "silent": feed.is_silent, "text": text}))
             autopilot.say(int(Severity.WARNING if feed.is_silent else Severity.NOTICE), text)
+
+    def _tell_company(self, autopilot: Autopilot) -> None:
+        """Say and record that a second companion is heard: one of our kind gives way when it starts."""
+        other = autopilot.link.other_companion()
+        if other is not None and not other.is_starting and now_s() - self._company_s >= COMPANY_EVERY_S:
+            self._company_s = now_s()
+            text = f"a second companion speaks as component {OWN_COMPONENT} of this boat: stop one of the two"
+            self.recorder.decision(self._stamped(self._quantised(now_s())[1], {"kind": "company", "text": text}))
+            autopilot.say(int(Severity.ERROR), text)
 
     async def _watch_loop(self) -> None:
         """Measure how long the event loop was held: a timer that fires late was kept waiting by somebody."""

@@ -8,13 +8,16 @@ the same actions.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.boat import AutopilotLimits
 from companion.geo.angles import wrap_pi
 from companion.mavlink.assembler import VehicleAssembler
-from companion.mavlink.codec import AUTOPILOT_COMPONENT, is_autopilot_heartbeat
-from companion.mavlink.frames import Message
+from companion.mavlink.codec import AUTOPILOT_COMPONENT, autopilot_version, is_autopilot_heartbeat
+from companion.mavlink.frames import Drop, Message
+from companion.mavlink.identity import GAP_S, UID_EVERY_S, Identity
+from companion.mavlink.parameter_ranges import RANGES, believable
+from companion.mavlink.witness import Witness
 from companion.messages import (
     AisReport,
     ApparentWind,
@@ -29,6 +32,7 @@ from companion.skipper.actions import Action
 from companion.skipper.config import Permissions
 from companion.skipper.snapshot import (
     AutopilotRebooted,
+    Disbelieved,
     Event,
     MissionOnBoard,
     ModeChanged,
@@ -78,7 +82,14 @@ class VoyageFold:
         self.skipper, self.wind, self.permissions = skipper, wind, permissions
         self.state: SkipperState = skipper.initial(persisted)
         self.assembler = VehicleAssembler()
+        self._witness = Witness()
+        self._identity = Identity()
+        self._uid_s = -float("inf")
+        self._neighbours: tuple[str, ...] = ()
         self._parameters: dict[str, float] = {}
+        self._in_doubt: dict[str, float] = {}
+        self._answered: set[str] = set()
+        self._disbelieved: set[str] = set()
         self._targets = Targets.empty(skipper.voyage.frame, traffic)
         self._mean90: Estimator = make("mean90")
         self._mean5: Estimator = make("mean5")
@@ -96,15 +107,32 @@ class VoyageFold:
         self._outcomes: list[Outcome] = []
 
     # ------------------------------------------------------------------------------------- inputs
+    def objection(self, t_s: float, message: Message) -> Drop | None:
+        """Return why a message of the autopilot's system is not to be used, None when it is; asked once for each."""
+        return self._witness.objection(t_s, message) if message.get_srcComponent() == AUTOPILOT_COMPONENT else None
+
     def message(self, t_s: float, message: Message) -> None:
         """Take one message of the autopilot's system, heard at ``t_s``, in the order of arrival."""
-        kind = message.get_type()
-        if kind == "HEARTBEAT" and is_autopilot_heartbeat(message):
-            self._heartbeat_s = t_s
-        elif kind == "MISSION_ITEM_REACHED" and message.get_srcComponent() == AUTOPILOT_COMPONENT:
-            self._events.append(WaypointReached(seq=int(message.seq)))
-        elif kind == "PARAM_VALUE":
-            self.parameters({message.param_id: float(message.param_value)})
+        try:
+            self._message(t_s, message)
+        except Exception as error:
+            kind = message.get_type()
+            self._disbelieve(f"fault in {kind}", f"a {kind} could not be digested and was left out: {error!r}")
+
+    def _message(self, t_s: float, message: Message) -> None:
+        if message.get_srcComponent() == AUTOPILOT_COMPONENT:
+            kind = message.get_type()
+            if kind == "HEARTBEAT" and is_autopilot_heartbeat(message):
+                if self._heartbeat_s is not None and t_s - self._heartbeat_s > GAP_S:
+                    self._identity = self._identity.doubted()
+                self._heartbeat_s = t_s
+            elif kind == "MISSION_ITEM_REACHED":
+                self._events.append(WaypointReached(seq=int(message.seq)))
+            elif kind == "PARAM_VALUE":
+                self.parameters({message.param_id: float(message.param_value)})
+            elif kind == "AUTOPILOT_VERSION":
+                self._uid_s = t_s
+                self._identity = self._identity.told(message.get_srcSystem(), autopilot_version(message).uid)
         for value in self.assembler.take(t_s, message):
             self.take(value)
 
@@ -134,12 +162,46 @@ class VoyageFold:
         self._events.append(event)
 
     def parameters(self, values: Mapping[str, float]) -> None:
-        """Take parameters of the autopilot (ArduPilot's names and units)."""
-        self._parameters.update(values)
-        if any(name.startswith("WNDVN_") for name in values):
+        """Take parameters of the autopilot (ArduPilot's names and units).
+
+        One that cannot be is said and left out. One that was known and has changed is asked for again, and believed
+        when it is told twice.
+        """
+        good, refused = believable(values)
+        for why in refused:
+            self._disbelieve(why.split()[0], f"the autopilot's {why}: not used")
+        self._answered |= values.keys()
+        for name in tuple(good):
+            known, value = self._parameters.get(name), good[name]
+            if name in RANGES and known not in {None, value} and self._in_doubt.get(name) != value:
+                self._in_doubt[name] = good.pop(name)
+            else:
+                self._in_doubt.pop(name, None)
+        self._parameters.update(good)
+        self._identity = self._identity.with_parameters(good)
+        if any(name.startswith("WNDVN_") for name in good):
             self.wind.set_parameters(self._parameters)
-        if self._parameters.keys() >= _LIMITS:
+        if self._answered >= _LIMITS:
             self._limits = AutopilotLimits.from_params(self._parameters)
+
+    @property
+    def unread(self) -> tuple[str, ...]:
+        """The parameters that were not told yet, or once with another value: to be asked for."""
+        return tuple(name for name in RANGES if name not in self._answered or name in self._in_doubt)
+
+    def wants_uid(self, t_s: float) -> bool:
+        """Return whether the autopilot is to be asked who it is."""
+        return not self._identity.is_confirmed or t_s - self._uid_s >= UID_EVERY_S
+
+    def neighbours(self, heard: tuple[str, ...]) -> None:
+        """Take who else is heard on a link on which our autopilot was not named."""
+        self._neighbours = heard
+
+    def _disbelieve(self, what: str, text: str) -> None:
+        """Say once that something heard is not used."""
+        if what not in self._disbelieved:
+            self._disbelieved.add(what)
+            self._events.append(Disbelieved(what=what, text=text))
 
     def planner_alive(self, alive: bool) -> None:
         """Note whether the planner's process lives."""
@@ -149,6 +211,8 @@ class VoyageFold:
         if self._boot_s is not None and boot_s < self._boot_s - REBOOT_BACK_S:
             self._events.append(AutopilotRebooted())
             self._mission = MissionOnBoard()
+            self._identity = self._identity.doubted()
+            self._answered.clear()
         self._boot_s = boot_s
 
     def _take_status(self, status: AutopilotStatus) -> None:
@@ -188,6 +252,10 @@ class VoyageFold:
             heartbeat_age_s=None if self._heartbeat_s is None else t_s - self._heartbeat_s,
             wind=self._wind_view(t_s),
             mission=self._mission,
+            identity=replace(
+                self._identity, vehicle_type=None if autopilot is None else autopilot.vehicle_type,
+                is_contested=self._witness.clock.is_contested(t_s)),
+            neighbours=self._neighbours,
             limits=self._limits,
             permissions=self.permissions,
             planner_alive=self._planner_alive,

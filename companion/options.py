@@ -37,6 +37,7 @@ class SailOptions:
         offload: where disk work is done.
         is_durable: force files to the disk, against power cuts; a simulation has none.
         signing: key and timestamp for a signed link.
+        token: 32 bits that tell our heartbeat from a second companion's; on the boat they are drawn by lot.
         budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
         command: what was typed, for the record.
     """
@@ -51,5 +52,6 @@ class SailOptions:
     offload: Offload = in_thread
     is_durable: bool = True
     signing: SigningStore | None = None
+    token: int = 1
     budget_scale: float = 1.0
     command: str = ""

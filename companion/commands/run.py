@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import os
 import re
+import secrets
 import signal
 import sys
 import time
@@ -14,6 +15,8 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+
+from companion.program import system_id
 
 # Loading takes about two seconds; beyond this the operator is told why nothing happens [s].
 PATIENCE_S = 4.0
@@ -30,6 +33,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="the mission file")
     parser.add_argument("--link", required=True, metavar="LINK",
                         help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--system", type=system_id, metavar="N",
+                        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)")
     parser.add_argument("--out", type=Path, metavar="DIR",
                         help="the voyage folder (default: voyages/<UTC time>-<mission>)")
     parser.add_argument("--dry-run", action="store_true", help="look, plan and speak; touch nothing")
@@ -60,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--speedup", str(args.speedup), "must be positive")
     for name in args.feed:
         parse_feed(name)
-    mission = load_mission(args.mission).with_feeds(*args.feed)
+    mission = load_mission(args.mission).with_feeds(*args.feed).with_system(args.system)
     for finding in mission.findings:
         sys.stderr.write(f"companion run: note: {finding}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
@@ -78,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
             seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
             expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
             wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
-            command=" ".join(sys.argv),
+            command=" ".join(sys.argv), token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
     summary = run_loop(_sail(mission, transport, folder, options, args.speedup), speedup=args.speedup)

@@ -15,6 +15,7 @@ from companion.skipper.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
     CommandResult,
+    Disbelieved,
     OperatorWish,
     PlanOutcome,
     ReadOutcome,
@@ -95,6 +96,8 @@ def take_events(turn: Turn) -> None:
             if event.text.startswith(FOREIGN_TEXTS) and not ours and event.source_component == 1:
                 turn.update(checked_mission=False, read_since_s=turn.t_s)
             note(turn, event)
+        elif isinstance(event, Disbelieved):
+            turn.say(Severity.WARNING, event.what, event.text, every_s=0.0)
         elif isinstance(event, OperatorWish):
             turn.update(wish=event)
 

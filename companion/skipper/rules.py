@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
 from companion.skipper.config import SkipperConfig
+from companion.skipper.custody import is_ours
 from companion.skipper.doubt import follow
 from companion.skipper.failsafe import has_stopped
 from companion.skipper.gates import Gate, gates_of
@@ -51,7 +52,9 @@ class Skipper:
         """Return the first state; with ``persisted`` the mission on the autopilot may be adopted by its content."""
         if persisted is not None and (persisted.voyage != self.voyage.name or persisted.gate > len(self.gates)):
             return SkipperState(why="the saved state is of another voyage")
-        return SkipperState(adoptable=persisted)
+        if persisted is None:
+            return SkipperState()
+        return SkipperState(adoptable=persisted, uid=persisted.uid, system=persisted.system)
 
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
@@ -82,7 +85,7 @@ class Skipper:
             return state.adoptable
         return Persisted(
             voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route, pending=pending,
-            own_mode=state.own_mode,
+            own_mode=state.own_mode, uid=state.uid, system=state.system,
         )
 
 
@@ -96,7 +99,7 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         phase = Phase.WAITING if not state.sailing else turn.state.phase
         turn.phase(phase, f"the autopilot is {heard}; what it has sails on")
         return
-    if _operator_has_it(turn):
+    if not is_ours(turn) or _operator_has_it(turn):
         return
     notice_truncation(turn)
     if not mission_is_known(turn):

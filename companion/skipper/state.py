@@ -136,6 +136,10 @@ class SkipperState:
     gate: int = 0                      # index of the gate being sailed to
     route: Route | None = None         # what is on the autopilot, as far as we know
     adoptable: Persisted | None = None  # from before a restart, until the autopilot's mission has been compared
+    uid: str | None = None             # of the autopilot that this voyage began with, and ...
+    system: int | None = None          # ... its system id
+    is_ours: bool = False              # in this step: it is that one, and a boat of ours
+    custody: str = ""                  # why it was not, until it is
     checked_mission: bool = False      # the mission on board has been compared with ours since link, reboot, operator
     foreign: str = ""                  # why the mission on board is not ours; empty: it is, or there is none
     sailing: bool = False              # has been in AUTO and armed with our route
@@ -207,13 +211,16 @@ class Persisted:
     route: Route | None
     pending: Route | None
     own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
+    uid: str | None = None             # of the autopilot, and ...
+    system: int | None = None          # ... its system id
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""
         return {
             "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
             "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
-            "own_mode": None if self.own_mode is None else self.own_mode.name,
+            "own_mode": None if self.own_mode is None else self.own_mode.name, "uid": self.uid,
+            "system": self.system,
         }
 
     @classmethod
@@ -226,6 +233,8 @@ class Persisted:
                 voyage=str(data["voyage"]), gate=int(data["gate"]), sailing=bool(data["sailing"]),
                 route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
                 own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
+                uid=None if data.get("uid") is None else str(data["uid"]),
+                system=None if data.get("system") is None else int(data["system"]),
             )
         except (KeyError, TypeError, IndexError, AttributeError) as error:
             raise ValueError(f"the saved state is damaged: {error!r}") from error

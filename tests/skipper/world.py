@@ -16,6 +16,7 @@ from companion.boat import AutopilotLimits, Boat, ardurover_sitl
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import LocalArea
+from companion.mavlink.identity import Identity
 from companion.messages import (
     AutopilotStatus,
     Command,
@@ -102,6 +103,8 @@ class World:
     position_offset: tuple[float, float] = (0.0, 0.0)
     system_status: int = 4
     ekf_ok: bool = True
+    identity: Identity = field(default_factory=lambda: Identity(
+        system=1, uid="5a", is_confirmed=True, vehicle_type=11, frame_class=2, sails=True))
     drift_mps: float = 0.0      # along the heading, while nobody sails
     uploads_fail: Callable[[int], UploadResult] = lambda n: UploadResult.OK
     planner: Callable | None = None
@@ -271,6 +274,7 @@ class World:
             system_status=self.system_status,
             mission_seq=self.seq, mission_total=len(self.mission), mission_state=self.mission_state)
         out = Snapshot(
+            identity=self.identity,
             t_s=self.t, vehicle=vehicle, vehicle_age_s=0.1, position_en_m=here, autopilot=status, autopilot_age_s=0.2,
             heartbeat_age_s=self.heartbeat_age, permissions=self.permissions,
             wind=WindView(health=self.wind_health, forecast=forecast(self.t, mean, mean_tws, self.sigma),
