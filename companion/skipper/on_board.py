@@ -1,6 +1,12 @@
-"""The mission on the autopilot: read, compared, and known to be ours, empty, a mixture of ours, or foreign."""
+"""The mission on the autopilot: read, compared, and known to be ours, empty, a mixture of ours, or foreign.
+
+A mission that is not ours is read twice before it is called foreign, and looked at again now and then while it is: what
+was read once may have been forged, and what a stranger put there he may take away.
+"""
 
 from __future__ import annotations
+
+import math
 
 from companion.messages import MissionItem, Mode
 from companion.skipper.actions import ReadMission, Severity
@@ -8,6 +14,8 @@ from companion.skipper.route import held_back, is_mixture, is_same_mission
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Persisted, Phase
 from companion.skipper.turn import Turn
+
+FOREIGN_REREAD_S = 30.0   # a mission that is not ours is read again this often
 
 
 def mission_is_known(turn: Turn) -> bool:
@@ -18,7 +26,9 @@ def mission_is_known(turn: Turn) -> bool:
         state = turn.state
     if state.foreign:
         if turn.snapshot.permissions.may_replace_foreign:
-            turn.update(foreign="", route=None, replace_foreign=True)
+            turn.update(foreign="", route=None, adoptable=None, replace_foreign=True)
+            return True
+        if _is_ours_again(turn):
             return True
         phase = Phase.OPERATOR if state.sailing else Phase.WAITING
         turn.phase(phase, f"{state.foreign}; it is not resumed and not replaced without permission")
@@ -63,7 +73,7 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
     """Judge the mission that was read: ours, empty, a mixture of ours, or foreign."""
     state = turn.state
     saved = state.adoptable
-    turn.update(checked_mission=True, read_t_s=turn.t_s, adoptable=None)
+    turn.update(checked_mission=True, read_t_s=turn.t_s, adoptable=None, read_twice=False)
     routes = [r for r in (
         state.route, state.unsure_route, saved.route if saved else None, saved.pending if saved else None,
     ) if r is not None]
@@ -92,14 +102,38 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
             turn.update(gate=saved.gate, sailing=state.sailing or _under_way(turn))
         turn.update(route=state.route or newest, unsure_route=newest, repair=True)
         return True
+    if not state.read_twice and not state.foreign:
+        # behind this very read, which has the step's own time
+        turn.update(
+            checked_mission=False, read_since_s=math.nextafter(turn.t_s, math.inf), read_twice=True, adoptable=saved)
+        phase = turn.state.phase if state.sailing else Phase.WAITING
+        turn.phase(phase, "the mission that was read is not ours: reading it once more")
+        return False
     if state.replace_foreign or turn.snapshot.permissions.may_replace_foreign:
         turn.update(route=None, unsure_route=None, replace_foreign=True)
         return True
     text = f"the mission on the autopilot ({len(items)} items) is not ours"
-    turn.update(foreign=text, route=None, unsure_route=None)
-    turn.say(Severity.ERROR, "foreign mission", turn.state.foreign, every_s=0.0)
+    # What we had is kept as after a restart: a mission of ours that is read again is taken over.
+    turn.update(foreign=text, route=None, unsure_route=None, adoptable=saved or state.persisted(turn.voyage.name))
+    if not state.foreign:
+        turn.say(Severity.ERROR, "foreign mission", text, every_s=0.0)
     turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{turn.state.foreign}; it is not resumed")
     return False
+
+
+def _is_ours_again(turn: Turn) -> bool:
+    """Look again at a mission that is not ours, and take up the voyage when it is ours by now."""
+    state = turn.state
+    if state.read_items is None or state.read_t_s != turn.t_s:
+        patient = turn.t_s - state.read_t_s > FOREIGN_REREAD_S and turn.t_s >= state.read_retry.not_before_s
+        if patient and state.pending_read is None:
+            _read(turn, "is it still a stranger's?")
+        return False
+    if not _compare(turn, state.read_items):
+        return False
+    turn.update(foreign="")
+    turn.phase(Phase.WAITING, "the mission on board is not a stranger's any more")
+    return True
 
 
 def _under_way(turn: Turn) -> bool:

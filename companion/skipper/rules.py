@@ -80,13 +80,7 @@ class Skipper:
 
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
-        pending = state.pending_upload.route if state.pending_upload is not None else state.unsure_route
-        if not state.checked_mission and state.adoptable is not None:
-            return state.adoptable
-        return Persisted(
-            voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route, pending=pending,
-            own_mode=state.own_mode, uid=state.uid, system=state.system,
-        )
+        return state.adoptable or state.persisted(self.voyage.name)
 
 
 def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:

@@ -135,12 +135,13 @@ class SkipperState:
     next_id: int = 1
     gate: int = 0                      # index of the gate being sailed to
     route: Route | None = None         # what is on the autopilot, as far as we know
-    adoptable: Persisted | None = None  # from before a restart, until the autopilot's mission has been compared
+    adoptable: Persisted | None = None  # from before a restart or a foreign mission, until one of ours is found
     uid: str | None = None             # of the autopilot that this voyage began with, and ...
     system: int | None = None          # ... its system id
     is_ours: bool = False              # in this step: it is that one, and a boat of ours
     custody: str = ""                  # why it was not, until it is
     checked_mission: bool = False      # the mission on board has been compared with ours since link, reboot, operator
+    read_twice: bool = False           # the last mission read was not ours: the next one decides
     foreign: str = ""                  # why the mission on board is not ours; empty: it is, or there is none
     sailing: bool = False              # has been in AUTO and armed with our route
     index: int = 0                     # target by the autopilot
@@ -199,6 +200,14 @@ class SkipperState:
     reached: tuple[int, ...] = ()                  # goals reached, in order
     missed: int = 0                                # buoys passed on the wrong side and sailed again
     wants: tuple[str, ...] = ()                    # what is missing, in words
+
+    def persisted(self, voyage: str) -> Persisted:
+        """Return what of it survives a kill."""
+        pending = self.pending_upload.route if self.pending_upload is not None else self.unsure_route
+        return Persisted(
+            voyage=voyage, gate=self.gate, sailing=self.sailing, route=self.route, pending=pending,
+            own_mode=self.own_mode, uid=self.uid, system=self.system,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

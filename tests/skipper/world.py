@@ -110,6 +110,8 @@ class World:
     planner: Callable | None = None
     state: SkipperState | None = None
     pending: list = field(default_factory=list)
+    stopped: list = field(default_factory=list)
+    forged_reads: list = field(default_factory=list)   # what the next reads find in place of the mission
     events: list = field(default_factory=list)
     actions: list = field(default_factory=list)
     log: list = field(default_factory=list)
@@ -202,11 +204,17 @@ class World:
             later((self.t + 0.1, "command", action))
         elif isinstance(action, act.SteerHeading):
             self.steer, self.steer_until = action.heading_rad, self.t + 3.0
+        elif isinstance(action, act.StopOrders):
+            self.stopped += [p for p in self.pending if p[1] != "plan"]
+            self.pending = [p for p in self.pending if p[1] == "plan"]
 
     def answer(self) -> list:
+        stopped = [UploadOutcome(upload_id=a.upload_id, result=UploadResult.TIMEOUT, text="stopped")
+                   for _, kind, a in self.stopped if kind == "upload"]
+        self.stopped = []
         due = [p for p in self.pending if p[0] <= self.t]
         self.pending = [p for p in self.pending if p[0] > self.t]
-        return [self._answer(kind, action) for _, kind, action in due]
+        return stopped + [self._answer(kind, action) for _, kind, action in due]
 
     def _answer(self, kind: str, action):
         if kind == "plan":
@@ -228,7 +236,8 @@ class World:
                 self.install((*action.items[:half], *self.mission[half:len(action.items)]))
             return UploadOutcome(upload_id=action.upload_id, result=result)
         if kind == "read":
-            return ReadOutcome(read_id=action.read_id, items=self.mission)
+            items = self.forged_reads.pop(0) if self.forged_reads else self.mission
+            return ReadOutcome(read_id=action.read_id, items=items)
         if isinstance(action, act.SetMode):
             if action.mode is Mode.AUTO and not self.mission:
                 return CommandOutcome(command_id=action.command_id, result=CommandResult.REFUSED, text="No Mission")
@@ -325,12 +334,14 @@ def check_invariants(before, after, snapshot, actions) -> None:
 
     for action in actions:
         assert permitted(action, snapshot.permissions), action
+        if isinstance(action, (act.UploadMission, act.SetMode, act.Arm, act.SetCurrent, act.SteerHeading)):
+            assert after.is_ours, action
         if isinstance(action, act.UploadMission):
             assert ends_safely(action.items)
             if before.route is not None and after.pending_upload is not None:
                 assert action.items[: action.keep_first] == before.route.items[: action.keep_first]
         if after.phase is Phase.OPERATOR:
-            assert isinstance(action, (act.Announce, act.CancelPlan, act.ReadMission)), action
+            assert isinstance(action, (act.Announce, act.CancelPlan, act.ReadMission, act.StopOrders)), action
     assert after.why
     ids = [getattr(a, n) for a in actions for n in ("request_id", "upload_id", "read_id", "command_id")
            if hasattr(a, n) and not isinstance(a, act.CancelPlan)]
