@@ -22,10 +22,11 @@ from companion.errors import LinkError
 from companion.executor import Executor, Planner
 from companion.fold import Step, VoyageFold
 from companion.geofence import Mission
-from companion.geofence.autopilot_fence import fence_for_autopilot
+from companion.keepers import keep_fence, keep_identity, keep_parameters
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.census import LISTEN_S, type_words, yields_to
-from companion.mavlink.link import OWN_COMPONENT, Link, LinkIdentity
+from companion.mavlink.link import Link
+from companion.mavlink.reception import OWN_COMPONENT, LinkIdentity
 from companion.mavlink.tlog import stamp
 from companion.mavlink.transport import Transport
 from companion.messages import CompanionStatus
@@ -50,8 +51,6 @@ LOOP_WATCH_S = 0.1
 # After arrival the boat loiters; the companion watches it for a moment before it ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
-# A parameter that is not answered is asked for again after this long [s].
-PARAMETER_AGAIN_S = 10.0
 # A second companion on the boat is said this often [s].
 COMPANY_EVERY_S = 60.0
 
@@ -114,9 +113,7 @@ class _Shell:
         if persisted is not None and self.fold.state.adoptable is None:
             self._refuse_state(self.fold.state.why)
         self._write_description(transport.name)
-        self.recorder.decision(self._stamped(self._quantised(now_s())[1], {
-            "kind": "start", "persisted": None if persisted is None else persisted.to_dict(),
-        }))
+        self._record({"kind": "start", "persisted": None if persisted is None else persisted.to_dict()})
         try:
             async with (
                 Link(
@@ -139,9 +136,9 @@ class _Shell:
                 async with asyncio.TaskGroup() as group:
                     tasks = [
                         group.create_task(executor.run(), name="executor"),
-                        group.create_task(self._keep_identity(autopilot, link), name="identity"),
-                        group.create_task(self._keep_parameters(autopilot, link), name="parameters"),
-                        group.create_task(self._keep_fence(autopilot), name="fence"),
+                        group.create_task(keep_identity(self.fold, autopilot), name="identity"),
+                        group.create_task(keep_parameters(self.fold, autopilot), name="parameters"),
+                        group.create_task(keep_fence(self.fold, autopilot, self.mission, self._record), name="fence"),
                         group.create_task(self._send_status(autopilot), name="radio status"),
                         group.create_task(self._sync(), name="disk sync"),
                         group.create_task(self._watch_loop(), name="loop watch"),
@@ -178,11 +175,15 @@ class _Shell:
             self._frames += 1
             self.fold.message(t_s, message)
 
+    def _record(self, record: dict[str, Any]) -> None:
+        """Record something that happened now."""
+        self.recorder.decision(self._stamped(self._quantised(now_s())[1], record))
+
     def _on_fault(self, text: str) -> None:
         """Record and say a fault of whoever listens on the link; the link itself goes on."""
         if self._autopilot is not None:
             self._autopilot.say(int(Severity.ERROR), text)
-        self.recorder.decision(self._stamped(self._quantised(now_s())[1], {"kind": "fault", "text": text}))
+        self._record({"kind": "fault", "text": text})
 
     def _on_outcome(self, outcome: Any) -> None:
         t_s = self._quantised(now_s())[1]
@@ -248,8 +249,7 @@ class _Shell:
 
     async def _find(self, link: Link) -> None:
         self._system = (await link.wait_autopilot(self.options.wait_s)).target_system
-        self.recorder.decision(self._stamped(self._quantised(now_s())[1], {
-            "kind": "autopilot", "system": self._system, "unheard": link.unheard}))
+        self._record({"kind": "autopilot", "system": self._system, "unheard": link.unheard})
         if self._named(self._adopted) is not None:
             await asyncio.sleep(LISTEN_S)   # without a name the link has listened this long already
         other = link.other_companion()
@@ -292,58 +292,6 @@ class _Shell:
         return {"t_s": t_s, "utc": utc.replace("+00:00", "Z"), **record}
 
     # ----------------------------------------------------------------------------------- companions
-    async def _keep_identity(self, autopilot: Autopilot, link: Link) -> None:
-        """Ask who the autopilot is, again after each gap and reboot; the fold hears the answer as a message."""
-        while True:
-            if link.is_alive and self.fold.wants_uid(now_s()):
-                await autopilot.read_version()
-            await asyncio.sleep(STEP_S)
-
-    async def _keep_parameters(self, autopilot: Autopilot, link: Link) -> None:
-        """Read the parameters that matter, again after each reboot; the fold hears them as messages."""
-        asked_s: dict[str, float] = {}
-        reboots = 0
-        while True:
-            if reboots != link.stats.reboots:
-                reboots = link.stats.reboots
-                asked_s.clear()
-            for name in self.fold.unread:
-                if link.is_alive and now_s() - asked_s.get(name, -PARAMETER_AGAIN_S) >= PARAMETER_AGAIN_S:
-                    asked_s[name] = now_s()
-                    await autopilot.get_parameter(name)
-            await asyncio.sleep(STEP_S)
-
-    async def _keep_fence(self, autopilot: Autopilot) -> None:
-        """Upload the fence once the autopilot is known to be ours; given up, and begun again, when it is not."""
-        upload: asyncio.Task[None] | None = None
-        try:
-            while self.fold.permissions.may_upload_fence:
-                is_ours = self.fold.state.is_ours
-                if upload is None and is_ours:
-                    upload = asyncio.create_task(self._upload_fence(autopilot), name="fence upload")
-                elif upload is not None and upload.done():
-                    return upload.result()
-                elif upload is not None and not is_ours:
-                    upload.cancel()
-                    upload = None
-                await asyncio.sleep(STEP_S)
-        finally:
-            if upload is not None:
-                upload.cancel()
-
-    async def _upload_fence(self, autopilot: Autopilot) -> None:
-        """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
-        mission = self.mission
-        places = [g.point for g in mission.goals] + ([mission.start] if mission.start else [])
-        fence = fence_for_autopilot(mission.area, mission.margin_m, inside=places)
-        record: dict[str, Any] = {"kind": "fence", "status": fence.status.name, "text": fence.reason}
-        if fence.items:
-            done = await autopilot.upload_fence(fence.items)
-            record |= {"outcome": done.outcome.value, "text": done.text, "count": len(fence.items)}
-            if done.is_ok:
-                record["enabled"] = (await autopilot.enable_fence()).outcome.value
-        self.recorder.decision(self._stamped(self._quantised(now_s())[1], record))
-
     async def _send_status(self, autopilot: Autopilot) -> None:
         while True:
             if self.status is not None:
@@ -356,8 +304,7 @@ class _Shell:
         """Say and record that a feed has fallen silent, and that it is heard again."""
         for feed in self.feeds.changed():
             text = f"AIS feed {'silent' if feed.is_silent else 'heard again'}: {feed.sentence()}"
-            self.recorder.decision(self._stamped(
-                self._quantised(now_s())[1], {"kind": "feed", "silent": feed.is_silent, "text": text}))
+            self._record({"kind": "feed", "silent": feed.is_silent, "text": text})
             autopilot.say(int(Severity.WARNING if feed.is_silent else Severity.NOTICE), text)
 
     def _tell_company(self, autopilot: Autopilot) -> None:
@@ -366,7 +313,7 @@ class _Shell:
         if other is not None and not other.is_starting and now_s() - self._company_s >= COMPANY_EVERY_S:
             self._company_s = now_s()
             text = f"a second companion speaks as component {OWN_COMPONENT} of this boat: stop one of the two"
-            self.recorder.decision(self._stamped(self._quantised(now_s())[1], {"kind": "company", "text": text}))
+            self._record({"kind": "company", "text": text})
             autopilot.say(int(Severity.ERROR), text)
 
     async def _watch_loop(self) -> None:

@@ -21,7 +21,7 @@ from companion.errors import InputError
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.frames import Codec, Message
-from companion.mavlink.link import OWN_COMPONENT
+from companion.mavlink.reception import OWN_COMPONENT
 from companion.mavlink.tlog import read_tlog
 from companion.messages import MissionItem
 from companion.planner import Plan

@@ -68,7 +68,8 @@ class VehicleAssembler:
 
     def _forget(self) -> None:
         """Forget what was true before a reboot."""
-        self._beats: deque[tuple[float, tuple[int, int, bool]]] = deque(maxlen=BEATS_KEPT)
+        self._beats: deque[tuple[float, tuple[int, int, bool]]] = deque(maxlen=BEATS_KEPT - 1)
+        self._fact: tuple[int, int, bool] | None = None
         self._acknowledged_s: float | None = None
         self._fixes = FixFilter()
         self._attitude: codec.Attitude | None = None
@@ -153,12 +154,13 @@ class VehicleAssembler:
         """Return whether what a heartbeat says of type, mode and arming is a fact."""
         says = (int(message.type), int(message.custom_mode), codec.is_armed(message))
         recent = [what for at_s, what in self._beats if t_s - at_s <= BEATS_S]
+        is_told = self._acknowledged_s is not None and t_s - self._acknowledged_s <= SHOWS_S
+        believes = not recent or is_told or recent.count(says) + 1 >= BEATS_AGREE
+        if believes and says != self._fact:
+            self._fact, self._acknowledged_s = says, None   # one acknowledgement, one change
+            self._beats.clear()
         self._beats.append((t_s, says))
-        if not recent or (self._acknowledged_s is not None and t_s - self._acknowledged_s <= SHOWS_S):
-            if recent and says != recent[-1]:
-                self._acknowledged_s = None   # one acknowledgement, one change
-            return True
-        return recent.count(says) + 1 >= BEATS_AGREE
+        return believes
 
     def _named(self, t_s: float, message: Message) -> list[Value]:
         """Join the two halves of the apparent wind; every link's copies carry the same boot time."""

@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
@@ -24,25 +23,22 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.clock import now_s
 from companion.errors import LinkError
 from companion.mavlink import codec
-from companion.mavlink.census import Census, OtherCompanion, Speaker, Standing, listed
+from companion.mavlink.census import LISTEN_S, OtherCompanion, Speaker, listed
 from companion.mavlink.commands import CommandAnswer, CommandSend
 from companion.mavlink.frames import Codec, Drop, Message
 from companion.mavlink.identity import GAP_S
 from companion.mavlink.link_stats import LinkStats, Throughput
 from companion.mavlink.machines import Machine, Outcome, Party, ResultT_co
 from companion.mavlink.rates import RateKeeper
+from companion.mavlink.reception import Heard, LinkIdentity, Objection, Reception
 from companion.mavlink.signing import TICKS_PER_S, SigningStore
 from companion.mavlink.streams import DEFAULT_STREAMS, Stream, StreamMonitor
 from companion.mavlink.transport import Transport, TransportState
-from companion.mavlink.witness import Witness
 
 OnMessage = Callable[[float, Message], None]
 OnFrame = Callable[[float, bytes], None]
 OnCommand = Callable[[Message], int]
-Objection = Callable[[float, Message], Drop | None]
 
-OWN_COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
-TOOL_COMPONENT = 192  # ..._COMPUTER2: a tool that looks in beside a companion that sails
 HEARTBEAT_S = 1.0
 # Without a heartbeat of the autopilot for this long the link is silent [s].
 SILENCE_S = 3.0
@@ -51,16 +47,6 @@ SILENCE_S = 3.0
 LOST_S = 6.0
 # A quiet link speaks this often, so that an autopilot that rebooted knows of it again [s].
 LISTENER_BEAT_S = 30.0
-_DUPLICATE_WINDOW = 32
-
-
-@dataclass(frozen=True, slots=True)
-class LinkIdentity:
-    """Who we are. ``system`` None: the autopilot's own, detected. ``token``: tells our heartbeat from another's."""
-
-    system: int | None = None
-    component: int = OWN_COMPONENT
-    token: int = 0
 
 
 class Link:
@@ -101,20 +87,14 @@ class Link:
         self.on_command: OnCommand | None = None
         self._identity = identity or LinkIdentity()
         self._sink, self._signing, self._is_quiet = sink, signing, is_quiet
-        self._census = Census(target_system)
-        self._target: int | None = None
-        self._refusal = ""
-        self._unheard: Counter[int] = Counter()
-        self._objection = objection or _of_the_autopilot(Witness())
+        self._reception = Reception(self._identity, target_system, objection, self.stats)
         self._stamp, self._on_fault = stamp, on_fault
         self._codec = Codec(
-            self._identity.system or target_system or 1, self._identity.component, signing.state if signing else None
-        )
+            self._reception.own_system, self._identity.component, signing.state if signing else None)
         self._subscribers: list[OnMessage] = []
         self._heartbeat_s: float | None = None
         self._found, self._decided = asyncio.Event(), asyncio.Event()
         self._boot_s: float | None = None
-        self._recent: deque[tuple[int, int, int, int, int]] = deque(maxlen=_DUPLICATE_WINDOW)
         self._rates = RateKeeper(self, self.monitor)
         self._throughput = Throughput()
         self._locks: dict[str, asyncio.Lock] = {}
@@ -158,16 +138,23 @@ class Link:
             async with asyncio.timeout(timeout_s):
                 await self._decided.wait()
         except TimeoutError:
-            raise LinkError(f"{self.transport.name}: no autopilot in {timeout_s:g} s: {self._diagnosis()}") from None
-        if self._refusal:
-            raise LinkError(f"{self.transport.name}: {self._refusal}")
+            # somebody was heard just now: let the census come to its end
+            if self._reception.census.wanted is None and self._reception.census.heard(self._now()):
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(LISTEN_S):
+                        await self._decided.wait()
+            if not self._decided.is_set():
+                raise LinkError(
+                    f"{self.transport.name}: no autopilot in {timeout_s:g} s: {self._diagnosis()}") from None
+        if self._reception.refusal:
+            raise LinkError(f"{self.transport.name}: {self._reception.refusal}")
         return self.party
 
     # ------------------------------------------------------------------------------------------- state
     @property
     def party(self) -> Party:
         """The autopilot and we; before it was heard, the system that is wanted, or 1."""
-        target = self._target or self._census.wanted or 1
+        target = self._reception.target or self._reception.census.wanted or 1
         return Party(target, codec.AUTOPILOT_COMPONENT, self._codec.system, self._codec.component)
 
     @property
@@ -200,15 +187,15 @@ class Link:
     @property
     def unheard(self) -> int:
         """How many messages of the autopilot's system came before it was known to be ours: nobody heard them."""
-        return self._unheard[self.party.target_system]
+        return self._reception.unheard(self.party.target_system)
 
     def neighbours(self) -> tuple[Speaker, ...]:
         """Return the other autopilots that are heard."""
-        return self._census.neighbours(now_s(), self.party.target_system)
+        return self._reception.census.neighbours(now_s(), self.party.target_system)
 
     def other_companion(self) -> OtherCompanion | None:
         """Return another program that speaks with our ids, None when there is none."""
-        return self._census.companion(now_s(), self.party.own_system)
+        return self._reception.census.companion(now_s(), self.party.own_system)
 
     def bytes_per_s(self) -> tuple[float, float]:
         """Return what came in and went out [bytes/s], over the last 10 s."""
@@ -316,38 +303,21 @@ class Link:
         now = self._now()
         self._throughput.note(now, received=len(data))
         for message in self._codec.feed(data):
-            self._take(now, message)
+            self.guard("the link", self._take, now, message)
 
     def _take(self, now: float, message: Message) -> None:
-        system, component = message.get_srcSystem(), message.get_srcComponent()
-        header = message.get_header()
-        key = (system, component, header.seq, header.msgId, message.get_crc() or 0)
-        if key in self._recent:
-            self.stats.dropped[Drop.DUPLICATE] += 1
+        if self._reception.is_repeat(message):
             return
-        self._recent.append(key)
         self.stats.frames_in += 1
         if self._sink is not None:
             self.guard("the tlog", self._sink, now, bytes(message.get_msgbuf()))
+        heard = self._reception.hear(now, message)
+        if not self._decided.is_set():
+            self._decide(now)
+        if heard is Heard.NOTHING:
+            return
         kind = message.get_type()
-        self._census.take(now, message)
-        if self._target is None:
-            self._choose(now)
-        if component == self._identity.component:
-            self._notice_companion(now, message, kind)
-            if system in {self._target, self._codec.system}:
-                self.stats.dropped[Drop.OWN_IDS] += 1  # an echo of what we said, or a second companion's
-                return
-        if system != self._target:
-            self._unheard[system] += component != self._identity.component
-            self._take_foreign(now, message, kind)
-            return
-        objection = self._objection(now, message)
-        if objection is not None:
-            self.stats.dropped[objection] += 1
-            return
-        self.stats.count(system, component, header.seq)
-        if component == codec.AUTOPILOT_COMPONENT:
+        if heard is Heard.OURS and message.get_srcComponent() == codec.AUTOPILOT_COMPONENT:
             self.monitor.heard(now, kind)
             self._notice_boot(message)
             if kind == "HEARTBEAT" and codec.is_autopilot_heartbeat(message):
@@ -360,51 +330,26 @@ class Link:
         for callback in tuple(self._subscribers):
             self.guard(getattr(callback, "__qualname__", repr(callback)), callback, now, message)
 
-    def _choose(self, now: float) -> None:
-        """Take the autopilot that is ours, when it is known."""
-        choice = self._census.choice(now)
-        if choice.standing is Standing.REFUSED:
-            self._refusal = choice.reason
-            self._decided.set()
-        elif choice.standing is Standing.CHOSEN and not self._refusal:
-            self._target = choice.system
-            if self._identity.system is None and choice.system is not None:
-                self._codec.system = choice.system
+    def _decide(self, now: float) -> None:
+        """Begin, once our autopilot is known; or give up, when it cannot be."""
+        self._reception.choose(now)
+        if not self._reception.is_decided:
+            return
+        self._decided.set()
+        if self._reception.target is not None:
+            self._codec.system = self._reception.own_system
             self._rates.wanted.set()
             self._heartbeat_s = now
             self._found.set()
-            self._decided.set()
 
     def _take_heartbeat(self, now: float) -> None:
         if self._heartbeat_s is None or now - self._heartbeat_s > GAP_S:
             self._rates.wanted.set()
         self._heartbeat_s = now
 
-    def _notice_companion(self, now: float, message: Message, kind: str) -> None:
-        """Tell a second companion from the echo of our own heartbeat."""
-        if kind == "HEARTBEAT" and message.type == wire.MAV_TYPE_ONBOARD_CONTROLLER and (
-            message.custom_mode != self._identity.token
-        ):
-            self._census.take_companion(now, message)
-
-    def _take_foreign(self, now: float, message: Message, kind: str) -> None:
-        """Other systems are not ours to listen to, except a ground station that commands us by our ids."""
-        if kind in {"COMMAND_LONG", "COMMAND_INT"} and self._is_for_us_alone(message):
-            self._take_command(message)
-            self._hand_out(now, message)
-        elif kind == "HEARTBEAT" and message.type == wire.MAV_TYPE_GCS:
-            pass
-        else:
-            self.stats.dropped[Drop.FOREIGN_SYSTEM] += 1
-
-    def _is_for_us_alone(self, message: Message) -> bool:
-        return bool(
-            message.target_system == self._codec.system and message.target_component == self._codec.component
-        )
-
     def _take_command(self, message: Message) -> None:
         """Answer a command addressed to this component by name; those to everybody are the autopilot's."""
-        if not self._is_for_us_alone(message):
+        if not self._reception.is_for_us_alone(message):
             return
         result = wire.MAV_RESULT_UNSUPPORTED
         if self.on_command is not None:
@@ -438,7 +383,7 @@ class Link:
                 self._rates.wanted.set()
                 spoken = 0
             # A listener speaks too, but little: the autopilot forwards nothing to a link on which nobody spoke.
-            is_new = spoken < 2 or not (self.is_alive or self._census.heard(self._now()))
+            is_new = spoken < 2 or not (self.is_alive or self._reception.census.heard(self._now()))
             if not self._is_quiet or is_new or now_s() - spoken_s >= LISTENER_BEAT_S:
                 self.send(codec.heartbeat(self._system_status, self._identity.token))
                 spoken += self.transport.state is TransportState.OPEN
@@ -446,8 +391,8 @@ class Link:
             if self._signing is not None:
                 self._advance_signing()
             now = now_s()
-            if self._target is None:
-                self._choose(self._now())
+            if not self._decided.is_set():
+                self._decide(self._now())
             elif self.is_alive:
                 self._rates.look(now)
             next_s = max(next_s + HEARTBEAT_S, now)
@@ -473,16 +418,8 @@ class Link:
             return "its frames are not signed with this key"
         if self.stats.frames_in == 0:
             return f"{stats.bytes_in} bytes and no MAVLink frame among them; check the baud rate"
-        wanted = f" of system {self._census.wanted}" if self._census.wanted is not None else ""
-        heard = self._census.heard(self._now())
+        census = self._reception.census
+        wanted = f" of system {census.wanted}" if census.wanted is not None else ""
+        heard = census.heard(self._now())
         others = f"; heard: {listed(heard)}" if heard else ""
         return f"{self.stats.frames_in} frames, but no autopilot's heartbeat{wanted}{others}"
-
-
-def _of_the_autopilot(witness: Witness) -> Objection:
-    """Return the judgement of one who has no key: the autopilot's own messages must fit together."""
-    def objection(t_s: float, message: Message) -> Drop | None:
-        return witness.objection(t_s, message) if message.get_srcComponent() == codec.AUTOPILOT_COMPONENT else None
-
-    return objection
-

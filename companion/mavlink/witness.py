@@ -21,8 +21,9 @@ from companion.mavlink.frames import Drop, Message
 AHEAD_S = 0.5
 # A message that waited longer than this on its way is of no use [s].
 BEHIND_S = 5.0
-# How fast the clock may run away from ours: a hurried simulator's does by a few parts in a hundred.
-LEAK = 0.02
+# How fast the two clocks may run apart: a hurried simulator's does by a few parts in a hundred. Nor is the clock led
+# faster than this by messages that are only a little wrong.
+DRIFT = 0.05
 # Another clock is believed when so many messages agree on it over this time, and the old one is silent for it [s].
 SWITCH_S = 1.0
 SWITCH_COUNT = 3
@@ -64,9 +65,10 @@ class BootClock:
         if self._offset_s is None:
             self._begin(t_s, offset_s)
             return True
-        expected_s = self._offset_s + LEAK * max(0.0, t_s - self._last_s)
-        if -AHEAD_S <= offset_s - expected_s <= BEHIND_S:
-            self._offset_s, self._last_s = min(expected_s, offset_s), t_s
+        drift_s = DRIFT * max(0.0, t_s - self._last_s)
+        if -AHEAD_S - drift_s <= offset_s - self._offset_s <= BEHIND_S + drift_s:
+            self._offset_s += min(max(offset_s - self._offset_s, -drift_s), drift_s)
+            self._last_s = t_s
             return True
         if self._rival_count == 0 or abs(offset_s - self._rival_s) > AHEAD_S or t_s - self._rival_last_s > ALIVE_S:
             self._rival_count, self._rival_first_s = 0, t_s

@@ -1,0 +1,74 @@
+"""What a voyage keeps of its autopilot: who it is, the parameters that matter, the fence that belongs on it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from companion.clock import now_s
+from companion.fold import VoyageFold
+from companion.geofence import Mission
+from companion.geofence.autopilot_fence import fence_for_autopilot
+from companion.mavlink.autopilot import Autopilot
+
+LOOK_S = 1.0
+# A parameter that is not answered is asked for again after this long [s].
+PARAMETER_AGAIN_S = 10.0
+
+Record = Callable[[dict[str, Any]], None]
+
+
+async def keep_identity(fold: VoyageFold, autopilot: Autopilot) -> None:
+    """Ask who the autopilot is, again after each gap and reboot; the fold hears the answer as a message."""
+    while True:
+        if autopilot.link.is_alive and fold.wants_uid(now_s()):
+            await autopilot.read_version()
+        await asyncio.sleep(LOOK_S)
+
+
+async def keep_parameters(fold: VoyageFold, autopilot: Autopilot) -> None:
+    """Read the parameters that matter, again after each reboot; the fold hears them as messages."""
+    asked_s: dict[str, float] = {}
+    reboots = 0
+    while True:
+        if reboots != autopilot.link.stats.reboots:
+            reboots = autopilot.link.stats.reboots
+            asked_s.clear()
+        for name in fold.unread:
+            if autopilot.link.is_alive and now_s() - asked_s.get(name, -PARAMETER_AGAIN_S) >= PARAMETER_AGAIN_S:
+                asked_s[name] = now_s()
+                await autopilot.get_parameter(name)
+        await asyncio.sleep(LOOK_S)
+
+
+async def keep_fence(fold: VoyageFold, autopilot: Autopilot, mission: Mission, record: Record) -> None:
+    """Upload the fence, where it may be, once the autopilot is known to be ours; begun again when that was in doubt."""
+    upload: asyncio.Task[None] | None = None
+    try:
+        while fold.permissions.may_upload_fence:
+            is_ours = fold.state.is_ours
+            if upload is None and is_ours:
+                upload = asyncio.create_task(_upload_fence(autopilot, mission, record), name="fence upload")
+            elif upload is not None and upload.done():
+                return upload.result()
+            elif upload is not None and not is_ours:
+                upload.cancel()
+                upload = None
+            await asyncio.sleep(LOOK_S)
+    finally:
+        if upload is not None:
+            upload.cancel()
+
+
+async def _upload_fence(autopilot: Autopilot, mission: Mission, record: Record) -> None:
+    """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
+    places = [g.point for g in mission.goals] + ([mission.start] if mission.start else [])
+    fence = fence_for_autopilot(mission.area, mission.margin_m, inside=places)
+    done: dict[str, Any] = {"kind": "fence", "status": fence.status.name, "text": fence.reason}
+    if fence.items:
+        sent = await autopilot.upload_fence(fence.items)
+        done |= {"outcome": sent.outcome.value, "text": sent.text, "count": len(fence.items)}
+        if sent.is_ok:
+            done["enabled"] = (await autopilot.enable_fence()).outcome.value
+    record(done)
