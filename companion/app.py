@@ -51,8 +51,6 @@ LOOP_WATCH_S = 0.1
 # After arrival the boat loiters; the companion watches it for a moment before it ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
-# A second companion on the boat is said this often [s].
-COMPANY_EVERY_S = 60.0
 
 OnStatus = Callable[[CompanionStatus, Step], None]
 
@@ -95,8 +93,7 @@ class _Shell:
         self._refusals: list[str] = []
         self.feeds = Feeds()
         self._system: int | None = None            # of our autopilot
-        self._neighbours: tuple[str, ...] = ()
-        self._company_s = -COMPANY_EVERY_S
+        self._others: dict[str, Any] = {"neighbours": [], "company": False}
         self._autopilot: Autopilot | None = None
 
     async def run(self, transport: Transport) -> dict[str, Any]:
@@ -193,16 +190,26 @@ class _Shell:
     # --------------------------------------------------------------------------------------- steps
     def _tick(self, t_s: float, link: Link) -> Step:
         """Fold what the feeds heard, after this step's messages as a replay does, and step."""
-        if self._named(self._adopted) is None and link.has_autopilot:
-            heard = tuple(f"system {s.system}, {type_words(s.vehicle_type)}" for s in link.neighbours())
-            if heard != self._neighbours:
-                self._neighbours = heard
-                self.recorder.decision(self._stamped(t_s, {"kind": "neighbours", "heard": list(heard)}))
-                self.fold.neighbours(heard)
+        if link.has_autopilot:
+            others = self._others_on(link, is_named=self._named(self._adopted) is not None)
+            if others != self._others:
+                self._others = others
+                self.recorder.decision(self._stamped(t_s, {"kind": "others", **others}))
+                self.fold.others(tuple(others["neighbours"]), has_company=others["company"])
         for report in self.feeds.take():
             self.recorder.decision(self._stamped(t_s, ais_record(report)))
             self.fold.take(report)
         return self.fold.tick(t_s)
+
+    @staticmethod
+    def _others_on(link: Link, *, is_named: bool) -> dict[str, Any]:
+        """Return who else is heard: autopilots, where ours was not named, and a companion that is at work."""
+        other = link.other_companion()
+        return {
+            "neighbours": [] if is_named else [
+                f"system {s.system}, {type_words(s.vehicle_type)}" for s in link.neighbours()],
+            "company": other is not None and not other.is_starting,
+        }
 
     async def _steps(self, executor: Executor, link: Link) -> None:
         started_s = next_s = now_s()
@@ -297,7 +304,6 @@ class _Shell:
             if self.status is not None:
                 autopilot.send_status(self.status)
             self._tell_silence(autopilot)
-            self._tell_company(autopilot)
             await asyncio.sleep(STATUS_EVERY_S)
 
     def _tell_silence(self, autopilot: Autopilot) -> None:
@@ -306,15 +312,6 @@ class _Shell:
             text = f"AIS feed {'silent' if feed.is_silent else 'heard again'}: {feed.sentence()}"
             self._record({"kind": "feed", "silent": feed.is_silent, "text": text})
             autopilot.say(int(Severity.WARNING if feed.is_silent else Severity.NOTICE), text)
-
-    def _tell_company(self, autopilot: Autopilot) -> None:
-        """Say and record that a second companion is heard: one of our kind gives way when it starts."""
-        other = autopilot.link.other_companion()
-        if other is not None and not other.is_starting and now_s() - self._company_s >= COMPANY_EVERY_S:
-            self._company_s = now_s()
-            text = f"a second companion speaks as component {OWN_COMPONENT} of this boat: stop one of the two"
-            self._record({"kind": "company", "text": text})
-            autopilot.say(int(Severity.ERROR), text)
 
     async def _watch_loop(self) -> None:
         """Measure how long the event loop was held: a timer that fires late was kept waiting by somebody."""

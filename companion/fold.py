@@ -86,6 +86,7 @@ class VoyageFold:
         self._identity = Identity()
         self._uid_s = -float("inf")
         self._neighbours: tuple[str, ...] = ()
+        self._has_company = False
         self._parameters: dict[str, float] = {}
         self._in_doubt: dict[str, float] = {}
         self._answered: set[str] = set()
@@ -191,11 +192,12 @@ class VoyageFold:
 
     def wants_uid(self, t_s: float) -> bool:
         """Return whether the autopilot is to be asked who it is."""
-        return not self._identity.is_confirmed or t_s - self._uid_s >= UID_EVERY_S
+        is_known = self._identity.is_confirmed and self.state.uid in {None, self._identity.uid}
+        return not is_known or t_s - self._uid_s >= UID_EVERY_S
 
-    def neighbours(self, heard: tuple[str, ...]) -> None:
-        """Take who else is heard on a link on which our autopilot was not named."""
-        self._neighbours = heard
+    def others(self, neighbours: tuple[str, ...], *, has_company: bool) -> None:
+        """Take who else is heard: autopilots, where ours was not named, and another companion of this boat."""
+        self._neighbours, self._has_company = neighbours, has_company
 
     def _disbelieve(self, what: str, text: str) -> None:
         """Say once that something heard is not used."""
@@ -256,6 +258,7 @@ class VoyageFold:
                 self._identity, vehicle_type=None if autopilot is None else autopilot.vehicle_type,
                 is_contested=self._witness.clock.is_contested(t_s)),
             neighbours=self._neighbours,
+            has_company=self._has_company,
             limits=self._limits,
             permissions=self.permissions,
             planner_alive=self._planner_alive,

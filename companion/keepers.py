@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -11,10 +12,13 @@ from companion.fold import VoyageFold
 from companion.geofence import Mission
 from companion.geofence.autopilot_fence import fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.parameter_ranges import RANGES
 
 LOOK_S = 1.0
 # A parameter that is not answered is asked for again after this long [s].
 PARAMETER_AGAIN_S = 10.0
+# All are read again this often: what was changed, damaged or forged does not stay [s].
+PARAMETERS_EVERY_S = 300.0
 
 Record = Callable[[dict[str, Any]], None]
 
@@ -28,15 +32,16 @@ async def keep_identity(fold: VoyageFold, autopilot: Autopilot) -> None:
 
 
 async def keep_parameters(fold: VoyageFold, autopilot: Autopilot) -> None:
-    """Read the parameters that matter, again after each reboot; the fold hears them as messages."""
+    """Read the parameters that matter, now and then and after each reboot; the fold hears them as messages."""
     asked_s: dict[str, float] = {}
     reboots = 0
     while True:
         if reboots != autopilot.link.stats.reboots:
             reboots = autopilot.link.stats.reboots
             asked_s.clear()
-        for name in fold.unread:
-            if autopilot.link.is_alive and now_s() - asked_s.get(name, -PARAMETER_AGAIN_S) >= PARAMETER_AGAIN_S:
+        for name in RANGES:
+            again_s = PARAMETER_AGAIN_S if name in fold.unread else PARAMETERS_EVERY_S
+            if autopilot.link.is_alive and now_s() - asked_s.get(name, -math.inf) >= again_s:
                 asked_s[name] = now_s()
                 await autopilot.get_parameter(name)
         await asyncio.sleep(LOOK_S)

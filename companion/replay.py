@@ -100,7 +100,7 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
         outcomes = iter([d for d in decisions if start_s <= d["t_s"] < end_s and d["kind"] in {"plan", "outcome"}])
         fed: dict[float, list[dict[str, Any]]] = {}
         for record in decisions:
-            if record["kind"] in {"ais", "neighbours"}:
+            if record["kind"] in {"ais", "others"}:
                 fed.setdefault(float(record["t_s"]), []).append(record)
         recorded = _actions_by_time([d for d in decisions if start_s <= d["t_s"] < end_s])
         for t_s, n_messages, n_outcomes in rows:
@@ -115,7 +115,7 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
                 if record["kind"] == "ais":
                     fold.take(ais_of(record))
                 else:
-                    fold.neighbours(tuple(record["heard"]))
+                    fold.others(tuple(record["neighbours"]), has_company=record["company"])
             step = fold.tick(t_s)
             mine = [
                 _plain(action_record(a, step.snapshot, skipper.config)) for a in step.actions

@@ -2,7 +2,7 @@
 
 ``VehicleAssembler.take`` never raises: what cannot be believed is counted in ``dropped`` and left out. A change of mode
 or arming is a fact when two of three heartbeats show it, or one behind the acknowledgement of a command that makes it;
-a position that leaps is one when the next ones stay there.
+a position that leaps is one when the next ones stay there; a breach of the fence when it is told twice.
 """
 
 from __future__ import annotations
@@ -78,6 +78,7 @@ class VehicleAssembler:
         self._apparent_ms = -1
         self._nav_s: float | None = None
         self._fence_s: float | None = None
+        self._breached = False
 
     def take(self, t_s: float, message: Message) -> list[Value]:
         """Return the values that ``message``, heard at ``t_s`` [s], completes: none, one, or several texts."""
@@ -213,8 +214,9 @@ class VehicleAssembler:
                 battery_remaining=message.battery_remaining / 100.0 if 0 <= message.battery_remaining <= 100 else None,
             )
         elif kind == "FENCE_STATUS":
-            self._status = replace(self._status, fence_breached=bool(message.breach_status))
-            self._fence_s = t_s
+            is_breached, was_breached = bool(message.breach_status), self._breached
+            self._breached, self._fence_s = is_breached, t_s
+            self._status = replace(self._status, fence_breached=is_breached and was_breached)
         else:
             return []
         self._status = replace(self._status, t_s=t_s, boot_s=self._boot_s)

@@ -83,8 +83,10 @@ class Reception:
 
     def choose(self, t_s: float) -> None:
         """Take the autopilot that is ours, once it is known."""
+        if self.is_decided:
+            return
         choice = self.census.choice(t_s)
-        if self.is_decided or choice.standing is Standing.LISTENING:
+        if choice.standing is Standing.LISTENING:
             return
         self.refusal, self.target = choice.reason, choice.system
         if choice.system is not None and self._identity.system is None:

@@ -13,7 +13,6 @@ A forger who listens gets both right. Against that one there is only a key.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 from companion.mavlink.frames import Drop, Message
 
@@ -35,13 +34,16 @@ CONTEST_OVER_S = 10.0
 
 # A stream of frames counts while one came within this time [s]; after a longer gap any count may go on.
 ALIVE_S = 1.5
-# Frames of one moment come in a burst, of which a bad link loses some [frames].
-BURST = 8
-# The count may run at this many times the rate seen lately; overtaken frames are late by this at most [s].
-FASTER = 2.0
-LATE_S = 0.5
-RATE_WINDOW_S = 1.0
+# Since the last boot time that was right the count has run on at this many times its rate, and a burst [frames].
+FASTER, BURST = 2.0, 8
 FIRST_RATE_HZ = 50.0
+# From frame to frame it goes one on, and over what the link loses: a run of losses as rare as this is none. After so
+# long a silence more may be missing [s].
+STEP, RARE, SILENCE_S = 1, 1e-3, 0.5
+# Overtaken frames are late by this at most [s].
+LATE_S = 0.5
+# Rate and loss are those of this time [s].
+WINDOW_S = 1.0
 # Messages with a right boot time that vouch for their stream.
 VOUCHERS = 3
 MAX_STREAMS = 4
@@ -92,44 +94,53 @@ class BootClock:
         self._rival_count = 0
 
 
-@dataclass(slots=True)
 class _Stream:
-    """Frames that count up; ``missing`` are the numbers left out of late, which may still come."""
+    """Frames that count up. A right boot time anchors the count: no other frame can lead it away."""
 
-    seq: int
-    last_s: float
-    missing: set[int] = field(default_factory=set)
-    counted: int = 0
-    since_s: float = 0.0
-    rate_hz: float = FIRST_RATE_HZ
-    vouchers: int = 0
-
-    def step_to(self, t_s: float, seq: int) -> int | None:
-        """Return by how much ``seq`` is ahead of the count, None when the stream cannot have come there."""
-        ahead = (seq - self.seq) % 256 or 256
-        if ahead <= BURST + FASTER * self.rate_hz * (t_s - self.last_s):
-            return ahead
-        return ahead - 256 if seq in self.missing else None
-
-    def take(self, t_s: float, ahead: int) -> None:
-        """Count a frame."""
-        if ahead <= 0:
-            self.missing.discard((self.seq + ahead) % 256)
-            return
-        late = int(BURST + LATE_S * self.rate_hz)
-        self.missing = {n for n in self.missing if (self.seq + ahead - n) % 256 <= late}
-        self.missing |= {(self.seq + n) % 256 for n in range(max(1, ahead - late), ahead)}
-        self.seq = (self.seq + ahead) % 256
-        self.counted += ahead
+    def __init__(self, t_s: float, seq: int) -> None:
         self.last_s = t_s
-        if t_s - self.since_s >= RATE_WINDOW_S:
-            self.rate_hz = max(1.0, self.counted / (t_s - self.since_s))
-            self.counted, self.since_s = 0, t_s
+        self.vouchers = 0
+        self._seq = self._anchor_seq = seq
+        self._anchor_s = self._since_s = t_s
+        self._anchor_boot_s = -math.inf
+        self._rate_hz, self._step = FIRST_RATE_HZ, STEP + BURST
+        self._counted = self._heard = 0
+        self._seen_s = [-math.inf] * 256
 
     @property
     def is_vouched(self) -> bool:
         """Its boot times have been right."""
         return self.vouchers >= VOUCHERS
+
+    def holds(self, t_s: float, seq: int, *, is_timed: bool) -> bool:
+        """Return whether the stream can have come to ``seq``; ``is_timed``: its boot time is right."""
+        since_s = t_s - self._anchor_s
+        room = BURST + FASTER * self._rate_hz * since_s
+        gone = (seq - self._anchor_seq) % 256 or 256
+        if gone <= room and (is_timed or since_s >= SILENCE_S):
+            return True
+        if gone <= room and 0 < (seq - self._seq) % 256 <= self._step:
+            return True
+        is_late = (self._seq - seq) % 256 <= BURST + LATE_S * self._rate_hz
+        return is_late and (is_timed or t_s - self._seen_s[seq] > 128.0 / self._rate_hz)
+
+    def take(self, t_s: float, seq: int, boot_s: float | None) -> None:
+        """Count a frame that it holds; ``boot_s`` is right, or None."""
+        self.last_s = self._seen_s[seq] = t_s
+        self._heard += 1
+        if boot_s is None or boot_s < self._anchor_boot_s:
+            if (seq - self._seq) % 256 < 128:
+                self._seq = seq
+            return
+        self.vouchers += 1
+        self._counted += (seq - self._anchor_seq) % 256
+        self._seq = self._anchor_seq = seq
+        self._anchor_s, self._anchor_boot_s = t_s, boot_s
+        if t_s - self._since_s >= WINDOW_S:
+            self._rate_hz = max(1.0, self._counted / (t_s - self._since_s))
+            lost = min(0.9, max(0.0, 1.0 - self._heard / max(1, self._counted)))
+            self._step = STEP + (math.ceil(math.log(RARE) / math.log(lost)) if lost > RARE else 0)
+            self._counted, self._heard, self._since_s = 0, 0, t_s
 
 
 class Witness:
@@ -142,28 +153,25 @@ class Witness:
     def objection(self, t_s: float, message: Message) -> Drop | None:
         """Return why ``message``, heard at ``t_s`` [s], is not used, None when it is."""
         boot_ms = getattr(message, "time_boot_ms", None)
-        if boot_ms is not None:
-            if not self.clock.take(t_s, boot_ms / 1e3):
+        boot_s = None if boot_ms is None else boot_ms / 1e3
+        if boot_s is not None:
+            if not self.clock.take(t_s, boot_s):
                 return Drop.WRONG_CLOCK
             if self.clock.is_new:
                 self._streams.clear()
-        stream = self._stream_of(t_s, message.get_seq())
         is_guarded = any(s.is_vouched and t_s - s.last_s <= ALIVE_S for s in self._streams)
-        was_vouched = stream.is_vouched
-        if boot_ms is not None:
-            stream.vouchers += 1
-        return Drop.OUT_OF_STEP if is_guarded and not was_vouched else None
+        stream = self._stream_of(t_s, message.get_seq(), boot_s)
+        return Drop.OUT_OF_STEP if is_guarded and not stream.is_vouched else None
 
-    def _stream_of(self, t_s: float, seq: int) -> _Stream:
-        """Return the stream that the frame belongs to, the nearest count first; a new one where none can be."""
-        steps = [(abs(ahead - 1), not s.is_vouched, n, ahead) for n, s in enumerate(self._streams)
-                 if (ahead := s.step_to(t_s, seq)) is not None]
-        if steps:
-            *_, number, ahead = min(steps)
-            self._streams[number].take(t_s, ahead)
-            return self._streams[number]
+    def _stream_of(self, t_s: float, seq: int, boot_s: float | None) -> _Stream:
+        """Return the stream that the frame belongs to, one that is vouched for first; a new one where none can be."""
+        for stream in sorted(self._streams, key=lambda s: -min(s.vouchers, VOUCHERS)):
+            if stream.holds(t_s, seq, is_timed=boot_s is not None):
+                stream.take(t_s, seq, boot_s)
+                return stream
         if len(self._streams) >= MAX_STREAMS:
-            self._streams.remove(min(self._streams, key=lambda s: s.last_s))
-        stream = _Stream(seq=seq, last_s=t_s, since_s=t_s)
+            self._streams.remove(min(self._streams, key=lambda s: (s.is_vouched, s.last_s)))
+        stream = _Stream(t_s, seq)
         self._streams.append(stream)
+        stream.take(t_s, seq, boot_s)
         return stream

@@ -19,6 +19,10 @@ SAY_EVERY_S = 60.0
 def is_ours(turn: Turn) -> bool:
     """Judge whose autopilot is heard; stop all orders when it is not ours, and say why and what to do."""
     identity = turn.snapshot.identity
+    if turn.snapshot.has_company:
+        turn.say(Severity.ERROR, "second companion",
+                 "a second companion speaks for this boat: stop one of the two, they give her different orders",
+                 every_s=SAY_EVERY_S)
     wrong = _stranger(turn, identity)
     if not wrong and not turn.state.sailing:
         wrong = _unfit(turn, identity)
