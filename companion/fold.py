@@ -47,8 +47,6 @@ from companion.skipper.state import Persisted, SkipperState
 from companion.traffic import TargetLimits, Targets
 from companion.wind import Estimator, Verdict, WindRoom, make
 
-# A boot time that goes back by more than this is a reboot, not a reordered frame [s].
-REBOOT_BACK_S = 5.0
 # Wind is believed after this long a record [s]; until then its spread is a guess.
 SETTLED_S = 20.0
 
@@ -99,7 +97,6 @@ class VoyageFold:
         self._heartbeat_s: float | None = None
         self._mission = MissionOnBoard()
         self._limits: AutopilotLimits | None = None
-        self._boot_s: float | None = None
         self._mode: Mode | None = None
         self._first_wind_s: float | None = None
         self._sample_s: float | None = None
@@ -134,13 +131,22 @@ class VoyageFold:
             elif kind == "AUTOPILOT_VERSION":
                 self._uid_s = t_s
                 self._identity = self._identity.told(message.get_srcSystem(), autopilot_version(message).uid)
-        for value in self.assembler.take(t_s, message):
+        reboots = self.assembler.reboots
+        values = self.assembler.take(t_s, message)
+        if self.assembler.reboots != reboots:
+            self._rebooted()
+        for value in values:
             self.take(value)
+
+    def _rebooted(self) -> None:
+        self._events.append(AutopilotRebooted())
+        self._mission = MissionOnBoard()
+        self._identity = self._identity.doubted()
+        self._answered.clear()
 
     def take(self, value: Value) -> None:
         """Take one decoded value, in the order of time."""
         if isinstance(value, VehicleState):
-            self._notice_boot(value.boot_s)
             self._vehicle = value
             self.wind.update(value)
         elif isinstance(value, WindSample | ApparentWind):
@@ -208,14 +214,6 @@ class VoyageFold:
     def planner_alive(self, alive: bool) -> None:
         """Note whether the planner's process lives."""
         self._planner_alive = alive
-
-    def _notice_boot(self, boot_s: float) -> None:
-        if self._boot_s is not None and boot_s < self._boot_s - REBOOT_BACK_S:
-            self._events.append(AutopilotRebooted())
-            self._mission = MissionOnBoard()
-            self._identity = self._identity.doubted()
-            self._answered.clear()
-        self._boot_s = boot_s
 
     def _take_status(self, status: AutopilotStatus) -> None:
         if status.mode is not None and status.mode != self._mode:
