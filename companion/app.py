@@ -25,7 +25,9 @@ from companion.geofence import Mission
 from companion.keepers import keep_fence, keep_identity, keep_parameters
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.census import LISTEN_S, type_words, yields_to
+from companion.mavlink.frames import Drop
 from companion.mavlink.link import Link
+from companion.mavlink.link_stats import LinkStats
 from companion.mavlink.reception import OWN_COMPONENT, LinkIdentity
 from companion.mavlink.tlog import stamp
 from companion.mavlink.transport import Transport
@@ -95,6 +97,7 @@ class _Shell:
         self._system: int | None = None            # of our autopilot
         self._others: dict[str, Any] = {"neighbours": [], "company": False}
         self._autopilot: Autopilot | None = None
+        self._counted = LinkStats()
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
@@ -120,6 +123,7 @@ class _Shell:
                 ) as link,
                 contextlib.AsyncExitStack() as stack,
             ):
+                self._counted = link.stats
                 link.subscribe(self._on_message)
                 await self._wait_autopilot(link)
                 autopilot = self._autopilot = await stack.enter_async_context(Autopilot(link))
@@ -368,6 +372,8 @@ class _Shell:
             "end_why": state.why,
             "ais_feeds": [feed.sentence() for feed in self.feeds.open_feeds],
             "ais_dropped": self.feeds.dropped,
+            "frames_disbelieved": sum(self._counted.dropped[why] for why in (Drop.WRONG_CLOCK, Drop.OUT_OF_STEP)),
+            "listener_faults": dict(self._counted.faults),
             "records_dropped": self.recorder.dropped,
             "planner_restarts": self.planner.restarts,
             "loop_held_max_s": round(self.loop_held_s * self.options.budget_scale, 4),

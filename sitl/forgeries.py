@@ -71,6 +71,12 @@ def _parameter(name: bytes, value: float) -> Callable[[Known], Any]:
     return lambda _: wire.MAVLink_param_value_message(name, value, 9, 1000, 65535)
 
 
+def _ghost(known: Known) -> Any:
+    return wire.MAVLink_ais_vessel_message(
+        211_000_001, known.lat_e7 + OFF_E7, known.lon_e7, 18000, 18000, 0, 100, 0, 70, 50, 50, 10, 10, b"", b"GHOST",
+        0, 0x36)
+
+
 _OTHER_BOARD = [0x66] * 18
 _NAK = bytes([1, 0, 0, 129, 0, 1, 2, 0, 0, 0, 0, 0, 2])
 
@@ -105,8 +111,8 @@ FORGERIES: tuple[Forgery, ...] = (
             build=lambda _: wire.MAVLink_statustext_message(2, b"EKF failsafe", 0, 0)),
     Forgery(message="STATUSTEXT", says='"Flight plan received"',
             build=lambda _: wire.MAVLink_statustext_message(6, b"Flight plan received", 0, 0)),
-    Forgery(message="AIS_VESSEL", says="a ship 300 m ahead", build=lambda k: wire.MAVLink_ais_vessel_message(
-        211_000_001, k.lat_e7 + OFF_E7, k.lon_e7, 18000, 18000, 0, 100, 0, 70, 50, 50, 10, 10, b"", b"GHOST", 0, 0x36)),
+    Forgery(message="AIS_VESSEL", says="a ship 300 m off", build=_ghost),
+    Forgery(message="AIS_VESSEL", says="the same, of a receiver of its own", component=156, build=_ghost),
     Forgery(message="HOME_POSITION", says="home is 300 m off", build=lambda k: wire.MAVLink_home_position_message(
         k.lat_e7 + OFF_E7, k.lon_e7, 0, 0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0)),
     Forgery(message="AUTOPILOT_VERSION", says="another board", build=lambda _: wire.MAVLink_autopilot_version_message(

@@ -150,6 +150,25 @@ def test_shore_tools_against_the_simulated_autopilot(tmp_path):
         check_shore_tools(tmp_path, f"udpout:{host}:{udp}", f"tcp:{host}:{tcp}")
 
 
+def test_only_the_boat_that_is_named_is_touched(tmp_path):
+    (tmp_path / "m.waypoints").write_text(WPL)
+    with boat_process("--warm", "--moored", "--speedup", "4", "--sysid", "7") as (host, tcp, _):
+        link = ("--link", f"tcp:{host}:{tcp}", "--timeout", "3")
+        code, out, err = companion("mission", "upload", tmp_path / "m.waypoints", *link, "--system", "9")
+        assert code == 1
+        assert "no autopilot's heartbeat of system 9; heard: system 7 (surface boat, ArduPilot" in err
+        assert not out
+        code, _, err = companion("mission", "download", tmp_path / "x.plan", *link, "--system", "7")
+        assert (code, err) == (1, "the autopilot holds no mission; nothing is written\n")
+        code, _, err = companion("status", "--link", f"tcp:{host}:{tcp}", "--system", "9", "--once", "--timeout", "3")
+        assert code == 3
+        assert "of system 9; heard: system 7" in err
+        code, _, err = companion("doctor", "--link", f"tcp:{host}:{tcp}", "--system", "9", "--wait", "3")
+        assert code == 1
+        assert "of system 9; heard: system 7" in err
+        assert companion("doctor", "--link", f"tcp:{host}:{tcp}", "--system", "0")[0] == 2
+
+
 @pytest.mark.ardurover
 def test_shore_tools_against_the_real_ardurover(tmp_path):
     from sitl.ardurover import DEFAULTS, free_instance
