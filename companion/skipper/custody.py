@@ -16,17 +16,17 @@ BOAT_CLASS = 2         # FRAME_CLASS of ArduRover
 SAY_EVERY_S = 60.0
 
 
-def is_ours(turn: Turn) -> bool:
-    """Judge whose autopilot is heard; stop all orders when it is not ours, and say why and what to do."""
+def judge(turn: Turn) -> None:
+    """Judge whose autopilot is heard, before anything else is done; stop all orders when it may not be ours."""
     identity = turn.snapshot.identity
     if turn.snapshot.has_company:
         turn.say(Severity.ERROR, "second companion",
                  "a second companion speaks for this boat: stop one of the two, they give her different orders",
                  every_s=SAY_EVERY_S)
-    wrong = _stranger(turn, identity)
-    if not wrong and not turn.state.sailing:
-        wrong = _unfit(turn, identity)
-    asking = "" if wrong else _unknown(turn, identity)
+    wrong = _wrong(turn, identity)
+    if wrong:
+        turn.say(Severity.ERROR, "not ours", f"no orders: {wrong}", every_s=SAY_EVERY_S)
+    asking = _unknown(turn, identity)
     if not wrong and not asking:
         if turn.state.custody:
             turn.update(custody="", checked_mission=False, read_since_s=turn.t_s)
@@ -34,22 +34,33 @@ def is_ours(turn: Turn) -> bool:
         if turn.state.uid is None:
             turn.update(uid=identity.uid, system=identity.system)
         turn.update(is_ours=True)
-        return True
+        return
     if turn.state.is_ours:
         turn.act(StopOrders(text=wrong or asking))
         if turn.state.pending_plan is not None:
             turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
         turn.update(pending_plan=None, steering_until_s=None)
     turn.update(is_ours=False, custody=wrong or turn.state.custody)
-    phase = turn.state.phase
-    if phase is not Phase.DONE and not turn.state.sailing:
+
+
+def stand_by(turn: Turn) -> bool:
+    """Say why nothing is asked of the autopilot; False when it is ours."""
+    state = turn.state
+    if state.is_ours:
+        return False
+    wrong = _wrong(turn, turn.snapshot.identity)
+    phase = state.phase
+    if phase is not Phase.DONE and not state.sailing:
         phase = Phase.WAITING
     elif phase is not Phase.DONE and wrong:
         phase = Phase.OPERATOR
-    if wrong:
-        turn.say(Severity.ERROR, "not ours", f"no orders: {wrong}", every_s=SAY_EVERY_S)
-    turn.phase(phase, f"no orders: {wrong}" if wrong else asking)
-    return False
+    turn.phase(phase, f"no orders: {wrong}" if wrong else _unknown(turn, turn.snapshot.identity))
+    return True
+
+
+def _wrong(turn: Turn, identity: Identity) -> str:
+    """Return why the autopilot is none of ours, "" when it may be."""
+    return _stranger(turn, identity) or ("" if turn.state.sailing else _unfit(turn, identity))
 
 
 def _stranger(turn: Turn, identity: Identity) -> str:

@@ -22,7 +22,7 @@ def mission_is_known(turn: Turn) -> bool:
     """Make sure that the mission on the autopilot is ours, empty, or known not to be."""
     state = turn.state
     if state.wish is OperatorWish.REPLACE_FOREIGN:
-        turn.update(wish=None, foreign="", replace_foreign=True)
+        turn.update(wish=None, foreign="", adoptable=None, replace_foreign=True)
         state = turn.state
     if state.foreign:
         if turn.snapshot.permissions.may_replace_foreign:

@@ -1,7 +1,7 @@
 """The skipper: ``step(state, snapshot) -> (state, actions)``, a pure fold over a voyage's snapshots.
 
-The order of a step: take in what happened, find the boat on its route, look at the watchdogs, then act by who has
-the boat: nobody yet (start), somebody else (operator), we (sail).
+The order of a step: see whose autopilot it is, take in what happened, find the boat on its route, look at the
+watchdogs, then act by who has the boat: nobody yet (start), somebody else (operator), we (sail).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
 from companion.skipper.config import SkipperConfig
-from companion.skipper.custody import is_ours
+from companion.skipper.custody import judge, stand_by
 from companion.skipper.doubt import follow
 from companion.skipper.failsafe import has_stopped
 from companion.skipper.gates import Gate, gates_of
@@ -59,6 +59,7 @@ class Skipper:
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
         turn = Turn(self.voyage, self.config, self.gates, state, snapshot)
+        judge(turn)
         take_events(turn)
         take_outcomes(turn)
         follow(turn)
@@ -80,7 +81,9 @@ class Skipper:
 
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
-        return state.adoptable or state.persisted(self.voyage.name)
+        if state.adoptable is not None and (state.foreign or not state.checked_mission):
+            return state.adoptable
+        return state.persisted(self.voyage.name)
 
 
 def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
@@ -93,7 +96,7 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         phase = Phase.WAITING if not state.sailing else turn.state.phase
         turn.phase(phase, f"the autopilot is {heard}; what it has sails on")
         return
-    if not is_ours(turn) or _operator_has_it(turn):
+    if stand_by(turn) or _operator_has_it(turn):
         return
     notice_truncation(turn)
     if not mission_is_known(turn):

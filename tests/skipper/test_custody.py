@@ -10,6 +10,7 @@ import pytest
 from companion.mavlink.identity import Identity
 from companion.messages import MissionItem, Mode
 from companion.skipper import actions as act
+from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Persisted, Phase
 from tests.skipper.test_voyage import is_done, is_sailing, make, said
 
@@ -141,6 +142,22 @@ def test_a_strangers_mission_stays_a_strangers():
     assert world.mission == THEIRS
     assert orders(world) == before
     assert len(said(world, "foreign mission")) == 2, "found, and the watchdog"
+
+
+def test_what_was_ours_is_given_up_when_the_strangers_mission_is_replaced():
+    world = make()
+    world.run(200, is_sailing)
+    world.install(THEIRS)
+    world.state = replace(world.state, checked_mission=False, read_since_s=world.t)
+    world.run(20)
+    old = world.skipper.persisted(world.state).route
+    world.events.append(OperatorWish.REPLACE_FOREIGN)
+    assert world.run(60, lambda w: w.mission != THEIRS)
+    world.run(5)
+    saved = world.skipper.persisted(world.state)
+    assert saved.route is not None
+    assert saved.route.items == world.mission
+    assert saved.route.items != old.items
 
 
 def test_an_identity_that_differs_counts_when_it_is_told_twice():
