@@ -17,14 +17,17 @@ from typing import Any
 import numpy as np
 
 from companion.clock import now_s
+from companion.company import NOBODY, make_way, others_on
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
 from companion.executor import Executor, Planner
 from companion.fold import Step, VoyageFold
 from companion.geofence import Mission
-from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
+from companion.keepers import keep_fence, keep_identity, keep_parameters
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.commands import CommandAnswer
+from companion.mavlink.frames import Drop
 from companion.mavlink.link import Link
+from companion.mavlink.link_stats import LinkStats
+from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.transport import Transport
 from companion.messages import CompanionStatus
 from companion.options import SailOptions
@@ -48,13 +51,6 @@ LOOP_WATCH_S = 0.1
 # With ``exit_on_arrival`` the loiter is watched for a moment before the program ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
-FENCE_TRIES = 5
-# Parameters that the plan and the wind depend on; asked at the start and after a reboot.
-PARAMETERS = (
-    "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "SAIL_LOIT_RADIUS", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE",
-    "FENCE_ACTION", "WNDVN_TYPE", "WNDVN_SPEED_TYPE", "WNDVN_SPEED_MIN", "WNDVN_TRUE_FILT", "WNDVN_DIR_FILT",
-    "WNDVN_SPEED_FILT", "WNDVN_DIR_OFS", "MODE_CH", "RCMAP_ROLL", "RCMAP_THROTTLE",
-)
 
 OnStatus = Callable[[CompanionStatus, Step], None]
 
@@ -93,20 +89,30 @@ class _Shell:
         self.end_reason = "stopped"
         self.loop_held_s = 0.0
         self._arrived_before = False
+        self._named = mission.autopilot.system     # of our autopilot: as named, or as of the voyage that goes on
         self._refusals: list[str] = []
         self.feeds = Feeds()
+        self._system: int | None = None            # of our autopilot, as heard
+        self._others = NOBODY
+        self._autopilot: Autopilot | None = None
+        self._counted = LinkStats()
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
         self._begin(transport.name)
         try:
             async with (
-                Link(transport, sink=self.log.frame, signing=self.options.signing) as link,
+                Link(
+                    transport, sink=self.log.frame, signing=self.options.signing, is_starting=True,
+                    identity=LinkIdentity(token=self.options.token), target_system=self._named,
+                    objection=self.fold.objection, stamp=self.log.stamped_s, on_fault=self._on_fault,
+                ) as link,
                 contextlib.AsyncExitStack() as stack,
             ):
+                self._counted = link.stats
                 link.subscribe(self._on_message)
                 await self._wait_autopilot(link)
-                autopilot = await stack.enter_async_context(Autopilot(link))
+                autopilot = self._autopilot = await stack.enter_async_context(Autopilot(link))
                 for text in await self.feeds.open(stack, feeds_of(self.mission), self.options.seed):
                     self._refuse("AIS feed", text)
                 for text in self._refusals:
@@ -115,12 +121,12 @@ class _Shell:
                                     expansions=self.options.expansions,
                                     budget_scale=self.options.budget_scale, config=self.config)
                 radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
-                if self.fold.permissions.may_upload_fence:
-                    await self._upload_fence(autopilot)
                 async with asyncio.TaskGroup() as group:
                     tasks = [
                         group.create_task(executor.run(), name="executor"),
-                        group.create_task(self._keep_parameters(autopilot, link), name="parameters"),
+                        group.create_task(keep_identity(self.fold, autopilot), name="identity"),
+                        group.create_task(keep_parameters(self.fold, autopilot), name="parameters"),
+                        group.create_task(keep_fence(self.fold, autopilot, self.mission, self._record), name="fence"),
                         group.create_task(radio.run(), name="radio"),
                         group.create_task(self._tend_records(), name="records"),
                         group.create_task(self._watch_loop(), name="loop watch"),
@@ -146,6 +152,8 @@ class _Shell:
             if options.is_again:
                 known = (*known, *persisted.names)
                 persisted = None
+        if self._named is None and persisted is not None:
+            self._named = persisted.system
         self.fold = VoyageFold(
             skipper, WindRoom(estimator=estimator_of(self.mission)),
             permissions_of(self.mission, dry_run=options.dry_run), persisted, known=known,
@@ -165,8 +173,19 @@ class _Shell:
 
     # -------------------------------------------------------------------------------------- inputs
     def _on_message(self, t_s: float, message: Any) -> None:
-        self.log.message()
-        self.fold.message(self.log.quantised(t_s)[1], message)
+        if self._system is None or message.get_srcSystem() == self._system:   # not a command of somebody ashore
+            self.log.message()
+            self.fold.message(t_s, message)
+
+    def _record(self, record: dict[str, Any]) -> None:
+        """Record something that happened now."""
+        self.log.note(self.log.now_s(), record)
+
+    def _on_fault(self, text: str) -> None:
+        """Record and say a fault of whoever listens on the link; the link itself goes on."""
+        if self._autopilot is not None:
+            self._autopilot.say(int(Severity.ERROR), text)
+        self._record({"kind": "fault", "text": text})
 
     def _on_outcome(self, outcome: Any) -> None:
         t_s = self.log.now_s()
@@ -174,8 +193,14 @@ class _Shell:
         self.fold.take_outcome(t_s, outcome)
 
     # --------------------------------------------------------------------------------------- steps
-    def _tick(self, t_s: float) -> Step:
+    def _tick(self, t_s: float, link: Link) -> Step:
         """Fold what the feeds heard, after this step's messages as a replay does, and step."""
+        if link.has_autopilot:
+            others = others_on(link, named=self._named)
+            if others != self._others:
+                self._others = others
+                self.log.note(t_s, others.to_record())
+                self.fold.others(others.neighbours, has_company=others.has_company)
         for report in self.feeds.take():
             self.log.note(t_s, ais_record(report))
             self.fold.take(report)
@@ -187,7 +212,7 @@ class _Shell:
         while True:
             t_s = self.log.now_s()
             self.fold.planner_alive(self.planner.is_alive)
-            step = self._tick(t_s)
+            step = self._tick(t_s, link)
             await self._after_step(step, link)
             executor.submit(step.actions)
             if step.state.phase is Phase.DONE and self.options.exit_on_arrival:
@@ -210,15 +235,25 @@ class _Shell:
                 return
 
     async def _wait_autopilot(self, link: Link) -> None:
-        """Wait for the first heartbeat, and say meanwhile that nobody is heard."""
-        waiting = asyncio.create_task(link.wait_autopilot(self.options.wait_s), name="first heartbeat")
+        """Wait until our autopilot is found and nobody else sails it, and say meanwhile that nobody is heard.
+
+        Raises:
+            LinkError: it is not found, or another companion is at work.
+        """
+        waiting = asyncio.create_task(self._find(link), name="whose boat")
         try:
             while not (await asyncio.wait([waiting], timeout=STEP_S))[0]:
-                step = self._tick(self.log.now_s())
+                step = self._tick(self.log.now_s(), link)
                 await self._after_step(step, link)
             await waiting
         finally:
             waiting.cancel()
+
+    async def _find(self, link: Link) -> None:
+        self._system = (await link.wait_autopilot(self.options.wait_s)).target_system
+        self._record({"kind": "autopilot", "system": self._system, "unheard": link.unheard})
+        await make_way(link, named=self._named, token=self.options.token)
+        link.started()
 
     async def _after_step(self, step: Step, link: Link) -> None:
         """Record the step; nothing of it is carried out before what a restart needs is on the disk."""
@@ -247,43 +282,6 @@ class _Shell:
             f"nothing is recorded: {records}" if records else "") if text)
 
     # ----------------------------------------------------------------------------------- companions
-    async def _keep_parameters(self, autopilot: Autopilot, link: Link) -> None:
-        """Read the parameters that matter, again after each reboot; the fold hears them as messages."""
-        reboots = -1
-        while True:
-            if reboots != link.stats.reboots and link.is_alive:
-                reboots = link.stats.reboots
-                for name in PARAMETERS:
-                    await autopilot.get_parameter(name)
-            await asyncio.sleep(STEP_S)
-
-    async def _upload_fence(self, autopilot: Autopilot) -> None:
-        """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
-        mission = self.mission
-        places = [*mission.places, *([mission.start] if mission.start else [])]
-        fence = fence_for_autopilot(mission.area, mission.margin_m, inside=places)
-        record: dict[str, Any] = {"kind": "fence", "status": fence.status.name, "text": fence.reason}
-        trouble = "" if fence.items or fence.status is FenceStatus.EMPTY else fence.reason
-        if fence.items:
-            done = await autopilot.upload_fence(fence.items)
-            record |= {"outcome": done.outcome.value, "text": done.text, "count": len(fence.items)}
-            trouble = "" if done.is_ok else done.text or done.outcome.value
-            if done.is_ok:
-                enabled = await self._enable_fence(autopilot)
-                record["enabled"] = enabled.outcome.value
-                trouble = "" if enabled.is_ok else enabled.text or enabled.outcome.value
-        if trouble:
-            autopilot.say(int(Severity.ERROR), f"the fence is not in force: {trouble}")
-        self.log.note(self.log.now_s(), record)
-
-    async def _enable_fence(self, autopilot: Autopilot) -> CommandAnswer:
-        """Switch the fence on; ArduRover refuses it for the moment in which it takes a new one in."""
-        for _ in range(FENCE_TRIES - 1):
-            answer = await autopilot.enable_fence()
-            if answer.is_ok:
-                return answer
-            await asyncio.sleep(STEP_S)
-        return await autopilot.enable_fence()
 
     async def _watch_loop(self) -> None:
         """Measure how long the event loop was held: a timer that fires late was kept waiting by somebody."""
@@ -319,6 +317,8 @@ class _Shell:
             "end_why": state.why,
             "ais_feeds": [feed.sentence() for feed in self.feeds.open_feeds],
             "ais_dropped": self.feeds.dropped,
+            "frames_disbelieved": sum(self._counted.dropped[why] for why in (Drop.WRONG_CLOCK, Drop.OUT_OF_STEP)),
+            "listener_faults": dict(self._counted.faults),
             "records_dropped": self.recorder.dropped,
             "disk_trouble": self._trouble(),
             "planner_restarts": self.planner.restarts,

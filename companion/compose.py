@@ -72,6 +72,7 @@ def config_of(mission: Mission) -> SkipperConfig:
     """Return the skipper's thresholds; what the mission does not say keeps its default."""
     options = mission.skipper
     changes: dict[str, Any] = {
+        "sails": mission.autopilot.frame == "sailboat",
         "delta_s": mission.risk.delta_s,
         "max_path_risk": mission.risk.max_path_risk,
         "delta_s_ladder": tuple(d for d in SkipperConfig().delta_s_ladder if d < mission.risk.delta_s),

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
@@ -29,6 +29,7 @@ from companion.skipper.actions import (
     SetCurrent,
     SetMode,
     SteerHeading,
+    StopOrders,
     UploadFence,
     UploadMission,
 )
@@ -94,7 +95,8 @@ class Executor:
         self._config = config or SkipperConfig()
         self._orders: deque[tuple[float, Action]] = deque()
         self._order_wanted = asyncio.Event()
-        self._reading: asyncio.Task[Outcome] | None = None
+        self._order: tuple[Action, asyncio.Task[Outcome]] | None = None   # under way
+        self._cut_short = ""                                              # why it was ended
         self._plan: RequestPlan | None = None
         self._plan_wanted = asyncio.Event()
         self.refused = 0
@@ -112,12 +114,14 @@ class Executor:
                 self._autopilot.steer_heading(action.heading_rad, thrust=action.thrust)
             elif isinstance(action, Announce):
                 self._autopilot.say(int(action.severity), action.text)
+            elif isinstance(action, StopOrders):
+                self._give_up(Action, action.text)
             else:
                 self._enqueue(action)
 
     def _enqueue(self, action: Action) -> None:
         if isinstance(action, UploadMission):
-            self._give_up_reads()
+            self._give_up(ReadMission, "an upload has overtaken it")   # what a read would tell is void by it
         if len(self._orders) >= MAX_WAITING:
             self.refused += 1
             self._on_outcome(_gave_up(action, f"{MAX_WAITING} orders are waiting"))
@@ -125,14 +129,15 @@ class Executor:
         self._orders.append((now_s() + self._patience_s(action), action))
         self._order_wanted.set()
 
-    def _give_up_reads(self) -> None:
-        """An upload is asked for: what a read would tell is void, and the upload need not wait for it."""
-        waiting = [action for _, action in self._orders if isinstance(action, ReadMission)]
+    def _give_up(self, kind: Any, why: str) -> None:
+        """Give up the orders of a kind: those that wait, and the one under way."""
+        waiting = [action for _, action in self._orders if isinstance(action, kind)]
         self._orders = deque(order for order in self._orders if order[1] not in waiting)
         for action in waiting:
-            self._on_outcome(_gave_up(action, "an upload has overtaken it"))
-        if self._reading is not None:
-            self._reading.cancel()
+            self._on_outcome(_gave_up(action, why))
+        if self._order is not None and isinstance(self._order[0], kind):
+            self._cut_short = why
+            self._order[1].cancel()
 
     def _patience_s(self, action: Action) -> float:
         """Return how long an order may take from being asked for [s]."""
@@ -180,22 +185,21 @@ class Executor:
                 continue
             try:
                 async with asyncio.timeout_at(until_s):
-                    outcome = await (self._read(action) if isinstance(action, ReadMission) else self._carry_out(action))
+                    outcome = await self._finish(action)
             except TimeoutError:
                 outcome = _gave_up(action, "took too long")
             self._on_outcome(outcome)
 
-    async def _read(self, action: ReadMission) -> Outcome:
-        """Read the mission, unless an upload overtakes it."""
-        self._reading = asyncio.create_task(self._carry_out(action), name="read")
+    async def _finish(self, action: Action) -> Outcome:
+        """Carry an order out, unless it is given up meanwhile."""
+        task = asyncio.create_task(self._carry_out(action), name="order")
+        self._order, self._cut_short = (action, task), ""
         try:
-            await asyncio.wait({self._reading})
-            if self._reading.cancelled():
-                return _gave_up(action, "an upload has overtaken it")
-            return self._reading.result()
+            await asyncio.wait({task})
+            return _gave_up(action, self._cut_short) if task.cancelled() else task.result()
         finally:
-            self._reading.cancel()
-            self._reading = None
+            task.cancel()
+            self._order = None
 
     async def _carry_out(self, action: Action) -> Outcome:
         autopilot = self._autopilot

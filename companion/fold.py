@@ -8,13 +8,16 @@ the same actions.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.boat import AutopilotLimits
 from companion.geo.angles import wrap_pi
 from companion.mavlink.assembler import VehicleAssembler
-from companion.mavlink.codec import AUTOPILOT_COMPONENT, is_autopilot_heartbeat
-from companion.mavlink.frames import Message
+from companion.mavlink.codec import AUTOPILOT_COMPONENT, autopilot_version, is_autopilot_heartbeat
+from companion.mavlink.frames import Drop, Message
+from companion.mavlink.identity import GAP_S, UID_EVERY_S, Identity
+from companion.mavlink.parameter_ranges import RANGES, believable
+from companion.mavlink.witness import Witness
 from companion.messages import (
     AisReport,
     ApparentWind,
@@ -30,6 +33,7 @@ from companion.skipper.config import Permissions
 from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import (
     AutopilotRebooted,
+    Disbelieved,
     Event,
     MissionOnBoard,
     ModeChanged,
@@ -44,8 +48,6 @@ from companion.skipper.state import SkipperState
 from companion.traffic import TargetLimits, Targets
 from companion.wind import Estimator, Verdict, WindRoom, make
 
-# A boot time that goes back by more than this is a reboot, not a reordered frame [s].
-REBOOT_BACK_S = 5.0
 # Wind is believed after this long a record [s]; until then its spread is a guess.
 SETTLED_S = 20.0
 
@@ -79,7 +81,15 @@ class VoyageFold:
         self.skipper, self.wind, self.permissions = skipper, wind, permissions
         self.state: SkipperState = skipper.initial(persisted, known)
         self.assembler = VehicleAssembler()
+        self._witness = Witness()
+        self._identity = Identity()
+        self._uid_s = -float("inf")
+        self._neighbours: tuple[str, ...] = ()
+        self._has_company = False
         self._parameters: dict[str, float] = {}
+        self._in_doubt: dict[str, float] = {}
+        self._answered: set[str] = set()
+        self._disbelieved: set[str] = set()
         self._targets = Targets.empty(skipper.voyage.frame, traffic)
         self._mean90: Estimator = make("mean90")
         self._mean5: Estimator = make("mean5")
@@ -88,7 +98,6 @@ class VoyageFold:
         self._heartbeat_s: float | None = None
         self._mission = MissionOnBoard()
         self._limits: AutopilotLimits | None = None
-        self._boot_s: float | None = None
         self._mode: Mode | None = None
         self._first_wind_s: float | None = None
         self._sample_s: float | None = None
@@ -97,22 +106,48 @@ class VoyageFold:
         self._outcomes: list[Outcome] = []
 
     # ------------------------------------------------------------------------------------- inputs
+    def objection(self, t_s: float, message: Message) -> Drop | None:
+        """Return why a message of the autopilot's system is not to be used, None when it is; asked once for each."""
+        return self._witness.objection(t_s, message) if message.get_srcComponent() == AUTOPILOT_COMPONENT else None
+
     def message(self, t_s: float, message: Message) -> None:
         """Take one message of the autopilot's system, heard at ``t_s``, in the order of arrival."""
-        kind = message.get_type()
-        if kind == "HEARTBEAT" and is_autopilot_heartbeat(message):
-            self._heartbeat_s = t_s
-        elif kind == "MISSION_ITEM_REACHED" and message.get_srcComponent() == AUTOPILOT_COMPONENT:
-            self._events.append(WaypointReached(seq=int(message.seq)))
-        elif kind == "PARAM_VALUE":
-            self.parameters({message.param_id: float(message.param_value)})
-        for value in self.assembler.take(t_s, message):
+        try:
+            self._message(t_s, message)
+        except Exception as error:
+            kind = message.get_type()
+            self._disbelieve(f"fault in {kind}", f"a {kind} could not be digested and was left out: {error!r}")
+
+    def _message(self, t_s: float, message: Message) -> None:
+        if message.get_srcComponent() == AUTOPILOT_COMPONENT:
+            kind = message.get_type()
+            if kind == "HEARTBEAT" and is_autopilot_heartbeat(message):
+                if self._heartbeat_s is not None and t_s - self._heartbeat_s > GAP_S:
+                    self._identity = self._identity.doubted()
+                self._heartbeat_s = t_s
+            elif kind == "MISSION_ITEM_REACHED":
+                self._events.append(WaypointReached(seq=int(message.seq)))
+            elif kind == "PARAM_VALUE":
+                self.parameters({message.param_id: float(message.param_value)})
+            elif kind == "AUTOPILOT_VERSION":
+                self._uid_s = t_s
+                self._identity = self._identity.told(message.get_srcSystem(), autopilot_version(message).uid)
+        reboots = self.assembler.reboots
+        values = self.assembler.take(t_s, message)
+        if self.assembler.reboots != reboots:
+            self._rebooted()
+        for value in values:
             self.take(value)
+
+    def _rebooted(self) -> None:
+        self._events.append(AutopilotRebooted())
+        self._mission = MissionOnBoard()
+        self._identity = self._identity.doubted()
+        self._answered.clear()
 
     def take(self, value: Value) -> None:
         """Take one decoded value, in the order of time."""
         if isinstance(value, VehicleState):
-            self._notice_boot(value.boot_s)
             self._vehicle = value
             self.wind.update(value)
         elif isinstance(value, WindSample | ApparentWind):
@@ -135,22 +170,51 @@ class VoyageFold:
         self._events.append(event)
 
     def parameters(self, values: Mapping[str, float]) -> None:
-        """Take parameters of the autopilot (ArduPilot's names and units)."""
-        self._parameters.update(values)
-        if any(name.startswith("WNDVN_") for name in values):
+        """Take parameters of the autopilot (ArduPilot's names and units).
+
+        One that cannot be is said and left out. One that was known and has changed is asked for again, and believed
+        when it is told twice.
+        """
+        good, refused = believable(values)
+        for why in refused:
+            self._disbelieve(why.split()[0], f"the autopilot's {why}: not used")
+        self._answered |= values.keys()
+        for name in tuple(good):
+            known, value = self._parameters.get(name), good[name]
+            if name in RANGES and known not in {None, value} and self._in_doubt.get(name) != value:
+                self._in_doubt[name] = good.pop(name)
+            else:
+                self._in_doubt.pop(name, None)
+        self._parameters.update(good)
+        self._identity = self._identity.with_parameters(good)
+        if any(name.startswith("WNDVN_") for name in good):
             self.wind.set_parameters(self._parameters)
-        if self._parameters.keys() >= _LIMITS:
+        if self._answered >= _LIMITS:
             self._limits = AutopilotLimits.from_params(self._parameters)
+
+    @property
+    def unread(self) -> tuple[str, ...]:
+        """The parameters that were not told yet, or once with another value: to be asked for."""
+        return tuple(name for name in RANGES if name not in self._answered or name in self._in_doubt)
+
+    def wants_uid(self, t_s: float) -> bool:
+        """Return whether the autopilot is to be asked who it is."""
+        is_known = self._identity.is_confirmed and self.state.uid in {None, self._identity.uid}
+        return not is_known or t_s - self._uid_s >= UID_EVERY_S
+
+    def others(self, neighbours: tuple[str, ...], *, has_company: bool) -> None:
+        """Take who else is heard: autopilots, where ours was not named, and another companion of this boat."""
+        self._neighbours, self._has_company = neighbours, has_company
+
+    def _disbelieve(self, what: str, text: str) -> None:
+        """Say once that something heard is not used."""
+        if what not in self._disbelieved:
+            self._disbelieved.add(what)
+            self._events.append(Disbelieved(what=what, text=text))
 
     def planner_alive(self, alive: bool) -> None:
         """Note whether the planner's process lives."""
         self._planner_alive = alive
-
-    def _notice_boot(self, boot_s: float) -> None:
-        if self._boot_s is not None and boot_s < self._boot_s - REBOOT_BACK_S:
-            self._events.append(AutopilotRebooted())
-            self._mission = MissionOnBoard()
-        self._boot_s = boot_s
 
     def _take_status(self, status: AutopilotStatus) -> None:
         if status.mode is not None and status.mode != self._mode:
@@ -189,6 +253,11 @@ class VoyageFold:
             heartbeat_age_s=None if self._heartbeat_s is None else t_s - self._heartbeat_s,
             wind=self._wind_view(t_s),
             mission=self._mission,
+            identity=replace(
+                self._identity, vehicle_type=None if autopilot is None else autopilot.vehicle_type,
+                is_contested=self._witness.clock.is_contested(t_s)),
+            neighbours=self._neighbours,
+            has_company=self._has_company,
             limits=self._limits,
             permissions=self.permissions,
             planner_alive=self._planner_alive,

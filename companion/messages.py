@@ -101,6 +101,7 @@ class AutopilotStatus:
 
     t_s: float
     boot_s: float | None = None
+    vehicle_type: int | None = None
     mode: Mode | None = None
     is_armed: bool = False
     system_status: int = 0

@@ -43,6 +43,7 @@ class SailOptions:
         shelf: the older voyages beside this one and what all may take together; None: they are left alone.
         is_again: sail the mission again although the saved state says that it has arrived.
         signing: key and timestamp for a signed link.
+        token: 32 bits that tell our heartbeat from a second companion's; on the boat they are drawn by lot.
         budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
         command: what was typed, for the record.
     """
@@ -61,5 +62,6 @@ class SailOptions:
     shelf: Shelf | None = None
     is_again: bool = False
     signing: SigningStore | None = None
+    token: int = 1
     budget_scale: float = 1.0
     command: str = ""

@@ -19,6 +19,13 @@ from companion.errors import CompanionError
 INTERRUPTED = 130
 
 
+def system_id(text: str) -> int:
+    """Take the argument of ``--system``: a MAVLink system id."""
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 255):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a system id from 1 to 255")
+    return int(text)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
     """A command line: its name, what it is for, and the summary of each command in the package of them."""

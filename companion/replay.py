@@ -21,7 +21,7 @@ from companion.errors import InputError
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.frames import Codec, Message
-from companion.mavlink.link import OWN_COMPONENT
+from companion.mavlink.reception import OWN_COMPONENT
 from companion.mavlink.tlog import read_tlog
 from companion.messages import MissionItem
 from companion.planner import Plan
@@ -99,11 +99,13 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             None if persisted is None else Persisted.from_dict(persisted), known=known,
             traffic=target_limits_of(mission),
         )
-        heard = _messages(folder / TLOG, epoch_s, start_s, end_s)
+        found = next((d for d in decisions if d["kind"] == "autopilot" and start_s <= d["t_s"] < end_s), None)
+        system, unheard = (0, 0) if found is None else (int(found["system"]), int(found["unheard"]))
+        heard = _messages(folder / TLOG, epoch_s, start_s, end_s, fold, system, unheard)
         outcomes = iter([d for d in decisions if start_s <= d["t_s"] < end_s and d["kind"] in {"plan", "outcome"}])
         fed: dict[float, list[dict[str, Any]]] = {}
         for record in decisions:
-            if record["kind"] == "ais":
+            if record["kind"] in {"ais", "others"}:
                 fed.setdefault(float(record["t_s"]), []).append(record)
         recorded = _actions_by_time([d for d in decisions if start_s <= d["t_s"] < end_s])
         for t_s, n_messages, n_outcomes in rows:
@@ -118,7 +120,10 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             for record in itertools.islice(outcomes, n_outcomes):
                 fold.take_outcome(float(record["t_s"]), _outcome(record))
             for record in fed.get(t_s, ()):
-                fold.take(ais_of(record))
+                if record["kind"] == "ais":
+                    fold.take(ais_of(record))
+                else:
+                    fold.others(tuple(record["neighbours"]), has_company=record["company"])
             step = fold.tick(t_s)
             mine = [
                 _plain(action_record(a, step.snapshot, skipper.config)) for a in step.actions
@@ -160,20 +165,21 @@ def _rows(path: Path) -> list[tuple[float, int, int]]:
         ]
 
 
-def _messages(path: Path, epoch_s: float, start_s: float, end_s: float) -> Iterator[tuple[float, Message]]:
-    """Yield what the fold heard: messages of the autopilot's system that are not our own."""
+def _messages(
+    path: Path, epoch_s: float, start_s: float, end_s: float, fold: VoyageFold, system: int, unheard: int,
+) -> Iterator[tuple[float, Message]]:
+    """Yield the messages of the autopilot's ``system`` that are not our own, behind those that nobody heard."""
     codec = Codec(system=1, component=OWN_COMPONENT)
-    target: int | None = None
     for record in read_tlog(path):
         at_s = record.unix_us / 1e6 - epoch_s
         if not start_s <= at_s < end_s:
             continue
         for message in codec.feed(record.frame):
-            if message.get_srcComponent() == OWN_COMPONENT:
+            if message.get_srcComponent() == OWN_COMPONENT or message.get_srcSystem() != system:
                 continue
-            if target is None and message.get_type() == "HEARTBEAT" and message.get_srcComponent() == 1:
-                target = message.get_srcSystem()
-            if message.get_srcSystem() == target:
+            if unheard > 0:
+                unheard -= 1
+            elif fold.objection(at_s, message) is None:
                 yield at_s, message
 
 

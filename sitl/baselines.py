@@ -25,8 +25,9 @@ from companion.errors import JobError, LinkError
 from companion.geofence import Mission, load_mission
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot as Pilot
-from companion.mavlink.link import Link, LinkIdentity
+from companion.mavlink.link import Link
 from companion.mavlink.machines import Outcome
+from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.transport import open_link
 from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
 from sitl.ardurover import ArduRover

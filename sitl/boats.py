@@ -20,7 +20,8 @@ from companion.errors import LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.link import Link, LinkIdentity
+from companion.mavlink.link import Link
+from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.streams import Stream
 from companion.mavlink.transport import open_link
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint

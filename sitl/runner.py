@@ -26,7 +26,8 @@ from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission, load_mission
 from companion.mavlink.autopilot import Autopilot as Pilot
-from companion.mavlink.link import Link, LinkIdentity
+from companion.mavlink.link import Link
+from companion.mavlink.reception import LinkIdentity
 from companion.messages import MissionItem, Mode, waypoint
 from companion.options import SailOptions, at_once
 from companion.telemetry.names import STATE, VERDICT

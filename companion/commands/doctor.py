@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from companion.program import system_id
+
 if TYPE_CHECKING:
     from companion.geofence import Mission
     from companion.mavlink.autopilot import Autopilot
@@ -60,6 +62,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     )
     parser.add_argument("--link", required=True, metavar="LINK",
                         help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--system", type=system_id, metavar="N",
+                        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)")
     parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="hold the settings against this voyage")
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (mode 0600)")
     parser.add_argument("--apply", action="store_true", help="set what the warnings and errors name, and read it back")
@@ -79,8 +83,9 @@ def run(args: argparse.Namespace) -> int:
     mission = load_mission(args.mission) if args.mission is not None else None
     transport = open_link(args.link)
     signing = SigningStore(args.signing_key, time.time()) if args.signing_key is not None else None
-    findings, changes = run_loop(
-        diagnose(transport, needs_of(mission), wait_s=args.wait, apply=args.apply, signing=signing))
+    system = args.system or (mission.autopilot.system if mission is not None else None)
+    findings, changes = run_loop(diagnose(
+        transport, needs_of(mission), wait_s=args.wait, apply=args.apply, signing=signing, system=system))
     if args.json:
         print(json.dumps(as_json(findings, changes), indent=1))
     else:
@@ -104,24 +109,27 @@ def needs_of(mission: Mission | None) -> Needs:
         goal_radius_m=min(goal.radius_m for goal in mission.goals), loiter_radius_m=config.loiter_radius_m,
         speed_mps=boat.polar.max_speed_mps(mission.wind.preview_speed_mps or 5.0), hull=boat.hull,
         reach_m=max(math.hypot(*place) for place in places), has_fence=mission.operator.upload_fence,
-        can_tack=boat.can_tack, has_refuge=bool(mission.refuges),
+        can_tack=boat.can_tack, has_refuge=bool(mission.refuges), sails=mission.autopilot.frame == "sailboat",
     )
 
 
 async def diagnose(
     transport: Transport, needs: Needs, *, wait_s: float = 30.0, listen_s: float = LISTEN_S, apply: bool = False,
-    signing: SigningStore | None = None,
+    signing: SigningStore | None = None, system: int | None = None,
 ) -> tuple[tuple[Finding, ...], tuple[Change, ...]]:
     """Read everything, judge it, and set what is to be set if ``apply``.
 
     Raises:
-        LinkError: no autopilot was heard, or none whose signatures fit the key.
+        LinkError: no autopilot was heard, none whose signatures fit the key, several and none named, or no rover.
     """
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
+    from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
     from companion.skipper.checks import examine
 
-    async with Link(transport, signing=signing) as link:
+    # Beside a companion that sails: by its ids the two would take each other for a second one.
+    own = LinkIdentity(component=TOOL_COMPONENT)
+    async with Link(transport, identity=own, target_system=system, signing=signing) as link:
         await link.wait_autopilot(wait_s)
         async with Autopilot(link) as autopilot:
             findings = examine(await read(autopilot, listen_s, has_key=signing is not None), needs)
@@ -157,6 +165,7 @@ async def read(autopilot: Autopilot, listen_s: float = LISTEN_S, *, has_key: boo
     return Examined(
         parameters=table.values,
         version=autopilot.version.version if autopilot.version is not None else None,
+        uid=autopilot.version.uid if autopilot.version is not None else None,
         mission=mission.items,
         fence=fence.items,
         rates_hz={name: n / elapsed_s for name, n in counts.items()},

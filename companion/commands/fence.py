@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.errors import InputError, JobError
+from companion.program import system_id
 
 if TYPE_CHECKING:
     from companion.geofence import Area, Document, Finding
@@ -76,9 +77,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 
 def link_options(parser: argparse.ArgumentParser) -> None:
-    """Add --link and --timeout."""
+    """Add --link, --system and --timeout."""
     parser.add_argument("--link", required=True, metavar="LINK",
                         help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--system", type=system_id, metavar="N",
+                        help="the autopilot's MAVLink system id (default: the only one heard)")
     parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="wait this long for a heartbeat (10)")
 
 
@@ -266,7 +269,7 @@ def _upload(args: argparse.Namespace) -> int:
         )
     else:
         print_losses(tuple(losses), args.file)
-    with Shore(args.link, timeout_s=args.timeout) as shore:
+    with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
         name = upload_and_compare(shore, MissionType.FENCE, items)
         print(f"fence of {len(items)} items uploaded and read back the same, hash {name}")
         if args.enable:
@@ -289,7 +292,7 @@ def _download(args: argparse.Namespace) -> int:
     from companion.messages import MissionType
 
     format_of(args.out)
-    with Shore(args.link, timeout_s=args.timeout) as shore:
+    with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
         items = download_list(shore, MissionType.FENCE)
     findings = Findings()
     zones, return_point = items_to_zones(items, findings)

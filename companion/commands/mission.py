@@ -287,7 +287,7 @@ def _upload(args: argparse.Namespace) -> int:
     items = document.rally if kind is MissionType.RALLY else document.items
     if not items:
         raise JobError(f"{args.file}: there is no {args.part} to upload")
-    with Shore(args.link, timeout_s=args.timeout) as shore:
+    with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
         name = upload_and_compare(shore, kind, items, home=document.home)
     print(f"{args.part} of {len(items)} items uploaded and read back the same, hash {name}")
     return 0
@@ -303,7 +303,7 @@ def _download(args: argparse.Namespace) -> int:
 
     format_of(args.out)
     kind = MissionType.RALLY if args.part == "rally" else MissionType.MISSION
-    with Shore(args.link, timeout_s=args.timeout) as shore:
+    with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
         items = download_list(shore, kind)
         home = shore.home if kind is MissionType.MISSION else None
     if not items:

@@ -8,6 +8,7 @@ import contextlib
 import math
 import os
 import re
+import secrets
 import signal
 import sys
 import time
@@ -18,6 +19,8 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 if TYPE_CHECKING:
     from companion.telemetry.console import Console
+
+from companion.program import system_id
 
 # Loading takes about two seconds; beyond this the operator is told why nothing happens [s].
 PATIENCE_S = 4.0
@@ -34,6 +37,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="the mission file")
     parser.add_argument("--link", required=True, metavar="LINK",
                         help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--system", type=system_id, metavar="N",
+                        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)")
     parser.add_argument("--out", type=Path, metavar="DIR",
                         help="the voyage folder (default: voyages/<UTC time>-<mission>)")
     parser.add_argument("--dry-run", action="store_true", help="look, plan and speak; touch nothing")
@@ -105,7 +110,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
         raise InputError("--keep-gb", str(args.keep_gb), "must be positive")
     for name in args.feed:
         parse_feed(name)
-    mission = load_mission(args.mission).with_feeds(*args.feed)
+    mission = load_mission(args.mission).with_feeds(*args.feed).with_system(args.system)
     for finding in mission.findings:
         err.write(f"companion run: note: {finding}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
@@ -130,6 +135,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
                 expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
                 wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
                 exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, command=" ".join(sys.argv),
+                token=secrets.randbelow(0xFFFFFFFF) + 1,
             )
 
         summary = run_loop(_sail(mission, transport, folder, options, args.speedup, out), speedup=args.speedup)

@@ -40,11 +40,35 @@ def mavsdk_url(link: str) -> str:
     return f"{kind}://{name.host}:{name.port}"
 
 
-class Shore:
-    """A connected autopilot, seen from the shore. Use as a context manager; blocking, one call at a time."""
+def find_system(link: str, timeout_s: float, system: int | None) -> int:
+    """Return the system id of the autopilot on ``link``: as named, or the only one that is heard.
 
-    def __init__(self, link: str, *, timeout_s: float = CONNECT_TIMEOUT_S) -> None:
-        self._link, self._timeout_s = link, timeout_s
+    MAVSDK takes the first autopilot that speaks, whosever it is; so this listens before.
+
+    Raises:
+        LinkError: nobody is heard, it cannot be told which is ours, or what is heard is no rover.
+    """
+    from companion.clock import run
+    from companion.mavlink.link import Link
+    from companion.mavlink.reception import LinkIdentity
+    from companion.mavlink.transport import open_link
+
+    async def listen() -> int:
+        own = LinkIdentity(system=255, component=190)
+        async with Link(open_link(link), identity=own, target_system=system, streams=(), is_quiet=True) as heard:
+            return (await heard.wait_autopilot(timeout_s)).target_system
+
+    return run(listen())
+
+
+class Shore:
+    """A connected autopilot, seen from the shore. Use as a context manager; blocking, one call at a time.
+
+    ``system`` is the autopilot's system id, None: the only one that is heard.
+    """
+
+    def __init__(self, link: str, *, timeout_s: float = CONNECT_TIMEOUT_S, system: int | None = None) -> None:
+        self._link, self._timeout_s, self._wanted = link, timeout_s, system
         self._mavsdk: Any = None
         self._system: Any = None
         self._raw: Any = None
@@ -60,6 +84,7 @@ class Shore:
 
     def __enter__(self) -> Self:
         url = mavsdk_url(self._link)
+        wanted = find_system(self._link, self._timeout_s, self._wanted)
         from mavsdk import Configuration, Mavsdk
         from mavsdk import logging as mavsdk_logging
         from mavsdk.component_type import ComponentType
@@ -72,10 +97,10 @@ class Shore:
         if result is not None and int(result) != 0:
             self._close()
             raise LinkError(f"{self._link} cannot be opened ({_words(result)})")
-        self._system = self._mavsdk.first_autopilot(self._timeout_s)
+        self._system = self._connected(wanted)
         if self._system is None:
             self._close()
-            raise LinkError(f"no heartbeat of an autopilot on {self._link} within {self._timeout_s:g} s")
+            raise LinkError(f"{self._link}: system {wanted} was heard and is gone")
         self._raw = MissionRaw(self._system)
         self._direct = MavlinkDirect(self._system)
         self._heard_s = time.monotonic()
@@ -88,6 +113,16 @@ class Shore:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
     ) -> None:
         self._close()
+
+    def _connected(self, wanted: int) -> Any:
+        """Return MAVSDK's system of the id that is ours, None when it does not find it in time."""
+        deadline_s = time.monotonic() + self._timeout_s
+        while time.monotonic() < deadline_s:
+            for system in self._mavsdk.get_systems():
+                if system.get_system_id() == wanted and system.has_autopilot():
+                    return system
+            time.sleep(0.05)
+        return None
 
     def _close(self) -> None:
         if self._direct is not None:

@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from companion.program import system_id
+
 EXIT_NO_LINK, EXIT_STALE, EXIT_ALARM = 3, 4, 5
 # States of the skipper that somebody ashore should look at.
 ALARM_STATES = frozenset({"holding"})
@@ -29,6 +31,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     )
     parser.add_argument("--link", required=True, metavar="LINK",
                         help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--system", type=system_id, metavar="N",
+                        help="the autopilot's MAVLink system id (default: the only one heard)")
     parser.add_argument("--once", action="store_true", help="print one status and end")
     parser.add_argument("--json", action="store_true", help="JSON, one object per status; unknown is null")
     parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="for the first status (default: 10)")
@@ -48,14 +52,17 @@ def run(args: argparse.Namespace) -> int:
 
 async def _watch(args: argparse.Namespace, transport: Any) -> int:
     from companion.clock import now_s
+    from companion.errors import LinkError
     from companion.mavlink.assembler import VehicleAssembler
-    from companion.mavlink.link import Link, LinkIdentity
+    from companion.mavlink.link import Link
+    from companion.mavlink.reception import LinkIdentity
     from companion.mavlink.status_wire import StatusReader
 
     reader, vehicle = StatusReader(), VehicleAssembler()
     heard = asyncio.Event()
     async with Link(
-        transport, identity=LinkIdentity(system=255, component=190), streams=(), is_quiet=True,
+        transport, identity=LinkIdentity(system=255, component=190), target_system=args.system, streams=(),
+        is_quiet=True,
     ) as link:
 
         def take(t_s: float, message: Any) -> None:
@@ -64,8 +71,14 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
                 heard.set()
 
         link.subscribe(take)
+        until_s = now_s() + args.timeout
         try:
-            async with asyncio.timeout(args.timeout):
+            await link.wait_autopilot(args.timeout)
+        except LinkError as error:
+            sys.stderr.write(f"companion status: {error}\n")
+            return EXIT_NO_LINK
+        try:
+            async with asyncio.timeout_at(until_s):
                 await heard.wait()
                 # The parts take turns on the air; a moment more brings the packed one.
                 while args.once and not _has_packed(reader.report(now_s())):
@@ -73,8 +86,9 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
                     await heard.wait()
         except TimeoutError:
             if reader.report(now_s()) is None:
-                what = "an autopilot, but no companion" if link.has_autopilot else "nothing"
-                sys.stderr.write(f"companion status: {what} heard on {transport.name} in {args.timeout:g} s\n")
+                sys.stderr.write(
+                    f"companion status: an autopilot, but no companion heard on {transport.name} in "
+                    f"{args.timeout:g} s\n")
                 return EXIT_NO_LINK
         write: Callable[[dict[str, Any]], None] = _write_json if args.json else (lambda d: _write_text(d, args.units))
         while True:

@@ -23,6 +23,7 @@ from companion.geofence.findings import Finding, Severity
 from companion.geofence.formats import read
 from companion.geofence.options import (
     AreaOptions,
+    AutopilotOptions,
     BoatOptions,
     GoalOptions,
     MissionOptions,
@@ -112,6 +113,11 @@ class Mission:
         return self.options.wind
 
     @property
+    def autopilot(self) -> AutopilotOptions:
+        """The ``[autopilot]`` table."""
+        return self.options.autopilot
+
+    @property
     def operator(self) -> OperatorOptions:
         """The ``[operator]`` table."""
         return self.options.operator
@@ -130,6 +136,13 @@ class Mission:
         """Return the mission with ``names`` after its own feeds of other vessels."""
         traffic = msgspec.structs.replace(self.traffic, feeds=(*self.traffic.feeds, *names))
         return replace(self, options=msgspec.structs.replace(self.options, traffic=traffic))
+
+    def with_system(self, system: int | None) -> Mission:
+        """Return the mission for the autopilot of ``system``, None: as it is."""
+        if system is None:
+            return self
+        autopilot = msgspec.structs.replace(self.autopilot, system=system)
+        return replace(self, options=msgspec.structs.replace(self.options, autopilot=autopilot))
 
     @property
     def margin_m(self) -> float:
@@ -206,8 +219,8 @@ def dump_options(options: MissionOptions) -> str:
     """Return the options as TOML, leaving out what has its default."""
     data = _without_defaults(options)
     order = [
-        "name", "description", "start", "goal", "refuge", "area", "wind", "risk", "boat", "operator", "skipper",
-        "traffic"]
+        "name", "description", "start", "goal", "refuge", "area", "wind", "risk", "boat", "autopilot",
+        "operator", "skipper", "traffic"]
     return tomli_w.dumps({k: data[k] for k in order if k in data})
 
 

@@ -103,6 +103,15 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Overwrite a mission on the autopilot that is not ours, before setting sail; under way somebody else's stays."""
 
 
+class AutopilotOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[autopilot]``: which autopilot is ours."""
+
+    system: Annotated[int, Meta(ge=1, le=255)] | None = None
+    """Its MAVLink system id (SYSID_THISMAV); None: the only one that is heard."""
+    frame: Literal["sailboat", "motor"] = "sailboat"
+    """What it must be: a boat (FRAME_CLASS 2) that sails (SAIL_ENABLE 1), or one that does not."""
+
+
 class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """``[skipper]``: the rules of the voyage, numbers as data."""
 
@@ -160,6 +169,7 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     risk: RiskOptions = RiskOptions()
     boat: BoatOptions = BoatOptions()
     wind: WindOptions = WindOptions()
+    autopilot: AutopilotOptions = AutopilotOptions()
     operator: OperatorOptions = OperatorOptions()
     skipper: SkipperOptions = SkipperOptions()
     traffic: TrafficOptions = TrafficOptions()

@@ -1,16 +1,19 @@
 """Folds the autopilot's messages into the values that the companion works with. Pure.
 
-``VehicleAssembler.take`` never raises: what cannot be believed is counted in ``dropped`` and left out.
+``VehicleAssembler.take`` never raises: what cannot be believed is counted in ``dropped`` and left out. A change of mode
+or arming is a fact when two of three heartbeats show it, or one behind the acknowledgement of a command that makes it;
+a position that leaps is one when the next ones stay there; a breach of the fence when it is told twice.
 """
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.mavlink import codec
+from companion.mavlink.fixes import FixFilter
 from companion.mavlink.frames import Drop, Message
 from companion.messages import (
     AisReport,
@@ -31,6 +34,14 @@ ATTITUDE_MAX_AGE_S = 1.5
 # NAV_CONTROLLER_OUTPUT and FENCE_STATUS stop when they have nothing to say; then they are unknown after [s].
 QUIET_S = 5.0
 _APPARENT = ("AppWndSpd", "AppWndDir")
+# Heartbeats that say the same before a change is believed, of so many, none older than this [s].
+BEATS_AGREE, BEATS_KEPT, BEATS_S = 2, 3, 3.5
+# A command that changes mode or arming shows in a heartbeat within this time of its acknowledgement [s].
+SHOWS_S = 3.0
+_CHANGING = frozenset({
+    wire.MAV_CMD_DO_SET_MODE, wire.MAV_CMD_COMPONENT_ARM_DISARM, wire.MAV_CMD_MISSION_START,
+    wire.MAV_CMD_NAV_RETURN_TO_LAUNCH, wire.MAV_CMD_NAV_LOITER_UNLIM,
+})
 
 
 class VehicleAssembler:
@@ -57,12 +68,17 @@ class VehicleAssembler:
 
     def _forget(self) -> None:
         """Forget what was true before a reboot."""
+        self._beats: deque[tuple[float, tuple[int, int, bool]]] = deque(maxlen=BEATS_KEPT - 1)
+        self._fact: tuple[int, int, bool] | None = None
+        self._acknowledged_s: float | None = None
+        self._fixes = FixFilter()
         self._attitude: codec.Attitude | None = None
         self._position_boot_s = -1.0
         self._apparent: dict[str, tuple[int, float]] = {}
         self._apparent_ms = -1
         self._nav_s: float | None = None
         self._fence_s: float | None = None
+        self._fence_told = (False, -1)
 
     def take(self, t_s: float, message: Message) -> list[Value]:
         """Return the values that ``message``, heard at ``t_s`` [s], completes: none, one, or several texts."""
@@ -79,6 +95,8 @@ class VehicleAssembler:
             return self._take(t_s, kind, message)
         except _Stale:
             reason = Drop.STALE
+        except _Leap:
+            reason = Drop.LEAP
         except (ValueError, OverflowError, TypeError):
             reason = Drop.BAD_VALUE
         self.dropped[reason] += 1
@@ -114,6 +132,10 @@ class VehicleAssembler:
             return [codec.wind_sample(t_s, message)]
         if kind == "NAMED_VALUE_FLOAT":
             return self._named(t_s, message)
+        if kind == "COMMAND_ACK":
+            if message.command in _CHANGING and message.result == wire.MAV_RESULT_ACCEPTED:
+                self._acknowledged_s = t_s
+            return []
         return self._fold_status(t_s, kind, message)
 
     def _position(self, t_s: float, message: Message) -> list[Value]:
@@ -124,8 +146,22 @@ class VehicleAssembler:
         if attitude is not None and abs(boot_s - attitude.boot_s) > ATTITUDE_MAX_AGE_S:
             attitude = None
         state = codec.vehicle_state(t_s, message, attitude)
+        if state is not None and not self._fixes.take(state):
+            raise _Leap
         self._position_boot_s = boot_s
         return [] if state is None else [state]
+
+    def _believes_beat(self, t_s: float, message: Message) -> bool:
+        """Return whether what a heartbeat says of type, mode and arming is a fact."""
+        says = (int(message.type), int(message.custom_mode), codec.is_armed(message))
+        recent = [what for at_s, what in self._beats if t_s - at_s <= BEATS_S]
+        is_told = self._acknowledged_s is not None and t_s - self._acknowledged_s <= SHOWS_S
+        believes = not recent or is_told or recent.count(says) + 1 >= BEATS_AGREE
+        if believes and says != self._fact:
+            self._fact, self._acknowledged_s = says, None   # one acknowledgement, one change
+            self._beats.clear()
+        self._beats.append((t_s, says))
+        return believes
 
     def _named(self, t_s: float, message: Message) -> list[Value]:
         """Join the two halves of the apparent wind; every link's copies carry the same boot time."""
@@ -147,10 +183,10 @@ class VehicleAssembler:
             if not codec.is_autopilot_heartbeat(message):
                 return []
             before = self._status or AutopilotStatus(t_s=t_s)
-            self._status = replace(
-                before, mode=codec.mode(message), is_armed=codec.is_armed(message),
-                system_status=message.system_status,
-            )
+            if self._believes_beat(t_s, message) or self._status is None:
+                before = replace(
+                    before, mode=codec.mode(message), is_armed=codec.is_armed(message), vehicle_type=int(message.type))
+            self._status = replace(before, system_status=message.system_status)
         elif self._status is None:
             return []  # a status begins with a heartbeat
         elif kind == "MISSION_CURRENT":
@@ -184,9 +220,12 @@ class VehicleAssembler:
         elif kind == "HOME_POSITION":
             self._status = replace(self._status, home=codec.geo_point(message.latitude, message.longitude))
         elif kind == "FENCE_STATUS":
+            # Two in a row that say the same: one alone may be damaged or forged.
+            now = bool(message.breach_status), int(message.breach_count)
+            last, self._fence_told, self._fence_s = self._fence_told, now, t_s
             self._status = replace(
-                self._status, fence_breached=bool(message.breach_status), fence_breaches=int(message.breach_count))
-            self._fence_s = t_s
+                self._status, fence_breached=now[0] and last[0],
+                fence_breaches=now[1] if now[1] == last[1] else self._status.fence_breaches)
         else:
             return []
         self._status = replace(self._status, t_s=t_s, boot_s=self._boot_s)
@@ -207,6 +246,10 @@ class VehicleAssembler:
 
 class _Stale(Exception):  # noqa: N818 - a signal inside this module
     """The message is older than one already used, or repeats it."""
+
+
+class _Leap(Exception):  # noqa: N818 - a signal inside this module
+    """The position is not where the boat can be, and nothing agrees with it yet."""
 
 
 def _mission_state(value: int) -> MissionState:

@@ -106,7 +106,7 @@ class Autopilot:
             self.link.monitor.bad_value(t_s, kind)
         for value in values:
             for callback in tuple(self._listeners):
-                callback(value)
+                self.link.guard(getattr(callback, "__qualname__", repr(callback)), callback, value)
         self._changed.set()
 
     async def _wait_status(

@@ -231,11 +231,15 @@ def ais_report(t_s: float, message: Message) -> AisReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutopilotVersion:
-    """AUTOPILOT_VERSION: ``version`` as (major, minor, patch), the capability bits, the git hash."""
+    """AUTOPILOT_VERSION: ``version`` as (major, minor, patch), the capability bits, the git hash, the board's id.
+
+    ``uid`` are the hex digits of UID2, of the older UID where that is empty, and "" of a board that tells neither.
+    """
 
     version: tuple[int, int, int]
     capabilities: int
     git_hash: str
+    uid: str
 
     @property
     def has_ftp(self) -> bool:
@@ -250,6 +254,7 @@ def autopilot_version(message: Message) -> AutopilotVersion:
         version=(number_ >> 24 & 0xFF, number_ >> 16 & 0xFF, number_ >> 8 & 0xFF),
         capabilities=message.capabilities,
         git_hash=bytes(message.flight_custom_version).rstrip(b"\x00").decode("ascii", "replace"),
+        uid=bytes(message.uid2).rstrip(b"\x00").hex() or (f"{message.uid:x}" if message.uid else ""),
     )
 
 
@@ -273,10 +278,14 @@ def mission_item(message: Message) -> MissionItem:
 
 
 # --------------------------------------------------------------------------------------------- encoding
-def heartbeat(system_status: int = wire.MAV_STATE_ACTIVE) -> Message:
-    """Return our HEARTBEAT: an onboard computer, no autopilot, never a ground station."""
+def heartbeat(system_status: int = wire.MAV_STATE_ACTIVE, token: int = 0) -> Message:
+    """Return our HEARTBEAT: an onboard computer, no autopilot, never a ground station.
+
+    ``token`` (32 bits) goes in custom_mode, which has no meaning for a companion: it tells our own heartbeat, echoed
+    by a router, from another companion's.
+    """
     return wire.MAVLink_heartbeat_message(
-        wire.MAV_TYPE_ONBOARD_CONTROLLER, wire.MAV_AUTOPILOT_INVALID, 0, 0, system_status, 3
+        wire.MAV_TYPE_ONBOARD_CONTROLLER, wire.MAV_AUTOPILOT_INVALID, 0, token, system_status, 3
     )
 
 

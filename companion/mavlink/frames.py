@@ -36,9 +36,13 @@ class Drop(enum.Enum):
     BAD_SIGNATURE = "frames unsigned or with a wrong signature"
     MAVLINK_1 = "frames of MAVLink 1"
     FOREIGN_SYSTEM = "messages of another system"
+    OWN_IDS = "messages with our own ids: echoes, or a second companion"
     DUPLICATE = "frames received twice"
     BAD_VALUE = "messages with a value that is not a number or out of range"
     STALE = "messages older than one already used"
+    WRONG_CLOCK = "messages whose boot time is not the autopilot's"
+    OUT_OF_STEP = "messages whose number is out of step with the autopilot's"
+    LEAP = "positions that nothing before or after them agrees with"
 
 
 @dataclass(slots=True)

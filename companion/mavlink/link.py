@@ -1,30 +1,36 @@
 """The link: one transport, one autopilot, our identity on it.
 
-``async with Link(transport) as link`` finds the autopilot by its heartbeat, speaks as component 191 of the same system
-(an onboard computer, never a ground station), asks for its messages one by one and again after a reboot or a gap,
-hands every message of that autopilot to its subscribers and every frame of both directions to the tlog sink.
+``async with Link(transport) as link`` listens who is there, takes the autopilot that is ours (see ``census``), speaks
+as component 191 of the same system (an onboard computer, never a ground station), asks for its messages one by one and
+again after a reboot or a gap, hands every message of that autopilot that is believed (see ``witness``) to its
+subscribers and every frame of both directions to the tlog sink.
 
-The heartbeat is sent from the same task that watches the link, so a companion that hangs falls silent.
+The heartbeat is sent from the same task that watches the link, so a companion that hangs falls silent. Whatever a
+subscriber raises ends with that subscriber: it is counted, said once, and the others hear the message all the same.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s
 from companion.errors import LinkError
 from companion.mavlink import codec
+from companion.mavlink.census import LISTEN_S, OtherCompanion, Speaker, listed
 from companion.mavlink.commands import CommandAnswer, CommandSend
 from companion.mavlink.frames import Codec, Drop, Message
+from companion.mavlink.identity import GAP_S
+from companion.mavlink.link_stats import LinkStats, Throughput
 from companion.mavlink.machines import Machine, Outcome, Party, ResultT_co
+from companion.mavlink.rates import RateKeeper
+from companion.mavlink.reception import Heard, LinkIdentity, Objection, Reception
 from companion.mavlink.signing import TICKS_PER_S, SigningStore
 from companion.mavlink.streams import DEFAULT_STREAMS, Stream, StreamMonitor
 from companion.mavlink.transport import Transport, TransportState
@@ -33,41 +39,14 @@ OnMessage = Callable[[float, Message], None]
 OnFrame = Callable[[float, bytes], None]
 OnCommand = Callable[[Message], int]
 
-OWN_COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 HEARTBEAT_S = 1.0
 # Without a heartbeat of the autopilot for this long the link is silent [s].
 SILENCE_S = 3.0
 # ... and for this long it is lost: a conversation that ends now ended for that. A line that loses a third of its frames
 # is silent for 3 s every half minute, for 6 s hardly ever [s].
 LOST_S = 6.0
-# A gap longer than this may have been a reboot: rates are asked for again [s].
-GAP_S = 5.0
-# Streams below their rate are asked for again this often, at most [s].
-REASK_S = 30.0
 # A quiet link speaks this often, so that an autopilot that rebooted knows of it again [s].
 LISTENER_BEAT_S = 30.0
-_RATE_WINDOW_S = 10.0
-_DUPLICATE_WINDOW = 32
-
-
-@dataclass(frozen=True, slots=True)
-class LinkIdentity:
-    """Who we are. ``system`` None: the autopilot's own, detected."""
-
-    system: int | None = None
-    component: int = OWN_COMPONENT
-
-
-@dataclass(slots=True)
-class LinkStats:
-    """Counters of a link."""
-
-    frames_in: int = 0
-    frames_out: int = 0
-    frames_lost: int = 0
-    reboots: int = 0
-    rates_asked: int = 0
-    dropped: Counter[Drop] = field(default_factory=Counter)
 
 
 class Link:
@@ -76,11 +55,15 @@ class Link:
     Args:
         transport: closed; the link opens and closes it.
         identity: our ids.
-        target_system: the autopilot's system id, None: the first that is heard.
+        target_system: the autopilot's system id, None: the only one that is heard.
         streams: the table of messages to ask for; empty: ask for nothing.
         sink: gets (t_s, frame) for every good frame in and every frame out; the caller adds the wall clock.
         signing: signs and verifies, None: plain.
         is_quiet: for listeners on a radio: a heartbeat of ours only until the autopilot has heard it, and one in 30 s.
+        objection: says what is wrong with a message of the autopilot's system, None: nothing; asked once for each.
+        stamp: rounds the time at which something was heard to what a record of it can hold.
+        is_starting: our heartbeat says that we are not at work yet, until ``started``.
+        on_fault: gets the words when a subscriber, the sink or ``on_command`` raises for the first time.
     """
 
     def __init__(
@@ -93,6 +76,10 @@ class Link:
         sink: OnFrame | None = None,
         signing: SigningStore | None = None,
         is_quiet: bool = False,
+        objection: Objection | None = None,
+        stamp: Callable[[float], float] | None = None,
+        is_starting: bool = False,
+        on_fault: Callable[[str], None] | None = None,
     ) -> None:
         self.transport = transport
         self.stats = LinkStats()
@@ -100,24 +87,20 @@ class Link:
         self.on_command: OnCommand | None = None
         self._identity = identity or LinkIdentity()
         self._sink, self._signing, self._is_quiet = sink, signing, is_quiet
-        self._target = target_system
+        self._reception = Reception(self._identity, target_system, objection, self.stats)
+        self._stamp, self._on_fault = stamp, on_fault
         self._codec = Codec(
-            self._identity.system or target_system or 1, self._identity.component, signing.state if signing else None
-        )
+            self._reception.own_system, self._identity.component, signing.state if signing else None)
         self._subscribers: list[OnMessage] = []
         self._heartbeat_s: float | None = None
-        self._found = asyncio.Event()
+        self._found, self._decided = asyncio.Event(), asyncio.Event()
         self._boot_s: float | None = None
-        self._recent: deque[tuple[int, int, int, int, int]] = deque(maxlen=_DUPLICATE_WINDOW)
-        self._last_seq: dict[tuple[int, int], int] = {}
-        self._want_rates = asyncio.Event()
-        self._asked_s = 0.0
-        self._refused_streams: set[str] = set()
-        self._traffic: deque[tuple[float, int, int]] = deque()
+        self._rates = RateKeeper(self, self.monitor)
+        self._throughput = Throughput()
         self._locks: dict[str, asyncio.Lock] = {}
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
-        self._system_status = wire.MAV_STATE_ACTIVE
+        self._system_status = wire.MAV_STATE_BOOT if is_starting else wire.MAV_STATE_ACTIVE
         self._signing_zero_s: float | None = None
 
     # -------------------------------------------------------------------------------------------- life
@@ -126,7 +109,7 @@ class Link:
         await self._group.__aenter__()
         self._tasks = [
             self._group.create_task(self._beat(), name="link heartbeat"),
-            self._group.create_task(self._keep_rates(), name="link rates"),
+            self._group.create_task(self._rates.keep(self._found), name="link rates"),
         ]
         return self
 
@@ -145,23 +128,33 @@ class Link:
                 self._signing.save()
 
     async def wait_autopilot(self, timeout_s: float = 10.0) -> Party:
-        """Wait for an autopilot's heartbeat.
+        """Wait until our autopilot is found.
 
         Raises:
-            LinkError: none came within ``timeout_s`` [s]; the text says what was heard instead.
+            LinkError: none came within ``timeout_s`` [s], or it cannot be told which of several is ours, or what is
+                heard is no boat; the text says what was heard instead.
         """
         try:
             async with asyncio.timeout(timeout_s):
-                await self._found.wait()
+                await self._decided.wait()
         except TimeoutError:
-            raise LinkError(f"{self.transport.name}: no autopilot in {timeout_s:g} s: {self._diagnosis()}") from None
+            # somebody was heard just now: let the census come to its end
+            if self._reception.census.wanted is None and self._reception.census.heard(self._now()):
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(LISTEN_S):
+                        await self._decided.wait()
+            if not self._decided.is_set():
+                raise LinkError(
+                    f"{self.transport.name}: no autopilot in {timeout_s:g} s: {self._diagnosis()}") from None
+        if self._reception.refusal:
+            raise LinkError(f"{self.transport.name}: {self._reception.refusal}")
         return self.party
 
     # ------------------------------------------------------------------------------------------- state
     @property
     def party(self) -> Party:
-        """The autopilot and we; before it was heard, system 1."""
-        target = self._target or 1
+        """The autopilot and we; before it was heard, the system that is wanted, or 1."""
+        target = self._reception.target or self._reception.census.wanted or 1
         return Party(target, codec.AUTOPILOT_COMPONENT, self._codec.system, self._codec.component)
 
     @property
@@ -191,12 +184,22 @@ class Link:
         age_s = self.heartbeat_age_s
         return age_s is None or age_s > LOST_S
 
+    @property
+    def unheard(self) -> int:
+        """How many messages of the autopilot's system came before it was known to be ours: nobody heard them."""
+        return self._reception.unheard(self.party.target_system)
+
+    def neighbours(self) -> tuple[Speaker, ...]:
+        """Return the other autopilots that are heard."""
+        return self._reception.census.neighbours(now_s(), self.party.target_system)
+
+    def other_companion(self) -> OtherCompanion | None:
+        """Return another program that speaks with our ids, None when there is none."""
+        return self._reception.census.companion(now_s(), self.party.own_system)
+
     def bytes_per_s(self) -> tuple[float, float]:
         """Return what came in and went out [bytes/s], over the last 10 s."""
-        self._forget_traffic(now_s())
-        received = sum(n for _, n, _ in self._traffic)
-        sent = sum(n for _, _, n in self._traffic)
-        return received / _RATE_WINDOW_S, sent / _RATE_WINDOW_S
+        return self._throughput.bytes_per_s(now_s())
 
     def dropped(self) -> Counter[Drop]:
         """Return what was dropped, by reason."""
@@ -209,8 +212,7 @@ class Link:
 
     def loss(self) -> float:
         """Return the share of the autopilot's frames that never arrived, by their sequence numbers."""
-        total = self.stats.frames_in + self.stats.frames_lost
-        return self.stats.frames_lost / total if total else 0.0
+        return self.stats.loss()
 
     # ---------------------------------------------------------------------------------------- messages
     def subscribe(self, callback: OnMessage) -> Callable[[], None]:
@@ -228,15 +230,15 @@ class Link:
         for message in messages:
             frame = self._codec.pack(message)
             self.stats.frames_out += 1
-            now = now_s()
-            self._traffic.append((now, 0, len(frame)))
+            now = self._now()
+            self._throughput.note(now, sent=len(frame))
             self.transport.write(frame)
             if self._sink is not None:
-                self._sink(now, frame)
+                self.guard("the tlog", self._sink, now, frame)
 
-    def set_system_status(self, state: int) -> None:
-        """Set MAV_STATE of our heartbeat."""
-        self._system_status = state
+    def started(self) -> None:
+        """Say from now on that we are at work: a second companion gives way to us."""
+        self._system_status = wire.MAV_STATE_ACTIVE
 
     def lock(self, channel: str) -> asyncio.Lock:
         """Return the lock of a kind of conversation: two uploads at once would spoil each other."""
@@ -281,95 +283,81 @@ class Link:
             return CommandAnswer(outcome=Outcome.LINK, text="the link is silent")
         return answer
 
-    def ask_rates(self) -> None:
-        """Ask for every stream of the table again, soon."""
-        self._refused_streams.clear()
-        self._want_rates.set()
-
     # ------------------------------------------------------------------------------------------ inside
+    def _now(self) -> float:
+        return now_s() if self._stamp is None else self._stamp(now_s())
+
+    def guard(self, whose: str, call: Callable[..., Any], *args: Any) -> Any:
+        """Call somebody who listens; what is raised ends here, or one listener's fault would end the transport."""
+        try:
+            return call(*args)
+        except Exception as error:
+            self.stats.faults[whose] += 1
+            if self.stats.faults[whose] == 1 and self._on_fault is not None:
+                # nobody is left to tell about the teller's own fault
+                with contextlib.suppress(Exception):
+                    self._on_fault(f"{whose} failed on what was heard, and goes on without it: {error!r}")
+            return None
+
     def _take_bytes(self, data: bytes) -> None:
-        now = now_s()
-        self._traffic.append((now, len(data), 0))
-        self._forget_traffic(now)
+        now = self._now()
+        self._throughput.note(now, received=len(data))
         for message in self._codec.feed(data):
-            self._take(now, message)
+            self.guard("the link", self._take, now, message)
 
     def _take(self, now: float, message: Message) -> None:
-        system, component = message.get_srcSystem(), message.get_srcComponent()
-        header = message.get_header()
-        key = (system, component, header.seq, header.msgId, message.get_crc() or 0)
-        if key in self._recent:
-            self.stats.dropped[Drop.DUPLICATE] += 1
+        if self._reception.is_repeat(message):
             return
-        self._recent.append(key)
         self.stats.frames_in += 1
         if self._sink is not None:
-            self._sink(now, bytes(message.get_msgbuf()))
-        kind = message.get_type()
-        if kind == "HEARTBEAT" and codec.is_autopilot_heartbeat(message) and self._target in {None, system}:
-            self._take_heartbeat(now, system)
-        if system != self._target:
-            self._take_foreign(now, message, kind)
+            self.guard("the tlog", self._sink, now, bytes(message.get_msgbuf()))
+        heard = self._reception.hear(now, message)
+        if not self._decided.is_set():
+            self._decide(now)
+        if heard is Heard.NOTHING:
             return
-        self._count_lost(system, component, header.seq)
-        if component == codec.AUTOPILOT_COMPONENT:
+        kind = message.get_type()
+        if heard is Heard.OURS and message.get_srcComponent() == codec.AUTOPILOT_COMPONENT:
             self.monitor.heard(now, kind)
             self._notice_boot(message)
-        if system == self._codec.system and component == self._codec.component:
-            self.stats.dropped[Drop.FOREIGN_SYSTEM] += 1  # our own ids from elsewhere: an echo, or a second companion
-            return
+            if kind == "HEARTBEAT" and codec.is_autopilot_heartbeat(message):
+                self._take_heartbeat(now)
         if kind in {"COMMAND_LONG", "COMMAND_INT"}:
             self._take_command(message)
         self._hand_out(now, message)
 
     def _hand_out(self, now: float, message: Message) -> None:
         for callback in tuple(self._subscribers):
-            callback(now, message)
+            self.guard(getattr(callback, "__qualname__", repr(callback)), callback, now, message)
 
-    def _take_heartbeat(self, now: float, system: int) -> None:
-        if self._target is None:
-            self._target = system
-        if self._identity.system is None:
-            self._codec.system = self._target
+    def _decide(self, now: float) -> None:
+        """Begin, once our autopilot is known; or give up, when it cannot be."""
+        self._reception.choose(now)
+        if not self._reception.is_decided:
+            return
+        self._decided.set()
+        if self._reception.target is not None:
+            self._codec.system = self._reception.own_system
+            self._rates.wanted.set()
+            self._heartbeat_s = now
+            self._found.set()
+
+    def _take_heartbeat(self, now: float) -> None:
         if self._heartbeat_s is None or now - self._heartbeat_s > GAP_S:
-            self._want_rates.set()
+            self._rates.wanted.set()
         self._heartbeat_s = now
-        self._found.set()
-
-    def _take_foreign(self, now: float, message: Message, kind: str) -> None:
-        """Other systems are not ours to listen to, except a ground station that commands us by our ids."""
-        if kind in {"COMMAND_LONG", "COMMAND_INT"} and self._is_for_us_alone(message):
-            self._take_command(message)
-            self._hand_out(now, message)
-        elif kind == "HEARTBEAT" and message.type == wire.MAV_TYPE_GCS:
-            pass
-        else:
-            self.stats.dropped[Drop.FOREIGN_SYSTEM] += 1
-
-    def _is_for_us_alone(self, message: Message) -> bool:
-        return bool(
-            message.target_system == self._codec.system and message.target_component == self._codec.component
-        )
 
     def _take_command(self, message: Message) -> None:
         """Answer a command addressed to this component by name; those to everybody are the autopilot's."""
-        if not self._is_for_us_alone(message):
+        if not self._reception.is_for_us_alone(message):
             return
-        result = self.on_command(message) if self.on_command else wire.MAV_RESULT_UNSUPPORTED
+        result = wire.MAV_RESULT_UNSUPPORTED
+        if self.on_command is not None:
+            answer = self.guard("on_command", self.on_command, message)
+            result = wire.MAV_RESULT_FAILED if answer is None else answer
         self.send(wire.MAVLink_command_ack_message(
             message.command, result, 0, 0, message.get_srcSystem(), message.get_srcComponent()
         ))
-
-    def _count_lost(self, system: int, component: int, seq: int) -> None:
-        last = self._last_seq.get((system, component))
-        if last is not None:
-            gap = (seq - last) % 256
-            if gap > 128:
-                # an overtaken frame: it was counted as lost when its follower came
-                self.stats.frames_lost = max(0, self.stats.frames_lost - 1)
-                return
-            self.stats.frames_lost += max(0, gap - 1)
-        self._last_seq[system, component] = seq
 
     def _notice_boot(self, message: Message) -> None:
         boot_ms = getattr(message, "time_boot_ms", None)
@@ -379,8 +367,8 @@ class Link:
         if self._boot_s is not None and boot_s < self._boot_s - GAP_S:
             self.stats.reboots += 1
             self._boot_s = boot_s
-            self._last_seq.clear()
-            self._want_rates.set()
+            self.stats.last_seq.clear()
+            self._rates.wanted.set()
         self._boot_s = boot_s if self._boot_s is None else max(self._boot_s, boot_s)
 
     async def _beat(self) -> None:
@@ -392,21 +380,21 @@ class Link:
             if self.transport.stats.connections != connections:
                 # a new connection may be a new port of the autopilot, which knows nothing of what was asked before
                 connections = self.transport.stats.connections
-                self._want_rates.set()
+                self._rates.wanted.set()
                 spoken = 0
             # A listener speaks too, but little: the autopilot forwards nothing to a link on which nobody spoke.
-            is_new = spoken < 2 or not self.is_alive
+            is_new = spoken < 2 or not (self.is_alive or self._reception.census.heard(self._now()))
             if not self._is_quiet or is_new or now_s() - spoken_s >= LISTENER_BEAT_S:
-                self.send(codec.heartbeat(self._system_status))
+                self.send(codec.heartbeat(self._system_status, self._identity.token))
                 spoken += self.transport.state is TransportState.OPEN
                 spoken_s = now_s()
             if self._signing is not None:
                 self._advance_signing()
             now = now_s()
-            if self.is_alive and now - self._asked_s > REASK_S and any(
-                s.rate_hz > 0.0 and s.name not in self._refused_streams for s in self.monitor.below_rate(now)
-            ):
-                self._want_rates.set()
+            if not self._decided.is_set():
+                self._decide(self._now())
+            elif self.is_alive:
+                self._rates.look(now)
             next_s = max(next_s + HEARTBEAT_S, now)
             await asyncio.sleep(next_s - now)
 
@@ -419,28 +407,6 @@ class Link:
         self._codec.set_signing_time(int((now - self._signing_zero_s) * TICKS_PER_S))
         self._signing.save()
 
-    async def _keep_rates(self) -> None:
-        while True:
-            await self._want_rates.wait()
-            await self._found.wait()
-            self._want_rates.clear()
-            self._asked_s = now_s()
-            for stream in self.monitor.table:
-                if stream.rate_hz <= 0.0 or self._want_rates.is_set():
-                    continue
-                answer = await self.command(
-                    wire.MAV_CMD_SET_MESSAGE_INTERVAL, stream.msg_id, 1e6 / stream.rate_hz, give_up_s=4.0
-                )
-                self.stats.rates_asked += 1
-                if answer.outcome in {Outcome.REFUSED, Outcome.UNSUPPORTED}:
-                    self._refused_streams.add(stream.name)
-                if answer.outcome is Outcome.LINK:
-                    break  # the next heartbeat after the gap asks again
-
-    def _forget_traffic(self, now: float) -> None:
-        while self._traffic and now - self._traffic[0][0] > _RATE_WINDOW_S:
-            self._traffic.popleft()
-
     def _diagnosis(self) -> str:
         stats, dropped = self.transport.stats, self.dropped()
         if stats.bytes_in == 0:
@@ -452,6 +418,8 @@ class Link:
             return "its frames are not signed with this key"
         if self.stats.frames_in == 0:
             return f"{stats.bytes_in} bytes and no MAVLink frame among them; check the baud rate"
-        wanted = f" of system {self._target}" if self._target is not None else ""
-        return f"{self.stats.frames_in} frames, but no autopilot's heartbeat{wanted}"
-
+        census = self._reception.census
+        wanted = f" of system {census.wanted}" if census.wanted is not None else ""
+        heard = census.heard(self._now())
+        others = f"; heard: {listed(heard)}" if heard else ""
+        return f"{self.stats.frames_in} frames, but no autopilot's heartbeat{wanted}{others}"

@@ -47,7 +47,7 @@ DEFAULT_STREAMS = (
     Stream("GPS_RAW_INT", 1.0, 5.0, is_vital=True),
     Stream("SYS_STATUS", 0.5, 10.0, is_vital=True),
     Stream("SYSTEM_TIME", 0.5, 10.0),
-    Stream("FENCE_STATUS", 0.5, 10.0),
+    Stream("FENCE_STATUS", 1.0, 10.0),
     Stream("RC_CHANNELS", 1.0, 10.0),
     Stream("AIS_VESSEL", 5.0, 60.0),
     Stream("HOME_POSITION", 0.2, 60.0),

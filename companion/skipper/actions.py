@@ -164,7 +164,14 @@ class Announce:
     text: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopOrders:
+    """Give up every order under way or waiting: the autopilot may not be ours. Each is answered as failed."""
+
+    text: str
+
+
 Action = (
     RequestPlan | CancelPlan | UploadMission | UploadFence | ReadMission | SetMode | Arm | SetCurrent
-    | SteerHeading | Announce
+    | SteerHeading | Announce | StopOrders
 )

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from companion.boat import AutopilotLimits, required_margin
+from companion.mavlink.parameter_ranges import believable
 from companion.skipper.checks_safety import failsafes, fence, identity, mission, signing, streams, version
 from companion.skipper.findings import Examined, Finding, Level, Needs, Report
 
@@ -23,9 +24,15 @@ def examine(seen: Examined, needs: Needs) -> tuple[Finding, ...]:
                    "what is not signed is not answered on this link" if seen.is_signed and not seen.has_key else
                    "is another program using the link, or does a router in between let nothing through to it?")
     else:
+        report.expect(Level.ERROR, "FRAME_CLASS", 2.0, "no order is given to anything but a boat")
+        for why in believable(seen.parameters)[1]:
+            report.add(Level.ERROR, "impossible", why, "the companion sails by the default in its place",
+                       name=why.split()[0])
         if needs.sails:
             _boat(report, needs)
             _wind(report)
+        else:
+            report.expect(Level.ERROR, "SAIL_ENABLE", 0.0, "the mission is for a motor boat")
         _navigation(report, needs)
         fence(report, seen, needs)
         failsafes(report, needs)
@@ -37,7 +44,6 @@ def examine(seen: Examined, needs: Needs) -> tuple[Finding, ...]:
     return tuple(sorted(report.findings, key=lambda f: (-f.level, f.code)))
 
 def _boat(report: Report, needs: Needs) -> None:
-    report.expect(Level.ERROR, "FRAME_CLASS", 2.0, "only a boat sails")
     report.expect(Level.ERROR, "SAIL_ENABLE", 1.0, "without it the autopilot sails into the wind")
     no_go = report.get("SAIL_NO_GO_ANGLE")
     planned = math.degrees(needs.no_go_half_rad)
@@ -49,9 +55,9 @@ def _boat(report: Report, needs: Needs) -> None:
         report.add(Level.WARNING, "no-go", f"SAIL_NO_GO_ANGLE {no_go:g}° is narrower than the boat's {planned:g}°",
                    "in a header the autopilot points higher than the boat sails", name="SAIL_NO_GO_ANGLE",
                    wanted=planned)
-    limits = AutopilotLimits.from_params({
+    limits = AutopilotLimits.from_params(believable({
         name: value for name in ("SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE",
-                                 "FENCE_ACTION") if (value := report.get(name)) is not None})
+                                 "FENCE_ACTION") if (value := report.get(name)) is not None})[0])
     margin = required_margin(limits, speed_mps=needs.speed_mps, hull=needs.hull)
     if not needs.can_tack:
         if limits.sail_xtrack_max_m > 0.0:

@@ -107,6 +107,9 @@ def identity(report: Report, seen: Examined) -> None:
     if own is not None and seen.system_id is not None and int(own) != seen.system_id:
         report.add(Level.WARNING, "system id", f"it calls itself {seen.system_id} and its parameter says {own:g}",
                    "a change of SYSID_THISMAV takes a reboot", name="SYSID_THISMAV")
+    if seen.uid == "":
+        report.add(Level.INFO, "board", "the autopilot tells no UID of its board",
+                   "that it has become another one under way cannot be seen")
     if own is not None and station is not None and own == station:
         report.add(Level.ERROR, "system id", f"SYSID_MYGCS is the vehicle's own id {own:g}",
                    "the companion then counts as the ground station: its heartbeat keeps the station failsafe from "

@@ -54,6 +54,7 @@ ALL_PERMITTED = Permissions(
 class SkipperConfig:
     """Thresholds of the rules. Watchdog thresholds are in ``companion.skipper.watchdogs``."""
 
+    sails: bool = True                 # False: a motor boat is what the mission asks for
     # planning
     delta_s: float = 0.95
     max_path_risk: float | None = None  # of ever being forced into the no-go zone along a plan; None: not bounded

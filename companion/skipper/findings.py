@@ -61,6 +61,7 @@ class Examined:
     fence: Sequence[MissionItem] | None = None
     rates_hz: Mapping[str, float] | None = None
     system_id: int | None = None                 # of its heartbeats
+    uid: str | None = None                       # of its board, "" when it tells none
     is_signed: bool = False                      # its frames carry signatures
     has_key: bool = False                        # ours do too
 

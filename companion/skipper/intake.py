@@ -15,6 +15,7 @@ from companion.skipper.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
     CommandResult,
+    Disbelieved,
     OperatorWish,
     PlanOutcome,
     ReadOutcome,
@@ -96,6 +97,8 @@ def take_events(turn: Turn) -> None:
                 # A read that is under way, or came in this very step, may tell of the mission before.
                 turn.update(checked_mission=False, read_since_s=turn.t_s, pending_read=None)
             note(turn, event)
+        elif isinstance(event, Disbelieved):
+            turn.say(Severity.WARNING, event.what, event.text, every_s=0.0)
         elif isinstance(event, OperatorWish):
             turn.update(wish=event)
 

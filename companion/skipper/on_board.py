@@ -1,7 +1,12 @@
-"""The mission on the autopilot: read, compared, and known to be ours, an earlier one of ours, a mixture, or foreign."""
+"""The mission on the autopilot: read, compared, and known to be ours, an earlier one of ours, a mixture, or foreign.
+
+A mission that is not ours is read twice before it is called foreign, and looked at again now and then while it is: what
+was read once may have been forged, and what a stranger put there he may take away.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from companion.mavlink.items import mission_hash
@@ -10,23 +15,26 @@ from companion.skipper.actions import ReadMission, Severity
 from companion.skipper.causes import STOPPING
 from companion.skipper.mark import are_marked, marked
 from companion.skipper.route import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
-from companion.skipper.saved import Persisted
+from companion.skipper.saved import Persisted, saved_of
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase, Route
 from companion.skipper.turn import Turn
 
 REMEDY = "it is not resumed; waiting for [operator] replace_foreign, or an order, to allow its replacement"
+FOREIGN_REREAD_S = 30.0   # a mission that is not ours is read again this often
 
 
 def mission_is_known(turn: Turn) -> bool:
     """Make sure that the mission on the autopilot is ours, empty, or known not to be."""
     state = turn.state
     if state.wish is OperatorWish.REPLACE_FOREIGN:
-        turn.update(wish=None, foreign="", replace_foreign=True)
+        turn.update(wish=None, foreign="", adoptable=None, replace_foreign=True)
         state = turn.state
     if state.foreign:
         if _may_replace(turn):
-            turn.update(foreign="", route=None, replace_foreign=True)
+            turn.update(foreign="", route=None, adoptable=None, replace_foreign=True)
+            return True
+        if _is_ours_again(turn):
             return True
         turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{state.foreign}; {REMEDY}")
         return False
@@ -70,7 +78,7 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
     """Judge the mission that was read: ours, empty, a mixture of ours, an earlier one of ours, or foreign."""
     state = turn.state
     saved = state.adoptable
-    turn.update(checked_mission=True, read_t_s=turn.t_s, adoptable=None)
+    turn.update(checked_mission=True, read_t_s=turn.t_s, adoptable=None, read_twice=False)
     routes = [r for r in (state.route, state.unsure_route, *(saved.lists if saved else ())) if r is not None]
     for route in routes:
         if is_same_mission(items, route.items):
@@ -101,12 +109,21 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
     if not state.sailing and (mission_hash(items) in state.known or are_marked(items)):
         _take_over(turn, items, saved)
         return True
+    if not state.read_twice and not state.foreign:
+        # behind this very read, which has the step's own time
+        turn.update(
+            checked_mission=False, read_since_s=math.nextafter(turn.t_s, math.inf), read_twice=True, adoptable=saved)
+        phase = turn.state.phase if state.sailing else Phase.WAITING
+        turn.phase(phase, "waiting for a second reading: the mission that was read is not ours")
+        return False
     if state.replace_foreign or _may_replace(turn):
         turn.update(route=None, unsure_route=None, replace_foreign=True)
         return True
     text = f"the mission on the autopilot ({len(items)} items) is not ours"
-    turn.update(foreign=text, route=None, unsure_route=None)
-    turn.say(Severity.ERROR, "foreign mission", f"{text}; {REMEDY}", every_s=0.0)
+    # What we had is kept as after a restart: a mission of ours that is read again is taken over.
+    turn.update(foreign=text, route=None, unsure_route=None, adoptable=saved or saved_of(state, turn.voyage.name))
+    if not state.foreign:
+        turn.say(Severity.ERROR, "foreign mission", f"{text}; {REMEDY}", every_s=0.0)
     turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{text}; {REMEDY}")
     return False
 
@@ -114,6 +131,21 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
 def _may_replace(turn: Turn) -> bool:
     """Return whether a stranger's mission may be overwritten: not one that somebody brings while we sail."""
     return turn.snapshot.permissions.may_replace_foreign and not turn.state.sailing
+
+
+def _is_ours_again(turn: Turn) -> bool:
+    """Look again at a mission that is not ours, and take up the voyage when it is ours by now."""
+    state = turn.state
+    if state.read_items is None or state.read_t_s != turn.t_s:
+        patient = turn.t_s - state.read_t_s > FOREIGN_REREAD_S and turn.t_s >= state.read_retry.not_before_s
+        if patient and state.pending_read is None:
+            _read(turn, "is it still a stranger's?")
+        return False
+    if not _compare(turn, state.read_items):
+        return False
+    turn.update(foreign="")
+    turn.phase(Phase.WAITING, "waiting no longer: the mission on board is not a stranger's any more")
+    return True
 
 
 def _take_over(turn: Turn, items: tuple[MissionItem, ...], saved: Persisted | None) -> None:

@@ -1,7 +1,7 @@
 """The skipper: ``step(state, snapshot) -> (state, actions)``, a pure fold over a voyage's snapshots.
 
-The order of a step: take in what happened, find the boat on its route, look at the watchdogs, then act by who has
-the boat: nobody yet (start), somebody else (operator), we (sail).
+The order of a step: see whose autopilot it is, take in what happened, find the boat on its route, look at the
+watchdogs, then act by who has the boat: nobody yet (start), somebody else (operator), we (sail).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
 from companion.skipper.causes import PERSON
 from companion.skipper.config import SkipperConfig
+from companion.skipper.custody import judge, stand_by
 from companion.skipper.doubt import follow
 from companion.skipper.failsafe import follow_answer, follow_stops, take_over
 from companion.skipper.gates import Gate, gates_of
@@ -29,7 +30,7 @@ from companion.skipper.launch import finished, launch, start
 from companion.skipper.lookout import look_out
 from companion.skipper.on_board import mission_is_known
 from companion.skipper.sailing import sail
-from companion.skipper.saved import Persisted
+from companion.skipper.saved import Persisted, saved_of
 from companion.skipper.snapshot import OperatorWish, Snapshot
 from companion.skipper.state import PATIENT, ByField, Phase, Signs, SkipperState
 from companion.skipper.stopped import speak_of_stop
@@ -62,7 +63,8 @@ class Skipper:
         if not self.fits(persisted):
             return SkipperState(why="the saved state is of another voyage", known=(*known, *persisted.names))
         return SkipperState(
-            adoptable=persisted, known=known, under_way_s=persisted.under_way_s, arrived=persisted.arrived)
+            adoptable=persisted, known=known, under_way_s=persisted.under_way_s, arrived=persisted.arrived,
+            uid=persisted.uid, system=persisted.system)
 
     def fits(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage."""
@@ -76,6 +78,7 @@ class Skipper:
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
         turn = Turn(self.voyage, self.config, self.gates, state, snapshot)
+        judge(turn)
         take_events(turn)
         take_outcomes(turn)
         follow_stops(turn)
@@ -101,14 +104,9 @@ class Skipper:
 
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
-        if not state.checked_mission and state.adoptable is not None:
+        if state.adoptable is not None and (state.foreign or not state.checked_mission):
             return state.adoptable
-        return Persisted(
-            voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route,
-            pending=state.pending_upload.route if state.pending_upload is not None else None,
-            unsure=state.unsure_route, own_mode=state.own_mode,
-            under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived,
-        )
+        return saved_of(state, self.voyage.name)
 
 
 def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
@@ -121,7 +119,7 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         phase = Phase.WAITING if not state.sailing else turn.state.phase
         turn.phase(phase, f"waiting to hear the autopilot: {heard}; what it has sails on")
         return
-    if _operator_has_it(turn):
+    if stand_by(turn) or _operator_has_it(turn):
         return
     notice_truncation(turn)
     if not mission_is_known(turn):

@@ -8,7 +8,7 @@ from typing import Any
 
 from companion.mavlink.items import mission_hash
 from companion.messages import MissionItem, Mode
-from companion.skipper.state import Route
+from companion.skipper.state import Route, SkipperState
 
 FORMAT = 1
 MAX_ITEMS = 2000       # no autopilot holds more
@@ -37,6 +37,8 @@ class Persisted:
     own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
     under_way_s: float = 0.0           # how long the voyage has been under way, in whole minutes
     arrived: bool = False              # nothing is left to sail, the way home included
+    uid: str | None = None             # of the autopilot, and ...
+    system: int | None = None          # ... its system id
 
     @property
     def lists(self) -> tuple[Route, ...]:
@@ -54,7 +56,7 @@ class Persisted:
             "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
             "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
             "unsure": _route_to_dict(self.unsure), "own_mode": None if self.own_mode is None else self.own_mode.name,
-            "under_way_s": self.under_way_s, "arrived": self.arrived,
+            "under_way_s": self.under_way_s, "arrived": self.arrived, "uid": self.uid, "system": self.system,
         }
 
     @classmethod
@@ -73,9 +75,21 @@ class Persisted:
                 unsure=_route_from_dict(data.get("unsure")),
                 own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
                 under_way_s=_number(data.get("under_way_s", 0.0)), arrived=_truth(data.get("arrived", False)),
+                uid=None if data.get("uid") is None else _words(data["uid"]),
+                system=None if data.get("system") is None else _whole(data["system"], 1, 255),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
+
+
+def saved_of(state: SkipperState, voyage: str) -> Persisted:
+    """Return what of a state survives a kill."""
+    return Persisted(
+        voyage=voyage, gate=state.gate, sailing=state.sailing, route=state.route,
+        pending=state.pending_upload.route if state.pending_upload is not None else None,
+        unsure=state.unsure_route, own_mode=state.own_mode, under_way_s=60.0 * (state.under_way_s // 60.0),
+        arrived=state.arrived, uid=state.uid, system=state.system,
+    )
 
 
 def _route_to_dict(route: Route | None) -> dict[str, Any] | None:

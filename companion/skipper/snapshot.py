@@ -7,10 +7,11 @@ in it, each exactly once.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from companion.boat import AutopilotLimits
+from companion.mavlink.identity import Identity
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
 from companion.skipper.config import DRY_RUN, Permissions
 from companion.skipper.voyage import PointEn
@@ -80,7 +81,15 @@ class OperatorWish(enum.Enum):
     GO_ON = "go_on"
 
 
-Event = WaypointReached | ModeChanged | AutopilotRebooted | StatusText | OperatorWish
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disbelieved:
+    """Something heard that cannot be, or that could not be digested: said once, and not used."""
+
+    what: str
+    text: str
+
+
+Event = WaypointReached | ModeChanged | AutopilotRebooted | StatusText | OperatorWish | Disbelieved
 
 
 # ----------------------------------------------------------------------------------------- outcomes
@@ -154,6 +163,9 @@ class Snapshot:
     heartbeat_age_s: float | None = None
     wind: WindView = WindView()
     mission: MissionOnBoard = MissionOnBoard()
+    identity: Identity = field(default_factory=Identity)   # as far as the autopilot has told it
+    neighbours: tuple[str, ...] = ()       # other autopilots on a link on which ours was not named, in words
+    has_company: bool = False              # another companion speaks with our ids
     limits: AutopilotLimits | None = None  # None: not read yet
     permissions: Permissions = DRY_RUN
     planner_alive: bool = True

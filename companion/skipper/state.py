@@ -166,9 +166,14 @@ class SkipperState:
     next_id: int = 1
     gate: int = 0                      # index of the gate being sailed to
     route: Route | None = None         # what is on the autopilot, as far as we know
-    adoptable: Persisted | None = None  # from before a restart, until the autopilot's mission has been compared
+    adoptable: Persisted | None = None  # from before a restart or a foreign mission, until one of ours is found
     known: tuple[str, ...] = ()        # hashes of lists that earlier voyages of ours may have left on board
+    uid: str | None = None             # of the autopilot that this voyage began with, and ...
+    system: int | None = None          # ... its system id
+    is_ours: bool = False              # in this step: it is that one, and a boat of ours
+    custody: str = ""                  # why it was not, until it is
     checked_mission: bool = False      # the mission on board has been compared with ours since link, reboot, operator
+    read_twice: bool = False           # the last mission read was not ours: the next one decides
     foreign: str = ""                  # why the mission on board is not ours; empty: it is, or there is none
     sailing: bool = False              # has been in AUTO and armed with our route
     index: int = 0                     # target by the autopilot

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from companion.mavlink.fixes import LEAP_M, MEMORY_S, leap_m
 from companion.messages import AutopilotStatus, Mode
 from companion.skipper.actions import (
     Action,
@@ -33,10 +34,8 @@ from companion.skipper.state import Phase, Retry, Route, SkipperState
 from companion.skipper.voyage import PointEn, Voyage
 
 FRESH_S = 3.0          # a part older than this is not acted upon
-JUMP_M = 20.0          # a fix this much farther than the boat can sail is a jump
-JUMP_MPS = 8.0         # no boat of ours sails faster
+JUMP_M = LEAP_M        # a fix this much farther than the boat can sail is a jump
 DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
-JUMP_MEMORY_S = 10.0   # after a longer silence any place is possible
 
 
 def permitted(action: Action, permissions: Permissions) -> bool:
@@ -78,8 +77,9 @@ class Turn:
         return number
 
     def act(self, action: Action) -> bool:
-        """Ask for an action; False (and nothing asked) when it is not permitted."""
-        if not permitted(action, self.snapshot.permissions):
+        """Ask for an action; False (and nothing asked) when it is not permitted, or the autopilot not ours."""
+        is_order = isinstance(action, UploadMission | UploadFence | SetMode | Arm | SetCurrent | SteerHeading)
+        if (is_order and not self.state.is_ours) or not permitted(action, self.snapshot.permissions):
             return False
         self.actions.append(action)
         return True
@@ -151,9 +151,7 @@ class Turn:
         if here is None or last is None or age is None or self.state.back_s == self.t_s:
             return 0.0
         elapsed_s = self.t_s - age - last.t_s
-        if elapsed_s > JUMP_MEMORY_S:
-            return 0.0
-        return max(0.0, math.dist(here, last.en_m) - JUMP_MPS * max(elapsed_s, 0.0))
+        return 0.0 if elapsed_s > MEMORY_S else leap_m(math.dist(here, last.en_m), elapsed_s)
 
     @property
     def speed_mps(self) -> float:

@@ -34,12 +34,16 @@ class Logbook:
     # ---------------------------------------------------------------------------------------------- time
     def quantised(self, t_s: float) -> tuple[int, float]:
         """Return a stamp [µs since 1970] as a tlog keeps it, and the loop time [s] that it stands for."""
-        stamp_us = int((self._epoch_s + t_s) * 1e6) & ~3
+        stamp_us = 4 * round((self._epoch_s + t_s) * 1e6 / 4.0)
         return stamp_us, stamp_us / 1e6 - self._epoch_s
+
+    def stamped_s(self, t_s: float) -> float:
+        """Return a loop time [s] as the records have it."""
+        return self.quantised(t_s)[1]
 
     def now_s(self) -> float:
         """Return the loop's time as the records have it [s]."""
-        return self.quantised(now_s())[1]
+        return self.stamped_s(now_s())
 
     def stamps(self, t_s: float) -> dict[str, Any]:
         """Return what says when in every record."""

@@ -27,6 +27,8 @@ class AutopilotConfig:
             first step. Otherwise it boots as the real one does: wind after 5 s, ready after 42 s.
         is_moored: lies still until it is armed. The real simulator drifts with the wind from the start.
         sysid: MAVLink system id.
+        uid: of its board, as AUTOPILOT_VERSION tells it.
+        vehicle_type: MAV_TYPE of its heartbeat; another than a boat's is a neighbour that only speaks like one.
         parameters: values other than the fresh boat's, by name.
         battery_v: at the start; ``Autopilot.set_battery`` changes it.
         has_ftp: offer MAVFTP; small boards are built without it.
@@ -39,6 +41,8 @@ class AutopilotConfig:
     is_warm: bool = False
     is_moored: bool = False
     sysid: int = 1
+    uid: bytes = b"simulated"
+    vehicle_type: int = 11
     parameters: Mapping[str, float] = field(default_factory=dict)
     battery_v: float = 12.6
     new_parameter_names: bool = False

@@ -36,10 +36,11 @@ def f32(x: float) -> float:
 
 def _heartbeat(a: Autopilot) -> Any:
     armed = mav.MAV_MODE_FLAG_SAFETY_ARMED if a.is_armed else 0
+    kind = a.config.vehicle_type
     if a.boot_s < 2.3:
-        return mav.MAVLink_heartbeat_message(11, 3, 65, Mode.INITIALISING, mav.MAV_STATE_CALIBRATING, 3)
+        return mav.MAVLink_heartbeat_message(kind, 3, 65, Mode.INITIALISING, mav.MAV_STATE_CALIBRATING, 3)
     base = 65 | armed | (8 if a.helm.mode in POSITION_MODES else 0)
-    return mav.MAVLink_heartbeat_message(11, 3, base, a.helm.mode, a.system_status, 3)
+    return mav.MAVLink_heartbeat_message(kind, 3, base, a.helm.mode, a.system_status, 3)
 
 
 def _sys_status(a: Autopilot) -> Any:
@@ -220,7 +221,7 @@ def autopilot_version(a: Autopilot) -> Any:
     custom = b"simulate"
     capabilities = _CAPABILITIES if a.config.has_ftp else _CAPABILITIES & ~mav.MAV_PROTOCOL_CAPABILITY_FTP
     return mav.MAVLink_autopilot_version_message(
-        capabilities, _VERSION, 0, 0, 0, custom, custom, custom, 0, 0, a.config.sysid
+        capabilities, _VERSION, 0, 0, 0, custom, custom, custom, 0, 0, 0, a.config.uid.ljust(18, b"\x00")
     )
 
 

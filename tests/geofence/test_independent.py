@@ -150,6 +150,25 @@ def test_shore_tools_against_the_simulated_autopilot(tmp_path):
         check_shore_tools(tmp_path, f"udpout:{host}:{udp}", f"tcp:{host}:{tcp}")
 
 
+def test_only_the_boat_that_is_named_is_touched(tmp_path):
+    (tmp_path / "m.waypoints").write_text(WPL)
+    with boat_process("--warm", "--moored", "--speedup", "4", "--sysid", "7") as (host, tcp, _):
+        link = ("--link", f"tcp:{host}:{tcp}", "--timeout", "3")
+        code, out, err = companion("mission", "upload", tmp_path / "m.waypoints", *link, "--system", "9")
+        assert code == 1
+        assert "no autopilot's heartbeat of system 9; heard: system 7 (surface boat, ArduPilot" in err
+        assert not out
+        code, _, err = companion("mission", "download", tmp_path / "x.plan", *link, "--system", "7")
+        assert (code, err) == (1, "the autopilot holds no mission; nothing is written\n")
+        code, _, err = companion("status", "--link", f"tcp:{host}:{tcp}", "--system", "9", "--once", "--timeout", "3")
+        assert code == 3
+        assert "of system 9; heard: system 7" in err
+        code, _, err = companion("doctor", "--link", f"tcp:{host}:{tcp}", "--system", "9", "--wait", "3")
+        assert code == 1
+        assert "of system 9; heard: system 7" in err
+        assert companion("doctor", "--link", f"tcp:{host}:{tcp}", "--system", "0")[0] == 2
+
+
 @pytest.mark.ardurover
 def test_shore_tools_against_the_real_ardurover(tmp_path):
     from sitl.ardurover import DEFAULTS, free_instance
@@ -169,7 +188,7 @@ def test_shore_tools_against_the_real_ardurover(tmp_path):
     try:
         link = f"tcp:127.0.0.1:{5760 + 10 * instance}"
         deadline = time.monotonic() + 60.0
-        while companion("mission", "download", tmp_path / "none.plan", "--link", link)[2].count("no heartbeat"):
+        while companion("mission", "download", tmp_path / "none.plan", "--link", link)[2].count("no autopilot"):
             assert time.monotonic() < deadline, "ArduRover does not speak"
         time.sleep(12.0)  # 48 simulated seconds: home is set once the EKF has a position
         check_shore_tools(tmp_path, link, link)
@@ -200,7 +219,7 @@ def test_a_dead_link_is_one_line_within_the_timeout(tmp_path):
     for argv in (("fence", "download", tmp_path / "x.wkt"), ("mission", "upload", tmp_path / "m.waypoints")):
         code, out, err = companion(*argv, "--link", "udpout:127.0.0.1:9", "--timeout", "1")
         assert code == 1
-        assert "no heartbeat of an autopilot" in err
+        assert "no autopilot in 1 s" in err
         assert err.count("\n") == 1
         assert not out
     assert not (tmp_path / "x.wkt").exists()

@@ -8,8 +8,9 @@ from companion import clock
 from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.items import first_difference, mission_hash, sailed
-from companion.mavlink.link import Link, LinkIdentity
+from companion.mavlink.link import Link
 from companion.mavlink.machines import Outcome
+from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.status_wire import StatusReader
 from companion.mavlink.transport import open_link
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, Mode, StatusText, waypoint

@@ -11,8 +11,9 @@ from companion.errors import LinkError
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.frames import Drop
 from companion.mavlink.items import canonical, mission_hash, sailed
-from companion.mavlink.link import Link, LinkIdentity
+from companion.mavlink.link import Link
 from companion.mavlink.machines import Outcome
+from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.status_wire import StatusReader
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
 from sitl.autopilot import Autopilot as SimulatedAutopilot

@@ -10,11 +10,13 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s, run, run_virtual
 from companion.errors import LinkError
+from companion.mavlink import codec
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.frames import Codec, Drop, SigningState
 from companion.mavlink.items import mission_hash
 from companion.mavlink.link import Link
 from companion.mavlink.machines import Outcome
+from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.signing import EPOCH_S, SigningStore
 from companion.mavlink.transport import open_link
 from companion.messages import Command, GeoPoint, Mode, waypoint
@@ -236,3 +238,120 @@ def test_a_mission_over_a_serial_line():
             os.close(theirs)
 
     assert run(main(), speedup=5.0)[Drop.BAD_CRC] == 0
+
+
+# ------------------------------------------------------------------------------- whose boat, and who listens
+def test_a_subscriber_that_raises_ends_no_transport_and_starves_nobody():
+    said = []
+
+    async def main(peer, link):
+        await link.wait_autopilot(5.0)
+        heard = []
+
+        def bad(_, message):
+            raise RuntimeError(f"cannot digest {message.get_type()}")
+
+        link.subscribe(bad)
+        link.subscribe(lambda _, m: heard.append(m))
+        for _ in range(5):
+            peer.say(BEAT)
+            await asyncio.sleep(0.1)
+        assert len(heard) == 5
+        return link
+
+    link = with_peer(main, on_fault=said.append)
+    assert link.transport.stats.connections == 1
+    assert [n for name, n in link.stats.faults.items() if "bad" in name] == [5]
+    assert len(said) == 1
+    assert "cannot digest HEARTBEAT" in said[0]
+
+
+def test_a_log_that_cannot_be_written_ends_no_link():
+    async def main(peer, link):
+        await link.wait_autopilot(5.0)
+        peer.say(BEAT)
+        await asyncio.sleep(0.1)
+        return link
+
+    def full(_, frame):
+        raise OSError(28, f"no space for {len(frame)} bytes")
+
+    link = with_peer(main, sink=full)
+    assert link.stats.faults["the tlog"] > 3
+    assert link.has_autopilot
+
+
+def test_a_listener_of_the_facade_that_raises_starves_nobody():
+    async def main(peer, link):
+        autopilot = Autopilot(link)
+        await link.wait_autopilot(5.0)
+        heard = []
+        autopilot.on_value(lambda value: 1 / 0)
+        autopilot.on_value(heard.append)
+        peer.say(BEAT)
+        await asyncio.sleep(0.1)
+        assert heard
+
+    with_peer(main)
+
+
+def test_who_is_not_named_among_several_is_refused_and_listed():
+    async def main(peer, link):
+        other = Codec(7, 1)
+        peer.end.write(other.pack(BEAT))
+        with pytest.raises(LinkError, match=r"2 autopilots are heard: system 1 .*; system 7 .*: say which is yours"):
+            await link.wait_autopilot(10.0)
+        assert not peer.of("COMMAND_LONG"), "nothing was asked of either"
+
+    with_peer(main)
+
+
+def test_the_one_that_is_named_is_found_whoever_speaks_first():
+    async def main(peer, link):
+        with pytest.raises(LinkError, match=r"no autopilot's heartbeat of system 7; heard: system 1 \(surface boat"):
+            await link.wait_autopilot(4.0)
+        other = Codec(7, 1)
+        peer.end.write(other.pack(BEAT))
+        party = await link.wait_autopilot(4.0)
+        assert (party.target_system, party.own_system) == (7, 7)
+        heard = []
+        link.subscribe(lambda _, m: heard.append(m.get_srcSystem()))
+        peer.say(BEAT)
+        peer.end.write(other.pack(BEAT))
+        await asyncio.sleep(0.1)
+        assert heard == [7]
+        assert [s.system for s in link.neighbours()] == [1]
+
+    with_peer(main, target_system=7)
+
+
+def test_an_echo_is_told_from_a_second_companion():
+    async def main(peer, link):
+        await link.wait_autopilot(5.0)
+        second = Codec(1, 191)
+        for _ in range(5):
+            for frame in [bytes(m.get_msgbuf()) for m in peer.of("HEARTBEAT")]:
+                peer.end.write(frame)
+            peer.heard.clear()
+            await asyncio.sleep(1.0)
+        assert link.other_companion() is None
+        for token in (0, 77, 77):
+            peer.end.write(second.pack(codec.heartbeat(token=token)))
+            await asyncio.sleep(1.0)
+        other = link.other_companion()
+        assert (other.token, other.is_starting) == (77, False)
+
+    with_peer(main, identity=LinkIdentity(token=12345))
+
+
+def test_our_heartbeat_says_when_we_are_not_yet_at_work():
+    async def main(peer, link):
+        await link.wait_autopilot(5.0)
+        link.started()
+        await asyncio.sleep(2.0)
+        states = [m.system_status for m in peer.of("HEARTBEAT")]
+        assert states[0] == wire.MAV_STATE_BOOT
+        assert states[-1] == wire.MAV_STATE_ACTIVE
+        assert {m.custom_mode for m in peer.of("HEARTBEAT")} == {12345}
+
+    with_peer(main, identity=LinkIdentity(token=12345), is_starting=True)

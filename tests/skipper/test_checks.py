@@ -1,13 +1,9 @@
 """The doctor: each setting that would spoil a voyage is found, nothing is changed unasked, what is set reads back."""
 
-import hashlib
-import itertools
 import math
 from functools import partial
 
 import pytest
-from pymavlink.dialects.v20 import ardupilotmega as wire
-from pymavlink.generator.mavcrc import x25crc
 
 from companion.clock import run_virtual
 from companion.commands.doctor import as_json, as_text, diagnose
@@ -18,6 +14,7 @@ from companion.skipper.checks import examine
 from companion.skipper.findings import Examined, Level, Needs
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.memory import frames
+from sitl.signer import Signer
 from sitl.wind import parse_wind
 
 # ArduRover's sailboat as `sim_vehicle.py -f sailboat` starts it.
@@ -53,6 +50,11 @@ def test_a_boat_that_is_set_up_has_nothing_in_its_way():
 @pytest.mark.parametrize(("changes", "needs", "code", "level", "name", "wanted"), [
     ({"SAIL_ENABLE": 0.0}, {}, "sail_enable", Level.ERROR, "SAIL_ENABLE", 1.0),
     ({"FRAME_CLASS": 1.0}, {}, "frame_class", Level.ERROR, "FRAME_CLASS", 2.0),
+    ({"SAIL_ENABLE": 1.0}, {"sails": False}, "sail_enable", Level.ERROR, "SAIL_ENABLE", 0.0),
+    ({"FRAME_CLASS": 1.0, "SAIL_ENABLE": 0.0}, {"sails": False}, "frame_class", Level.ERROR, "FRAME_CLASS", 2.0),
+    ({"SAIL_NO_GO_ANGLE": 90.0}, {}, "impossible", Level.ERROR, "SAIL_NO_GO_ANGLE", None),
+    ({"WP_RADIUS": -1.0}, {}, "impossible", Level.ERROR, "WP_RADIUS", None),
+    ({"uid": ""}, {}, "board", Level.INFO, None, None),
     ({"WNDVN_TYPE": 0.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", None),
     ({"WNDVN_TYPE": 1.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", None),
     ({"WNDVN_TYPE": 11.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", 10.0),
@@ -178,19 +180,10 @@ KEY = bytes(range(32))
 STAMP = 10**13
 
 
-def signed(frame, stamp):
-    """Return a frame with a signature, as an autopilot that was given KEY sends it."""
-    kind = wire.mavlink_map[frame[7] | frame[8] << 8 | frame[9] << 16]
-    head = bytes([frame[0], frame[1], frame[2] | 1]) + frame[3:-2]
-    body = head + x25crc(head[1:] + bytes([kind.crc_extra])).crc.to_bytes(2, "little")
-    tail = bytes([0]) + stamp.to_bytes(6, "little")
-    return body + tail + hashlib.sha256(KEY + body + tail).digest()[:6]
-
-
 def sign(link, *, is_strict=True):
     """Let the autopilot sign what it sends and, if strict, hear only what is signed."""
-    answer, ask, stamps = link.far.write, link.near.write, itertools.count(STAMP)
-    link.far.write = lambda data: answer(b"".join(signed(f, next(stamps)) for f in frames(data)))
+    answer, ask, signer = link.far.write, link.near.write, Signer(KEY, STAMP)
+    link.far.write = lambda data: answer(b"".join(map(signer.sign, frames(data))))
     link.near.write = lambda data: ask(b"".join(f for f in frames(data) if f[2] & 1 or not is_strict))
 
 

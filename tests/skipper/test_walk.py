@@ -8,6 +8,7 @@ from functools import cache
 
 import pytest
 
+from companion.mavlink.identity import Identity
 from companion.messages import Mode, StatusText
 from companion.planner import plan
 from companion.skipper import actions as act
@@ -18,6 +19,7 @@ from companion.skipper.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
     CommandResult,
+    Disbelieved,
     ModeChanged,
     OperatorWish,
     PlanOutcome,
@@ -179,6 +181,14 @@ EVENTS = {
     "armed in AUTO": status(is_armed=True, mode=Mode.AUTO),
     "EKF lost": status(ekf_ok=False),
     "boot time back": status(boot_s=1.0),
+    # whose autopilot it is
+    "another board": lambda s: replace(s, identity=replace(s.identity, uid="77")),
+    "no board told yet": lambda s: replace(s, identity=Identity(system=1)),
+    "two on one id": lambda s: replace(s, identity=replace(s.identity, is_contested=True)),
+    "not a rover": lambda s: replace(s, identity=replace(s.identity, vehicle_type=2)),
+    "a motor boat": lambda s: replace(s, identity=replace(s.identity, sails=False)),
+    "a neighbour": lambda s: replace(s, neighbours=("system 7, surface boat",)),
+    "disbelieved": event(Disbelieved(what="SAIL_NO_GO_ANGLE", text="SAIL_NO_GO_ANGLE 90 cannot be")),
     # what may be missing
     "no autopilot": lambda s: replace(s, autopilot=None, heartbeat_age_s=None),
     "no vehicle": lambda s: replace(s, vehicle=None, vehicle_age_s=None, position_en_m=None),
@@ -292,14 +302,17 @@ def test_each_watchdog_enters_and_leaves_and_says_so(dog):
 
     if dog.name == "foreign mission":
         state, _ = skipper.step(state, change(snapshot))
-        read = state.pending_read
-        assert read is not None
         from companion.messages import MissionItem
 
         theirs = (MissionItem(command=16, lat_e7=1, lon_e7=1), MissionItem(command=20))
-        state, _ = skipper.step(state, replace(
-            snapshot, t_s=snapshot.t_s + 1, outcomes=(ReadOutcome(read_id=read[0], items=theirs),)))
-        state, raised = run(state, snapshot, 4, snapshot.t_s + 2)
+        for n in (1, 3):   # read twice before it is believed
+            read = state.pending_read
+            assert read is not None
+            assert not state.foreign
+            state, _ = skipper.step(state, replace(
+                snapshot, t_s=snapshot.t_s + n, outcomes=(ReadOutcome(read_id=read[0], items=theirs),)))
+            state, _ = skipper.step(state, replace(snapshot, t_s=snapshot.t_s + n + 1, outcomes=()))
+        state, raised = run(state, snapshot, 4, snapshot.t_s + 5)
         assert raised
         return
     state, raised = run(state, seen_after(change, snapshot, state), int(dog.enter_s) + 4, snapshot.t_s)

@@ -16,6 +16,7 @@ from companion.boat import AutopilotLimits, Boat, ardurover_sitl
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import LocalArea
+from companion.mavlink.identity import Identity
 from companion.messages import (
     AutopilotStatus,
     Command,
@@ -105,11 +106,15 @@ class World:
     system_status: int = 4
     ekf_ok: bool = True
     shown: dict = field(default_factory=dict)   # what else the status shows
+    identity: Identity = field(default_factory=lambda: Identity(
+        system=1, uid="5a", is_confirmed=True, vehicle_type=11, frame_class=2, sails=True))
     drift_mps: float = 0.0      # along the heading, while nobody sails
     uploads_fail: Callable[[int], UploadResult] = lambda n: UploadResult.OK
     planner: Callable | None = None
     state: SkipperState | None = None
     pending: list = field(default_factory=list)
+    stopped: list = field(default_factory=list)
+    forged_reads: list = field(default_factory=list)   # what the next reads find in place of the mission
     events: list = field(default_factory=list)
     actions: list = field(default_factory=list)
     log: list = field(default_factory=list)
@@ -202,11 +207,17 @@ class World:
             later((self.t + 0.1, "command", action))
         elif isinstance(action, act.SteerHeading):
             self.steer, self.steer_until = action.heading_rad, self.t + 3.0
+        elif isinstance(action, act.StopOrders):
+            self.stopped += [p for p in self.pending if p[1] != "plan"]
+            self.pending = [p for p in self.pending if p[1] == "plan"]
 
     def answer(self) -> list:
+        stopped = [UploadOutcome(upload_id=a.upload_id, result=UploadResult.TIMEOUT, text="stopped")
+                   for _, kind, a in self.stopped if kind == "upload"]
+        self.stopped = []
         due = [p for p in self.pending if p[0] <= self.t]
         self.pending = [p for p in self.pending if p[0] > self.t]
-        return [self._answer(kind, action) for _, kind, action in due]
+        return stopped + [self._answer(kind, action) for _, kind, action in due]
 
     def _answer(self, kind: str, action):
         if kind == "plan":
@@ -228,7 +239,8 @@ class World:
                 self.install((*action.items[:half], *self.mission[half:len(action.items)]))
             return UploadOutcome(upload_id=action.upload_id, result=result)
         if kind == "read":
-            return ReadOutcome(read_id=action.read_id, items=self.mission)
+            items = self.forged_reads.pop(0) if self.forged_reads else self.mission
+            return ReadOutcome(read_id=action.read_id, items=items)
         if isinstance(action, act.SetMode):
             if action.mode is Mode.AUTO and not self.mission:
                 return CommandOutcome(command_id=action.command_id, result=CommandResult.REFUSED, text="No Mission")
@@ -274,6 +286,7 @@ class World:
             system_status=self.system_status,
             mission_seq=self.seq, mission_total=len(self.mission), mission_state=self.mission_state, **self.shown)
         out = Snapshot(
+            identity=self.identity,
             t_s=self.t, vehicle=vehicle, vehicle_age_s=0.1, position_en_m=here, autopilot=status, autopilot_age_s=0.2,
             heartbeat_age_s=self.heartbeat_age, permissions=self.permissions,
             wind=WindView(health=self.wind_health, forecast=forecast(self.t, mean, mean_tws, self.sigma),
@@ -324,12 +337,14 @@ def check_invariants(before, after, snapshot, actions) -> None:
 
     for action in actions:
         assert permitted(action, snapshot.permissions), action
+        if isinstance(action, (act.UploadMission, act.SetMode, act.Arm, act.SetCurrent, act.SteerHeading)):
+            assert after.is_ours, action
         if isinstance(action, act.UploadMission):
             assert ends_safely(action.items)
             if before.route is not None and after.pending_upload is not None:
                 assert action.items[: action.keep_first] == before.route.items[: action.keep_first]
         if after.phase is Phase.OPERATOR:
-            assert isinstance(action, (act.Announce, act.CancelPlan, act.ReadMission)), action
+            assert isinstance(action, (act.Announce, act.CancelPlan, act.ReadMission, act.StopOrders)), action
     assert after.why
     if after.phase in {Phase.WAITING, Phase.HOLDING}:
         assert "wait" in after.why, f"{after.phase.value}, and not said for what: {after.why}"

@@ -1,0 +1,47 @@
+"""The messages that this program reads, and where.
+
+A test holds this table and the code together; ``sitl hostile`` forges each of them. Beside these, every message with
+``time_boot_ms`` counts for the autopilot's clock, and every one for its sequence numbers (``witness``), whatever it
+says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+_LISTS = ("lists", "shore")
+
+# Name -> the modules that read it.
+READS: Mapping[str, tuple[str, ...]] = {
+    "HEARTBEAT": ("census", "reception", "link", "assembler", "fold", "shore"),
+    "ATTITUDE": ("assembler", "wind"),
+    "GLOBAL_POSITION_INT": ("assembler",),
+    "WIND": ("assembler", "wind"),
+    "NAMED_VALUE_FLOAT": ("assembler", "link", "status_wire", "wind"),
+    "MISSION_CURRENT": ("assembler",),
+    "MISSION_ITEM_REACHED": ("assembler", "fold"),
+    "NAV_CONTROLLER_OUTPUT": ("assembler",),
+    "EKF_STATUS_REPORT": ("assembler",),
+    "GPS_RAW_INT": ("assembler",),
+    "SYS_STATUS": ("assembler",),
+    "FENCE_STATUS": ("assembler",),
+    "STATUSTEXT": ("assembler", "machines", "shore"),
+    "AIS_VESSEL": ("assembler",),
+    "HOME_POSITION": ("autopilot",),
+    "AUTOPILOT_VERSION": ("autopilot", "fold"),
+    "PARAM_VALUE": ("fold", "params"),
+    "COMMAND_ACK": ("assembler", "commands"),
+    "COMMAND_LONG": ("reception", "link"),
+    "COMMAND_INT": ("reception", "link"),
+    "MISSION_COUNT": _LISTS,
+    "MISSION_ITEM_INT": ("codec", *_LISTS),
+    "MISSION_ITEM": ("lists",),
+    "MISSION_REQUEST": _LISTS,
+    "MISSION_REQUEST_INT": _LISTS,
+    "MISSION_ACK": _LISTS,
+    "FILE_TRANSFER_PROTOCOL": ("ftp",),
+    "TUNNEL": ("status_wire",),
+    "WIND_COV": ("status_wire",),
+}
+# Read only by who listens ashore, from the companion's own component.
+ASHORE = frozenset({"TUNNEL", "WIND_COV"})

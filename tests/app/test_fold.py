@@ -1,0 +1,156 @@
+"""The fold and what it must not believe: parameters, faults of its own, and who may tell it anything."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import socket
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
+from companion.boat import AutopilotLimits
+from companion.clock import run
+from companion.compose import config_of, estimator_of, voyage_of
+from companion.fold import VoyageFold
+from companion.geofence import load_mission
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.frames import Codec
+from companion.mavlink.link import Link
+from companion.mavlink.parameter_ranges import RANGES, believable, refusal
+from companion.mavlink.transport import open_link
+from companion.skipper import Skipper
+from companion.skipper.config import Permissions
+from companion.skipper.snapshot import Disbelieved
+from companion.wind import WindRoom
+from companion.wind.parameters import VaneParameters
+from sitl.autopilot import Autopilot as SimulatedAutopilot
+from sitl.autopilot import AutopilotConfig, serve
+from sitl.wind import Constant
+
+DEMO = "missions/archipelago.toml"
+
+
+def fresh():
+    mission = load_mission(DEMO)
+    return VoyageFold(
+        Skipper(voyage=voyage_of(mission), config=config_of(mission)), WindRoom(estimator=estimator_of(mission)),
+        Permissions())
+
+
+def told(fold, name, value, *, component=1, t_s=1.0):
+    message = wire.MAVLink_param_value_message(name.encode(), value, 9, 900, 65535)
+    [heard] = Codec(9, 9).feed(Codec(1, component).pack(message))
+    fold.message(t_s, heard)
+
+
+def disbelieved(fold, t_s=2.0):
+    return [e for e in fold.tick(t_s).snapshot.events if isinstance(e, Disbelieved)]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.dictionaries(st.sampled_from(sorted(RANGES)), st.floats(width=32)))
+def test_no_value_of_a_parameter_raises_and_the_limits_are_learnt(values):
+    good, refused = believable(values)
+    assert len(good) + len(refused) == len(values)
+    limits = AutopilotLimits.from_params(good)
+    assert math.isfinite(limits.sail_no_go_angle_rad)
+    assert math.isfinite(VaneParameters.from_mapping(good).true_tau_s)
+
+
+def test_the_defaults_stand_in_for_what_cannot_be():
+    fold = fresh()
+    for name in RANGES:
+        told(fold, name, math.nan)
+    assert not fold.unread, "answered, if with nonsense"
+    assert len(disbelieved(fold)) == len(RANGES)
+    assert fold.tick(3.0).snapshot.limits == AutopilotLimits()
+    for name in RANGES:
+        told(fold, name, math.nan)
+    assert not disbelieved(fold, 4.0), "once"
+
+
+def test_an_impossible_value_leaves_the_known_one():
+    fold = fresh()
+    for name, value in (("SAIL_NO_GO_ANGLE", 40.0), ("SAIL_XTRACK_MAX", 7.0), ("WP_RADIUS", 3.0)):
+        told(fold, name, value)
+    told(fold, "SAIL_NO_GO_ANGLE", 90.0)
+    limits = fold.tick(2.0).snapshot.limits
+    assert math.degrees(limits.sail_no_go_angle_rad) == pytest.approx(40.0)
+    assert limits.sail_xtrack_max_m == 7.0
+
+
+def test_a_change_is_believed_when_it_is_told_twice():
+    fold = fresh()
+    for name, value in (("SAIL_NO_GO_ANGLE", 40.0), ("SAIL_XTRACK_MAX", 7.0), ("WP_RADIUS", 3.0)):
+        told(fold, name, value)
+    told(fold, "SAIL_XTRACK_MAX", 100.0)
+    assert "SAIL_XTRACK_MAX" in fold.unread
+    assert fold.tick(2.0).snapshot.limits.sail_xtrack_max_m == 7.0
+    told(fold, "SAIL_XTRACK_MAX", 7.0)
+    assert "SAIL_XTRACK_MAX" not in fold.unread
+    told(fold, "SAIL_XTRACK_MAX", 100.0)
+    told(fold, "SAIL_XTRACK_MAX", 100.0)
+    assert fold.tick(3.0).snapshot.limits.sail_xtrack_max_m == 100.0
+
+
+def test_parameters_and_versions_of_other_components_are_none():
+    fold = fresh()
+    told(fold, "FRAME_CLASS", 2.0, component=154)
+    version = wire.MAVLink_autopilot_version_message(0, 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0, [5] * 18)
+    [heard] = Codec(9, 9).feed(Codec(1, 154).pack(version))
+    fold.message(1.0, heard)
+    identity = fold.tick(2.0).snapshot.identity
+    assert identity.frame_class is None
+    assert identity.uid is None
+
+
+def test_a_fault_of_its_own_is_said_once_and_ends_nothing(monkeypatch):
+    fold = fresh()
+
+    def broken(*_):
+        raise ZeroDivisionError("of all things")
+
+    monkeypatch.setattr(fold.wind, "set_parameters", broken)
+    for n in range(3):
+        told(fold, "WNDVN_TYPE", 10.0 + n)
+    [said] = disbelieved(fold)
+    assert "of all things" in said.text
+    told(fold, "WP_RADIUS", 3.0)
+    assert "WP_RADIUS" not in fold.unread
+
+
+def test_refusals_name_the_value_and_what_can_be():
+    assert refusal("SAIL_NO_GO_ANGLE", 89.0) == ""
+    assert refusal("ANY_OTHER", math.inf) == ""
+    assert refusal("WP_RADIUS", -1.0) == "WP_RADIUS -1 cannot be (0 to 10000)"
+
+
+def test_over_tcp_an_impossible_parameter_costs_no_connection():
+    """It hung up thirteen times: what a subscriber raised reached the transport, which hung up."""
+    fold = fresh()
+
+    async def main():
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        boat = SimulatedAutopilot(
+            AutopilotConfig(is_warm=True, parameters={"SAIL_NO_GO_ANGLE": 90.0}), Constant(0.0, 5.0), 1)
+        async with (
+            serve(boat, [f"tcpin:127.0.0.1:{port}"]),
+            Link(open_link(f"tcp:127.0.0.1:{port}"), objection=fold.objection) as link,
+        ):
+            link.subscribe(fold.message)
+            await link.wait_autopilot(20.0)
+            autopilot = Autopilot(link)
+            for name in ("SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS", "SAIL_NO_GO_ANGLE"):
+                assert (await autopilot.get_parameter(name)).is_ok
+            await asyncio.sleep(0.1)
+            return link.transport.stats.connections, link.stats.faults
+
+    connections, faults = run(main(), speedup=8.0)
+    assert connections == 1
+    assert not faults
+    assert fold.tick(1e6).snapshot.limits == AutopilotLimits(sail_xtrack_max_m=10.0, wp_radius_m=3.0)
