@@ -195,6 +195,15 @@ class LocalArea:
             clearance = min(clearance, float(shapely.distance(self.limits.boundary, line)) if inside else -1.0)
         return clearance
 
+    def nearest_name(self, point_en: ArrayLike) -> str:
+        """Return what the nearest obstacle or limit to a point is called; empty in open water."""
+        point = shapely.points(np.asarray(point_en, dtype=np.float64).reshape(2))
+        far = [float(shapely.distance(p, point)) for p in self.polygons]
+        nearest = min(range(len(far)), key=far.__getitem__, default=None)
+        if self.limits is not None and (nearest is None or float(self.limit_clearance_m(point_en)[0]) < far[nearest]):
+            return "the fence"
+        return "" if nearest is None else self.names[nearest]
+
     def obstacles_wkt(self, margin_m: float = 0.0) -> list[str]:
         """Return the obstacles, grown by the margin and merged, as the WKT polygons of a planning problem."""
         merged = self.buffered(margin_m) if self.polygons else MultiPolygon()

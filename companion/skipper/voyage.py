@@ -54,6 +54,10 @@ class Area(Protocol):
         """Return the smallest distance of a polyline (n, 2) to obstacles and limits [m], at most 0 on contact."""
         ...
 
+    def nearest_name(self, point_en: ArrayLike) -> str:
+        """Return what the nearest obstacle or limit to a point is called; empty in open water."""
+        ...
+
     def obstacles_wkt(self, margin_m: float = 0.0) -> list[str]:
         """Return the obstacles grown by the margin as WKT POLYGONs."""
         ...
