@@ -9,12 +9,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from companion.clock import now_s
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
@@ -217,9 +216,9 @@ class _Shell:
         """Record the step; nothing of it is carried out before what a restart needs is on the disk."""
         snapshot = step.snapshot
         clearance_m = None
-        if snapshot.position_en_m is not None:
-            value = float(self.voyage.area.clearance_m(np.array([snapshot.position_en_m]))[0])
-            clearance_m = value if np.isfinite(value) else None
+        if snapshot.position_en_m is not None and snapshot.vehicle is not None:
+            value = self.voyage.hull_clearance_m(snapshot.position_en_m, snapshot.vehicle.heading_rad)
+            clearance_m = value if math.isfinite(value) else None
         self.figures.take(step, clearance_m)
         self.recorder.track(track_row(step, self._frames, clearance_m))
         self._frames = 0

@@ -38,11 +38,13 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from companion.boat import Hull
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.messages import Command, Mode
 from companion.skipper.actions import UploadMission
 from sitl.autopilot import Autopilot, MemoryLink
+from sitl.clearance import HullTrack
 from sitl.scenario import EventSpec
 
 MAX_SILENCE_S = 10.0
@@ -83,9 +85,11 @@ class Watch:
 
     solid: BaseGeometry
     frame: LocalFrame
+    hull: Hull
     operator_s: list[tuple[float, float]] = field(default_factory=list)
     t_s: list[float] = field(default_factory=list)
     en_m: list[tuple[float, float]] = field(default_factory=list)
+    heading_rad: list[float] = field(default_factory=list)
     believed_en_m: list[tuple[float, float]] = field(default_factory=list)
     helm: list[Helm] = field(default_factory=list)
     armed: list[bool] = field(default_factory=list)
@@ -114,6 +118,7 @@ class Watch:
         self.has_sailed = self.has_sailed or helm is Helm.SAILED
         self.t_s.append(t_s)
         self.en_m.append(self.frame.en_from_geo(truth.position))
+        self.heading_rad.append(truth.heading_rad)
         self.believed_en_m.append(self.frame.en_from_geo(pilot))
         self.helm.append(helm)
         self.armed.append(truth.is_armed)
@@ -130,15 +135,7 @@ class Watch:
     # ------------------------------------------------------------------------------------------ contacts
     def contacts(self) -> list[tuple[float, str]]:
         """Return when the boat entered what is solid [s], and what excuses it; "unexcused" for nothing."""
-        if not self.t_s:
-            return []
-        shapely.prepare(self.solid)
-        positions = np.asarray(self.en_m)
-        # looked at between the samples too: a corner can be cut in a quarter of a second
-        ways = shapely.linestrings(np.stack([positions[:-1], positions[1:]], axis=1))
-        inside = shapely.intersects(self.solid, np.concatenate([[shapely.points(positions[0])], ways]))
-        entries = np.flatnonzero(inside & ~np.concatenate([[False], inside[:-1]]))
-        return [(self.t_s[i], self._excuse(int(i))) for i in entries]
+        return [(self.t_s[i], self._excuse(i)) for i in self._track().entries(self.solid)]
 
     def _excuse(self, i: int) -> str:
         wrong = np.hypot(*(np.asarray(self.en_m) - np.asarray(self.believed_en_m)).T) > 1.0
@@ -161,11 +158,16 @@ class Watch:
         """Return the index of the first sample not more than ``span_s`` before sample ``i``."""
         return bisect.bisect_left(self.t_s, self.t_s[i] - span_s)
 
-    def clearance_m(self) -> float | None:
-        """Return the smallest true distance to anything solid [m]."""
+    def clearance_m(self) -> tuple[float, float] | None:
+        """Return the hull's smallest true distance to anything solid [m], and when [s]."""
         if not self.en_m:
             return None
-        return float(np.min(shapely.distance(self.solid, shapely.points(np.asarray(self.en_m)))))
+        least_m, i = self._track().least_m(self.solid)
+        return least_m, self.t_s[i]
+
+    def _track(self) -> HullTrack:
+        return HullTrack(en_m=np.asarray(self.en_m).reshape(-1, 2), heading_rad=np.asarray(self.heading_rad),
+                         hull=self.hull)
 
     # ------------------------------------------------------------------------------------------ missions
     def mixture_s(self) -> float:

@@ -33,6 +33,7 @@ EXPANSIONS = 4_000
 def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[str, Any]:
     """Sail one seed and return how it went; a voyage folder is left in ``keep``."""
     from companion.clock import run_virtual
+    from companion.compose import boat_of
     from companion.geofence import load_mission
     from companion.messages import waypoint
     from sitl.runner import run_embedded, solid_of
@@ -43,7 +44,7 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
     scenario = draw(seed, load_scenario(base))
     mission = load_mission(scenario.mission_path(base))
     frame = mission.frame()
-    watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame,
+    watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame, hull=boat_of(mission).hull,
                   operator_s=operator_spans(scenario.events, scenario.limit_s))
     for event in scenario.events:
         if event.kind == "foreign_mission":
@@ -67,6 +68,7 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
             errors = [str(e) for c in verdict.checks if c.name == "no unhandled error" for e in c.figure]
         except Exception as error:
             errors = [repr(error)]
+    least = watch.clearance_m()
     contacts, mixture_s, silence_s = watch.contacts(), watch.mixture_s(), watch.silence_s(status_s)
     faults = [f"contact at {t_s:.0f} s" for t_s, excuse in contacts if excuse == "unexcused"]
     if mixture_s > 0.0:
@@ -80,7 +82,8 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
         "events": [f"{e.kind} at {e.at_s:.0f} s" for e in scenario.events],
         "kinds": sorted({e.kind for e in scenario.events}),
         "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
-        "contacts": [{"t_s": t_s, "excuse": excuse} for t_s, excuse in contacts], "clearance_m": watch.clearance_m(),
+        "contacts": [{"t_s": t_s, "excuse": excuse} for t_s, excuse in contacts],
+        "clearance_m": least and least[0], "clearance_t_s": least and least[1],
         "mixture_s": mixture_s, "held_back_s": watch.held_back_s(),
         "silence_s": silence_s, "sailed": watch.has_sailed, "errors": errors,
         "simulated_s": watch.t_s[-1] if watch.t_s else 0.0, "cpu_s": time.process_time() - began_s,

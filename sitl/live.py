@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.clock import now_s, run
+from companion.compose import boat_of
 from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
@@ -164,7 +165,8 @@ async def _run(
     summary: dict[str, Any] = json.loads(summary_path.read_bytes())
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=truth,
-        solid=solid_of(mission.area.local(frame)), goal_en_m=frame.en_from_geo(mission.goals[-1].point),
+        solid=solid_of(mission.area.local(frame)), hull=boat_of(mission).hull,
+        goal_en_m=frame.en_from_geo(mission.goals[-1].point),
         summary=summary, status_times_s=None, alerts=summary.get("alerts", {}), errors=errors,
         marks=marks_of(mission),
     )

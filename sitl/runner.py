@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.app import sail
 from companion.clock import now_s
+from companion.compose import boat_of
 from companion.errors import LinkError
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
@@ -171,6 +172,7 @@ async def run_embedded(
     area = mission.area.local(frame)
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
+        hull=boat_of(mission).hull,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
         status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
     )

@@ -25,6 +25,11 @@ class Hull:
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} is {value}; it must be 0 m or more")
 
+    @property
+    def reach_m(self) -> float:
+        """How far the hull reaches from the place that the position is of, which is amidships [m]."""
+        return 0.5 * math.hypot(self.length_m, self.beam_m)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Boat:

@@ -6,8 +6,6 @@ of the road are shown, never relied upon: the boat keeps clear of everyone (``co
 
 from __future__ import annotations
 
-import math
-
 from companion.skipper.actions import Severity
 from companion.skipper.config import SkipperConfig
 from companion.skipper.turn import Turn
@@ -36,7 +34,7 @@ def look_out(turn: Turn) -> None:
     hull, wind = turn.voyage.boat.hull, turn.wind_now
     own = OwnShip(
         t_s=turn.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
-        radius_m=0.5 * math.hypot(hull.length_m, hull.beam_m))
+        radius_m=hull.reach_m)
     before = {(a.vessel.mmsi, a.vessel.branch): a.alarm for a in turn.state.watch}
     found = assess(own, picture, limits(turn.config), None if wind is None else wind[0])[:SHOWN]
     turn.update(watch=found)

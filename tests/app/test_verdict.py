@@ -5,36 +5,74 @@ import math
 import numpy as np
 import pytest
 import shapely
+import shapely.affinity
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from companion.boat import Hull
+from sitl.clearance import HullTrack
 from sitl.scenario import ExpectSpec
-from sitl.verdict import Truth, contacts_and_clearance, count_roundings, count_tacks, judge, longest_silence_s
+from sitl.verdict import Truth, count_roundings, count_tacks, judge, longest_silence_s
 
 ISLAND = shapely.Point(0.0, 0.0).buffer(10.0)
 
 
+DOT = Hull(length_m=0.0, beam_m=0.0)
+LONG = Hull(length_m=8.0, beam_m=2.0)
+
+
+def hulls(en_m, heading_deg=0.0, hull=DOT):
+    en_m = np.asarray(en_m, dtype=float).reshape(-1, 2)
+    return HullTrack(en_m=en_m, heading_rad=np.radians(np.broadcast_to(heading_deg, len(en_m))), hull=hull)
+
+
 def test_a_track_across_an_island_touches_once_even_between_samples():
-    far_apart = np.array([[-50.0, 0.0], [50.0, 0.0]])
-    assert contacts_and_clearance(far_apart, ISLAND) == (1, 0.0)
+    far_apart = hulls([[-50.0, 0.0], [50.0, 0.0]])
+    assert far_apart.entries(ISLAND) == [1]
+    assert far_apart.least_m(ISLAND) == (0.0, 1)
 
 
 def test_two_crossings_are_two_contacts():
-    track = np.array([[-20.0, 0], [0, 0], [20.0, 0], [20.0, 30], [0, 30], [0, 0], [0, -30.0]])
-    contacts, clearance = contacts_and_clearance(track, ISLAND)
-    assert (contacts, clearance) == (2, 0.0)
+    track = hulls([[-20.0, 0], [0, 0], [20.0, 0], [20.0, 30], [0, 30], [0, 0], [0, -30.0]])
+    assert track.entries(ISLAND) == [1, 5]
 
 
 def test_clearance_is_the_smallest_distance():
-    track = np.column_stack([np.linspace(-50, 50, 400), np.full(400, 17.0)])
-    contacts, clearance = contacts_and_clearance(track, ISLAND)
-    assert contacts == 0
-    assert clearance == pytest.approx(7.0, abs=0.05)
+    track = hulls(np.column_stack([np.linspace(-50, 50, 400), np.full(400, 17.0)]))
+    assert track.entries(ISLAND) == []
+    assert track.least_m(ISLAND)[0] == pytest.approx(7.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("heading_deg", "clearance_m"), [(0.0, 0.0), (90.0, 2.0)])
+def test_the_hull_is_what_touches(heading_deg, clearance_m):
+    """Three metres off an island a boat of eight by two touches it bow first and passes it broadside."""
+    track = hulls([[0.0, 13.0]], heading_deg, LONG)
+    least_m, _ = track.least_m(ISLAND)
+    assert track.entries(ISLAND) == ([0] if clearance_m == 0.0 else [])
+    assert least_m == pytest.approx(clearance_m, abs=0.02)
+    assert hulls([[0.0, 13.0]]).least_m(ISLAND)[0] == pytest.approx(3.0, abs=0.02)
+
+
+def test_what_the_hull_sweeps_between_two_samples_is_touched():
+    post = shapely.Point(0.0, 3.9).buffer(0.05)
+    assert hulls([[-10.0, 0.0], [10.0, 0.0]], 0.0, LONG).entries(post) == [1]
+    assert hulls([[-10.0, 0.0], [10.0, 0.0]], 90.0, LONG).entries(post) == []
+
+
+def test_the_hull_is_where_the_planes_geometry_has_it():
+    """Against an independent way to draw it: a box turned by shapely, whose angles run the other way."""
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        en, heading = rng.uniform(-25, 25, 2), rng.uniform(-np.pi, np.pi)
+        box = shapely.affinity.translate(
+            shapely.affinity.rotate(shapely.box(-1.0, -4.0, 1.0, 4.0), -np.degrees(heading), origin=(0, 0)), *en)
+        assert hulls([en], np.degrees(heading), LONG).least_m(ISLAND)[0] == pytest.approx(
+            shapely.distance(box, ISLAND), abs=1e-9)
 
 
 def test_a_boat_that_never_sailed_touched_nothing_and_does_not_pass():
     def verdict(truth):
-        return judge(scenario="x", seed=0, expect=ExpectSpec(arrived=None), truth=truth, solid=ISLAND,
+        return judge(scenario="x", seed=0, expect=ExpectSpec(arrived=None), truth=truth, solid=ISLAND, hull=DOT,
                      goal_en_m=(0.0, 99.0), summary={}, status_times_s=None, alerts=())
 
     assert verdict(_truth([0.0] * 400)).passed is False   # through the island
@@ -45,7 +83,8 @@ def test_a_boat_that_never_sailed_touched_nothing_and_does_not_pass():
 
 
 def test_open_water_has_no_clearance():
-    assert contacts_and_clearance(np.zeros((3, 2)), shapely.Polygon()) == (0, math.inf)
+    assert hulls(np.zeros((3, 2))).entries(shapely.Polygon()) == []
+    assert hulls(np.zeros((3, 2))).least_m(shapely.Polygon())[0] == math.inf
 
 
 def _truth(headings_deg, twd_deg=0.0, step_s=0.25):
@@ -67,7 +106,7 @@ def test_tacks_are_counted_on_the_way_only():
     late = [60.0] * 100 + [-60.0] * 60
     expect = ExpectSpec(arrived=None, within_m=5.0, max_tacks=0)
     def passed(goal_north_m):
-        return judge(scenario="s", seed=0, expect=expect, truth=_truth(late), solid=shapely.Polygon(),
+        return judge(scenario="s", seed=0, expect=expect, truth=_truth(late), solid=shapely.Polygon(), hull=DOT,
                      goal_en_m=(0.0, goal_north_m), summary={}, status_times_s=None, alerts=()).checks[-1].passed
     assert passed(50.0)
     assert not passed(500.0)
@@ -93,8 +132,8 @@ def test_a_verdict_fails_for_each_reason_by_name():
     truth = _truth([45.0] * 20)
     verdict = judge(
         scenario="x", seed=1, expect=ExpectSpec(arrived=True, contacts=0, within_m=1.0, alerts=("irons",)),
-        truth=truth, solid=shapely.Point(0, 5).buffer(1.0), goal_en_m=(100.0, 0.0), summary={"arrived": False},
-        status_times_s=[0.0], alerts=[], errors=["boom"],
+        truth=truth, solid=shapely.Point(0, 5).buffer(1.0), hull=DOT, goal_en_m=(100.0, 0.0),
+        summary={"arrived": False}, status_times_s=[0.0], alerts=[], errors=["boom"],
     )
     failed = {c.name for c in verdict.checks if not c.passed}
     assert failed == {"no unhandled error", "arrived", "contacts", "distance to the goal, m", "announced irons"}

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 import shapely
 
+from companion.boat import Hull
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint, Mode
 from sitl.fault_draw import draw
@@ -66,7 +67,7 @@ class Ghost:
         geo = self.watch.frame.geo_from_en
         point, seen = geo(east, north), geo(*(believed or (east, north)))
         pilot = SimpleNamespace(
-            truth=SimpleNamespace(position=point, is_armed=is_armed, mode=mode),
+            truth=SimpleNamespace(position=point, heading_rad=0.0, is_armed=is_armed, mode=mode),
             failsafe=SimpleNamespace(is_active=fails), ekf_ready=not fails,
             chart=SimpleNamespace(point=lambda _: seen), vehicle=SimpleNamespace(position=None),
             helm=SimpleNamespace(mission=SimpleNamespace(items=[None, *self.items])),
@@ -78,7 +79,7 @@ class Ghost:
 
 @pytest.fixture
 def ghost():
-    watch = Watch(solid=ROCK, frame=LocalFrame(GeoPoint(lat_deg=50.8, lon_deg=-1.3)))
+    watch = Watch(solid=ROCK, hull=Hull(), frame=LocalFrame(GeoPoint(lat_deg=50.8, lon_deg=-1.3)))
     watch.lives = [(0.0, 1000.0)]
     return Ghost(watch)
 
