@@ -117,7 +117,7 @@ def test_a_contact_is_excused_only_by_what_nobody_could_help(ghost):
         "autopilot refuses", "autopilot refuses", "operator", "operator", "unexcused",
     ]
     assert set(excuses(ghost)) < {*EXCUSES, "unexcused"}
-    assert ghost.watch.clearance_m() == 0.0
+    assert ghost.watch.clearance_m()[0] == 0.0
 
 
 def test_a_corner_that_is_cut_between_two_looks_is_a_contact(ghost):
