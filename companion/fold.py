@@ -121,7 +121,9 @@ class VoyageFold:
         elif isinstance(value, StatusText):
             self._events.append(value)
         elif isinstance(value, AisReport):
-            self._targets = self._targets.heard(value)
+            own = self._vehicle
+            self._targets = self._targets.heard(value) if own is None else self._targets.heard(
+                value, self.skipper.voyage.frame.en_from_geo(own.position))
 
     def take_outcome(self, t_s: float, outcome: Outcome) -> None:
         """Take the outcome of an earlier action, known at ``t_s``."""

@@ -191,6 +191,7 @@ class SkipperState:
     by_field: ByField = ByField()
     irons_s: tuple[float, ...] = ()                # when the boat was in irons
     watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
+    watch_told: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of those said lately, when
     announced: tuple[tuple[str, float], ...] = ()  # code, last said
     reached: tuple[int, ...] = ()                  # goals reached, in order
     missed: int = 0                                # buoys passed on the wrong side and sailed again
