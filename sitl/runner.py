@@ -29,6 +29,8 @@ from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link, LinkIdentity
 from companion.messages import MissionItem, Mode, waypoint
 from companion.options import SailOptions, at_once
+from companion.skipper.actions import Announce
+from companion.skipper.adrift import CALL
 from companion.telemetry.recorder import write_atomically
 from sitl.autopilot import (
     Autopilot,
@@ -90,6 +92,7 @@ class _World:
     planner: FragilePlanner = field(default_factory=FragilePlanner)
     observer: Observer | None = None
     stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
+    called: asyncio.Event = field(default_factory=asyncio.Event)   # the companion calls its crew to the anchor
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -149,7 +152,7 @@ async def run_embedded(
         heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     autopilot = Autopilot(
         AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
-                        parameters=scenario.parameters, has_ftp=scenario.has_ftp),
+                        parameters=scenario.parameters, has_ftp=scenario.has_ftp, has_motor=mission.boat.motor),
         wind, seed=seed,
     )
     link = MemoryLink("companion", seed=seed)
@@ -194,6 +197,8 @@ async def _sail_and_restart(
 
     def on_status(status: Any, step: Step) -> None:  # noqa: ARG001 - the interface has both
         world.status_s.append(step.snapshot.t_s)
+        if any(isinstance(action, Announce) and action.code == CALL for action in step.actions):
+            world.called.set()
         if on_step is not None:
             on_step(step)
 
@@ -294,6 +299,13 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
         autopilot.set_battery(event.volts or 0.0)
     elif event.kind == "current":
         autopilot.set_current(math.radians(event.set_deg), event.drift_mps)
+    elif event.kind == "crew":
+        await world.called.wait()
+        await asyncio.sleep(event.react_s)
+        autopilot.vehicle.anchor(down=True)
+        if event.for_s is not None:
+            await asyncio.sleep(event.for_s)
+            autopilot.vehicle.anchor(down=False)
     elif event.kind in TRAFFIC:
         await world.others.play(event, 0.0, lambda: _ours(autopilot, mission.frame()))
     elif event.kind == "foreign_mission":

@@ -30,6 +30,7 @@ EventKind = Literal[
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
     "current",           # set_deg, drift_mps
+    "crew",              # anchors react_s after the companion first calls for it, weighs after for_s
     "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
     "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
     "second_boat",       # east_m, north_m, goal_east_m, goal_north_m: VAIMOS's model, steered by field, told by radio
@@ -72,6 +73,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     volts: float | None = None
     set_deg: float = 0.0
     drift_mps: float = 0.0
+    react_s: float = 0.0         # a crew's, from being called to the anchor on the ground
     course_deg: float = 0.0
     sog_mps: float = 0.0
     every_s: float = 10.0        # between its AIS reports

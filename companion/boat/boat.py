@@ -45,6 +45,7 @@ class Boat:
         can_tack: False for a boat that does not get through the wind's eye: its plans gybe round instead.
         gybe_room_m: Leg to leeward that gybing round needs [m]; None: five turning radii at full speed.
         hull: Its size.
+        has_motor: It has an auxiliary motor that the autopilot can run.
     """
 
     polar: Polar
@@ -56,6 +57,7 @@ class Boat:
     can_tack: bool = True
     gybe_room_m: float | None = None
     hull: Hull = field(default_factory=Hull)
+    has_motor: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.no_go_half_rad < math.pi:

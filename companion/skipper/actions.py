@@ -142,6 +142,15 @@ class SetCurrent:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RunMotor:
+    """Run the auxiliary motor, or leave it to the autopilot's own judgement again; answered by CommandOutcome."""
+
+    command_id: int
+    is_on: bool
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SteerHeading:
     """A GUIDED heading setpoint [rad, true]; repeated every step, since it times out after 3 s. Not answered.
 
@@ -164,5 +173,5 @@ class Announce:
 
 Action = (
     RequestPlan | CancelPlan | UploadMission | UploadFence | ReadMission | SetMode | Arm | SetCurrent
-    | SteerHeading | Announce
+    | RunMotor | SteerHeading | Announce
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from companion.messages import MissionItem, Mode
 from companion.skipper.actions import ReadMission, Severity
 from companion.skipper.route import held_back, is_mixture, is_same_mission
@@ -113,6 +115,7 @@ def _adopt(turn: Turn, saved: Persisted) -> None:
     index = (status.mission_seq or 1) - 1 if status is not None else 0
     turn.update(
         gate=saved.gate, index=index, own_index=index, after_restart=True, own_mode=saved.own_mode,
+        adrift=replace(turn.state.adrift, motor=saved.motor),
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         sailing=_under_way(turn) or (saved.sailing and status is not None and status.is_armed),
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
+from companion.skipper.adrift import follow_ground
 from companion.skipper.config import SkipperConfig
 from companion.skipper.doubt import follow
 from companion.skipper.failsafe import has_stopped
@@ -28,7 +29,7 @@ from companion.skipper.lookout import look_out
 from companion.skipper.on_board import mission_is_known
 from companion.skipper.sailing import sail
 from companion.skipper.snapshot import OperatorWish, Snapshot
-from companion.skipper.state import PATIENT, ByField, Persisted, Phase, SkipperState
+from companion.skipper.state import PATIENT, Adrift, ByField, Persisted, Phase, SkipperState
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import Voyage
 from companion.skipper.watchdogs import watch
@@ -59,6 +60,7 @@ class Skipper:
         take_events(turn)
         take_outcomes(turn)
         follow(turn)
+        follow_ground(turn)
         locate(turn)
         look_out(turn)
         fresh = watch(turn)
@@ -82,7 +84,7 @@ class Skipper:
             return state.adoptable
         return Persisted(
             voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route, pending=pending,
-            own_mode=state.own_mode,
+            own_mode=state.own_mode, motor=state.adrift.motor,
         )
 
 
@@ -121,7 +123,7 @@ def _rebooted(turn: Turn) -> None:
     keeps = turn.state.phase is Phase.OPERATOR and since is not None and turn.t_s - since > REBOOT_RACE_S
     turn.update(
         checked_mission=False, read_since_s=turn.t_s, own_mode=None, steering_until_s=None, pending_command=None,
-        by_field=ByField(),
+        by_field=ByField(), adrift=Adrift(),
     )
     if not keeps:
         turn.update(sailing=False, operator_since_s=None)

@@ -7,6 +7,7 @@ import math
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.actions import CancelPlan, ReplanReason, Severity, SteerHeading
+from companion.skipper.adrift import stops_drift
 from companion.skipper.answers import hold
 from companion.skipper.beating import IRONS_MEMORY_S
 from companion.skipper.by_field import heading as by_field_heading
@@ -40,7 +41,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         if not keeps_station(turn):
             _finish(turn)
         return
-    if stands_off(turn):
+    if stands_off(turn) or stops_drift(turn):
         return
     stopped = turn.state.own_mode in {Mode.HOLD, Mode.LOITER}
     if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:

@@ -114,6 +114,19 @@ PATIENT = Retry()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Adrift:
+    """How the boat moves over ground, and what was done to stop a drift (``companion.skipper.adrift``)."""
+
+    ground_en_mps: tuple[float, float] | None = None   # mean velocity of the last seconds
+    ground_t_s: float = float("-inf")
+    places: tuple[Fix, ...] = ()       # of the last minute, of a boat that hardly moves
+    since_s: float | None = None       # since when a drift onto something is being stopped
+    loitered: bool = False             # LOITER has shown in this calm: it is not asked for again
+    loiter_en_m: PointEn | None = None # where it began
+    motor: bool = False                # the autopilot has accepted to run it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ByField:
     """Steering by field: the memory of the guidance and of the station keeper, and the last resort's."""
 
@@ -189,6 +202,7 @@ class SkipperState:
     steering_until_s: float | None = None          # bearing away in GUIDED until
     steering_heading_rad: float | None = None
     by_field: ByField = ByField()
+    adrift: Adrift = Adrift()
     irons_s: tuple[float, ...] = ()                # when the boat was in irons
     watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
     watch_told: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of those said lately, when
@@ -208,13 +222,14 @@ class Persisted:
     route: Route | None
     pending: Route | None
     own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
+    motor: bool = False                # it was run by us: ours to switch off
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""
         return {
             "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
             "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
-            "own_mode": None if self.own_mode is None else self.own_mode.name,
+            "own_mode": None if self.own_mode is None else self.own_mode.name, "motor": self.motor,
         }
 
     @classmethod
@@ -227,6 +242,7 @@ class Persisted:
                 voyage=str(data["voyage"]), gate=int(data["gate"]), sailing=bool(data["sailing"]),
                 route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
                 own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
+                motor=bool(data.get("motor", False)),
             )
         except (KeyError, TypeError, IndexError, AttributeError) as error:
             raise ValueError(f"the saved state is damaged: {error!r}") from error

@@ -16,6 +16,7 @@ from companion.skipper.actions import (
     Action,
     Announce,
     Arm,
+    RunMotor,
     SetCurrent,
     SetMode,
     Severity,
@@ -46,6 +47,8 @@ def permitted(action: Action, permissions: Permissions) -> bool:
         return permissions.may_upload_fence
     if isinstance(action, SetMode):
         return permissions.may_set_mode and (action.mode is not Mode.GUIDED or permissions.may_steer)
+    if isinstance(action, RunMotor):
+        return permissions.may_set_mode
     if isinstance(action, Arm):
         return permissions.may_arm
     if isinstance(action, SetCurrent):

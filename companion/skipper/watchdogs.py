@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.actions import Severity
+from companion.skipper.adrift import LIGHT_MPS, meets_in_s, sails
 from companion.skipper.by_field import meets_in
 from companion.skipper.geometry import along_m, cross_track_m, distance_m
 from companion.skipper.snapshot import WindHealth
@@ -28,7 +29,8 @@ class Response(enum.Enum):
     FREEZE = "no actions until it clears; what is on the autopilot sails on"
     NO_BOAT_PLANS = "no plan from the boat's position until it clears, unless the way from there is shut"
     NO_WIND_PLANS = "no new plan because of the wind; the plan in place stays"
-    WAIT_FOR_WIND = "no plans and no complaint about progress; plan again when the wind is back"
+    WAIT_FOR_WIND = "no plans, no complaint about progress; LOITER where she drifts; plan again when the wind is back"
+    STOP_DRIFT = "say where to and when, each minute; motor if there is one, LOITER if she can stem it, else the anchor"
     BEAR_AWAY = "bear away under GUIDED until the boat sails, back to AUTO, plan again; after two, gybe round"
     REPLAN = "plan again from the boat"
     RESTART = "read the mission, take it over if it is ours, and start again as far as permitted"
@@ -70,9 +72,12 @@ TABLE: tuple[Watchdog, ...] = (
     W(name="wind untrusted", watches="the wind room's verdict (frozen, mirrored, spiking, silent vane)", enter=1.0,
       exit=0.5, unit="", enter_s=5.0, exit_s=30.0, severity=S.WARNING, response=Response.NO_WIND_PLANS, at_rest=True,
       why="a plan made for a wind that is not there is worse than an old one"),
-    W(name="becalmed", watches="true wind speed, and the boat hardly moving", enter=0.8, exit=1.2, unit="m/s",
-      enter_s=60.0, exit_s=30.0, severity=S.NOTICE, response=Response.WAIT_FOR_WIND,
+    W(name="becalmed", watches="mean true wind speed, of a boat that does not sail", enter=LIGHT_MPS, exit=1.2,
+      unit="m/s", enter_s=60.0, exit_s=30.0, severity=S.NOTICE, response=Response.WAIT_FOR_WIND,
       why="without wind there is no progress to complain of and no direction to plan for"),
+    W(name="drifting", watches="time until a boat that does not sail drifts within the margin's floor of something",
+      enter=300.0, exit=360.0, unit="s", enter_s=20.0, exit_s=30.0, severity=S.CRITICAL, response=Response.STOP_DRIFT,
+      why="a current takes her there without wind, and an anchor takes time to be let go"),
     W(name="in irons", watches="speed ahead while pointing within 35° of the wind", enter=0.3, exit=0.8, unit="m/s",
       enter_s=8.0, exit_s=3.0, severity=S.WARNING, response=Response.BEAR_AWAY,
       why="ArduRover has no recovery of its own; a tack takes 2 to 7 s"),
@@ -151,7 +156,7 @@ def _becalmed(turn: Turn) -> float | None:
     wind = turn.wind_mean
     if wind is None:
         return None
-    return wind[1] if turn.speed_mps < MOVING_MPS else max(wind[1], BY_NAME["becalmed"].exit)
+    return max(wind[1], BY_NAME["becalmed"].exit) if sails(turn) else wind[1]
 
 
 def _irons(turn: Turn) -> float | None:
@@ -199,8 +204,8 @@ def corridor_m(turn: Turn) -> float:
 def _corridor(turn: Turn) -> float | None:
     """Share of the corridor used; in open water the grid size bounds it, not the margin."""
     boat, leg = turn.boat_en, turn.leg()
-    if boat is None or leg is None or not turn.ahead():
-        return None
+    if boat is None or leg is None or not turn.ahead() or turn.state.own_mode in {Mode.HOLD, Mode.LOITER}:
+        return None      # stopped she follows no leg
     if distance_m(*leg) < 1.0:
         return 0.0
     if along_m(boat, *leg) < 0.0:
@@ -252,7 +257,8 @@ def _planner(turn: Turn) -> float | None:
 
 _MEASURES: dict[str, Callable[[Turn], float | None]] = {
     "link silent": _link, "position lost": _position_lost, "position jump": _jump, "wind untrusted": _wind,
-    "becalmed": _becalmed, "in irons": _irons, "vessel too near": _too_near, "no progress": _progress,
+    "becalmed": _becalmed, "drifting": meets_in_s, "in irons": _irons, "vessel too near": _too_near,
+    "no progress": _progress,
     "heading against course": _heading, "off the corridor": _corridor, "stuck waypoint": _stuck,
     "mission ended": _ended, "fence breach": _breach, "foreign mission": _foreign, "reboot": _reboot,
     "battery low": _battery, "battery critical": _battery, "planner dead": _planner,

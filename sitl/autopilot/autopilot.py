@@ -379,6 +379,12 @@ class Autopilot:
         self.parameters.put("SIM_TIDE_SPEED", drift_mps)
         self.vehicle.load_parameters()
 
+    def run_motor(self, *, on: bool) -> None:
+        """Run the auxiliary motor always, or never: there is no assistance in tacks here."""
+        if on and not self.config.has_motor:
+            self.announce(mav.MAV_SEVERITY_WARNING, "Sailboat: failed to enable motor")
+        self.vehicle.run_motor(on=on and self.config.has_motor)
+
     def set_vane(self, fault: VaneFault) -> None:
         """Break or mend the wind vane."""
         self.vehicle.set_vane_fault(fault.code, wrap_pi(fault.value_rad) if fault.value_rad else 0.0)

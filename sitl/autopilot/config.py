@@ -29,6 +29,7 @@ class AutopilotConfig:
         parameters: values other than the fresh boat's, by name.
         battery_v: at the start; ``Autopilot.set_battery`` changes it.
         has_ftp: offer MAVFTP; small boards are built without it.
+        has_motor: an auxiliary motor, run by DO_AUX_FUNCTION 74.
         new_parameter_names: answer to ArduPilot 4.7's names (MAV_SYSID) instead of the older ones.
     """
 
@@ -41,6 +42,7 @@ class AutopilotConfig:
     battery_v: float = 12.6
     new_parameter_names: bool = False
     has_ftp: bool = True
+    has_motor: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
