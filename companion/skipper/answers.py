@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import shapely
 
 from companion.messages import Command, waypoint
 from companion.planner import Plan, Problem
 from companion.skipper.actions import Change, ReplanReason, Severity
 from companion.skipper.beating import room_m, tacks_fail
+from companion.skipper.corners import LEAST_LEG_S, Quality, spread
 from companion.skipper.geometry import distance_m
 from companion.skipper.judge import judge
 from companion.skipper.ladder import rungs
@@ -116,16 +118,17 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
 def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
     """Splice a plan into the route and ask for its upload."""
     points = simplified(pending.problem, _apart([(float(e), float(n)) for e, n in plan.waypoints_en]))[1:]
+    start = pending.start_en_m
+    if pending.lead_in and turn.boat_en is not None:
+        start = turn.boat_en
+    points = _followed(turn, pending, [start, *pending.lead_in, *points])[1:]
     if tacks_fail(turn):
         # Tacks have failed: turn the other way round where there is room.
         points = list(gybe_round(
-            pending.start_en_m, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
+            start, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
             area=turn.voyage.area, floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m)))
         turn.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
-    tail = Tail(start_en=pending.start_en_m, points_en=(*pending.lead_in, *points), gate=pending.gate)
-    if pending.lead_in:
-        boat = turn.boat_en
-        tail = replace(tail, start_en=boat if boat is not None else pending.start_en_m)
+    tail = Tail(start_en=start, points_en=tuple(points), gate=pending.gate)
     facts = replace(
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
         why=plan.why.text or plan.reason)
@@ -151,6 +154,30 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
     change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
     upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}", change=change)
+
+
+def _followed(turn: Turn, pending: PendingPlan, path: list[PointEn]) -> list[PointEn]:
+    """Return the path with corners that the autopilot can follow (``companion.skipper.corners``)."""
+    wind, area, boat = turn.wind_mean, turn.voyage.area, turn.voyage.boat
+    if wind is None:
+        return path
+    keep_out = shapely.union_all([shapely.from_wkt(w) for w in (
+        turn.gates[pending.gate].keep_out if pending.gate >= 0 else ())])
+
+    def quality(way: list[PointEn]) -> Quality:
+        clearance_m = area.path_clearance_m(way)
+        if not pending.lead_in:
+            judged = pending.problem.evaluate(np.asarray(way))
+            if judged.is_feasible:
+                return Quality(is_feasible=True, is_sailable=True, clearance_m=clearance_m, time_s=judged.time_s)
+        seen = judge(
+            way, boat=boat, no_go_half_rad=turn.planned_no_go_rad, twd_from_rad=wind[0], tws_mps=wind[1], area=area,
+            beat_room_m=room_m(turn))
+        is_sailable = seen.spare_rad >= 0.0 and not shapely.intersects(keep_out, shapely.LineString(way))
+        return Quality(is_feasible=False, is_sailable=is_sailable, clearance_m=clearance_m, time_s=seen.time_s)
+
+    floor_m = min(turn.config.margin_floor_m, pending.facts.margin_m)
+    return spread(path, least_m=LEAST_LEG_S * boat.polar.max_speed_mps(wind[1]), floor_m=floor_m, quality=quality)
 
 
 def _apart(points: list[PointEn]) -> list[PointEn]:
