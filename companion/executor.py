@@ -30,6 +30,7 @@ from companion.skipper.actions import (
     SetCurrent,
     SetMode,
     SteerHeading,
+    Tack,
     UploadFence,
     UploadMission,
 )
@@ -216,6 +217,8 @@ class Executor:
             return _command(action.command_id, await autopilot.set_mode(action.mode))
         if isinstance(action, Arm):
             return _command(action.command_id, await autopilot.arm())
+        if isinstance(action, Tack):
+            return _command(action.command_id, await autopilot.tack())
         if isinstance(action, RunMotor):
             return _command(action.command_id, await autopilot.run_motor(on=action.is_on))
         if isinstance(action, SetCurrent):
@@ -233,7 +236,7 @@ def _gave_up(action: Action, why: str) -> Outcome:
         return UploadOutcome(upload_id=action.upload_id, result=UploadResult.TIMEOUT, text=why)
     if isinstance(action, ReadMission):
         return ReadOutcome(read_id=action.read_id, text=why)
-    if isinstance(action, SetMode | Arm | SetCurrent | RunMotor):
+    if isinstance(action, SetMode | Arm | SetCurrent | RunMotor | Tack):
         return CommandOutcome(command_id=action.command_id, result=CommandResult.TIMEOUT, text=why)
     raise TypeError(f"{type(action).__name__} is no order")
 

@@ -1,7 +1,7 @@
 """Watches a voyage with faults from the outside, and judges it.
 
-What counts as contact. An entry into what is solid fails the voyage. It is counted under another name only where
-nothing on board could have prevented it:
+What counts as contact. A hull that touches what is solid fails the voyage. It may be excused where something looks
+like having prevented everybody on board from helping it, and is only where that is so (``sitl.counterfactual``):
 
 - ``false position``: the position that every instrument on board reports was wrong at that moment, by an injected
   error, and clear of everything; or it became right less than ``REACTION_S`` ago, which is what it takes to see it,
@@ -45,6 +45,7 @@ from companion.messages import Command, Mode
 from companion.skipper.actions import UploadMission
 from sitl.autopilot import Autopilot, MemoryLink
 from sitl.clearance import HullTrack
+from sitl.counterfactual import Reach
 from sitl.scenario import EventSpec
 
 MAX_SILENCE_S = 10.0
@@ -57,7 +58,8 @@ RESUME_S = 10.0
 # A ground station's upload of one item on a link that loses nothing [s]: the count cuts the old mission short at once,
 # the item is written when it has been asked for.
 STRANGER_S = 1.0
-# What excuses a contact, in the words of the campaign's table.
+UNEXCUSED = "unexcused"
+# What may excuse a contact, in the words of the campaign's table.
 EXCUSES = {
     "false position": f"with the reported position wrong and clear, or right again for less than {REACTION_S:g} s",
     "operator": f"in a person's hands, or given back less than {REACTION_S:g} s before",
@@ -134,7 +136,7 @@ class Watch:
 
     # ------------------------------------------------------------------------------------------ contacts
     def contacts(self) -> list[tuple[float, str]]:
-        """Return when the boat entered what is solid [s], and what excuses it; "unexcused" for nothing."""
+        """Return when the hull came to touch [s], and what looks like an excuse; ``UNEXCUSED`` for nothing."""
         return [(self.t_s[i], self._excuse(i)) for i in self._track().entries(self.solid)]
 
     def _excuse(self, i: int) -> str:
@@ -152,7 +154,13 @@ class Watch:
             return "cut off"
         if self.missions[i] in self.foreign:
             return "foreign"
-        return "unexcused"
+        return UNEXCUSED
+
+    def reach(self) -> Reach:
+        """Return when a skipper could see and order."""
+        changes = [(t_s, up) for n, (t_s, up) in enumerate(zip(self.t_s, self.link_up, strict=True))
+                   if n == 0 or up != self.link_up[n - 1]]
+        return Reach(lives=tuple(self.lives), link_up=tuple(changes), operator_s=tuple(self.operator_s))
 
     def _since(self, i: int, span_s: float) -> int:
         """Return the index of the first sample not more than ``span_s`` before sample ``i``."""

@@ -85,6 +85,24 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     goal_north_m: float = 0.0
 
 
+# What a boat must bear without coming nearer to anything than its mission allows.
+ORDINARY = frozenset({"wind_speed", "wind_shift", "link_cut", "link_quality", "kill_planner", "battery", "vessel"})
+ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
+ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
+ORDINARY_LOSS = 0.3          # a link that loses more is none
+
+
+def is_ordinary(event: EventSpec) -> bool:
+    """Return whether an event belongs to ordinary weather, links and traffic."""
+    if event.kind == "wind_shift":
+        return abs(event.veer_deg) <= ORDINARY_VEER_DEG
+    if event.kind == "link_cut":
+        return event.for_s is not None and event.for_s <= ORDINARY_CUT_S
+    if event.kind == "link_quality":
+        return event.loss <= ORDINARY_LOSS
+    return event.kind in ORDINARY
+
+
 class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What must hold when it is over; a check that is not asked for is not made."""
 

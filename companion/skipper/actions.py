@@ -142,6 +142,14 @@ class SetCurrent:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Tack:
+    """Ask for a tack on a leg that the autopilot beats; answered by CommandOutcome."""
+
+    command_id: int
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RunMotor:
     """Run the auxiliary motor, or leave it to the autopilot's own judgement again; answered by CommandOutcome."""
 
@@ -173,5 +181,5 @@ class Announce:
 
 Action = (
     RequestPlan | CancelPlan | UploadMission | UploadFence | ReadMission | SetMode | Arm | SetCurrent
-    | RunMotor | SteerHeading | Announce
+    | Tack | RunMotor | SteerHeading | Announce
 )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from companion.messages import MissionState, Mode
-from companion.skipper.actions import Arm, RunMotor, SetCurrent, SetMode
+from companion.skipper.actions import Arm, RunMotor, SetCurrent, SetMode, Severity, Tack
 from companion.skipper.turn import Turn
 from companion.skipper.uploads import upload
 
 ARMING, CURRENT = "arming", "set current"
+TACK = "tack"
 MOTOR_ON, MOTOR_OFF = "motor on", "motor off"
 CHECK_S = 3.0   # MISSION_CURRENT comes once a second: by then it shows what was asked for
 
@@ -42,6 +43,18 @@ def arm(turn: Turn) -> bool:
     if not turn.act(Arm(command_id=number)):
         return False
     turn.update(pending_command=(number, turn.t_s, ARMING))
+    return True
+
+
+def tack(turn: Turn, text: str) -> bool:
+    """Ask for a tack; False when not permitted or not now."""
+    if is_busy(turn, TACK):
+        return False
+    number = turn.new_id()
+    if not turn.act(Tack(command_id=number, text=text)):
+        return False
+    turn.update(pending_command=(number, turn.t_s, TACK), tacked_s=turn.t_s)
+    turn.say(Severity.NOTICE, "short tack", text)
     return True
 
 

@@ -8,8 +8,8 @@ from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.actions import CancelPlan, ReplanReason, Severity, SteerHeading
 from companion.skipper.adrift import stops_drift
-from companion.skipper.answers import hold
 from companion.skipper.beating import IRONS_MEMORY_S
+from companion.skipper.brake import brakes
 from companion.skipper.by_field import heading as by_field_heading
 from companion.skipper.by_field import keeps_station, last_resort
 from companion.skipper.config import Guidance
@@ -19,7 +19,9 @@ from companion.skipper.geometry import distance_m
 from companion.skipper.headings import desired_heading_rad
 from companion.skipper.helm import check_current, hand_back, is_busy, make_current, repair, set_mode
 from companion.skipper.manoeuvre import bear_away_rad
+from companion.skipper.not_found import hold
 from companion.skipper.planning import request
+from companion.skipper.short_tack import short_tack
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase
 from companion.skipper.traffic import near
@@ -41,7 +43,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         if not keeps_station(turn):
             _finish(turn)
         return
-    if stands_off(turn) or stops_drift(turn):
+    if stands_off(turn) or stops_drift(turn) or brakes(turn):
         return
     stopped = turn.state.own_mode in {Mode.HOLD, Mode.LOITER}
     if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:
@@ -66,6 +68,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         check_current(turn)
     else:
         check_current(turn)
+        short_tack(turn)
     if turn.is_raised("stuck waypoint") and turn.state.own_index > turn.state.index:
         make_current(turn, turn.state.own_index + 1)
     if turn.state.wish is OperatorWish.HOLD:

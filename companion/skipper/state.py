@@ -163,6 +163,7 @@ class SkipperState:
     ready_route: Route | None = None   # planned, not allowed or not yet possible to upload
     own_mode: Mode | None = None       # a mode other than AUTO that we asked for ourselves
     rung: int = 0                      # step of the ladder being tried
+    unanswered: int = 0                # requests in a row that the planner did not answer
     ladder_reason: ReplanReason | None = None
     plan_retry: Retry = PATIENT
     upload_retry: Retry = PATIENT
@@ -178,6 +179,7 @@ class SkipperState:
     uploaded_s: float = float("-inf")   # when the last upload ended well
     good_wind_since_s: float | None = None
     no_go_since_s: float | None = None
+    tacked_s: float = float("-inf")     # when a tack was last asked for
     wish: OperatorWish | None = None    # the operator's last wish, until it is answered
     read_items: tuple[MissionItem, ...] | None = None      # the mission as last read
     read_t_s: float = float("-inf")

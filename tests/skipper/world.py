@@ -105,6 +105,7 @@ class World:
     drift_mps: float = 0.0      # along the heading, while nobody sails
     current: Callable[[float], tuple[float, float]] = lambda t: (0.0, 0.0)   # of the water, east north
     motor: bool = False         # it runs
+    tack_asked: bool = False    # heard on a leg that is beaten
     uploads_fail: Callable[[int], UploadResult] = lambda n: UploadResult.OK
     planner: Callable | None = None
     state: SkipperState | None = None
@@ -187,7 +188,8 @@ class World:
         tack = 1.0 if difference_rad(twd, self.heading) >= 0.0 else -1.0
         off = cross_track_m(self.position, self.leg_from, target)
         out = self.corridor > 0.0 and abs(off) >= self.corridor and (off > 0.0) == (tack < 0.0)
-        if out and self.t - self.last_tack > 5.0:
+        asked, self.tack_asked = self.tack_asked, False
+        if (out or asked) and self.t - self.last_tack > 5.0:
             tack, self.last_tack, self.tacks = -tack, self.t, self.tacks + 1
         return wrap_pi(twd - tack * self.no_go)
 
@@ -202,7 +204,7 @@ class World:
             later((self.t + self.upload_s, "upload", action))
         elif isinstance(action, act.ReadMission):
             later((self.t + 0.5, "read", action))
-        elif isinstance(action, (act.SetMode, act.Arm, act.SetCurrent, act.RunMotor)):
+        elif isinstance(action, (act.SetMode, act.Arm, act.SetCurrent, act.RunMotor, act.Tack)):
             later((self.t + 0.1, "command", action))
         elif isinstance(action, act.SteerHeading):
             self.steer, self.steer_until = action.heading_rad, self.t + 3.0
@@ -240,6 +242,8 @@ class World:
         elif isinstance(action, act.Arm):
             self.armed = True
             self.set_mode(self.mode)
+        elif isinstance(action, act.Tack):
+            self.tack_asked = True
         elif isinstance(action, act.RunMotor):
             self.motor = action.is_on
         elif isinstance(action, act.SetCurrent):
