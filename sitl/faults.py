@@ -26,7 +26,7 @@ from sitl.counterfactual import avoidable
 from sitl.fault_draw import draw
 from sitl.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
 from sitl.pool import in_processes
-from sitl.scenario import Scenario, is_ordinary, load_scenario
+from sitl.scenario import Scenario, is_all_ordinary, load_scenario
 
 BASE = Path(__file__).parent / "scenarios" / "faults" / "rocks.toml"
 # Effort of one plan: the voyage is short and its water simple.
@@ -56,7 +56,7 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
               for c in contacts if c["excuse"] == UNEXCUSED]
     is_low = least is not None and least[0] < voyage.floor_m
     before = [e for e in scenario.events if least is not None and e.at_s <= least[1]]
-    is_weather = all(is_ordinary(e) for e in before)
+    is_weather = is_all_ordinary(before)
     if is_low and is_weather and least is not None:
         faults.append(f"{least[0]:.1f} m clear at {least[1]:.0f} s, in ordinary weather")
     if mixture_s > 0.0:

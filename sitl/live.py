@@ -27,7 +27,7 @@ from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
 from sitl.runner import TRUTH_EVERY_S, VERDICT, break_vane, marks_of, solid_of
-from sitl.scenario import EventSpec, Scenario
+from sitl.scenario import EventSpec, Scenario, is_all_ordinary
 from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
@@ -166,6 +166,7 @@ async def _run(
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=truth,
         solid=solid_of(mission.area.local(frame)), hull=boat_of(mission).hull,
+        floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point),
         summary=summary, status_times_s=None, alerts=summary.get("alerts", {}), errors=errors,
         marks=marks_of(mission),

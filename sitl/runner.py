@@ -45,7 +45,7 @@ from sitl.autopilot.memory import MemoryEnd
 from sitl.fragile import FragilePlanner
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, befall
-from sitl.scenario import EventSpec, Scenario
+from sitl.scenario import EventSpec, Scenario, is_all_ordinary
 from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
@@ -93,6 +93,7 @@ class _World:
     observer: Observer | None = None
     stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
     called: asyncio.Event = field(default_factory=asyncio.Event)   # the companion calls its crew to the anchor
+    called_at_s: list[float] = field(default_factory=list)
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -175,7 +176,8 @@ async def run_embedded(
     area = mission.area.local(frame)
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
-        hull=boat_of(mission).hull,
+        hull=boat_of(mission).hull, floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
+        called_at_s=world.called_at_s,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
         status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
     )
@@ -199,6 +201,7 @@ async def _sail_and_restart(
         world.status_s.append(step.snapshot.t_s)
         if any(isinstance(action, Announce) and action.code == CALL for action in step.actions):
             world.called.set()
+            world.called_at_s.append(step.snapshot.t_s)
         if on_step is not None:
             on_step(step)
 

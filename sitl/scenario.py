@@ -7,6 +7,7 @@ their unit in the key; directions are where the wind comes from, degrees clockwi
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -103,6 +104,11 @@ def is_ordinary(event: EventSpec) -> bool:
     return event.kind in ORDINARY
 
 
+def is_all_ordinary(events: Iterable[EventSpec]) -> bool:
+    """Return whether nothing but ordinary weather, links and traffic befalls the boat."""
+    return all(is_ordinary(event) for event in events)
+
+
 class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What must hold when it is over; a check that is not asked for is not made."""
 
@@ -120,6 +126,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     end_phase: str | None = None
     alerts: tuple[str, ...] = ()              # announced at least once, by code
     marks_rounded: int | None = None           # in order, each on its side
+    called_s: float | None = None              # the crew is called to the anchor this long before a contact
 
 
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -20,6 +20,8 @@ from sitl.clearance import HullTrack
 from sitl.scenario import ExpectSpec
 from sitl.tasks.scores import station_score
 
+# A call to the anchor is for what comes within this time [s].
+CALL_HOLDS_S = 600.0
 # A tack is counted when the boat has been on the other side of the wind for this long.
 TACK_SETTLED_S = 3.0
 
@@ -172,15 +174,17 @@ def judge(
     errors: Sequence[str] = (),
     marks: Sequence[tuple[tuple[float, float], str]] = (),
     floor_m: float | None = None,
+    called_at_s: Sequence[float] | None = None,
 ) -> Verdict:
     """Hold a run against what its scenario expects.
 
     ``hull`` is what touches. ``floor_m`` is the mission's, which the hull must keep in ordinary weather; None: not
-    asked for.
+    asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
     """
     positions = truth.positions_m()
     hulls = truth.hull(hull)
-    contacts, clearance = len(hulls.entries(solid)), hulls.least_m(solid)[0]
+    touches, clearance = hulls.entries(solid), hulls.least_m(solid)[0]
+    contacts = len(touches)
     tacks, gybes = count_tacks(truth)
     end_distance = float(math.dist(truth.en_m[-1], goal_en_m)) if truth.en_m else math.inf
     duration_s = truth.t_s[-1] - truth.t_s[0] if truth.t_s else 0.0
@@ -236,6 +240,11 @@ def judge(
     if expect.marks_rounded is not None:
         rounded = count_roundings(positions, marks)
         check("marks rounded", rounded == expect.marks_rounded, rounded, expect.marks_rounded)
+    if expect.called_s is not None and called_at_s is not None:
+        ahead_s = [max((truth.t_s[i] - t for t in called_at_s if 0.0 <= truth.t_s[i] - t <= CALL_HOLDS_S), default=0.0)
+                   for i in touches]
+        check("called before a contact, s", all(s >= expect.called_s for s in ahead_s), ahead_s,
+              f"at least {expect.called_s}")
     for code in expect.alerts:
         check(f"announced {code}", code in seen, sorted(seen), code)
     return Verdict(

@@ -193,7 +193,7 @@ class Autopilot:
     async def run_motor(self, *, on: bool) -> CommandAnswer:
         """Run a sailboat's auxiliary motor always, or leave it to the autopilot (its state after a boot).
 
-        Acknowledged by an autopilot without a throttle output, too, which says that it failed in a STATUSTEXT.
+        An autopilot without a throttle output acknowledges it, too, and does nothing.
         """
         return await self.link.command(
             wire.MAV_CMD_DO_AUX_FUNCTION, float(AUX_SAILBOAT_MOTOR), AUX_HIGH if on else AUX_MIDDLE)

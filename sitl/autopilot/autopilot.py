@@ -380,9 +380,10 @@ class Autopilot:
         self.vehicle.load_parameters()
 
     def run_motor(self, *, on: bool) -> None:
-        """Run the auxiliary motor always, or never: there is no assistance in tacks here."""
-        if on and not self.config.has_motor:
-            self.announce(mav.MAV_SEVERITY_WARNING, "Sailboat: failed to enable motor")
+        """Run the auxiliary motor, or not: there is no assistance in tacks here.
+
+        As on the real one (measured) nothing is said by a boat that has none.
+        """
         self.vehicle.run_motor(on=on and self.config.has_motor)
 
     def set_vane(self, fault: VaneFault) -> None:
