@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from companion.boat import Hull
 from sitl.clearance import HullTrack
-from sitl.scenario import ExpectSpec
+from sitl.scenario import EventSpec, ExpectSpec, is_ordinary
 from sitl.verdict import Truth, count_roundings, count_tacks, judge, longest_silence_s
 
 ISLAND = shapely.Point(0.0, 0.0).buffer(10.0)
@@ -148,3 +148,53 @@ def test_roundings_count_only_on_the_right_side_and_in_order():
     assert count_roundings(np.vstack([anticlockwise[::-1], second]), marks) == 1
     assert count_roundings(anticlockwise, marks) == 1
     assert count_roundings(second, marks) == 0
+
+
+def verdict_of(truth, hull=DOT, **how):
+    return judge(scenario="x", seed=0, expect=how.pop("expect", ExpectSpec(arrived=None, contacts=9)), truth=truth,
+                 solid=ISLAND, hull=hull, goal_en_m=(0.0, 99.0), summary={}, status_times_s=None, alerts=(), **how)
+
+
+def passes_by(off_m):
+    truth = _truth([0.0] * 400)
+    truth.en_m = [(10.0 + off_m, north - 200.0) for _, north in truth.en_m]
+    return truth
+
+
+@pytest.mark.parametrize(("off_m", "hull", "keeps"), [(8.2, DOT, True), (7.8, DOT, False), (8.8, LONG, False)])
+def test_in_ordinary_weather_the_hull_keeps_the_floor(off_m, hull, keeps):
+    assert verdict_of(passes_by(off_m), hull, floor_m=8.0).passed is keeps
+    assert verdict_of(passes_by(off_m), hull).passed                   # not asked for
+
+
+def test_the_higher_of_floor_and_expectation_is_asked_for():
+    expect = ExpectSpec(arrived=None, min_clearance_m=9.0)
+    assert not verdict_of(passes_by(8.5), floor_m=8.0, expect=expect).passed
+    assert verdict_of(passes_by(9.5), floor_m=8.0, expect=expect).passed
+
+
+@pytest.mark.parametrize(("called_at_s", "passed"), [
+    ((), False), ((10.0,), False), ((0.0, 60.0), True), ((200.0,), False), (None, True),
+])
+def test_a_contact_is_announced_in_time(called_at_s, passed):
+    """The track of 100 s touches at 50 s."""
+    truth = passes_by(-5.0)
+    expect = ExpectSpec(arrived=None, contacts=9, called_s=45.0)
+    assert verdict_of(truth, expect=expect, called_at_s=called_at_s).passed is passed
+    assert verdict_of(passes_by(5.0), expect=expect, called_at_s=()).passed
+
+
+@pytest.mark.parametrize(("event", "ordinary"), [
+    (EventSpec(at_s=1.0, kind="wind_speed", tws_mps=13.0), True),
+    (EventSpec(at_s=1.0, kind="wind_shift", veer_deg=40.0), True),
+    (EventSpec(at_s=1.0, kind="wind_shift", veer_deg=-120.0), False),
+    (EventSpec(at_s=1.0, kind="link_cut", for_s=1.2), True),
+    (EventSpec(at_s=1.0, kind="link_cut", for_s=30.0), False),
+    (EventSpec(at_s=1.0, kind="link_cut"), False),
+    (EventSpec(at_s=1.0, kind="link_quality", loss=0.1, delay_s=1.5), True),
+    (EventSpec(at_s=1.0, kind="link_quality", loss=0.6), False),
+    (EventSpec(at_s=1.0, kind="gps_jump", east_m=30.0), False),
+    (EventSpec(at_s=1.0, kind="mode", mode="HOLD"), False),
+])
+def test_what_is_ordinary(event, ordinary):
+    assert is_ordinary(event) is ordinary

@@ -106,6 +106,7 @@ class World:
     current: Callable[[float], tuple[float, float]] = lambda t: (0.0, 0.0)   # of the water, east north
     motor: bool = False         # it runs
     tack_asked: bool = False    # heard on a leg that is beaten
+    turning_to: float = 0.0     # the tack that a turn through the wind ends on, 0 when there is none
     uploads_fail: Callable[[int], UploadResult] = lambda n: UploadResult.OK
     planner: Callable | None = None
     state: SkipperState | None = None
@@ -190,8 +191,10 @@ class World:
         out = self.corridor > 0.0 and abs(off) >= self.corridor and (off > 0.0) == (tack < 0.0)
         asked, self.tack_asked = self.tack_asked, False
         if (out or asked) and self.t - self.last_tack > 5.0:
-            tack, self.last_tack, self.tacks = -tack, self.t, self.tacks + 1
-        return wrap_pi(twd - tack * self.no_go)
+            self.turning_to, self.last_tack, self.tacks = -tack, self.t, self.tacks + 1
+        if self.turning_to == tack:
+            self.turning_to = 0.0          # through the wind
+        return wrap_pi(twd - (self.turning_to or tack) * self.no_go)
 
     # ----------------------------------------------------------------------------------- application
     def carry_out(self, action: act.Action) -> None:
