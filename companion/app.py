@@ -9,12 +9,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from companion.clock import now_s
 from companion.company import NOBODY, make_way, others_on
@@ -259,9 +258,9 @@ class _Shell:
         """Record the step; nothing of it is carried out before what a restart needs is on the disk."""
         snapshot = step.snapshot
         clearance_m = None
-        if snapshot.position_en_m is not None:
-            value = float(self.voyage.area.clearance_m(np.array([snapshot.position_en_m]))[0])
-            clearance_m = value if np.isfinite(value) else None
+        if snapshot.position_en_m is not None and snapshot.vehicle is not None:
+            value = self.voyage.hull_clearance_m(snapshot.position_en_m, snapshot.vehicle.heading_rad)
+            clearance_m = value if math.isfinite(value) else None
         self.log.step(step, clearance_m)
         if not self.options.dry_run:   # which must not take the place of a voyage that is interrupted
             await self.state_file.save(self.fold.skipper.persisted(step.state))

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from companion.boat import Boat, Polar, ardurover_sitl, constant, read_polar
+from companion.boat import Boat, Hull, Polar, ardurover_sitl, constant, read_polar
 from companion.errors import InputError
 from companion.geofence import Mission
 from companion.skipper.config import Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
@@ -46,6 +46,8 @@ def boat_of(mission: Mission) -> Boat:
         gybe_loss_s=mission.boat.gybe_loss_s,
         can_tack=mission.boat.can_tack,
         gybe_room_m=mission.boat.gybe_room_m,
+        hull=Hull(length_m=mission.boat.length_m, beam_m=mission.boat.beam_m),
+        has_motor=mission.boat.motor,
     )
 
 

@@ -26,10 +26,12 @@ from companion.skipper.actions import (
     CancelPlan,
     ReadMission,
     RequestPlan,
+    RunMotor,
     SetCurrent,
     SetMode,
     SteerHeading,
     StopOrders,
+    Tack,
     UploadFence,
     UploadMission,
 )
@@ -219,6 +221,10 @@ class Executor:
             return _command(action.command_id, await autopilot.set_mode(action.mode))
         if isinstance(action, Arm):
             return _command(action.command_id, await autopilot.arm())
+        if isinstance(action, Tack):
+            return _command(action.command_id, await autopilot.tack())
+        if isinstance(action, RunMotor):
+            return _command(action.command_id, await autopilot.run_motor(on=action.is_on))
         if isinstance(action, SetCurrent):
             return _command(action.command_id, await autopilot.set_current(action.seq, reset=action.reset))
         raise TypeError(f"nobody carries out {type(action).__name__}")
@@ -234,7 +240,7 @@ def _gave_up(action: Action, why: str) -> Outcome:
         return UploadOutcome(upload_id=action.upload_id, result=UploadResult.TIMEOUT, text=why)
     if isinstance(action, ReadMission):
         return ReadOutcome(read_id=action.read_id, text=why)
-    if isinstance(action, SetMode | Arm | SetCurrent):
+    if isinstance(action, SetMode | Arm | SetCurrent | RunMotor | Tack):
         return CommandOutcome(command_id=action.command_id, result=CommandResult.TIMEOUT, text=why)
     raise TypeError(f"{type(action).__name__} is no order")
 

@@ -157,7 +157,9 @@ class VoyageFold:
         elif isinstance(value, StatusText):
             self._events.append(value)
         elif isinstance(value, AisReport):
-            self._targets = self._targets.heard(value)
+            own = self._vehicle
+            self._targets = self._targets.heard(value) if own is None else self._targets.heard(
+                value, self.skipper.voyage.frame.en_from_geo(own.position))
 
     def take_outcome(self, t_s: float, outcome: Outcome) -> None:
         """Take the outcome of an earlier action, known at ``t_s``."""
@@ -231,7 +233,8 @@ class VoyageFold:
         if self._first_wind_s is None:
             self._first_wind_s = sample.t_s
         for mean in (self._mean90, self._mean5):
-            mean.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight)
+            mean.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight,
+                        speed_weight=status.speed_weight)
 
     # -------------------------------------------------------------------------------------- step
     def tick(self, t_s: float) -> Step:
@@ -274,9 +277,11 @@ class VoyageFold:
         mean_rad, _, mean_mps, _ = self._mean90.forecast(0.0)
         now_rad, _, now_mps, _ = self._mean5.forecast(0.0)
         record_s = t_s - self._first_wind_s
-        if any(v in _UNTRUSTED for v in status.verdicts):
+        is_calm = Verdict.CALM in status.verdicts
+        # In a calm the autopilot holds the old direction, by its least speed: that is the calm and no fault.
+        if any(v in _UNTRUSTED and not (is_calm and v is Verdict.HELD) for v in status.verdicts):
             health = WindHealth.UNTRUSTED
-        elif Verdict.CALM in status.verdicts:
+        elif is_calm:
             health = WindHealth.LIGHT
         elif record_s < SETTLED_S:
             health = WindHealth.SETTLING

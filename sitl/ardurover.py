@@ -29,6 +29,8 @@ from sitl.autopilot.config import Truth
 from sitl.wind import Wind
 
 DEFAULTS = Path(__file__).with_name("sailboat.parm")
+MOTOR = "-motor"      # of a model: the hull with an auxiliary motor
+THROTTLE = ("SERVO3_FUNCTION 70", "SERVO3_MIN 1000", "SERVO3_MAX 2000", "SERVO3_TRIM 1500")
 _WIND_HZ = 5.0
 _WIND_REPEAT_S = 5.0
 _INSTANCES = 20
@@ -50,7 +52,7 @@ class ArduRover:
         instance: chooses the ports (5760 + 10 instance); the first free one when None.
         parameters: set besides those of the model's file, sailboat.parm or motorboat.parm.
         folder: where it keeps eeprom and logs; a temporary one when None.
-        model: of the simulator.
+        model: of the simulator; ``sailboat-motor`` has a throttle.
 
     ``link`` is the companion's LINK, ``shore_link`` another port (SERIAL2) for a ground station.
     """
@@ -105,8 +107,10 @@ class ArduRover:
             folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="ardurover-")))
         folder.mkdir(parents=True, exist_ok=True)
         defaults = folder / "boat.parm"
-        common = DEFAULTS.with_name(f"{self._model}.parm").read_text()
-        lines = [common, *(f"{name} {value:g}" for name, value in self._parameters.items())]
+        hull = self._model.removesuffix(MOTOR)
+        common = DEFAULTS.with_name(f"{hull}.parm").read_text()
+        motor = THROTTLE if hull != self._model else ()
+        lines = [common, *motor, *(f"{name} {value:g}" for name, value in self._parameters.items())]
         defaults.write_text("\n".join(lines) + "\n")
         self.instance = free_instance() if self._wanted is None else self._wanted
         heading_deg = math.degrees(wrap_two_pi(self._heading_rad))

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.clock import now_s, run, run_virtual
+from companion.compose import boat_of
 from companion.errors import JobError, LinkError
 from companion.geofence import Mission, load_mission
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
@@ -38,7 +39,7 @@ from sitl.hull import own_polar
 from sitl.live import run_live
 from sitl.runner import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.scenario import load_scenario
-from sitl.verdict import Truth, Verdict, contacts_and_clearance, count_tacks
+from sitl.verdict import Truth, Verdict, count_tacks
 from sitl.weather import scenario_wind
 from sitl.wind import Wind
 
@@ -114,8 +115,9 @@ class Track:
 
     def record(self, who: str, scenario: str, seed: int) -> dict[str, Any]:
         """Return how it went."""
-        contacts, clearance_m = contacts_and_clearance(
-            self.truth.positions_m(), solid_of(self.mission.area.local(self.mission.frame())))
+        hulls, solid = self.truth.hull(boat_of(self.mission).hull), solid_of(
+            self.mission.area.local(self.mission.frame()))
+        contacts, clearance_m = len(hulls.entries(solid)), hulls.least_m(solid)[0]
         tacks, gybes = count_tacks(self.truth)
         return {
             "who": who, "scenario": scenario, "seed": seed, "arrived": self.is_done, "contacts": contacts,

@@ -25,7 +25,7 @@ from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.streams import Stream
 from companion.mavlink.transport import open_link
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
-from sitl.ardurover import ArduRover
+from sitl.ardurover import MOTOR, ArduRover
 from sitl.ardurover_program import require
 from sitl.scenario import EventSpec, Scenario
 from sitl.ships import free_port
@@ -171,6 +171,7 @@ class RealBoat:
         async with ArduRover(
             require(program), mission.start or mission.origin, wind, speedup=pace, parameters=scenario.parameters,
             heading_rad=math.radians(heading_deg_of(scenario, mission)),
+            model="sailboat" + (MOTOR if mission.boat.motor else ""),
         ) as rover:
             yield cls(rover)
         (folder / "autopilot.log").write_text("\n".join(f"{t:.1f} {s} {x}" for t, s, x in rover.texts) + "\n")

@@ -1,7 +1,7 @@
 """Watches a voyage with faults from the outside, and judges it.
 
-What counts as contact. An entry into what is solid fails the voyage. It is counted under another name only where
-nothing on board could have prevented it:
+What counts as contact. A hull that touches what is solid fails the voyage. It may be excused where something looks
+like having prevented everybody on board from helping it, and is only where that is so (``sitl.counterfactual``):
 
 - ``false position``: the position that every instrument on board reports was wrong at that moment, by an injected
   error, and clear of everything; or it became right less than ``REACTION_S`` ago, which is what it takes to see it,
@@ -38,11 +38,14 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from companion.boat import Hull
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.messages import Command, Mode
 from companion.skipper.actions import UploadMission
 from sitl.autopilot import Autopilot, MemoryLink
+from sitl.clearance import HullTrack
+from sitl.counterfactual import Reach
 from sitl.scenario import EventSpec
 
 MAX_SILENCE_S = 10.0
@@ -55,7 +58,8 @@ RESUME_S = 10.0
 # A ground station's upload of one item on a link that loses nothing [s]: the count cuts the old mission short at once,
 # the item is written when it has been asked for.
 STRANGER_S = 1.0
-# What excuses a contact, in the words of the campaign's table.
+UNEXCUSED = "unexcused"
+# What may excuse a contact, in the words of the campaign's table.
 EXCUSES = {
     "false position": f"with the reported position wrong and clear, or right again for less than {REACTION_S:g} s",
     "operator": f"in a person's hands, or given back less than {REACTION_S:g} s before",
@@ -83,9 +87,11 @@ class Watch:
 
     solid: BaseGeometry
     frame: LocalFrame
+    hull: Hull
     operator_s: list[tuple[float, float]] = field(default_factory=list)
     t_s: list[float] = field(default_factory=list)
     en_m: list[tuple[float, float]] = field(default_factory=list)
+    heading_rad: list[float] = field(default_factory=list)
     believed_en_m: list[tuple[float, float]] = field(default_factory=list)
     helm: list[Helm] = field(default_factory=list)
     armed: list[bool] = field(default_factory=list)
@@ -114,6 +120,7 @@ class Watch:
         self.has_sailed = self.has_sailed or helm is Helm.SAILED
         self.t_s.append(t_s)
         self.en_m.append(self.frame.en_from_geo(truth.position))
+        self.heading_rad.append(truth.heading_rad)
         self.believed_en_m.append(self.frame.en_from_geo(pilot))
         self.helm.append(helm)
         self.armed.append(truth.is_armed)
@@ -129,16 +136,8 @@ class Watch:
 
     # ------------------------------------------------------------------------------------------ contacts
     def contacts(self) -> list[tuple[float, str]]:
-        """Return when the boat entered what is solid [s], and what excuses it; "unexcused" for nothing."""
-        if not self.t_s:
-            return []
-        shapely.prepare(self.solid)
-        positions = np.asarray(self.en_m)
-        # looked at between the samples too: a corner can be cut in a quarter of a second
-        ways = shapely.linestrings(np.stack([positions[:-1], positions[1:]], axis=1))
-        inside = shapely.intersects(self.solid, np.concatenate([[shapely.points(positions[0])], ways]))
-        entries = np.flatnonzero(inside & ~np.concatenate([[False], inside[:-1]]))
-        return [(self.t_s[i], self._excuse(int(i))) for i in entries]
+        """Return when the hull came to touch [s], and what looks like an excuse; ``UNEXCUSED`` for nothing."""
+        return [(self.t_s[i], self._excuse(i)) for i in self._track().entries(self.solid)]
 
     def _excuse(self, i: int) -> str:
         wrong = np.hypot(*(np.asarray(self.en_m) - np.asarray(self.believed_en_m)).T) > 1.0
@@ -155,17 +154,28 @@ class Watch:
             return "cut off"
         if self.missions[i] in self.foreign:
             return "foreign"
-        return "unexcused"
+        return UNEXCUSED
+
+    def reach(self) -> Reach:
+        """Return when a skipper could see and order."""
+        changes = [(t_s, up) for n, (t_s, up) in enumerate(zip(self.t_s, self.link_up, strict=True))
+                   if n == 0 or up != self.link_up[n - 1]]
+        return Reach(lives=tuple(self.lives), link_up=tuple(changes), operator_s=tuple(self.operator_s))
 
     def _since(self, i: int, span_s: float) -> int:
         """Return the index of the first sample not more than ``span_s`` before sample ``i``."""
         return bisect.bisect_left(self.t_s, self.t_s[i] - span_s)
 
-    def clearance_m(self) -> float | None:
-        """Return the smallest true distance to anything solid [m]."""
+    def clearance_m(self) -> tuple[float, float] | None:
+        """Return the hull's smallest true distance to anything solid [m], and when [s]."""
         if not self.en_m:
             return None
-        return float(np.min(shapely.distance(self.solid, shapely.points(np.asarray(self.en_m)))))
+        least_m, i = self._track().least_m(self.solid)
+        return least_m, self.t_s[i]
+
+    def _track(self) -> HullTrack:
+        return HullTrack(en_m=np.asarray(self.en_m).reshape(-1, 2), heading_rad=np.asarray(self.heading_rad),
+                         hull=self.hull)
 
     # ------------------------------------------------------------------------------------------ missions
     def mixture_s(self) -> float:

@@ -1,9 +1,10 @@
 """Faults by the thousand: random but repeatable trouble on a short voyage, and what may never come of it.
 
 A seed gives the weather and one to five faults of link, sensors, wind, process and people (``sitl.fault_draw``). Each
-voyage is sailed on the embedded autopilot under the virtual clock and judged on four points (``sitl.fault_watch``):
-no contact, no mission that is a mixture of two, no silence without a status, no unhandled exception. Arriving is
-counted, not required: a boat that the operator put in HOLD for half the voyage has done nothing wrong by being late.
+voyage is sailed on the embedded autopilot under the virtual clock and judged on five points (``sitl.fault_watch``):
+no contact of the hull that was to be helped (``sitl.counterfactual``), the margin's floor kept in ordinary weather, no
+mission that is a mixture of two, no silence without a status, no unhandled exception. Arriving is counted, not
+required: a boat that the operator put in HOLD for half the voyage has done nothing wrong by being late.
 """
 
 from __future__ import annotations
@@ -15,15 +16,17 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from companion.errors import InputError
 from companion.fold import Step
+from sitl.counterfactual import avoidable
 from sitl.fault_draw import draw
-from sitl.fault_watch import EXCUSES, MAX_SILENCE_S, Watch, mission_key, operator_spans
+from sitl.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
 from sitl.pool import in_processes
-from sitl.scenario import load_scenario
+from sitl.scenario import Scenario, is_all_ordinary, load_scenario
 
 BASE = Path(__file__).parent / "scenarios" / "faults" / "rocks.toml"
 # Effort of one plan: the voyage is short and its water simple.
@@ -32,18 +35,71 @@ EXPANSIONS = 4_000
 
 def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[str, Any]:
     """Sail one seed and return how it went; a voyage folder is left in ``keep``."""
-    from companion.clock import run_virtual
-    from companion.geofence import load_mission
-    from companion.messages import waypoint
-    from sitl.runner import run_embedded, solid_of
-
     if keep is not None and keep.is_dir() and any(keep.iterdir()):
         raise InputError("--keep", str(keep), "is not empty", "a voyage's folder is taken up where it was left")
     began_s = time.process_time()
     scenario = draw(seed, load_scenario(base))
+    voyage = _sail(scenario, seed, base, keep)
+    watch, figures, errors = voyage.watch, voyage.figures, voyage.errors
+
+    def touches(other: Scenario) -> float | None:
+        return next((t_s for t_s, _ in _sail(other, seed, base, None).watch.contacts()), None)
+
+    contacts = []
+    for t_s, excuse in watch.contacts():
+        helped = "" if excuse == UNEXCUSED else avoidable(scenario, excuse, t_s, watch.reach(), touches)
+        contacts.append({
+            "t_s": t_s, "excuse": UNEXCUSED if helped else excuse, "looked_like": excuse, "helped": helped})
+    least = watch.clearance_m()
+    mixture_s, silence_s = watch.mixture_s(), watch.silence_s(voyage.status_s)
+    faults = [f"contact at {c['t_s']:.0f} s{': ' if c['helped'] else ''}{c['helped']}"
+              for c in contacts if c["excuse"] == UNEXCUSED]
+    is_low = least is not None and least[0] < voyage.floor_m
+    before = [e for e in scenario.events if least is not None and e.at_s <= least[1]]
+    is_weather = is_all_ordinary(before)
+    if is_low and is_weather and least is not None:
+        faults.append(f"{least[0]:.1f} m clear at {least[1]:.0f} s, in ordinary weather")
+    if mixture_s > 0.0:
+        faults.append(f"a mixture for {mixture_s:.1f} s")
+    if silence_s > MAX_SILENCE_S:
+        faults.append(f"silent for {silence_s:.0f} s")
+    if errors:
+        faults.append(f"unhandled: {errors[0].strip().splitlines()[-1]}")
+    return {
+        "seed": seed, "passed": not faults, "faults": faults,
+        "events": [f"{e.kind} at {e.at_s:.0f} s" for e in scenario.events],
+        "kinds": sorted({e.kind for e in scenario.events}),
+        "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
+        "contacts": contacts, "clearance_m": least and least[0], "clearance_t_s": least and least[1],
+        "below_floor": is_low, "weather_only": is_weather,
+        "mixture_s": mixture_s, "held_back_s": watch.held_back_s(),
+        "silence_s": silence_s, "sailed": watch.has_sailed, "errors": errors,
+        "simulated_s": watch.t_s[-1] if watch.t_s else 0.0, "cpu_s": time.process_time() - began_s,
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Voyage:
+    """A scenario that was sailed."""
+
+    watch: Watch
+    figures: dict[str, Any]
+    errors: list[str]
+    status_s: list[float]
+    floor_m: float
+
+
+def _sail(scenario: Scenario, seed: int, base: Path, keep: Path | None) -> _Voyage:
+    """Sail a scenario on the embedded autopilot under the eyes of a watch."""
+    from companion.clock import run_virtual
+    from companion.compose import boat_of
+    from companion.geofence import load_mission
+    from companion.messages import waypoint
+    from sitl.runner import run_embedded, solid_of
+
     mission = load_mission(scenario.mission_path(base))
     frame = mission.frame()
-    watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame,
+    watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame, hull=boat_of(mission).hull,
                   operator_s=operator_spans(scenario.events, scenario.limit_s))
     for event in scenario.events:
         if event.kind == "foreign_mission":
@@ -67,24 +123,7 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
             errors = [str(e) for c in verdict.checks if c.name == "no unhandled error" for e in c.figure]
         except Exception as error:
             errors = [repr(error)]
-    contacts, mixture_s, silence_s = watch.contacts(), watch.mixture_s(), watch.silence_s(status_s)
-    faults = [f"contact at {t_s:.0f} s" for t_s, excuse in contacts if excuse == "unexcused"]
-    if mixture_s > 0.0:
-        faults.append(f"a mixture for {mixture_s:.1f} s")
-    if silence_s > MAX_SILENCE_S:
-        faults.append(f"silent for {silence_s:.0f} s")
-    if errors:
-        faults.append(f"unhandled: {errors[0].strip().splitlines()[-1]}")
-    return {
-        "seed": seed, "passed": not faults, "faults": faults,
-        "events": [f"{e.kind} at {e.at_s:.0f} s" for e in scenario.events],
-        "kinds": sorted({e.kind for e in scenario.events}),
-        "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
-        "contacts": [{"t_s": t_s, "excuse": excuse} for t_s, excuse in contacts], "clearance_m": watch.clearance_m(),
-        "mixture_s": mixture_s, "held_back_s": watch.held_back_s(),
-        "silence_s": silence_s, "sailed": watch.has_sailed, "errors": errors,
-        "simulated_s": watch.t_s[-1] if watch.t_s else 0.0, "cpu_s": time.process_time() - began_s,
-    }
+    return _Voyage(watch=watch, figures=figures, errors=errors, status_s=status_s, floor_m=mission.margin_floor_m)
 
 
 def run_faults(
@@ -117,6 +156,7 @@ def run_faults(
 def figures_of(records: Sequence[dict[str, Any]], wall_s: float) -> dict[str, Any]:
     """Return what was counted over all voyages."""
     touched: Counter[str] = Counter()
+    low = [r for r in records if r["below_floor"]]
     kinds: Counter[str] = Counter()
     for record in records:
         touched.update({c["excuse"] for c in record["contacts"]})
@@ -126,11 +166,13 @@ def figures_of(records: Sequence[dict[str, Any]], wall_s: float) -> dict[str, An
         "voyages": len(records), "passed": sum(r["passed"] for r in records),
         "failed_seeds": [r["seed"] for r in records if not r["passed"]],
         "arrived": sum(r["arrived"] for r in records),
-        "touched": touched.pop("unexcused", 0), "touched_excused": dict(sorted(touched.items())),
+        "touched": touched.pop(UNEXCUSED, 0), "touched_excused": dict(sorted(touched.items())),
         "excused_seeds": {
             excuse: [r["seed"] for r in records if any(c["excuse"] == excuse for c in r["contacts"])]
             for excuse in sorted(touched)
         },
+        "below_floor": len(low), "below_floor_in_weather": [r["seed"] for r in low if r["weather_only"]],
+        "clearance_min_m": min((r["clearance_m"] for r in records if r["clearance_m"] is not None), default=None),
         "mixture_max_s": max((r["mixture_s"] for r in records), default=0.0),
         "held_back_max_s": max((r["held_back_s"] for r in records), default=0.0),
         "silence_max_s": max((r["silence_s"] for r in records), default=0.0),
@@ -149,7 +191,9 @@ def print_figures(table: dict[str, Any]) -> None:
     print(f"touched something: {table['touched']} voyages; longest mixture {table['mixture_max_s']:.1f} s; "
           f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}")
     for excuse, voyages in table["touched_excused"].items():
-        print(f"  excused: {voyages} voyages touched, {EXCUSES[excuse]}")
+        print(f"  excused: {voyages} voyages touched, {EXCUSES[excuse]}; nothing that was tried would have helped")
+    print(f"below the margin's floor: {table['below_floor']} voyages, {len(table['below_floor_in_weather'])} of them "
+          "in ordinary weather")
     print(f"  a mission held back by a slow upload, ended by a loiter: {table['held_back_max_s']:.1f} s at most")
     print("voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items()))
     print(f"{table['simulated_s'] / 3600.0:.1f} h simulated in {table['wall_s']:.0f} s, "

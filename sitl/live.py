@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.clock import now_s, run
+from companion.compose import boat_of
 from companion.disk import Disk
 from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
@@ -27,7 +28,7 @@ from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
 from sitl.runner import TRUTH_EVERY_S, break_vane, ends_of, marks_of, solid_of
-from sitl.scenario import EventSpec, Scenario
+from sitl.scenario import EventSpec, Scenario, is_all_ordinary
 from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
@@ -166,7 +167,9 @@ async def _run(
     summary: dict[str, Any] = json.loads(summary_path.read_bytes())
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=truth,
-        solid=solid_of(mission.area.local(frame)), goal_en_m=frame.en_from_geo(mission.goals[-1].point),
+        solid=solid_of(mission.area.local(frame)), hull=boat_of(mission).hull,
+        floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
+        goal_en_m=frame.en_from_geo(mission.goals[-1].point),
         summary=summary, status_times_s=None, alerts=summary.get("alerts", {}), errors=errors,
         marks=marks_of(mission), **ends_of(mission),
     )

@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.app import sail
 from companion.clock import now_s
+from companion.compose import boat_of
 from companion.disk import Disk
 from companion.errors import LinkError
 from companion.fold import Step
@@ -30,6 +31,8 @@ from companion.mavlink.link import Link
 from companion.mavlink.reception import LinkIdentity
 from companion.messages import MissionItem, Mode, waypoint
 from companion.options import SailOptions, at_once
+from companion.skipper.actions import Announce
+from companion.skipper.adrift import CALL
 from companion.telemetry.names import STATE, VERDICT
 from sitl.autopilot import (
     Autopilot,
@@ -46,7 +49,7 @@ from sitl.fragile import FragilePlanner
 from sitl.hull import own_polar
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, befall
-from sitl.scenario import EventSpec, Scenario
+from sitl.scenario import EventSpec, Scenario, is_all_ordinary
 from sitl.ships import Motion, free_port
 from sitl.sick_disk import SickDisk
 from sitl.verdict import Truth, Verdict, judge
@@ -95,6 +98,8 @@ class _World:
     disk: SickDisk = field(default_factory=SickDisk)
     observer: Observer | None = None
     stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
+    called: asyncio.Event = field(default_factory=asyncio.Event)   # the companion calls its crew to the anchor
+    called_at_s: list[float] = field(default_factory=list)
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -163,7 +168,8 @@ async def run_embedded(
         heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     autopilot = Autopilot(
         AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
-                        parameters=scenario.parameters, has_ftp=scenario.has_ftp, polar=own_polar(mission)),
+                        parameters=scenario.parameters, has_ftp=scenario.has_ftp, has_motor=mission.boat.motor,
+                        polar=own_polar(mission)),
         wind, seed=seed,
     )
     link = MemoryLink("companion", seed=seed)
@@ -188,6 +194,8 @@ async def run_embedded(
     area = mission.area.local(frame)
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
+        hull=boat_of(mission).hull, floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
+        called_at_s=world.called_at_s,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
         status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
         **ends_of(mission),
@@ -211,6 +219,9 @@ async def _sail_and_restart(
 
     def on_status(status: Any, step: Step) -> None:  # noqa: ARG001 - the interface has both
         world.status_s.append(step.snapshot.t_s)
+        if any(isinstance(action, Announce) and action.code == CALL for action in step.actions):
+            world.called.set()
+            world.called_at_s.append(step.snapshot.t_s)
         if on_step is not None:
             on_step(step)
 
@@ -314,6 +325,13 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
         await break_vane(autopilot.set_vane, event)
     elif event.kind == "current":
         autopilot.set_current(math.radians(event.set_deg), event.drift_mps)
+    elif event.kind == "crew":
+        await world.called.wait()
+        await asyncio.sleep(event.react_s)
+        autopilot.vehicle.anchor(down=True)
+        if event.for_s is not None:
+            await asyncio.sleep(event.for_s)
+            autopilot.vehicle.anchor(down=False)
     elif event.kind in TRAFFIC:
         await world.others.play(event, 0.0, lambda: _ours(autopilot, mission.frame()))
     elif event.kind == "foreign_mission":

@@ -7,6 +7,7 @@ their unit in the key; directions are where the wind comes from, degrees clockwi
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -36,6 +37,7 @@ EventKind = Literal[
     "station",           # for_s: a ground station is heard, from then on no more
     "knockdown",         # roll_deg, for_s
     "current",           # set_deg, drift_mps
+    "crew",              # anchors react_s after the companion first calls for it, weighs after for_s
     "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
     "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
     "second_boat",       # east_m, north_m, goal_east_m, goal_north_m: VAIMOS's model, steered by field, told by radio
@@ -81,6 +83,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     seq: int = 1
     set_deg: float = 0.0
     drift_mps: float = 0.0
+    react_s: float = 0.0         # a crew's, from being called to the anchor on the ground
     course_deg: float = 0.0
     sog_mps: float = 0.0
     every_s: float = 10.0        # between its AIS reports
@@ -90,6 +93,29 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     bearing_deg: float = 0.0     # clockwise
     goal_east_m: float = 0.0
     goal_north_m: float = 0.0
+
+
+# What a boat must bear without coming nearer to anything than its mission allows.
+ORDINARY = frozenset({"wind_speed", "wind_shift", "link_cut", "link_quality", "kill_planner", "battery", "vessel"})
+ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
+ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
+ORDINARY_LOSS = 0.3          # a link that loses more is none
+
+
+def is_ordinary(event: EventSpec) -> bool:
+    """Return whether an event belongs to ordinary weather, links and traffic."""
+    if event.kind == "wind_shift":
+        return abs(event.veer_deg) <= ORDINARY_VEER_DEG
+    if event.kind == "link_cut":
+        return event.for_s is not None and event.for_s <= ORDINARY_CUT_S
+    if event.kind == "link_quality":
+        return event.loss <= ORDINARY_LOSS
+    return event.kind in ORDINARY
+
+
+def is_all_ordinary(events: Iterable[EventSpec]) -> bool:
+    """Return whether nothing but ordinary weather, links and traffic befalls the boat."""
+    return all(is_ordinary(event) for event in events)
 
 
 class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -111,6 +137,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     end_phase: str | None = None
     alerts: tuple[str, ...] = ()              # announced at least once, by code
     marks_rounded: int | None = None           # in order, each on its side
+    called_s: float | None = None              # the crew is called to the anchor this long before a contact
 
 
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -12,13 +12,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from companion.boat import Hull
+from sitl.clearance import HullTrack
 from sitl.scenario import ExpectSpec
 from sitl.tasks.scores import station_score
 
+# A call to the anchor is for what comes within this time [s].
+CALL_HOLDS_S = 600.0
 # A tack is counted when the boat has been on the other side of the wind for this long.
 TACK_SETTLED_S = 3.0
 
@@ -50,6 +53,11 @@ class Truth:
     def positions_m(self) -> NDArray[np.float64]:
         """Return (n, 2) east, north [m]."""
         return np.asarray(self.en_m, dtype=np.float64).reshape(-1, 2)
+
+    def hull(self, hull: Hull) -> HullTrack:
+        """Return the track of a hull that was there."""
+        return HullTrack(
+            en_m=self.positions_m(), heading_rad=np.asarray(self.heading_rad, dtype=np.float64), hull=hull)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,25 +91,6 @@ class Verdict:
             ],
             "figures": self.figures,
         }
-
-
-def contacts_and_clearance(positions_m: NDArray[np.float64], solid: BaseGeometry) -> tuple[int, float]:
-    """Return how often the track entered ``solid`` and its smallest distance to it [m] (0 on contact).
-
-    Args:
-        positions_m: (n, 2) east, north [m].
-        solid: obstacles and everything outside the fence, local metres.
-    """
-    if solid.is_empty or len(positions_m) == 0:
-        return 0, math.inf
-    points = shapely.points(positions_m)
-    shapely.prepare(solid)
-    inside = shapely.intersects(solid, points)
-    entries = int(np.count_nonzero(inside[1:] & ~inside[:-1])) + int(inside[0])
-    clearance = float(np.min(shapely.distance(solid, points)))
-    if len(positions_m) > 1 and entries == 0 and shapely.intersects(solid, shapely.LineString(positions_m)):
-        return 1, 0.0
-    return entries, clearance
 
 
 def count_tacks(truth: Truth, until: int | None = None) -> tuple[int, int]:
@@ -177,6 +166,7 @@ def judge(
     expect: ExpectSpec,
     truth: Truth,
     solid: BaseGeometry,
+    hull: Hull,
     goal_en_m: tuple[float, float],
     summary: dict[str, Any],
     status_times_s: Sequence[float] | None,
@@ -185,11 +175,19 @@ def judge(
     marks: Sequence[tuple[tuple[float, float], str]] = (),
     home_en_m: tuple[float, float] = (0.0, 0.0),
     refuges_en_m: Sequence[tuple[float, float]] = (),
+    floor_m: float | None = None,
+    called_at_s: Sequence[float] | None = None,
 ) -> Verdict:
-    """Hold a run against what its scenario expects."""
+    """Hold a run against what its scenario expects.
+
+    ``hull`` is what touches. ``floor_m`` is the mission's, which the hull must keep in ordinary weather; None: not
+    asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
+    """
     ends = {"goal": [goal_en_m], "home": [home_en_m], "refuge": refuges_en_m}[expect.ends_at]
     positions = truth.positions_m()
-    contacts, clearance = contacts_and_clearance(positions, solid)
+    hulls = truth.hull(hull)
+    touches, clearance = hulls.entries(solid), hulls.least_m(solid)[0]
+    contacts = len(touches)
     tacks, gybes = count_tacks(truth)
     end_distance = min((math.dist(truth.en_m[-1], p) for p in ends), default=math.inf) if truth.en_m else math.inf
     duration_s = truth.t_s[-1] - truth.t_s[0] if truth.t_s else 0.0
@@ -218,8 +216,9 @@ def judge(
         check("nearest to a refuge, m", nearest <= expect.refuge_within_m, nearest, f"at most {expect.refuge_within_m}")
     if expect.max_time_s is not None:
         check("time, s", duration_s <= expect.max_time_s, duration_s, f"at most {expect.max_time_s}")
-    if expect.min_clearance_m is not None:
-        check("clearance, m", clearance >= expect.min_clearance_m, clearance, f"at least {expect.min_clearance_m}")
+    least_m = max((m for m in (expect.min_clearance_m, floor_m) if m is not None), default=None)
+    if least_m is not None:
+        check("clearance, m", clearance >= least_m, clearance, f"at least {least_m}")
     if expect.min_vessel_distance_m is not None:
         nearest = min(truth.vessels_m.values(), default=-math.inf)   # nothing measured does not pass
         check("distance to vessels, m", nearest >= expect.min_vessel_distance_m, truth.vessels_m,
@@ -248,6 +247,11 @@ def judge(
     if expect.marks_rounded is not None:
         rounded = count_roundings(positions, marks)
         check("marks rounded", rounded == expect.marks_rounded, rounded, expect.marks_rounded)
+    if expect.called_s is not None and called_at_s is not None:
+        ahead_s = [max((truth.t_s[i] - t for t in called_at_s if 0.0 <= truth.t_s[i] - t <= CALL_HOLDS_S), default=0.0)
+                   for i in touches]
+        check("called before a contact, s", all(s >= expect.called_s for s in ahead_s), ahead_s,
+              f"at least {expect.called_s}")
     for code in expect.alerts:
         check(f"announced {code}", code in seen, sorted(seen), code)
     return Verdict(

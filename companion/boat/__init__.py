@@ -14,6 +14,7 @@ from companion.boat.margins import (
     fence_penetration,
     required_margin,
 )
+from companion.boat.outline import outline_en_m
 from companion.boat.polar import MPS_PER_KNOT, Polar, SailingAngle
 from companion.boat.polar_files import PolarFile, parse_polar, read_polar
 
@@ -31,6 +32,7 @@ __all__ = [
     "avalon",
     "constant",
     "fence_penetration",
+    "outline_en_m",
     "parse_polar",
     "read_polar",
     "required_margin",

@@ -25,6 +25,11 @@ class Hull:
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} is {value}; it must be 0 m or more")
 
+    @property
+    def reach_m(self) -> float:
+        """How far the hull reaches from the place that the position is of, which is amidships [m]."""
+        return 0.5 * math.hypot(self.length_m, self.beam_m)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Boat:
@@ -40,6 +45,7 @@ class Boat:
         can_tack: False for a boat that does not get through the wind's eye: its plans gybe round instead.
         gybe_room_m: Leg to leeward that gybing round needs [m]; None: five turning radii at full speed.
         hull: Its size.
+        has_motor: It has an auxiliary motor that the autopilot can run.
     """
 
     polar: Polar
@@ -51,6 +57,7 @@ class Boat:
     can_tack: bool = True
     gybe_room_m: float | None = None
     hull: Hull = field(default_factory=Hull)
+    has_motor: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.no_go_half_rad < math.pi:

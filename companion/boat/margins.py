@@ -138,7 +138,7 @@ def required_margin(
         "track": "wanders about the line",
     }
     parts = [
-        MarginPart(name="hull", value_m=0.5 * math.hypot(hull.length_m, hull.beam_m), why="the hull about its antenna"),
+        MarginPart(name="hull", value_m=hull.reach_m, why="the hull about its antenna"),
         MarginPart(name="position", value_m=hull.position_error_m, why="the position fix"),
         # The three ways off the line exclude one another in time: the boat corners, follows or beats.
         MarginPart(name=widest[1], value_m=widest[0], why=why[widest[1]]),

@@ -82,6 +82,11 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """False: the boat does not get through the wind's eye; its plans gybe round."""
     gybe_room_m: Positive | None = None
     """Leg to leeward that gybing round needs; None: five turning radii at full speed."""
+    length_m: Annotated[float, Meta(gt=0.0, le=100.0)] = 1.0
+    beam_m: Annotated[float, Meta(gt=0.0, le=30.0)] = 0.3
+    """The hull: what touches, and what vessels are kept clear of. The position is taken to be amidships."""
+    motor: bool = False
+    """The boat has an auxiliary motor that the autopilot can run: used when she drifts onto something."""
 
 
 class WindOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

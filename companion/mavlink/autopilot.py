@@ -38,7 +38,8 @@ OnValue = Callable[[Value], None]
 # How long the autopilot has to show what it acknowledged: its heartbeat and MISSION_CURRENT come once a second [s].
 CONFIRM_S = 2.5
 SET_CURRENT_TRIES = 3
-AUX_SAILBOAT_TACK = 63  # RC option number of DO_AUX_FUNCTION
+AUX_SAILBOAT_TACK, AUX_SAILBOAT_MOTOR = 63, 74   # RC option numbers of DO_AUX_FUNCTION
+AUX_MIDDLE, AUX_HIGH = 1.0, 2.0                  # positions of its switch
 
 
 class Autopilot:
@@ -188,6 +189,14 @@ class Autopilot:
     async def tack(self) -> CommandAnswer:
         """Ask for a tack now; the autopilot does it only while it beats by itself, 5 s after the last at earliest."""
         return await self.link.command(wire.MAV_CMD_DO_AUX_FUNCTION, float(AUX_SAILBOAT_TACK), 2.0)
+
+    async def run_motor(self, *, on: bool) -> CommandAnswer:
+        """Run a sailboat's auxiliary motor always, or leave it to the autopilot (its state after a boot).
+
+        An autopilot without a throttle output acknowledges it, too, and does nothing.
+        """
+        return await self.link.command(
+            wire.MAV_CMD_DO_AUX_FUNCTION, float(AUX_SAILBOAT_MOTOR), AUX_HIGH if on else AUX_MIDDLE)
 
     async def enable_fence(self, *, enabled: bool = True) -> CommandAnswer:
         """Switch the fence on or off until the next reboot (the parameter FENCE_ENABLE stays)."""

@@ -20,6 +20,7 @@ class PlanStatus(enum.Enum):
     INFEASIBLE = "infeasible"    # proved: no path exists
     TIMEOUT = "timeout"          # the effort ended without a path and without a proof
     INVALID = "invalid"          # the problem cannot be planned at all
+    UNANSWERED = "unanswered"    # the planner died, hung or failed: nothing is known of the problem
 
     @property
     def has_path(self) -> bool:

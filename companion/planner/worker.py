@@ -37,7 +37,7 @@ _PULSE_S = 0.5
 
 def failed(reason: str, *, seed: int, algorithm: str, elapsed_s: float = 0.0) -> Plan:
     """Return the plan that says the worker did not answer."""
-    return Plan(status=PlanStatus.TIMEOUT, reason=reason, waypoints_en=np.empty((0, 2)), algorithm=algorithm,
+    return Plan(status=PlanStatus.UNANSWERED, reason=reason, waypoints_en=np.empty((0, 2)), algorithm=algorithm,
                 seed=seed, elapsed_s=elapsed_s, why=Why(text=reason))
 
 

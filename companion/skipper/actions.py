@@ -144,6 +144,23 @@ class SetCurrent:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Tack:
+    """Ask for a tack on a leg that the autopilot beats; answered by CommandOutcome."""
+
+    command_id: int
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunMotor:
+    """Run the auxiliary motor, or leave it to the autopilot's own judgement again; answered by CommandOutcome."""
+
+    command_id: int
+    is_on: bool
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SteerHeading:
     """A GUIDED heading setpoint [rad, true]; repeated every step, since it times out after 3 s. Not answered.
 
@@ -173,5 +190,5 @@ class StopOrders:
 
 Action = (
     RequestPlan | CancelPlan | UploadMission | UploadFence | ReadMission | SetMode | Arm | SetCurrent
-    | SteerHeading | Announce | StopOrders
+    | Tack | RunMotor | SteerHeading | Announce | StopOrders
 )

@@ -1,21 +1,21 @@
-"""Taking the planner's answers: the splice, keeping the old plan, climbing down the ladder, holding."""
+"""Taking the planner's answers: the splice, keeping the old plan."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+import shapely
 
-from companion.messages import Command, waypoint
-from companion.planner import Plan, Problem
+from companion.planner import Plan, PlanStatus, Problem
 from companion.skipper.actions import Change, ReplanReason, Severity
 from companion.skipper.beating import room_m, tacks_fail
+from companion.skipper.corners import LEAST_LEG_S, Quality, spread
 from companion.skipper.geometry import distance_m
 from companion.skipper.judge import judge
-from companion.skipper.ladder import rungs
 from companion.skipper.manoeuvre import gybe_round
-from companion.skipper.planning import request
-from companion.skipper.route import Tail, loiter_place, splice
+from companion.skipper.not_found import asks_again, not_found
+from companion.skipper.route import Tail, splice
 from companion.skipper.snapshot import PlanOutcome
 from companion.skipper.state import PendingPlan, Phase, Retry, Route
 from companion.skipper.traffic import apart_m, meetings
@@ -44,9 +44,12 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
     plan = outcome.plan
     if plan is None or not plan.has_path:
         reason = outcome.text or (plan.reason if plan is not None else "the planner died")
-        _not_found(turn, pending, reason)
+        if (plan is None or plan.status is PlanStatus.UNANSWERED) and asks_again(turn, pending, reason):
+            return
+        not_found(turn, pending, reason)
         return
     turn.update(
+        unanswered=0,
         rung=0, ladder_reason=None, plan_retry=turn.failed(turn.state.plan_retry) if pending.rung > 0 else Retry())
     keep, set_current = _place(turn, pending)
     if keep is None:
@@ -119,16 +122,17 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
 def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
     """Splice a plan into the route and ask for its upload."""
     points = simplified(pending.problem, _apart([(float(e), float(n)) for e, n in plan.waypoints_en]))[1:]
+    start = pending.start_en_m
+    if pending.lead_in and turn.boat_en is not None:
+        start = turn.boat_en
+    points = _followed(turn, pending, [start, *pending.lead_in, *points])[1:]
     if tacks_fail(turn):
         # Tacks have failed: turn the other way round where there is room.
         points = list(gybe_round(
-            pending.start_en_m, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
+            start, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
             area=turn.voyage.area, floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m)))
         turn.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
-    tail = Tail(start_en=pending.start_en_m, points_en=(*pending.lead_in, *points), gate=pending.gate)
-    if pending.lead_in:
-        boat = turn.boat_en
-        tail = replace(tail, start_en=boat if boat is not None else pending.start_en_m)
+    tail = Tail(start_en=start, points_en=tuple(points), gate=pending.gate)
     facts = replace(
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
         why=plan.why.text or plan.reason)
@@ -144,7 +148,7 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
                       leg_from_en_m=old.leg_from_en_m[ahead], gate_of=old.gate_of[ahead])
         keep, set_current = len(old.items), 1
     route = splice(
-        turn.voyage, turn.config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts)
+        turn.voyage, turn.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts)
     if turn.state.route is not None and _is_same(turn.state.route, route):
         turn.update(route=replace(route, items=turn.state.route.items, points_en_m=turn.state.route.points_en_m))
         turn.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
@@ -154,6 +158,30 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
     change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
     upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}", change=change)
+
+
+def _followed(turn: Turn, pending: PendingPlan, path: list[PointEn]) -> list[PointEn]:
+    """Return the path with corners that the autopilot can follow (``companion.skipper.corners``)."""
+    wind, area, boat = turn.wind_mean, turn.voyage.area, turn.voyage.boat
+    if wind is None:
+        return path
+    keep_out = shapely.union_all([shapely.from_wkt(w) for w in (
+        turn.gates[pending.gate].keep_out if pending.gate >= 0 else ())])
+
+    def quality(way: list[PointEn]) -> Quality:
+        clearance_m = area.path_clearance_m(way)
+        if not pending.lead_in:
+            judged = pending.problem.evaluate(np.asarray(way))
+            if judged.is_feasible:
+                return Quality(is_feasible=True, is_sailable=True, clearance_m=clearance_m, time_s=judged.time_s)
+        seen = judge(
+            way, boat=boat, no_go_half_rad=turn.planned_no_go_rad, twd_from_rad=wind[0], tws_mps=wind[1], area=area,
+            beat_room_m=room_m(turn))
+        is_sailable = seen.spare_rad >= 0.0 and not shapely.intersects(keep_out, shapely.LineString(way))
+        return Quality(is_feasible=False, is_sailable=is_sailable, clearance_m=clearance_m, time_s=seen.time_s)
+
+    floor_m = min(turn.config.margin_floor_m, pending.facts.margin_m)
+    return spread(path, least_m=LEAST_LEG_S * boat.polar.max_speed_mps(wind[1]), floor_m=floor_m, quality=quality)
 
 
 def _apart(points: list[PointEn]) -> list[PointEn]:
@@ -199,74 +227,3 @@ def _is_same(a: Route, b: Route) -> bool:
         x.command == y.command and distance_m(p, q) < SAME_M
         for x, y, p, q in zip(a.items, b.items, a.points_en_m, b.points_en_m, strict=True)
     )
-
-
-def is_old_plan_sound(turn: Turn) -> bool:
-    """Return whether the mission sailed now is still good for the present wind and keeps the margin's floor."""
-    boat, wind, ahead = turn.boat_en, turn.wind_mean, turn.ahead()
-    if boat is None or wind is None or not ahead:
-        return False
-    verdict = judge(
-        [boat, *ahead], boat=turn.voyage.boat, no_go_half_rad=turn.no_go_half_rad, twd_from_rad=wind[0],
-        tws_mps=wind[1], area=turn.voyage.area, beat_room_m=room_m(turn),
-    )
-    return verdict.is_sound(min(turn.config.margin_floor_m, turn.config.margin_m))
-
-
-def _not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
-    steps = rungs(turn.config)
-    state = turn.state
-    where = steps[min(pending.rung, len(steps) - 1)].name or "as configured"
-    met = meetings(turn) if state.route is not None else ()
-    if pending.rung == 0 and state.route is not None and not met and is_old_plan_sound(turn):
-        turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
-        turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
-        return
-    # Only the boat's own place helps when the way from a waypoint ahead is closed: the rungs start at the boat.
-    from_index = pending.from_index if pending.rung == 0 and state.route is not None and _tail_only(turn) else None
-    if pending.rung + 1 < len(steps):
-        following = steps[pending.rung + 1].name
-        text = f"no plan {where} ({reason}): trying {following}"
-        turn.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
-        if request(turn, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
-            return
-    turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
-    if met and is_old_plan_sound(turn):
-        # Loitering in a vessel's way is no better than sailing on through it: the operator must know.
-        turn.say(
-            Severity.CRITICAL, "no way clear",
-            f"no plan keeps clear of {met[0].name}, met in {met[0].time_s:.0f} s: the old plan stays", every_s=0.0)
-        return
-    wait = turn.state.plan_retry.not_before_s - turn.t_s
-    turn.say(
-        Severity.CRITICAL, "no plan at all",
-        f"no plan on any step of the ladder ({reason}): holding, trying again in {wait:.0f} s", every_s=0.0)
-    hold(turn, f"no plan found: {reason}")
-
-
-def _tail_only(turn: Turn) -> bool:
-    """Return whether the way to the present target is sound by itself, so that only the tail needs a plan."""
-    boat, leg, wind = turn.boat_en, turn.leg(), turn.wind_mean
-    if boat is None or leg is None or wind is None:
-        return False
-    verdict = judge(
-        [boat, leg[1]], boat=turn.voyage.boat, no_go_half_rad=turn.no_go_half_rad, twd_from_rad=wind[0],
-        tws_mps=wind[1], area=turn.voyage.area, beat_room_m=room_m(turn))
-    return verdict.is_sound(min(turn.config.margin_floor_m, turn.config.margin_m))
-
-
-def hold(turn: Turn, why: str) -> None:
-    """Loiter in the roomiest place near the boat, by a mission that ends there at once."""
-    boat, wind, state = turn.boat_en, turn.wind_mean, turn.state
-    turn.phase(Phase.HOLDING if state.sailing else Phase.WAITING, f"waiting for a plan: {why}")
-    if boat is None or not state.sailing or state.route is None or state.index >= len(state.route.items) - 1:
-        return   # not under way, or already in the safe end of the mission
-    place, room = loiter_place(turn.voyage, turn.config, boat, wind[0] if wind else 0.0)
-    keep = state.index
-    end = waypoint(turn.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
-    route = replace(
-        state.route, items=(*state.route.items[:keep], end), points_en_m=(*state.route.points_en_m[:keep], place),
-        leg_from_en_m=(*state.route.leg_from_en_m[:keep], boat), gate_of=(*state.route.gate_of[:keep], -1),
-        rung="hold", risk=None, cost_s=None, bound_for="", why=f"{why}; loitering with {room:.0f} m of room",
-    )
-    upload(turn, route, keep + 1, route.why)

@@ -45,7 +45,7 @@ QUICK_RADPS = math.radians(20.0)   # a boat that turns faster ends its boards on
 def obstacles(turn: Turn, vessels: Sequence[Vessel]) -> tuple[Obstacle, ...]:
     """Return the discs that the field keeps out of: hull, half the distance that plans keep, and what is not known."""
     hull = turn.voyage.boat.hull
-    own_m = 0.5 * math.hypot(hull.length_m, hull.beam_m) + KEEP_SHARE * turn.config.traffic_clearance_m
+    own_m = hull.reach_m + KEEP_SHARE * turn.config.traffic_clearance_m
     out = []
     for vessel in vessels:
         now, later = predict(vessel, turn.t_s), predict(vessel, turn.t_s + GROWN_S)

@@ -2,7 +2,8 @@
 
 The autopilot takes the new position and sails by it. A jump back to where dead reckoning has the boat ends the doubt at
 once. Until then, where the other place is not clear ahead, the boat loiters: ArduRover's LOITER turns in circles of
-12 m about a point, and where on earth that is does not matter to it, while HOLD would drift.
+12 m about a point, and where on earth that is does not matter to it, while HOLD would drift. That the new place is not
+clear, either, is no reason against it: nobody sails inside a rock, and what jumps is false more often than true.
 """
 
 from __future__ import annotations
@@ -74,8 +75,9 @@ def stands_off(turn: Turn) -> bool:
         return False   # nor would it loiter then
     if turn.t_s - state.doubt.t_s > STAND_OFF_S or not is_other_shut(turn):
         return False
-    if float(turn.voyage.area.clearance_m([here])[0]) < turn.config.margin_floor_m + LOITER_M:
-        return False   # not here either: see Turn.is_way_shut
+    room_m = float(turn.voyage.area.clearance_m([here])[0])
+    if 0.0 < room_m < LOITER_M and not turn.is_way_shut:
+        return False   # afloat there she would have no room to loiter, and her way is clear
     if status.mode is Mode.LOITER and state.own_mode is Mode.LOITER:
         turn.phase(Phase.HOLDING, "the position jumped and the other place is not clear ahead: waiting in a loiter "
                    "until it can be believed")

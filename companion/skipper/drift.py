@@ -56,7 +56,7 @@ class DriftAhead:
     def sentence(self) -> str:
         """Return one line: how fast, where to, what it meets."""
         set_rad = wrap_two_pi(bearing_rad((0.0, 0.0), self.velocity_en_mps))
-        text = f"drifting {self.speed_mps:.1f} m/s towards {math.degrees(set_rad):03.0f}°"
+        text = f"drifting {self.speed_mps:.2g} m/s towards {math.degrees(set_rad):03.0f}°"
         if self.floor_s is None:
             return f"{text}, {self.clearance_m:.0f} m clear" if math.isfinite(self.clearance_m) else f"{text}, clear"
         if self.contact_s is not None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from companion.messages import MissionState, Mode
-from companion.skipper.actions import Arm, SetCurrent, SetMode
+from companion.skipper.actions import Arm, RunMotor, SetCurrent, SetMode, Severity, Tack
 from companion.skipper.turn import Turn
 from companion.skipper.uploads import upload
 
 ARMING, CURRENT = "arming", "set current"
+TACK = "tack"
+MOTOR_ON, MOTOR_OFF = "motor on", "motor off"
 CHECK_S = 3.0   # MISSION_CURRENT comes once a second: by then it shows what was asked for
 
 
@@ -41,6 +43,30 @@ def arm(turn: Turn) -> bool:
     if not turn.act(Arm(command_id=number)):
         return False
     turn.update(pending_command=(number, turn.t_s, ARMING))
+    return True
+
+
+def tack(turn: Turn, text: str) -> bool:
+    """Ask for a tack; False when not permitted or not now."""
+    if is_busy(turn, TACK):
+        return False
+    number = turn.new_id()
+    if not turn.act(Tack(command_id=number, text=text)):
+        return False
+    turn.update(pending_command=(number, turn.t_s, TACK), tacked_s=turn.t_s)
+    turn.say(Severity.NOTICE, "short tack", text)
+    return True
+
+
+def run_motor(turn: Turn, *, on: bool, text: str) -> bool:
+    """Ask for the motor to be run or not; False when not permitted or not now."""
+    what = MOTOR_ON if on else MOTOR_OFF
+    if is_busy(turn, what):
+        return False
+    number = turn.new_id()
+    if not turn.act(RunMotor(command_id=number, is_on=on, text=text)):
+        return False
+    turn.update(pending_command=(number, turn.t_s, what))
     return True
 
 

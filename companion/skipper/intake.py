@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from companion.messages import Mode, StatusText
 from companion.skipper.actions import CancelPlan, Severity
@@ -11,6 +12,7 @@ from companion.skipper.config import Guidance
 from companion.skipper.failsafe import note
 from companion.skipper.gates import Gate, passed_on
 from companion.skipper.geometry import distance_m, leg_distance_m, waypoint_done
+from companion.skipper.helm import MOTOR_OFF, MOTOR_ON
 from companion.skipper.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
@@ -75,6 +77,8 @@ def _take_command(turn: Turn, outcome: CommandOutcome) -> None:
         return
     if outcome.result is CommandResult.ACCEPTED:
         turn.update(pending_command=None, command_retry=PATIENT, accepted=(pending[2], turn.t_s))
+        if pending[2] in {MOTOR_ON, MOTOR_OFF}:
+            turn.update(adrift=replace(turn.state.adrift, motor=pending[2] == MOTOR_ON))
         return
     turn.update(pending_command=None, command_retry=turn.failed(turn.state.command_retry))
     turn.say(Severity.WARNING, f"refused {pending[2]}",

@@ -1,19 +1,21 @@
 """The lookout: every vessel's approach, alarm and rule each step, and what is said of them.
 
-An alarm needs CPA and TCPA both under their limits, and is said when it rises, then again every half minute. The rules
-of the road are shown, never relied upon: the boat keeps clear of everyone (``companion.traffic.colregs``).
+An alarm needs CPA and TCPA both under their limits. Of each vessel one line is said in half a minute, one vessel a
+step and the worst first: among many nobody can read more. The rules of the road are shown, never relied upon: the boat
+keeps clear of everyone (``companion.traffic.colregs``).
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 
 from companion.skipper.actions import Severity
 from companion.skipper.config import SkipperConfig
 from companion.skipper.turn import Turn
-from companion.traffic import Alarm, AlarmLimits, OwnShip, assess
+from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, assess
 
 SHOWN = 8                # vessels kept in the state: the worst
+EVERY_S = 30.0           # between two lines of one vessel
 # Acting begins nearer than warning: the shares of a lake's limits (``companion.traffic.LAKE``).
 ACT_CPA, ACT_TCPA = 0.4, 0.5
 SEVERITY = {Alarm.WARN: Severity.WARNING, Alarm.ACT: Severity.CRITICAL, Alarm.TOUCH: Severity.CRITICAL}
@@ -36,13 +38,18 @@ def look_out(turn: Turn) -> None:
     hull, wind = turn.voyage.boat.hull, turn.wind_now
     own = OwnShip(
         t_s=turn.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
-        radius_m=0.5 * math.hypot(hull.length_m, hull.beam_m))
-    before = {(a.vessel.mmsi, a.vessel.branch): a.alarm for a in turn.state.watch}
+        radius_m=hull.reach_m)
     found = assess(own, picture, limits(turn.config), None if wind is None else wind[0])[:SHOWN]
     turn.update(watch=found)
-    for seen in found:
-        if seen.alarm is Alarm.NONE:
-            break                           # the worst come first
-        rises = seen.alarm > before.get((seen.vessel.mmsi, seen.vessel.branch), Alarm.NONE)
-        if rises or seen is found[0]:
-            turn.say(SEVERITY[seen.alarm], "vessel near", seen.sentence(), every_s=0.0 if rises else None)
+    _say(turn, found)
+
+
+def _say(turn: Turn, found: Sequence[Assessment]) -> None:
+    """Say the worst of the alarms that were not said lately."""
+    lately = tuple(told for told in turn.state.watch_told if turn.t_s - told[2] < EVERY_S)
+    known = {told[:2] for told in lately}
+    news = next((a for a in found if a.alarm is not Alarm.NONE and (a.vessel.mmsi, a.vessel.branch) not in known), None)
+    if news is not None:
+        turn.say(SEVERITY[news.alarm], "vessel near", news.sentence(), every_s=0.0)
+        lately = (*lately, (news.vessel.mmsi, news.vessel.branch, turn.t_s))
+    turn.update(watch_told=lately)

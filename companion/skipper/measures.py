@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable
 
 from companion.geo.angles import difference_rad
+from companion.skipper.adrift import meets_in_s, sails
 from companion.skipper.by_field import meets_in
+from companion.skipper.causes import STOPPING
 from companion.skipper.errands import Kind, errand
 from companion.skipper.geometry import along_m, cross_track_m, distance_m
 from companion.skipper.snapshot import WindHealth
@@ -49,7 +51,7 @@ def _becalmed(turn: Turn) -> float | None:
     wind = turn.wind_mean
     if wind is None:
         return None
-    return wind[1] if turn.speed_mps < MOVING_MPS else max(wind[1], BY_NAME["becalmed"].exit)
+    return max(wind[1], BY_NAME["becalmed"].exit) if sails(turn) else wind[1]
 
 
 def _irons(turn: Turn) -> float | None:
@@ -99,8 +101,8 @@ def corridor_m(turn: Turn) -> float:
 def _corridor(turn: Turn) -> float | None:
     """Share of the corridor used; in open water the grid size bounds it, not the margin."""
     boat, leg = turn.boat_en, turn.leg()
-    if boat is None or leg is None or not turn.ahead():
-        return None
+    if boat is None or leg is None or not turn.ahead() or turn.state.own_mode in STOPPING:
+        return None      # stopped she follows no leg
     if distance_m(*leg) < 1.0:
         return 0.0
     if along_m(boat, *leg) < 0.0:
@@ -176,7 +178,8 @@ def _planner(turn: Turn) -> float | None:
 
 _MEASURES: dict[str, Callable[[Turn], float | None]] = {
     "link silent": _link, "position lost": _position_lost, "position jump": _jump, "wind untrusted": _wind,
-    "becalmed": _becalmed, "in irons": _irons, "vessel too near": _too_near, "no progress": _progress,
+    "becalmed": _becalmed, "drifting": meets_in_s, "in irons": _irons, "vessel too near": _too_near,
+    "no progress": _progress,
     "heading against course": _heading, "off the corridor": _corridor, "stuck waypoint": _stuck,
     "mission ended": _ended, "fence breach": _breach, "foreign mission": _foreign, "reboot": _reboot,
     "battery low": _battery_low, "battery critical": _battery_critical, "out of time": _time, "dragged off": _dragged,

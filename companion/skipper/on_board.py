@@ -188,6 +188,7 @@ def _adopt(turn: Turn, saved: Persisted, what: str = "ours") -> None:
     index = (status.mission_seq or 1) - 1 if status is not None else 0
     turn.update(
         gate=saved.gate, index=index, own_index=index, own_mode=saved.own_mode,
+        adrift=replace(turn.state.adrift, motor=saved.motor),
         after_operator=saved.own_mode in STOPPING,   # she has drifted since
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         sailing=_under_way(turn) or (saved.sailing and status is not None and status.is_armed),

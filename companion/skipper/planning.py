@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from companion.errors import InputError
+from companion.messages import Mode
 from companion.planner import Problem
 from companion.skipper.actions import CancelPlan, ReplanReason, RequestPlan, Severity
 from companion.skipper.beating import problem_beat
@@ -85,7 +86,9 @@ def _start(turn: Turn, from_index: int | None) -> Start | None:
     if boat is None or vehicle is None:
         return None
     if from_index is None:
-        sailing = turn.state.sailing and vehicle.speed_mps > SLOW_MPS
+        # Stopped, or turning in circles, she is where she is.
+        stopped = turn.state.own_mode in {Mode.HOLD, Mode.LOITER}
+        sailing = turn.state.sailing and vehicle.speed_mps > SLOW_MPS and not stopped
         ahead = turn.config.plan_budget_s + UPLOAD_LATENCY_S if sailing else 0.0
         heading = math.atan2(*vehicle.velocity_en_mps) if sailing else vehicle.heading_rad
         return Start(en_m=moved(boat, heading, vehicle.speed_mps * ahead), heading_rad=heading, after_s=ahead)

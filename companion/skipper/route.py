@@ -14,9 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from companion.geo.angles import difference_rad
 from companion.messages import Command, MissionItem, waypoint
 from companion.skipper.config import SkipperConfig
-from companion.skipper.geometry import distance_m, moved
+from companion.skipper.geometry import bearing_rad, distance_m, moved
 from companion.skipper.state import Route
 from companion.skipper.voyage import PointEn, Voyage
 
@@ -74,16 +75,21 @@ def loiter_place(
     """Return where to loiter after ``end_en`` and the room there [m].
 
     The first place with ``loiter_radius_m`` all round and to leeward, looked for in growing rings that a straight
-    line reaches; without one, the roomiest found.
+    line reaches; without one, the roomiest found. A line that the wind has closed is one that the autopilot beats
+    about: it needs the room of that corridor as well.
     """
+    corridor_m = config.tack_corridor_m if config.tack_corridor_m > 0.0 else math.inf
     best, best_room = end_en, -math.inf
     leeward = twd_from_rad + math.pi
     for ring_m in RINGS_M:
         count = 1 if ring_m == 0.0 else DIRECTIONS
         for n in range(count):
             place = moved(end_en, 2.0 * math.pi * n / DIRECTIONS, ring_m)
-            if ring_m > 0.0 and voyage.area.path_clearance_m([end_en, place]) < config.margin_floor_m:
-                continue
+            if ring_m > 0.0:
+                closed = abs(difference_rad(twd_from_rad, bearing_rad(end_en, place))) < config.no_go_half_rad
+                needed_m = config.margin_floor_m + (corridor_m if closed else 0.0)
+                if voyage.area.path_clearance_m([end_en, place]) < needed_m:
+                    continue
             down = [moved(place, leeward, s * LEEWARD_ROOM_M) for s in (0.0, 0.25, 0.5, 0.75, 1.0)]
             clearance = voyage.area.clearance_m(np.asarray(down))
             # Drifting out of the end of the leeward strip is slow: there half the room is enough.

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
+from companion.skipper.adrift import follow_ground
 from companion.skipper.causes import PERSON
 from companion.skipper.config import SkipperConfig
 from companion.skipper.custody import judge, stand_by
@@ -32,7 +33,7 @@ from companion.skipper.on_board import mission_is_known
 from companion.skipper.sailing import sail
 from companion.skipper.saved import Persisted, saved_of
 from companion.skipper.snapshot import OperatorWish, Snapshot
-from companion.skipper.state import PATIENT, ByField, Phase, Signs, SkipperState
+from companion.skipper.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState
 from companion.skipper.stopped import speak_of_stop
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import Voyage
@@ -84,6 +85,7 @@ class Skipper:
         follow_stops(turn)
         follow_answer(turn)
         follow(turn)
+        follow_ground(turn)
         locate(turn)
         look_out(turn)
         count_time(turn)
@@ -142,7 +144,7 @@ def _rebooted(turn: Turn) -> None:
     keeps = turn.state.phase is Phase.OPERATOR and since is not None and turn.t_s - since > REBOOT_RACE_S
     turn.update(
         checked_mission=False, read_since_s=turn.t_s, own_mode=None, steering_until_s=None, pending_command=None,
-        by_field=ByField(), answering="", stop=None, signs=Signs(),
+        by_field=ByField(), answering="", stop=None, signs=Signs(), adrift=Adrift(),
     )
     if not keeps:
         turn.update(sailing=False, operator_since_s=None)

@@ -7,8 +7,9 @@ import math
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.actions import ReplanReason, Severity, SteerHeading
-from companion.skipper.answers import hold
+from companion.skipper.adrift import stops_drift
 from companion.skipper.beating import IRONS_MEMORY_S
+from companion.skipper.brake import brakes
 from companion.skipper.by_field import heading as by_field_heading
 from companion.skipper.by_field import last_resort
 from companion.skipper.causes import STOPPING
@@ -20,8 +21,10 @@ from companion.skipper.geometry import distance_m
 from companion.skipper.headings import desired_heading_rad
 from companion.skipper.helm import check_current, hand_back, is_busy, make_current, repair, set_mode
 from companion.skipper.manoeuvre import bear_away_rad
+from companion.skipper.not_found import hold
 from companion.skipper.planning import request
 from companion.skipper.rest import comes_to_rest, rest
+from companion.skipper.short_tack import short_tack
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase
 from companion.skipper.traffic import near
@@ -41,11 +44,12 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     """Act for one step under way."""
     bound = errand(turn)
     if bound is None and (turn.gate is None or turn.state.over):
-        rest(turn)
+        if not (turn.state.over and stops_drift(turn)):
+            rest(turn)
         return
     if bound is not None and comes_to_rest(turn, bound):
         return
-    if stands_off(turn):
+    if stands_off(turn) or stops_drift(turn) or brakes(turn):
         return
     stopped = turn.state.own_mode in STOPPING
     if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:
@@ -70,6 +74,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         check_current(turn)
     else:
         check_current(turn)
+        short_tack(turn)
     if turn.is_raised("stuck waypoint") and turn.state.own_index > turn.state.index:
         make_current(turn, turn.state.own_index + 1)
     if bound is not None and not bound.has_place:

@@ -35,6 +35,7 @@ class Persisted:
     pending: Route | None
     unsure: Route | None = None
     own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
+    motor: bool = False                # it was run by us: ours to switch off
     under_way_s: float = 0.0           # how long the voyage has been under way, in whole minutes
     arrived: bool = False              # nothing is left to sail, the way home included
     uid: str | None = None             # of the autopilot, and ...
@@ -56,7 +57,8 @@ class Persisted:
             "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
             "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
             "unsure": _route_to_dict(self.unsure), "own_mode": None if self.own_mode is None else self.own_mode.name,
-            "under_way_s": self.under_way_s, "arrived": self.arrived, "uid": self.uid, "system": self.system,
+            "motor": self.motor, "under_way_s": self.under_way_s, "arrived": self.arrived, "uid": self.uid,
+            "system": self.system,
         }
 
     @classmethod
@@ -74,6 +76,7 @@ class Persisted:
                 route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
                 unsure=_route_from_dict(data.get("unsure")),
                 own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
+                motor=_truth(data.get("motor", False)),
                 under_way_s=_number(data.get("under_way_s", 0.0)), arrived=_truth(data.get("arrived", False)),
                 uid=None if data.get("uid") is None else _words(data["uid"]),
                 system=None if data.get("system") is None else _whole(data["system"], 1, 255),
@@ -87,8 +90,8 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
     return Persisted(
         voyage=voyage, gate=state.gate, sailing=state.sailing, route=state.route,
         pending=state.pending_upload.route if state.pending_upload is not None else None,
-        unsure=state.unsure_route, own_mode=state.own_mode, under_way_s=60.0 * (state.under_way_s // 60.0),
-        arrived=state.arrived, uid=state.uid, system=state.system,
+        unsure=state.unsure_route, own_mode=state.own_mode, motor=state.adrift.motor,
+        under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived, uid=state.uid, system=state.system,
     )
 
 

@@ -145,6 +145,19 @@ class Signs:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Adrift:
+    """How the boat moves over ground, and what was done to stop a drift (``companion.skipper.adrift``)."""
+
+    ground_en_mps: tuple[float, float] | None = None   # mean velocity of the last seconds
+    ground_t_s: float = float("-inf")
+    places: tuple[Fix, ...] = ()       # of the last minute, of a boat that hardly moves
+    since_s: float | None = None       # since when a drift onto something is being stopped
+    loitered: bool = False             # LOITER has shown in this calm: it is not asked for again
+    loiter_en_m: PointEn | None = None # where it began
+    motor: bool = False                # the autopilot has accepted to run it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ByField:
     """Steering by field: the memory of the guidance and of the station keeper, and the last resort's."""
 
@@ -187,6 +200,7 @@ class SkipperState:
     ready_route: Route | None = None   # planned, not allowed or not yet possible to upload
     own_mode: Mode | None = None       # a mode other than AUTO that we asked for ourselves
     rung: int = 0                      # step of the ladder being tried
+    unanswered: int = 0                # requests in a row that the planner did not answer
     ladder_reason: ReplanReason | None = None
     plan_retry: Retry = PATIENT
     upload_retry: Retry = PATIENT
@@ -202,6 +216,7 @@ class SkipperState:
     uploaded_s: float = float("-inf")   # when the last upload ended well
     good_wind_since_s: float | None = None
     no_go_since_s: float | None = None
+    tacked_s: float = float("-inf")     # when a tack was last asked for
     wish: OperatorWish | None = None    # the operator's last wish, until it is answered
     read_items: tuple[MissionItem, ...] | None = None      # the mission as last read
     read_t_s: float = float("-inf")
@@ -235,8 +250,10 @@ class SkipperState:
     steering_until_s: float | None = None          # bearing away in GUIDED until
     steering_heading_rad: float | None = None
     by_field: ByField = ByField()
+    adrift: Adrift = Adrift()
     irons_s: tuple[float, ...] = ()                # when the boat was in irons
     watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
+    watch_told: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of those said lately, when
     announced: tuple[tuple[str, float], ...] = ()  # code, last said
     reached: tuple[int, ...] = ()                  # goals reached, in order
     missed: int = 0                                # buoys passed on the wrong side and sailed again

@@ -68,7 +68,7 @@ def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> t
     hull = turn.voyage.boat.hull
     keep = Keep(
         sigmas=sigmas, clearance_m=turn.config.traffic_clearance_m, horizon_s=HORIZON_S, own_timing_mps=OWN_TIMING_MPS,
-        own_radius_m=0.5 * math.hypot(hull.length_m, hull.beam_m), ahead_m=turn.config.traffic_clearance_m,
+        own_radius_m=hull.reach_m, ahead_m=turn.config.traffic_clearance_m,
         settled_m=SETTLED_M,
     )
     known = [v for v in vessels if v.is_moving_known]

@@ -17,10 +17,12 @@ from companion.skipper.actions import (
     Action,
     Announce,
     Arm,
+    RunMotor,
     SetCurrent,
     SetMode,
     Severity,
     SteerHeading,
+    Tack,
     UploadFence,
     UploadMission,
 )
@@ -46,6 +48,8 @@ def permitted(action: Action, permissions: Permissions) -> bool:
         return permissions.may_upload_fence
     if isinstance(action, SetMode):
         return permissions.may_set_mode and (action.mode is not Mode.GUIDED or permissions.may_steer)
+    if isinstance(action, RunMotor | Tack):
+        return permissions.may_set_mode
     if isinstance(action, Arm):
         return permissions.may_arm
     if isinstance(action, SetCurrent):
@@ -184,6 +188,11 @@ class Turn:
         """SAIL_XTRACK_MAX."""
         limits = self.snapshot.limits
         return self.config.tack_corridor_m if limits is None else limits.sail_xtrack_max_m
+
+    @property
+    def known_config(self) -> SkipperConfig:
+        """The configuration, with what has been read of the autopilot in place of its defaults."""
+        return replace(self.config, no_go_half_rad=self.no_go_half_rad, tack_corridor_m=self.tack_corridor_m)
 
     @property
     def gate(self) -> Gate | None:

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from companion.boat import Boat
+from companion.boat import Boat, outline_en_m
 from companion.geo.frame import LocalFrame
 
 PointEn = tuple[float, float]
@@ -97,6 +97,10 @@ class Voyage:
     def __post_init__(self) -> None:
         if not self.goals or self.laps < 1:
             raise ValueError("a voyage has at least one goal and one lap")
+
+    def hull_clearance_m(self, en_m: PointEn, heading_rad: float) -> float:
+        """Return the distance of the hull's outline to the nearest obstacle or limit [m], at most 0 on contact."""
+        return self.area.path_clearance_m(outline_en_m(self.boat.hull, [en_m], [heading_rad])[0])
 
     @property
     def legs(self) -> tuple[Goal, ...]:

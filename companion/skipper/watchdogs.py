@@ -11,6 +11,7 @@ import enum
 from dataclasses import dataclass
 
 from companion.skipper.actions import Severity
+from companion.skipper.adrift import LIGHT_MPS
 from companion.skipper.turn import JUMP_M
 
 
@@ -21,7 +22,8 @@ class Response(enum.Enum):
     FREEZE = "no actions until it clears; what is on the autopilot sails on"
     NO_BOAT_PLANS = "no plan from the boat's position until it clears, unless the way from there is shut"
     NO_WIND_PLANS = "no new plan because of the wind; the plan in place stays"
-    WAIT_FOR_WIND = "no plans and no complaint about progress; plan again when the wind is back"
+    WAIT_FOR_WIND = "no plans, no complaint about progress; LOITER where she drifts; plan again when the wind is back"
+    STOP_DRIFT = "say where to and when, each minute; motor if there is one, LOITER if she can stem it, else the anchor"
     BEAR_AWAY = "bear away under GUIDED until the boat sails, back to AUTO, plan again; after two, gybe round"
     REPLAN = "plan again from the boat"
     RESTART = "read the mission, take it over if it is ours, and start again as far as permitted"
@@ -68,9 +70,14 @@ TABLE: tuple[Watchdog, ...] = (
     W(name="wind untrusted", watches="the wind room's verdict (frozen, mirrored, spiking, silent vane)", enter=1.0,
       exit=0.5, unit="", enter_s=5.0, exit_s=30.0, severity=S.WARNING, response=Response.NO_WIND_PLANS, at_rest=True,
       why="a plan made for a wind that is not there is worse than an old one"),
-    W(name="becalmed", watches="true wind speed, and the boat hardly moving", enter=0.8, exit=1.2, unit="m/s",
-      enter_s=60.0, exit_s=30.0, severity=S.NOTICE, response=Response.WAIT_FOR_WIND, loitering=True,
+    W(name="becalmed", watches="mean true wind speed, of a boat that does not sail", enter=LIGHT_MPS, exit=1.2,
+      unit="m/s", enter_s=60.0, exit_s=30.0, severity=S.NOTICE, response=Response.WAIT_FOR_WIND,
+      loitering=True,
       why="without wind there is no progress to complain of and no direction to plan for"),
+    W(name="drifting", watches="time until a boat that does not sail drifts within the margin's floor of something",
+      enter=300.0, exit=360.0, unit="s", enter_s=20.0, exit_s=30.0, severity=S.CRITICAL, response=Response.STOP_DRIFT,
+      loitering=True,
+      why="a current takes her there without wind, and an anchor takes time to be let go"),
     W(name="in irons", watches="speed ahead while pointing within 35° of the wind", enter=0.3, exit=0.8, unit="m/s",
       enter_s=8.0, exit_s=3.0, severity=S.WARNING, response=Response.BEAR_AWAY,
       why="ArduRover has no recovery of its own; a tack takes 2 to 7 s"),

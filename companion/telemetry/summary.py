@@ -56,7 +56,7 @@ class VoyageFigures:
     _touching: bool = False
 
     def take(self, step: Step, clearance_m: float | None) -> None:
-        """Take one step and the clearance [m] of the boat at it (None: nothing to be clear of, or no position)."""
+        """Take one step and the clearance [m] of the hull at it (None: nothing to be clear of, or no position)."""
         snapshot = step.snapshot
         for action in step.actions:
             if isinstance(action, RequestPlan):

@@ -21,9 +21,10 @@ from companion.traffic.assess import Assessment, assess
 from companion.traffic.colregs import Encounter, Policy, Role, Rule, classify
 from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json, decode_nmea
 from companion.traffic.occupancy import Disc, planning_discs, time_matched_discs
+from companion.traffic.picture import Change, TrafficCounts, TrafficPicture
 from companion.traffic.plans import Conflict, Decision, TimedLeg, check_legs, decide, path_distance_m
 from companion.traffic.predict import Motion, Prediction, motion_of, predict
-from companion.traffic.targets import Change, TargetLimits, Targets, TrafficCounts, TrafficPicture
+from companion.traffic.targets import TargetLimits, Targets
 from companion.traffic.vessel import Hull, Vessel
 
 __all__ = [

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from companion.traffic.approach import Alarm, AlarmLimits, Approach, OwnShip, alarm_of, cpa
 from companion.traffic.colregs import Encounter, classify
-from companion.traffic.targets import TrafficPicture
+from companion.traffic.picture import TrafficPicture
 from companion.traffic.vessel import Vessel
 
 

@@ -6,7 +6,6 @@ that cannot be. Everything refused is counted; nothing raises.
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -14,12 +13,13 @@ from dataclasses import dataclass, field, replace
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import AisReport
+from companion.traffic.picture import Change, TrafficCounts, TrafficPicture
 from companion.traffic.predict import predict, risk_factor
 from companion.traffic.vessel import Vessel, hull_of
 
 # How far off a report may be from what can be reached and still be the same vessel [m, m/s]: fast ferries do 25.
 REACH_SLACK_M, REACH_MPS = 400.0, 30.0
-# Beyond this a vessel says nothing to a boat of a few knots, and the local frame is no longer exact.
+# Farther from us than this a vessel says nothing to a boat of a few knots.
 FAR_M = 60_000.0
 # A change of course or speed worth checking a plan for.
 TURNED_RAD, TURNED_SHARE, TURNED_MPS = math.radians(10.0), 0.2, 0.5
@@ -29,21 +29,12 @@ SURPRISE_RISK = 1e-3
 CLOCK_BACK_S = 60.0
 
 
-class Change(enum.Enum):
-    """Why an active plan should be checked again."""
-
-    APPEARED = "appeared"
-    TURNED = "turned"
-    SPEED = "changed speed"
-    SURPRISE = "is not where it was expected"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TargetLimits:
     """Bounds of the fold.
 
     Attributes:
-        max_vessels: the farthest from the frame's origin goes when one more appears.
+        max_vessels: the farthest from our boat goes when one more appears.
         max_branches: vessels kept apart under one MMSI.
         expire_s: a vessel unheard for this long is forgotten (ArduPilot's AIS_TIME_OUT).
         max_age_s: a report that was this old when it arrived is refused.
@@ -59,45 +50,6 @@ class TargetLimits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrafficCounts:
-    """What happened to the reports, for the status."""
-
-    heard: int = 0
-    own: int = 0
-    late: int = 0             # older than what is known of the vessel
-    stale: int = 0            # too old when it came
-    far: int = 0              # not near enough to matter, or not on the globe's useful part
-    static_unknown: int = 0   # name and size of a vessel whose position was never heard
-    shared_mmsi: int = 0      # two vessels with one MMSI
-    clock_jumps: int = 0
-    forgotten: int = 0        # expired, or pushed out by the bound
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrafficPicture:
-    """All vessels at ``t_s``: what the rest of the program sees."""
-
-    t_s: float
-    vessels: tuple[Vessel, ...] = ()
-    changes: tuple[tuple[float, int, Change], ...] = ()   # (when, MMSI, what), the last 32
-    counts: TrafficCounts = TrafficCounts()
-    last_heard_s: float | None = None
-
-    def age_s(self, vessel: Vessel) -> float:
-        """Return how old the vessel's position is [s]."""
-        return max(0.0, self.t_s - vessel.t_s)
-
-    @property
-    def silence_s(self) -> float | None:
-        """Seconds since any report; None: never heard one. AIS is not all traffic, and a stopped feed is silent."""
-        return None if self.last_heard_s is None else max(0.0, self.t_s - self.last_heard_s)
-
-    def changed_since(self, t_s: float) -> tuple[tuple[float, int, Change], ...]:
-        """Return the changes after ``t_s``: an active plan is checked again when there is one."""
-        return tuple(change for change in self.changes if change[0] > t_s)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Targets:
     """The fold's state. Make it with ``Targets.empty(frame)``."""
 
@@ -105,7 +57,7 @@ class Targets:
     limits: TargetLimits = TargetLimits()
     vessels: Mapping[tuple[int, int], Vessel] = field(default_factory=dict)
     changes: tuple[tuple[float, int, Change], ...] = ()
-    counts: TrafficCounts = TrafficCounts()
+    counts: TrafficCounts = field(default_factory=TrafficCounts)
     last_heard_s: float | None = None
 
     @classmethod
@@ -119,11 +71,14 @@ class Targets:
         return TrafficPicture(t_s=t_s, vessels=tuple(alive), changes=self.changes, counts=self.counts,
                               last_heard_s=self.last_heard_s)
 
-    def heard(self, report: AisReport) -> Targets:
-        """Return the fold after ``report``; ``report.t_s`` is when it arrived on our clock."""
-        return self._clock(report.t_s)._heard(report)  # noqa: SLF001 - the same class
+    def heard(self, report: AisReport, own_en_m: tuple[float, float] = (0.0, 0.0)) -> Targets:
+        """Return the fold after ``report``; ``report.t_s`` is when it arrived on our clock.
 
-    def _heard(self, report: AisReport) -> Targets:
+        ``own_en_m`` is where our boat is: what is near and what is far is near to it or far from it.
+        """
+        return self._clock(report.t_s)._heard(report, own_en_m)  # noqa: SLF001 - the same class
+
+    def _heard(self, report: AisReport, own_en_m: tuple[float, float]) -> Targets:
         now = report.t_s if self.last_heard_s is None else max(report.t_s, self.last_heard_s)
         counts = replace(self.counts, heard=self.counts.heard + 1)
         if not _is_sound(report):
@@ -135,9 +90,9 @@ class Targets:
         if report.age_s > self.limits.max_age_s:
             return self.counted(counts, now, stale=1)
         en = self.frame.en_from_geo(report.position)
-        if not (math.isfinite(en[0]) and math.isfinite(en[1])) or math.hypot(*en) > FAR_M:
+        if not (math.isfinite(en[0]) and math.isfinite(en[1])) or math.dist(en, own_en_m) > FAR_M:
             return self.counted(counts, now, far=1)
-        return self._placed(report, en, counts, now)
+        return self._placed(report, en, own_en_m, counts, now)
 
     # ------------------------------------------------------------------------------------- inside
     def counted(self, counts: TrafficCounts, now_s: float, **more: int) -> Targets:
@@ -171,7 +126,8 @@ class Targets:
         return replace(self, vessels=vessels, counts=counts, last_heard_s=now_s)
 
     def _placed(
-        self, report: AisReport, en: tuple[float, float], counts: TrafficCounts, now_s: float
+        self, report: AisReport, en: tuple[float, float], own_en_m: tuple[float, float], counts: TrafficCounts,
+        now_s: float,
     ) -> Targets:
         t_s = report.t_s - max(0.0, report.age_s)
         known = self._branches(report.mmsi)
@@ -183,7 +139,7 @@ class Targets:
             return self.counted(counts, now_s, late=1)
         vessels = dict(self.vessels)
         if nearest is None:
-            return self._new(report, en, t_s, vessels, known, counts, now_s)
+            return self._new(report, en, own_en_m, t_s, vessels, known, counts, now_s)
         after = _moved(nearest, report, en, t_s, now_s)
         vessels[nearest.mmsi, nearest.branch] = after
         change = _change(nearest, after)
@@ -191,8 +147,8 @@ class Targets:
         return replace(self, vessels=vessels, changes=changes, counts=counts, last_heard_s=now_s)
 
     def _new(
-        self, report: AisReport, en: tuple[float, float], t_s: float, vessels: dict[tuple[int, int], Vessel],
-        known: list[Vessel], counts: TrafficCounts, now_s: float,
+        self, report: AisReport, en: tuple[float, float], own_en_m: tuple[float, float], t_s: float,
+        vessels: dict[tuple[int, int], Vessel], known: list[Vessel], counts: TrafficCounts, now_s: float,
     ) -> Targets:
         expired = [k for k, v in vessels.items() if now_s - v.heard_s > self.limits.expire_s]
         for key in expired:
@@ -208,7 +164,7 @@ class Targets:
         branch = free[0] if free else min(known, key=lambda v: (v.t_s, v.branch)).branch
         vessels[report.mmsi, branch] = _first(report, branch, en, t_s, now_s, is_shared=shared)
         if len(vessels) > self.limits.max_vessels:
-            farthest = max(vessels, key=lambda k: (math.hypot(*vessels[k].antenna_en_m), k))
+            farthest = max(vessels, key=lambda k: (math.dist(vessels[k].antenna_en_m, own_en_m), k))
             del vessels[farthest]
             forgotten += 1
         changes = (*self.changes, (now_s, report.mmsi, Change.APPEARED))[-32:]

@@ -35,8 +35,8 @@ class Arma(Base):
         self._variance = 0.05**2
         self._count = 0
 
-    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float) -> None:
-        for y in self._cells.add(dt_s, x_rad, speed_mps, weight):
+    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float) -> None:
+        for y in self._cells.add(dt_s, x_rad, speed_mps, weight, speed_weight):
             self._cell(y)
 
     def _cell(self, y: float) -> None:

@@ -31,7 +31,9 @@ class Cells:
         self.speed_variance = 1.0
         self._has_begun = False
 
-    def add(self, dt_s: float, x_rad: float, speed_mps: float, weight: float) -> Iterator[float]:
+    def add(
+        self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float,
+    ) -> Iterator[float]:
         """Take a reading; yield the departures [rad] of the cells that it completes."""
         if not self._has_begun:
             self._has_begun = True
@@ -48,6 +50,9 @@ class Cells:
             yield self._last - self.mean
             self._sum = self._weight = 0.0
             self._end_s += self.width_s
+        deviation = speed_mps - self.speed
+        self.speed += speed_weight * gain(dt_s, 20.0) * deviation
+        self.speed_variance += speed_weight * gain(dt_s, 600.0) * (deviation**2 - self.speed_variance)
         if weight <= 0.0:
             return
         self._seen_s += dt_s
@@ -57,9 +62,6 @@ class Cells:
         self.mean += weight * gain(dt_s, min(self._mean_s, max(30.0, self._seen_s))) * (x - self.mean)
         within = x - self._sum / self._weight
         self.scatter += weight * gain(dt_s, 600.0) * (min(1.0, within * within) - self.scatter)
-        deviation = speed_mps - self.speed
-        self.speed += weight * gain(dt_s, 20.0) * deviation
-        self.speed_variance += weight * gain(dt_s, 600.0) * (deviation**2 - self.speed_variance)
 
     @property
     def sigma_speed(self) -> float:

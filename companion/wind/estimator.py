@@ -34,15 +34,19 @@ class Estimator(Protocol):
     """A wind forecaster.
 
     ``update`` takes a true wind reading: ``t_s`` in seconds on any steady clock, the direction it comes from [rad,
-    true north clockwise, any branch] and its speed [m/s]. ``weight`` in 0..1 says how far it may be believed; 0
-    only moves the clock. A reading not later than the previous one is ignored.
+    true north clockwise, any branch] and its speed [m/s]. ``weight`` in 0..1 says how far the direction may be
+    believed, ``speed_weight`` how far the speed (None: as far): a calm has a speed and no direction. 0 and 0 only
+    move the clock. A reading not later than the previous one is ignored.
 
     ``forecast`` and ``interval`` count their horizon [s] from the last update; ``table`` counts from its ``t_s``.
     """
 
     name: str
 
-    def update(self, t_s: float, direction_rad: float, speed_mps: float, *, weight: float = 1.0) -> None:
+    def update(
+        self, t_s: float, direction_rad: float, speed_mps: float, *, weight: float = 1.0,
+        speed_weight: float | None = None,
+    ) -> None:
         """Take one reading."""
         ...
 
@@ -81,8 +85,11 @@ class Base:
         self._reference_rad = 0.0
 
     # ------------------------------------------------------------------------------ for the subclass
-    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float) -> None:
-        """Take a reading: ``x_rad`` is on [-π, π] about the first; ``dt_s`` > 0, or 0 for the first of all."""
+    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float) -> None:
+        """Take a reading: ``x_rad`` is on [-π, π] about the first; ``dt_s`` > 0, or 0 for the first of all.
+
+        The first has a direction that is believed.
+        """
         raise NotImplementedError
 
     def _predict(self, horizon_s: float) -> tuple[float, float, float, float]:
@@ -100,15 +107,19 @@ class Base:
         """Time of the last reading [s]."""
         return self._t_s
 
-    def update(self, t_s: float, direction_rad: float, speed_mps: float, *, weight: float = 1.0) -> None:
+    def update(
+        self, t_s: float, direction_rad: float, speed_mps: float, *, weight: float = 1.0,
+        speed_weight: float | None = None,
+    ) -> None:
         """Take one reading of the true wind (see ``Estimator``)."""
         # Plain floats only: an int would make the compiled estimator compile again, in flight.
         t_s, direction_rad, speed_mps, weight = float(t_s), float(direction_rad), float(speed_mps), float(weight)
+        of_speed = weight if speed_weight is None else float(speed_weight)
         if not (math.isfinite(t_s) and math.isfinite(direction_rad) and math.isfinite(speed_mps)):
             raise ValueError(f"reading {t_s}, {direction_rad}, {speed_mps} is not finite")
         if self._t_s is None:
-            if weight <= 0.0:
-                return
+            if weight <= 0.0 or of_speed <= 0.0:
+                return      # an estimator begins with a reading that it can believe
             self._reference_rad = wrap_pi(direction_rad)
             dt_s = 0.0
         else:
@@ -119,7 +130,7 @@ class Base:
                 return
         self._t_s = t_s
         x_rad = round(wrap_pi(direction_rad - self._reference_rad), 9)
-        self._step(dt_s, abs(x_rad) if abs(x_rad) >= 3.141592653 else x_rad, speed_mps, weight)
+        self._step(dt_s, abs(x_rad) if abs(x_rad) >= 3.141592653 else x_rad, speed_mps, weight, of_speed)
 
     def forecast(self, horizon_s: float) -> tuple[float, float, float, float]:
         """Return mean direction [rad, -π..π), sigma [rad], mean speed, sigma [m/s], that long after the last update.

@@ -33,6 +33,11 @@ class FrozenVane:
         self._heading = 0.0
         self.is_frozen = self.is_suspect = False
 
+    def rest(self) -> None:
+        """Forget what was seen: there is too little wind to tell."""
+        self._since_s = None
+        self.is_frozen = self.is_suspect = False
+
     def update(self, t_s: float, awa_rad: float, heading_rad: float) -> bool:
         """Take an apparent angle with the heading of that moment; return the verdict."""
         moved = self._since_s is None or abs(wrap_pi(awa_rad - self._angle)) > _STILL_RAD

@@ -33,7 +33,7 @@ _Z = np.array([normal_half_width(float(p)) for p in kernel.QUANTILE_P])
 def compile_kernels() -> None:
     """Compile (or load) the kernels before the first reading, so that no reading waits for it."""
     state = kernel.new_state(CONSTANTS)
-    kernel.update(state, CONSTANTS, kernel.prior_quantile(CONSTANTS), 0.0, 0.0, 1.0, 1.0)
+    kernel.update(state, CONSTANTS, kernel.prior_quantile(CONSTANTS), 0.0, 0.0, 1.0, 1.0, 1.0)
     kernel.predict(state, CONSTANTS, 60.0)
     kernel.half_width_ratio(state, 60.0, _Z, 1.0)
     kernel.correlation_time(state)
@@ -51,8 +51,8 @@ class Forecaster(Base):
         self._state = kernel.new_state(constants)
         self._prior = self._state.quantile.copy()
 
-    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float) -> None:
-        kernel.update(self._state, self._constants, self._prior, dt_s, x_rad, speed_mps, weight)
+    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float) -> None:
+        kernel.update(self._state, self._constants, self._prior, dt_s, x_rad, speed_mps, weight, speed_weight)
 
     def _predict(self, horizon_s: float) -> tuple[float, float, float, float]:
         mean, sigma, speed, sigma_speed, _, _ = kernel.predict(self._state, self._constants, horizon_s)

@@ -42,17 +42,18 @@ class AdaptiveKalman(Base):
         self._sum = np.zeros((2, 2))
         self._dt_s = 1.0
 
-    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float) -> None:
+    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float) -> None:
         kf = self._filter
         if dt_s == 0.0:
             kf.x = np.array([[speed_mps], [x_rad]])                                    # (1)
             return
-        if weight <= 0.0:
+        if weight <= 0.0 and speed_weight <= 0.0:
             return
         self._dt_s += 0.01 * (dt_s - self._dt_s)
         kf.predict()                                                                   # (2)
-        # The innovation goes the short way round the circle.
-        z = np.array([[speed_mps], [kf.x[1, 0] + wrap_pi(x_rad - kf.x[1, 0])]])
+        # The innovation goes the short way round the circle; a speed without a direction is no news of that.
+        turned = wrap_pi(x_rad - kf.x[1, 0]) if weight > 0.0 else 0.0
+        z = np.array([[speed_mps], [kf.x[1, 0] + turned]])
         kf.update(z)                                                                   # (3) to (6)
         outer = kf.y @ kf.y.T
         if len(self._window) == self._window.maxlen:

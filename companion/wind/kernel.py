@@ -260,8 +260,21 @@ def _learn(st: State, con: Constants, prior: Array, j: int, row: int, x: float, 
 
 
 @njit(nogil=True, cache=True)
-def _moments(st: State, con: Constants, step: float, x: float, speed: float, weight: float) -> None:
-    """Move every running mean by a reading that stands for ``step`` seconds."""
+def _speeds(st: State, step: float, speed: float, weight: float) -> None:
+    """Move every running mean of the speed by a reading that stands for ``step`` seconds."""
+    now = st.now
+    for k in range(SPEED_SCALE_S.size):
+        keep = math.exp(-step / SPEED_SCALE_S[k])
+        st.speed[k, 0] = st.speed[k, 0] * keep + (1.0 - keep) * speed * weight
+        st.speed[k, 1] = st.speed[k, 1] * keep + (1.0 - keep) * weight
+    keep = math.exp(-step / 10.0)
+    now[WIND] = now[WIND] * keep + (1.0 - keep) * speed
+    now[WIND_N] = now[WIND_N] * keep + (1.0 - keep)
+
+
+@njit(nogil=True, cache=True)
+def _directions(st: State, con: Constants, step: float, x: float, speed: float, weight: float) -> None:
+    """Move every running mean of the direction by a reading that stands for ``step`` seconds."""
     now, mem = st.now, con.memory
     # Means of the air's motion: light air weighs little.
     vs, vc = max(speed, 0.05) * weight * math.sin(x), max(speed, 0.05) * weight * math.cos(x)
@@ -270,10 +283,6 @@ def _moments(st: State, con: Constants, step: float, x: float, speed: float, wei
         st.sums[k, 0] = st.sums[k, 0] * keep + (1.0 - keep) * vs
         st.sums[k, 1] = st.sums[k, 1] * keep + (1.0 - keep) * vc
         st.mean[k] = math.atan2(st.sums[k, 0], st.sums[k, 1])
-    for k in range(SPEED_SCALE_S.size):
-        keep = math.exp(-step / SPEED_SCALE_S[k])
-        st.speed[k, 0] = st.speed[k, 0] * keep + (1.0 - keep) * speed * weight
-        st.speed[k, 1] = st.speed[k, 1] * keep + (1.0 - keep) * weight
     now[FAST] = x if now[SEEN] == 0.0 else now[FAST] - weight * math.expm1(-step / 0.3) * wrap(x - now[FAST])
     share = weight * -math.expm1(-step / mem[M_ROUGH]) * mem[M_ROUGH]
     keep = math.exp(-step / mem[M_ROUGH])
@@ -283,9 +292,6 @@ def _moments(st: State, con: Constants, step: float, x: float, speed: float, wei
     keep = math.exp(-step / mem[M_CLIMATE])
     now[CLIMATE] = now[CLIMATE] * keep + share * wrap(x - st.mean[SCALE_S.size - 1]) ** 2
     now[CLIMATE_N] = now[CLIMATE_N] * keep + share
-    keep = math.exp(-step / 10.0)
-    now[WIND] = now[WIND] * keep + (1.0 - keep) * speed
-    now[WIND_N] = now[WIND_N] * keep + (1.0 - keep)
     now[SEEN] += 1.0
 
 
@@ -313,8 +319,10 @@ def _remember(st: State, con: Constants) -> None:
 
 
 @njit(nogil=True, cache=True)
-def update(st: State, con: Constants, prior: Array, dt: float, x: float, speed: float, weight: float) -> None:
-    """Take a reading ``dt`` after the last; the first has ``dt`` 0."""
+def update(
+    st: State, con: Constants, prior: Array, dt: float, x: float, speed: float, weight: float, speed_weight: float,
+) -> None:
+    """Take a reading ``dt`` after the last; the first has ``dt`` 0, and a direction that is believed."""
     now = st.now
     now[CLOCK] += dt
     is_first = now[SEEN] == 0.0
@@ -327,9 +335,12 @@ def update(st: State, con: Constants, prior: Array, dt: float, x: float, speed: 
                 _learn(st, con, prior, j, p, x, speed)
             p = (p + 1) % ROWS
         st.pointer[j] = p
+    step = 1.0 if is_first else dt
+    if speed_weight > 0.0:
+        _speeds(st, step, speed, speed_weight)
     if weight <= 0.0:
         return
-    _moments(st, con, 1.0 if is_first else dt, x, speed, weight)
+    _directions(st, con, step, x, speed, weight)
     if is_first or now[CLOCK] - now[LAST_ROW_S] >= EVERY_S - 1e-6:
         _remember(st, con)
 
@@ -343,7 +354,7 @@ def replay(
     out = np.zeros((int(ask.sum()), horizon.size, 4 + zp.size))
     q = 0
     for i in range(t.size):
-        update(st, con, prior, t[i] - t[i - 1] if i else 0.0, x[i], speed[i], 1.0)
+        update(st, con, prior, t[i] - t[i - 1] if i else 0.0, x[i], speed[i], 1.0, 1.0)
         if ask[i]:
             for a in range(horizon.size):
                 m, sigma, v, sigma_v, _, _ = predict(st, con, horizon[a])

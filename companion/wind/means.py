@@ -19,6 +19,7 @@ _MEMORY_S = 3600.0
 _FIRST_RAD = 0.22        # [rad] expected rms error at 60 s before any has been seen, growing as h^0.25
 _FIRST_MPS = 0.8
 _ERROR_MAX_RAD = 1.5
+_NOTHING = 1e-6          # what rounding leaves of sums that are empty
 
 
 class RollingMean(Base):
@@ -30,7 +31,7 @@ class RollingMean(Base):
         super().__init__()
         self.name = f"mean{window_s:g}"
         self._window_s = window_s
-        # (time, sin, cos, speed, weight); readings closer than a 400th of the window share a place.
+        # (time, sin, cos, speed, its weight); readings closer than a 400th of the window share a place.
         self._window: deque[tuple[float, float, float, float, float]] = deque(maxlen=512)
         self._sums = [0.0, 0.0, 0.0, 0.0]
         self._appended = 0
@@ -43,13 +44,13 @@ class RollingMean(Base):
         self._square_speed = [0.0] * len(_KNOTS_S)
         self._weight = [0.0] * len(_KNOTS_S)
 
-    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float) -> None:
+    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float) -> None:
         self._clock_s += dt_s
         now = self._clock_s
         self._score(x_rad, speed_mps, weight)
-        if weight <= 0.0:
+        if weight <= 0.0 and speed_weight <= 0.0:
             return
-        new = (now, weight * math.sin(x_rad), weight * math.cos(x_rad), weight * speed_mps, weight)
+        new = (now, weight * math.sin(x_rad), weight * math.cos(x_rad), speed_weight * speed_mps, speed_weight)
         if len(self._window) > 1 and now - self._window[-2][0] < self._window_s / 400.0:
             _, s, c, v, w = self._window.pop()
             new = (now, new[1] + s, new[2] + c, new[3] + v, new[4] + w)
@@ -63,7 +64,11 @@ class RollingMean(Base):
         if self._appended % 1000 == 0:      # what rounding has left behind
             self._sums = [sum(row[i] for row in self._window) for i in range(1, 5)]
         s, c, v, w = self._sums
-        self._mean, self._speed = math.atan2(s, c), v / w
+        # A window without a direction, or without a speed, keeps the last.
+        if math.hypot(s, c) > _NOTHING:
+            self._mean = math.atan2(s, c)
+        if w > _NOTHING:
+            self._speed = v / w
         if not self._kept or now - self._kept[-1][0] >= _EVERY_S - 1e-6:
             if len(self._kept) == self._kept.maxlen:
                 self._dropped += 1

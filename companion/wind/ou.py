@@ -37,13 +37,16 @@ class OrnsteinUhlenbeck(Base):
         self._xx, self._xy, self._yy = _FIRST_VARIANCE, _FIRST_VARIANCE * math.exp(-lag_s / 120.0), _FIRST_VARIANCE
         self._speed = self._speed_variance = 0.0
 
-    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float) -> None:
+    def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float) -> None:
         if dt_s == 0.0:
             self._slow = self._mean = self._last = x_rad
             self._speed, self._speed_variance = speed_mps, max(0.25, 0.1 * speed_mps) ** 2
             self._past.append((0.0, x_rad))
             return
         self._clock_s += dt_s
+        deviation = speed_mps - self._speed
+        self._speed += speed_weight * gain(dt_s, 20.0) * deviation
+        self._speed_variance += speed_weight * gain(dt_s, 600.0) * (deviation**2 - self._speed_variance)
         if weight <= 0.0:
             return
         # Unwrap against a slow mean, never against the last reading: one wild reading must not slip a turn.
@@ -53,9 +56,6 @@ class OrnsteinUhlenbeck(Base):
         # A young mean is a plain average, later exponential.
         self._mean += weight * gain(dt_s, min(self._mean_s, max(30.0, self._seen_s))) * (x - self._mean)
         self._last += weight * gain(dt_s, 1.5) * (x - self._last)
-        deviation = speed_mps - self._speed
-        self._speed += weight * gain(dt_s, 20.0) * deviation
-        self._speed_variance += weight * gain(dt_s, 600.0) * (deviation**2 - self._speed_variance)
         while len(self._past) > 1 and self._past[1][0] <= self._clock_s - self._lag_s + 0.5 * _CELL_S:
             self._past.popleft()
         then_s, then = self._past[0]

@@ -89,10 +89,12 @@ class WindRoom:
         if sample.source is WindSource.AUTOPILOT_TRUE:
             extra = self._lost_to_filter(sample)
             status = replace(status, extra_sigma_rad=math.hypot(status.extra_sigma_rad, extra))
-        self._status = replace(status, sample=replace(sample, quality=_quality(sample, status)))
+        judged = status.sample or sample
+        self._status = replace(status, sample=replace(judged, quality=_quality(judged, status)))
         # A reading that is not believed is not fed at all: the forecast then ages, and widens, by itself.
-        if status.weight > 0.0:
-            self._estimator.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight)
+        if max(status.weight, status.speed_weight) > 0.0:
+            self._estimator.update(
+                judged.t_s, judged.twd_from_rad, judged.tws_mps, weight=status.weight, speed_weight=status.speed_weight)
 
     def _lost_to_filter(self, sample: WindSample) -> float:
         """Return the sigma [rad] that the autopilot's low pass took out of the wind.

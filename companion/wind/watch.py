@@ -9,14 +9,14 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.geo.angles import wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
 from companion.wind.estimator import gain
 from companion.wind.faults import FrozenVane, Spikes, TackOffset
 from companion.wind.parameters import VaneParameters
-from companion.wind.true_wind import LIGHT_MPS, apparent_wind
+from companion.wind.true_wind import LIGHT_MPS, apparent_wind, true_wind
 
 
 class Verdict(enum.Enum):
@@ -40,9 +40,10 @@ class WindStatus:
     """What is known about the wind's source at ``t_s``.
 
     The forecast's sigma is widened to hypot(``widening`` sigma, ``extra_sigma_rad``); ``weight`` in 0..1 is how far
-    the last sample moved the estimate. ``offset_rad`` is the estimated mounting error of the vane, positive when it
-    reads too far clockwise, ``side_rad`` what it reads too wide on both tacks; None when the boat has not tacked
-    enough to tell. ``sample`` is the last sample with the quality that it was given. ``reason`` is one line of text.
+    the last sample moved the estimate of the direction, ``speed_weight`` that of the speed. ``offset_rad`` is the
+    estimated mounting error of the vane, positive when it reads too far clockwise, ``side_rad`` what it reads too wide
+    on both tacks; None when the boat has not tacked enough to tell. ``sample`` is the last sample with the quality
+    that it was given. ``reason`` is one line of text.
     """
 
     t_s: float
@@ -55,6 +56,7 @@ class WindStatus:
     age_s: float | None
     reason: str
     side_rad: float | None = None
+    speed_weight: float = 1.0
 
     @property
     def is_good(self) -> bool:
@@ -113,7 +115,9 @@ class WindWatch:
     def apparent(self, wind: ApparentWind) -> None:
         """Take what the boat feels."""
         self._apparent = wind
-        if self._vehicle is not None and abs(wind.t_s - self._vehicle.t_s) <= _NEAR_S and wind.aws_mps > 0.0:
+        if wind.aws_mps < LIGHT_MPS:
+            self._frozen.rest()      # so little wind turns no vane: that it stands still says nothing of it
+        elif self._vehicle is not None and abs(wind.t_s - self._vehicle.t_s) <= _NEAR_S:
             self._frozen.update(wind.t_s, wind.awa_rad, self._vehicle.heading_rad)
 
     # ------------------------------------------------------------------------------------------ judging
@@ -124,6 +128,11 @@ class WindWatch:
         self._last = sample
         found: list[tuple[Verdict, str]] = []
         widening, extra, weight = 1.0, 0.0, 1.0
+        # A calm is measured: it has a speed, whatever its direction is worth. All else that is doubted is not fed.
+        calm_weight = 1.0
+        is_held, measured = self._is_held(sample, last), self._measured(sample)
+        if is_held and measured is not None:
+            sample = replace(sample, tws_mps=measured.tws_mps)
 
         has_no_speed = self._lacks_speed(sample, dt_s)
         self._speed_mps += (1.0 if last is None else gain(dt_s, 10.0)) * (sample.tws_mps - self._speed_mps)
@@ -135,14 +144,15 @@ class WindWatch:
             found.append((Verdict.CALM, f"{self._speed_mps:.1f} m/s is too little for a direction"))
             lack = 1.0 - self._speed_mps / LIGHT_MPS
             widening *= 1.0 + 2.0 * lack
-            weight = min(weight, 1.0 - 0.8 * lack) if sample.tws_mps >= _DEAD_MPS else 0.0
+            calm_weight = 1.0 - 0.8 * lack if sample.tws_mps >= _DEAD_MPS else 0.0
         if self.parameters.is_direction_invented:
             found.append((Verdict.SYNTHESISED, f"WNDVN_TYPE {self.parameters.vane_type}: the direction is invented"))
             extra = math.hypot(extra, _INVENTED_RAD)
-        if self._is_held(sample, last):
+        if is_held:
             found.append((Verdict.HELD, "the autopilot repeats an old true wind"))
             widening *= 1.0 + min(2.0, (t - self._same_s) / 60.0)
-            weight = 0.0
+            calm_weight = 0.0
+            weight = weight if measured is not None else 0.0
         is_turning = sample.quality is WindQuality.TURNING or t - self._turn_s < _LAG_S
         if is_turning:
             found.append((Verdict.TURNING, "the boat turns: vane and compass lag"))
@@ -176,15 +186,31 @@ class WindWatch:
             widening *= 1.0 + min(1.0, self._gap_s / 300.0) * (1.0 - (t - self._back_s) / _RETURN_S)
         return WindStatus(
             t_s=t, verdicts=tuple(v for v, _ in found) or (Verdict.GOOD,), widening=widening, extra_sigma_rad=extra,
-            weight=weight, offset_rad=self.tacks.offset_rad, side_rad=self.tacks.side_rad, sample=sample, age_s=0.0,
+            weight=min(weight, calm_weight), speed_weight=weight, offset_rad=self.tacks.offset_rad,
+            side_rad=self.tacks.side_rad, sample=sample, age_s=0.0,
             reason="; ".join(text for _, text in found) or "good",
         )
 
     def _lacks_speed(self, sample: WindSample, dt_s: float) -> bool:
-        """No speed sensor configured, or a speed of exactly nothing on a boat that sails."""
+        """No speed sensor configured or, where that is not known, a speed of exactly nothing on a boat that moves.
+
+        A boat that a current carries through a calm looks the same, but feels a wind as fast as she goes.
+        """
         self._zero_s = self._zero_s + dt_s if sample.tws_mps == 0.0 else 0.0
-        sails = self._vehicle is not None and self._vehicle.speed_mps > 0.5
-        return self.parameters.has_no_speed_sensor or (self._zero_s >= _ZERO_S and sails)
+        if self.parameters.speed_type is not None:
+            return self.parameters.has_no_speed_sensor
+        felt, boat = self._apparent, self._vehicle
+        if self._zero_s < _ZERO_S or boat is None or boat.speed_mps <= 0.5:
+            return False
+        is_heard = felt is not None and sample.t_s - felt.t_s < 3.0
+        return not (is_heard and felt is not None and 0.0 < felt.aws_mps < boat.speed_mps + LIGHT_MPS)
+
+    def _measured(self, sample: WindSample) -> WindSample | None:
+        """Return the true wind that vane and anemometer make at this instant, None when they are not heard."""
+        felt, boat = self._apparent, self._vehicle
+        if felt is None or boat is None or max(abs(sample.t_s - felt.t_s), abs(felt.t_s - boat.t_s)) > _NEAR_S:
+            return None
+        return true_wind(felt, boat)
 
     def _is_held(self, sample: WindSample, last: WindSample | None) -> bool:
         """Below WNDVN_SPEED_MIN, or bit for bit the same true wind while the boat moves."""

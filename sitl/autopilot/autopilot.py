@@ -392,6 +392,13 @@ class Autopilot:
         self.parameters.put("SIM_TIDE_SPEED", drift_mps)
         self.vehicle.load_parameters()
 
+    def run_motor(self, *, on: bool) -> None:
+        """Run the auxiliary motor, or not: there is no assistance in tacks here.
+
+        As on the real one (measured) nothing is said by a boat that has none.
+        """
+        self.vehicle.run_motor(on=on and self.config.has_motor)
+
     def set_vane(self, fault: VaneFault) -> None:
         """Break or mend the wind vane."""
         self.vehicle.set_vane_fault(fault.code, wrap_pi(fault.value_rad) if fault.value_rad else 0.0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
-from sitl.autopilot.helm import AUX_TACK
+from sitl.autopilot.helm import AUX_MOTOR, AUX_TACK
 from sitl.autopilot.links import GROUPS, LOOP_S, OPTIONAL_STREAMS, STREAMABLE, Link
 from sitl.autopilot.telemetry import BUILDERS, autopilot_version
 
@@ -69,6 +69,9 @@ def _dispatch(a: Autopilot, m: Any, link: Link, p: tuple[float, ...], place: tup
     if command == mav.MAV_CMD_DO_FENCE_ENABLE:
         return OK if a.switch_fence(enabled=p[0] == 1.0) else FAILED
     if command == mav.MAV_CMD_DO_AUX_FUNCTION:
+        if int(p[0]) == AUX_MOTOR:
+            a.run_motor(on=int(p[1]) == 2)
+            return OK
         if int(p[0]) != AUX_TACK:
             return FAILED
         if int(p[1]) == 2:

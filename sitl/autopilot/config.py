@@ -33,6 +33,7 @@ class AutopilotConfig:
         battery_v: at the start; ``Autopilot.set_battery`` changes it.
         has_ftp: offer MAVFTP; small boards are built without it.
         polar: of a boat that is not the simulator's own; None: hers.
+        has_motor: an auxiliary motor, run by DO_AUX_FUNCTION 74.
         new_parameter_names: answer to ArduPilot 4.7's names (MAV_SYSID) instead of the older ones.
     """
 
@@ -48,6 +49,7 @@ class AutopilotConfig:
     new_parameter_names: bool = False
     has_ftp: bool = True
     polar: Polar | None = None
+    has_motor: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

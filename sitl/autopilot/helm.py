@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot
 
 GUIDED_TIMEOUT_S = 3.0
-AUX_TACK = 63
+AUX_TACK, AUX_MOTOR = 63, 74
 # Entering one of these gives the navigation its limits of acceleration and jerk.
 NAVIGATING = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL})
 KNOWN = frozenset({

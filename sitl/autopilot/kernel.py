@@ -59,6 +59,8 @@ STEER_OFF, STEER_HOLD, STEER_LEG, STEER_LOITER, STEER_HEADING, STEER_RATE = rang
 FAULT_NONE, FAULT_FROZEN, FAULT_OFFSET, FAULT_SPIKES = range(4)
 REACHED, TACKED, TACK_TIMED_OUT = 1, 2, 4
 
+MOORED, ANCHORED = 1.0, 2.0       # in S_MOORED: until it is armed; whatever it does
+
 NOGO_PAD_RAD = math.radians(10.0)
 TACK_DONE_RAD = math.radians(10.0)
 TACK_TIMEOUT_S = 5.0
@@ -66,6 +68,7 @@ TACK_RETRY_S = 5.0
 TACK_REQUEST_S = 0.5
 MASS_KG = 2.0
 POLAR_STEP_MPS = 0.5
+MOTOR_MPS = 2.0                   # speed under the auxiliary motor: what a small boat's makes
 TURNING_CIRCLE_M = 1.8
 RUDDER_MAX_RAD = math.radians(35.0)
 WIND_DELAY_S = 5.0
@@ -155,8 +158,8 @@ def _hull(s: Vector, p: Vector, polar: NDArray[np.float64]) -> None:
             force = _polar_force(speed, force, awa, s[S_SAIL], p[P_IDEAL])
         rate = v * math.sin(s[S_RUDDER] * RUDDER_MAX_RAD) * 2.0 / (TURNING_CIRCLE_M * math.sin(RUDDER_MAX_RAD))
         if s[S_MOTOR] > 0.0:
-            # a motorboat: full throttle balances the drag at WP_SPEED 5 m/s, and a rudder in its wash turns it
-            force = s[S_THROTTLE] * 0.5 * 25.0
+            # the auxiliary motor, with the sails down: full throttle balances the drag at MOTOR_MPS
+            force = s[S_THROTTLE] * 0.5 * MOTOR_MPS * MOTOR_MPS
         drag = 0.5 * v * abs(v)
         v += (force - drag) / MASS_KG * dt
         half = yaw + 0.5 * rate * dt
@@ -444,6 +447,8 @@ def _control(s: Vector, p: Vector) -> int:
             thrust = 0.0
     elif steer == STEER_LOITER:
         heading, events = _loiter(s, p)
+        if s[S_MOTOR] > 0.0 and s[S_DIST] <= p[P_LOITER_RADIUS]:
+            thrust = 0.0
     elif steer == STEER_HEADING:
         heading, thrust = s[S_WANT_YAW], s[S_THRUST]
     else:
@@ -481,7 +486,9 @@ def advance(
         a = _alpha(LOOP_S, 1.0 / max(p[P_WIND_TC], 0.1))
         s[S_WSPD] += a * (wind[i, 1] - s[S_WSPD])
         s[S_WDIR] = _wrap(s[S_WDIR] + a * _wrap(wind[i, 0] - s[S_WDIR]))
-        if not (s[S_MOORED] and not s[S_ARMED]):
+        if s[S_MOORED] == ANCHORED:
+            s[S_V], s[S_VE], s[S_VN], s[S_RATE] = 0.0, 0.0, 0.0, 0.0
+        elif not (s[S_MOORED] and not s[S_ARMED]):
             _hull(s, p, polar)
         if tick % VANE_LOOPS == 0:
             _vane(s, p, noise[done] if noise.shape[0] > 0 else 1.0)

@@ -245,6 +245,14 @@ class Vehicle:
         """Break or mend the wind vane."""
         self.state[k.S_VANE_FAULT], self.state[k.S_VANE_VALUE] = fault, value_rad
 
+    def anchor(self, *, down: bool) -> None:
+        """Let go the anchor, which holds at once, or weigh it."""
+        self.state[k.S_MOORED] = k.ANCHORED if down else 0.0
+
+    def run_motor(self, *, on: bool) -> None:
+        """Run the auxiliary motor in place of the sails, or not."""
+        self.state[k.S_MOTOR] = float(on)
+
     def set_position_error(self, east_m: float, north_m: float) -> None:
         """Let the autopilot believe that it is so far from where it is."""
         self.state[k.S_GPS_E], self.state[k.S_GPS_N] = east_m, north_m

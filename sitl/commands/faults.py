@@ -13,8 +13,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "faults", help=summary,
         description="Sail a short voyage many times, each with faults drawn from its seed: bad and cut links, broken "
         "vanes, false positions, wind shifts and calms, a planner that dies or hangs, a companion that is killed, an "
-        "autopilot that reboots, an operator, a stranger's mission. None may end in contact, in a mission that is a "
-        "mixture, in silence or in an unhandled error. A failing seed is printed and repeats exactly.",
+        "autopilot that reboots, an operator, a stranger's mission. None may end in a contact of the hull that was to "
+        "be helped, below the margin's floor in ordinary weather, in a mission that is a mixture, in silence or in an "
+        "unhandled error. A failing seed is printed and repeats exactly.",
         epilog="Example: sitl faults --runs 1000, then sitl faults --first-seed 17 --keep v",
     )
     parser.add_argument("--runs", type=int, default=1000, metavar="N", help="seeds to sail (default: 1000)")

@@ -31,7 +31,7 @@ def test_plans_dies_hangs_and_comes_back():
 
             os.kill(worker.pid, signal.SIGSTOP)
             hung = await worker.plan(p, budget_s=0.1)
-            assert hung.status is PlanStatus.TIMEOUT
+            assert hung.status is PlanStatus.UNANSWERED
             assert "in time" in hung.reason
             assert worker.restarts == 2
             assert (await worker.plan(p, expansions=3_000)).has_path
@@ -43,7 +43,7 @@ def test_a_worker_that_cannot_start_is_an_outcome():
     async def main():
         async with PlannerWorker(command=[sys.executable, "-c", "raise SystemExit(3)"]) as worker:
             answer = await worker.plan(Problem.from_json(simple()), budget_s=0.2)
-            assert answer.status is PlanStatus.TIMEOUT
+            assert answer.status is PlanStatus.UNANSWERED
             assert "died" in answer.reason
 
     run(main())

@@ -161,12 +161,13 @@ class Client:
 
 def sail(
     job: Callable[[Client], Awaitable[Any]], *, wind: Wind | None = None, seed: int = 1, is_warm: bool = True,
-    is_moored: bool = False, heading_deg: float = 0.0, **parameters: float,
+    is_moored: bool = False, has_motor: bool = False, heading_deg: float = 0.0, **parameters: float,
 ) -> Any:
     """Run ``job`` with a client of a boat, under the virtual clock."""
     async def main() -> Any:
         config = AutopilotConfig(
-            is_warm=is_warm, is_moored=is_moored, heading_rad=math.radians(heading_deg), parameters=parameters
+            is_warm=is_warm, is_moored=is_moored, heading_rad=math.radians(heading_deg), parameters=parameters,
+            has_motor=has_motor,
         )
         autopilot = Autopilot(config, wind or Constant(0.0, 5.0), seed)
         link = MemoryLink(seed=seed)

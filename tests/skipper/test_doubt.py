@@ -33,7 +33,8 @@ def lie(world):
 
 
 def is_near_an_island(world):
-    return world.state.phase is Phase.STANDARD and world.skipper.voyage.area.clearance_m([world.position])[0] < 30.0
+    sails = world.state.phase in {Phase.STANDARD, Phase.DESTINATION_APPROACH}
+    return sails and world.skipper.voyage.area.clearance_m([world.position])[0] < 30.0
 
 
 @pytest.mark.parametrize("stays_s", [4, 15])

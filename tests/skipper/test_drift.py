@@ -37,7 +37,7 @@ def test_beyond_the_horizon_and_away_it_is_clear():
         ahead = drift_ahead(area(ROCK), (0.0, 0.0), velocity, floor_m=8.0, horizon_s=horizon_s)
         assert ahead.is_clear
         assert ahead.name == ""
-    assert drift_ahead(area(), (0.0, 0.0), (1.0, 0.0), floor_m=8.0).sentence() == "drifting 1.0 m/s towards 090°, clear"
+    assert drift_ahead(area(), (0.0, 0.0), (1.0, 0.0), floor_m=8.0).sentence() == "drifting 1 m/s towards 090°, clear"
 
 
 def test_a_boat_that_lies_still_too_near_is_there_already():

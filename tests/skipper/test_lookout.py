@@ -1,6 +1,7 @@
 """The lookout: alarms are said when they rise, with rule and role; the mission's safe distance and time count."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -74,20 +75,38 @@ def test_power_gives_way_to_sail_and_is_shown_so():
     assert encounter.must_act(turn.state.watch[0].alarm)           # and is kept clear of all the same
 
 
-def test_an_alarm_that_rises_is_said_at_once_and_one_that_stays_is_not_said_each_second():
+def test_a_vessel_has_one_line_in_half_a_minute_whatever_its_alarm_does():
     world = make()
     world.run(60)
-    first = turn_among(world=world)
-    first = turn_among(coming(first, away_m=500.0), world=world)
-    look_out(first)
-    world.state = first.state
-    again = turn_among(coming(first, away_m=490.0), world=world)
-    look_out(again)
-    assert not said(again)
-    world.state = again.state
-    nearer = turn_among(coming(first, away_m=200.0), world=world)
-    look_out(nearer)
-    assert [a.severity for a in said(nearer)] == [Severity.CRITICAL]
+    heard = []
+    for k in range(70):
+        turn = turn_among(world=world)
+        turn = turn_among(coming(turn, away_m=(500.0, 200.0, 1500.0)[k % 3]), world=world)
+        look_out(turn)
+        world.state = turn.state
+        heard += [world.t for _ in said(turn)]
+        world.t += 1.0
+    assert len(heard) == 3
+    assert all(b - a >= 30.0 for a, b in pairwise(heard))
+
+
+def test_among_many_one_line_comes_a_step_and_the_worst_first():
+    world = make()
+    world.run(60)
+    heard = []
+    for _ in range(60):
+        turn = turn_among(world=world)
+        turn = turn_among(*(coming(turn, away_m=150.0 + 20.0 * i, mmsi=300 + i) for i in range(30)), world=world)
+        look_out(turn)
+        world.state = turn.state
+        assert len(said(turn)) <= 1
+        heard += [(world.t, int(a.text[:3])) for a in said(turn)]
+        world.t += 1.0
+    assert [mmsi for _, mmsi in heard[:SHOWN]] == list(range(300, 300 + SHOWN))
+    for mmsi in {m for _, m in heard}:
+        times = [t for t, m in heard if m == mmsi]
+        assert all(b - a >= 30.0 for a, b in pairwise(times))
+    assert len(heard) == 2 * SHOWN
 
 
 def test_only_the_worst_are_kept_and_nobody_when_all_have_gone():

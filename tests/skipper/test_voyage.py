@@ -10,6 +10,8 @@ from shapely.geometry import box
 
 from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, Mode, StatusText
+from companion.planner import PlanStatus
+from companion.planner.worker import failed
 from companion.skipper import actions as act
 from companion.skipper.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
 from companion.skipper.geometry import bearing_rad, distance_m, moved
@@ -408,8 +410,13 @@ def test_after_a_reboot_without_permission_it_waits():
 
 
 # -------------------------------------------------------------------------------------- nothing found
+def nothing(problem, seed):
+    """Answer as a planner that has looked and found no path."""
+    return replace(failed("none was found", seed=seed, algorithm="auto"), status=PlanStatus.TIMEOUT)
+
+
 def test_nothing_found_climbs_down_the_ladder_and_backs_off():
-    world = make(planner=lambda problem, seed: None)
+    world = make(planner=nothing)
     world.run(1800)
     asked = world.count(act.RequestPlan)
     assert 10 < asked < 120
@@ -421,7 +428,7 @@ def test_nothing_found_climbs_down_the_ladder_and_backs_off():
 def test_an_old_plan_that_is_sound_stays_when_nothing_better_is_found():
     world = make(wind=lambda t: (0.0, 5.0))
     assert world.run(60, is_sailing)
-    world.planner = lambda problem, seed: None
+    world.planner = nothing
     assert world.run(1500, is_done)
     assert said(world, "no plan")
     assert world.count(act.UploadMission) == 1

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
+import shapely
 
 from companion.mavlink.identity import Identity
 from companion.messages import Mode, StatusText
@@ -34,7 +35,7 @@ from companion.skipper.state import Phase
 from companion.skipper.voyage import Goal, Side
 from companion.skipper.watchdogs import TABLE
 from companion.traffic import TrafficPicture
-from tests.skipper.test_voyage import make
+from tests.skipper.test_voyage import ISLANDS, make
 from tests.skipper.world import check_invariants
 from tests.traffic.conftest import vessel
 
@@ -82,10 +83,11 @@ def states():
     near.extra = {"traffic": on_collision_course(near.snapshot())}
     near.run(20, lambda w: w.state.by_field.seen_guided)
     keep("last resort", near)
-    fresh.run(1500, lambda w: w.state.phase is Phase.DESTINATION_APPROACH)
-    keep("destination approach", fresh)
-    fresh.run(1500, lambda w: w.state.phase is Phase.DONE)
-    keep("done", fresh)
+    there = make()
+    there.run(1500, lambda w: w.state.phase is Phase.DESTINATION_APPROACH)
+    keep("destination approach", there)
+    there.run(1500, lambda w: w.state.phase is Phase.DONE)
+    keep("done", there)
     buoys = make(Goal(en_m=(0.0, 60.0), side=Side.PORT), Goal(en_m=(-60.0, 30.0), side=Side.PORT), obstacles=())
     buoys.run(900, lambda w: w.state.phase is Phase.BUOY_APPROACH)
     keep("buoy approach", buoys)
@@ -140,6 +142,14 @@ def beside(snapshot, state):
     return moved(snapshot.position_en_m, heading + math.pi / 2, 22.0)
 
 
+def towards_an_island(snapshot, in_s=200.0):
+    """Return the velocity that a boat without wind drifts onto the nearest island with."""
+    here = snapshot.position_en_m
+    island = min(ISLANDS, key=lambda p: p.distance(shapely.Point(here)))
+    there = island.representative_point()
+    return (there.x - here[0]) / in_s, (there.y - here[1]) / in_s
+
+
 def on_collision_course(snapshot, gap_m=90.0):
     """Return the picture of a boat of 12 m that is ``gap_m`` to the east and comes straight at ours."""
     east, north = snapshot.position_en_m
@@ -157,6 +167,9 @@ EVENTS = {
     "wind untrusted": wind(health=WindHealth.UNTRUSTED, verdict="frozen"),
     "becalmed": lambda s: replace(
         vehicle(velocity_en_mps=(0.0, 0.0))(s),
+        wind=replace(s.wind, health=WindHealth.LIGHT, mean_tws_mps=0.1, present_tws_mps=0.1)),
+    "drifting": lambda s: replace(
+        vehicle(velocity_en_mps=towards_an_island(s))(s),
         wind=replace(s.wind, health=WindHealth.LIGHT, mean_tws_mps=0.1, present_tws_mps=0.1)),
     "in irons": lambda s: replace(
         vehicle(velocity_en_mps=(0.0, -0.1), heading_rad=s.wind.present_twd_from_rad or 0.0)(s)),
@@ -281,7 +294,7 @@ def test_a_plan_that_comes_with_the_takeover_is_not_uploaded():
 # ------------------------------------------------------------------------------------------ watchdogs
 # The state each is looked for in, and whether its own event alone raises it within its time.
 # Those that need a track behind them are looked at one by one below and in the voyages.
-TRACKS = {"no progress", "stuck waypoint", "position jump", "reboot", "out of time", "dragged off"}
+TRACKS = {"no progress", "stuck waypoint", "position jump", "reboot", "out of time", "dragged off", "drifting"}
 
 
 @pytest.mark.parametrize("dog", [d for d in TABLE if d.name not in TRACKS], ids=lambda dog: dog.name)

@@ -109,6 +109,10 @@ class World:
     identity: Identity = field(default_factory=lambda: Identity(
         system=1, uid="5a", is_confirmed=True, vehicle_type=11, frame_class=2, sails=True))
     drift_mps: float = 0.0      # along the heading, while nobody sails
+    current: Callable[[float], tuple[float, float]] = lambda t: (0.0, 0.0)   # of the water, east north
+    motor: bool = False         # it runs
+    tack_asked: bool = False    # heard on a leg that is beaten
+    turning_to: float = 0.0     # the tack that a turn through the wind ends on, 0 when there is none
     uploads_fail: Callable[[int], UploadResult] = lambda n: UploadResult.OK
     planner: Callable | None = None
     state: SkipperState | None = None
@@ -141,6 +145,11 @@ class World:
         return FRAME.en_from_geo(item.point)
 
     def sail(self, dt: float) -> None:
+        water = self.current(self.t)
+        self.position = (self.position[0] + dt * water[0], self.position[1] + dt * water[1])
+        if self.motor:          # it keeps the boat where it is
+            self.speed, self.position = 0.0, (self.position[0] - dt * water[0], self.position[1] - dt * water[1])
+            return
         twd, tws = self.wind(self.t)
         if self.mode is Mode.GUIDED and self.armed and self.steer is not None and self.t < self.steer_until:
             want = self.steer
@@ -188,9 +197,12 @@ class World:
         tack = 1.0 if difference_rad(twd, self.heading) >= 0.0 else -1.0
         off = cross_track_m(self.position, self.leg_from, target)
         out = self.corridor > 0.0 and abs(off) >= self.corridor and (off > 0.0) == (tack < 0.0)
-        if out and self.t - self.last_tack > 5.0:
-            tack, self.last_tack, self.tacks = -tack, self.t, self.tacks + 1
-        return wrap_pi(twd - tack * self.no_go)
+        asked, self.tack_asked = self.tack_asked, False
+        if (out or asked) and self.t - self.last_tack > 5.0:
+            self.turning_to, self.last_tack, self.tacks = -tack, self.t, self.tacks + 1
+        if self.turning_to == tack:
+            self.turning_to = 0.0          # through the wind
+        return wrap_pi(twd - (self.turning_to or tack) * self.no_go)
 
     # ----------------------------------------------------------------------------------- application
     def carry_out(self, action: act.Action) -> None:
@@ -203,7 +215,7 @@ class World:
             later((self.t + self.upload_s, "upload", action))
         elif isinstance(action, act.ReadMission):
             later((self.t + 0.5, "read", action))
-        elif isinstance(action, (act.SetMode, act.Arm, act.SetCurrent)):
+        elif isinstance(action, (act.SetMode, act.Arm, act.SetCurrent, act.RunMotor, act.Tack)):
             later((self.t + 0.1, "command", action))
         elif isinstance(action, act.SteerHeading):
             self.steer, self.steer_until = action.heading_rad, self.t + 3.0
@@ -248,6 +260,10 @@ class World:
         elif isinstance(action, act.Arm):
             self.armed = True
             self.set_mode(self.mode)
+        elif isinstance(action, act.Tack):
+            self.tack_asked = True
+        elif isinstance(action, act.RunMotor):
+            self.motor = action.is_on
         elif isinstance(action, act.SetCurrent):
             if action.seq > len(self.mission):
                 return CommandOutcome(command_id=action.command_id, result=CommandResult.REFUSED, text="DENIED")
@@ -278,7 +294,8 @@ class World:
         short = [w for w in recent if w[0] > self.t - 5.0]
         present = math.atan2(sum(math.sin(w[1]) for w in short), sum(math.cos(w[1]) for w in short))
         here = (self.position[0] + self.position_offset[0], self.position[1] + self.position_offset[1])
-        velocity = (self.speed * math.sin(self.heading), self.speed * math.cos(self.heading))
+        water = (0.0, 0.0) if self.motor else self.current(self.t)
+        velocity = (self.speed * math.sin(self.heading) + water[0], self.speed * math.cos(self.heading) + water[1])
         vehicle = VehicleState(t_s=self.t, boot_s=self.boot_s + self.t, position=FRAME.geo_from_en(*here),
                                velocity_en_mps=velocity, heading_rad=self.heading)
         status = AutopilotStatus(

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from time import process_time
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.messages import AisReport, GeoPoint
+from companion.compose import config_of, permissions_of, voyage_of
+from companion.fold import VoyageFold
+from companion.geofence import load_mission
+from companion.messages import AisReport, GeoPoint, VehicleState
+from companion.skipper import Skipper
 from companion.traffic import Change, TargetLimits, Targets
 from companion.traffic.nmea import NmeaDecoder
+from companion.wind import WindRoom
 from tests.traffic.conftest import FRAME, report
 
 
@@ -113,6 +119,38 @@ def test_the_number_of_vessels_is_bounded_and_the_farthest_goes() -> None:
     assert len(p.vessels) == 20
     assert max(v.antenna_en_m[0] for v in p.vessels) < 2000.0
     assert p.counts.forgotten == 40
+
+
+def test_far_from_the_start_it_is_the_boats_own_surroundings_that_stay() -> None:
+    """A harbour of 400 at the start, and a ship 200 m ahead of a boat that has come 15 km."""
+    t, here = Targets.empty(FRAME), (0.0, 15_000.0)
+    for k in range(400):
+        t = t.heard(report(0.0, (10.0 * k, 0.0), mmsi=1000 + k))
+    t = t.heard(report(5.0, (0.0, 15_200.0), mmsi=77), here)
+    assert 77 in {v.mmsi for v in t.picture(5.0).vessels}
+    assert len(t.picture(5.0).vessels) == 400
+    assert 1399 not in {v.mmsi for v in t.picture(5.0).vessels}
+    t = t.heard(report(6.0, (0.0, 70_000.0), mmsi=78), here)         # 70 km from the start, and 55 from us
+    t = t.heard(report(6.0, (0.0, -46_000.0), mmsi=79), here)        # the other way round
+    assert t.counts.far == 1
+
+
+def test_the_voyage_tells_the_targets_where_its_boat_is() -> None:
+    mission = load_mission(Path("missions/open-water.toml"))
+    voyage = voyage_of(mission)
+    fold = VoyageFold(Skipper(voyage=voyage, config=config_of(mission)), WindRoom(), permissions_of(mission))
+
+    def hear(t_s: float, en: tuple[float, float], mmsi: int) -> None:
+        fold.take(AisReport(t_s=t_s, mmsi=mmsi, position=voyage.frame.geo_from_en(*en)))
+
+    for k in range(400):
+        hear(0.0, (10.0 * k, 0.0), 1000 + k)
+    there = voyage.frame.geo_from_en(0.0, 15_000.0)
+    fold.take(VehicleState(t_s=5.0, boot_s=5.0, position=there, velocity_en_mps=(0.0, 2.0), heading_rad=0.0))
+    hear(5.0, (0.0, 15_200.0), 77)
+    picture = fold.tick(5.0).snapshot.traffic
+    assert picture is not None
+    assert 77 in {v.mmsi for v in picture.vessels}
 
 
 numbers = st.one_of(st.none(), st.floats(allow_nan=True, allow_infinity=True))
