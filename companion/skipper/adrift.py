@@ -230,7 +230,7 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
     if status.mode is Mode.LOITER and state.own_mode is Mode.LOITER:
         place = memory.loiter_en_m if memory.loiter_en_m is not None else turn.boat_en
         turn.update(adrift=replace(memory, loitered=True, loiter_en_m=place))
-        turn.phase(Phase.HOLDING, f"{what}, {how}: loitering until she can sail")
+        turn.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until she can sail")
         return True
     if status.mode is not Mode.AUTO or memory.loitered or ahead is None:
         return False

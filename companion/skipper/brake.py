@@ -50,7 +50,7 @@ def brakes(turn: Turn) -> bool:
     met = ahead_of(turn)
     if met is None or is_busy(turn, Mode.LOITER.name):
         return False
-    text = f"{met.name} is {met.floor_s or 0.0:.0f} s ahead, too near to plan round: loitering first"
+    text = f"{met.name} is {met.floor_s or 0.0:.0f} s ahead, too near to plan round: waiting in a loiter for a plan"
     if not set_mode(turn, Mode.LOITER, text):
         return False
     turn.update(after_operator=True)

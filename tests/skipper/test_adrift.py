@@ -11,7 +11,8 @@ from companion.messages import Mode
 from companion.skipper import actions as act
 from companion.skipper.adrift import CALL, MEANS
 from companion.skipper.drift import drift_ahead
-from companion.skipper.state import Persisted, Phase
+from companion.skipper.saved import Persisted
+from companion.skipper.state import Phase
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import Goal
 from tests.skipper.test_voyage import is_done, make, said

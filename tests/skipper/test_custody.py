@@ -10,8 +10,9 @@ import pytest
 from companion.mavlink.identity import Identity
 from companion.messages import MissionItem, Mode
 from companion.skipper import actions as act
+from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import OperatorWish
-from companion.skipper.state import Persisted, Phase
+from companion.skipper.state import Phase
 from tests.skipper.test_voyage import is_done, is_sailing, make, said
 
 ORDERS = (act.UploadMission, act.SetMode, act.Arm, act.SetCurrent, act.SteerHeading)

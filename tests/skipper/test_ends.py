@@ -9,7 +9,8 @@ from companion.messages import GeoPoint, Mode
 from companion.skipper import actions as act
 from companion.skipper.config import SafeEnd
 from companion.skipper.geometry import distance_m
-from companion.skipper.state import Persisted, Phase
+from companion.skipper.saved import Persisted
+from companion.skipper.state import Phase
 from companion.skipper.voyage import Goal
 from tests.skipper.test_failsafe import text
 from tests.skipper.test_voyage import is_done, make, said
