@@ -35,7 +35,7 @@ from companion.skipper.actions import Severity
 from companion.skipper.state import Phase
 from companion.telemetry.logbook import Logbook
 from companion.telemetry.names import STATE
-from companion.telemetry.progress import DISK
+from companion.telemetry.progress import DISK, left_behind
 from companion.telemetry.radio import Radio
 from companion.telemetry.recorder import Recorder
 from companion.telemetry.records import ais_record, outcome_record
@@ -56,16 +56,20 @@ OnStatus = Callable[[CompanionStatus, Step], None]
 
 async def sail(
     mission: Mission, transport: Transport, planner: Planner, folder: Path, options: SailOptions,
-    *, on_status: OnStatus | None = None, stop: asyncio.Event | None = None,
+    *, on_status: OnStatus | None = None, on_refusal: Callable[[str], None] | None = None,
+    stop: asyncio.Event | None = None,
 ) -> dict[str, Any]:
     """Sail ``mission`` and watch the boat at its end until stopped or out of time; return the summary.
+
+    ``on_status`` hears of every step, ``on_refusal`` of what was given and is not used (a saved state, a feed).
 
     Raises:
         LinkError: no autopilot was heard within ``options.wait_s``.
         JobError: the folder's name cannot be one, or another companion is recording there.
     """
     with Recorder(folder, disk=options.disk, shelf=options.shelf, is_durable=options.is_durable) as recorder:
-        shell = _Shell(mission, planner, recorder, options, on_status, stop or asyncio.Event())
+        shell = _Shell(mission, planner, recorder, options, stop or asyncio.Event())
+        shell.on_status, shell.on_refusal = on_status, on_refusal
         return await shell.run(transport)
 
 
@@ -73,11 +77,12 @@ class _Shell:
     """One voyage: the fold and everything around it that has a life."""
 
     def __init__(
-        self, mission: Mission, planner: Planner, recorder: Recorder, options: SailOptions,
-        on_status: OnStatus | None, stop: asyncio.Event,
+        self, mission: Mission, planner: Planner, recorder: Recorder, options: SailOptions, stop: asyncio.Event,
     ) -> None:
         self.mission, self.recorder, self.options = mission, recorder, options
-        self.planner, self.on_status, self.stop = planner, on_status, stop
+        self.planner, self.stop = planner, stop
+        self.on_status: OnStatus | None = None
+        self.on_refusal: Callable[[str], None] | None = None
         self.voyage = voyage_of(mission)
         self.config = config_of(mission)
         self.log = Logbook(recorder, self.config, options.epoch_s)
@@ -85,6 +90,7 @@ class _Shell:
             options.state_path or recorder.folder / STATE, disk=options.disk, offload=options.offload,
             is_durable=options.is_durable, pace=1.0 / options.budget_scale)
         self.status: CompanionStatus | None = None
+        self._step: Step | None = None
         self.end_reason = "stopped"
         self.loop_held_s = 0.0
         self._arrived_before = False
@@ -269,7 +275,7 @@ class _Shell:
         trouble = self._trouble()
         if trouble and not status.alert_code:
             status = replace(status, alert_code=DISK, alert_text=trouble)
-        self.status = status
+        self.status, self._step = status, step
         if self.on_status is not None:
             self.on_status(status, step)
 
@@ -281,7 +287,6 @@ class _Shell:
             f"nothing is recorded: {records}" if records else "") if text)
 
     # ----------------------------------------------------------------------------------- companions
-
     async def _watch_loop(self) -> None:
         """Measure how long the event loop was held: a timer that fires late was kept waiting by somebody."""
         while True:
@@ -300,6 +305,8 @@ class _Shell:
         """Record that something given is not used, and keep the sentence for the radio."""
         self.log.note(self.log.now_s(), {"kind": "refusal", "what": what, "text": text})
         self._refusals.append(text)
+        if self.on_refusal is not None:
+            self.on_refusal(text)
 
     def _summary(self) -> dict[str, Any]:
         state = self.fold.state
@@ -314,6 +321,7 @@ class _Shell:
             "end_phase": state.phase.value,
             "end_reason": self.end_reason,
             "end_why": state.why,
+            "left_behind": "" if self._step is None else left_behind(self._step),
             "ais_feeds": [feed.sentence() for feed in self.feeds.open_feeds],
             "ais_dropped": self.feeds.dropped,
             "frames_disbelieved": sum(self._counted.dropped[why] for why in (Drop.WRONG_CLOCK, Drop.OUT_OF_STEP)),

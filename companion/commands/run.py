@@ -153,6 +153,8 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
         return 2, f"not sailed: {name} had arrived before this start; --again sails it again"
     end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
     text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {summary['tacks']} tacks, {summary['replans']} replans"
+    if not summary["arrived"] and summary["left_behind"]:
+        text += f"\n{summary['left_behind']}"
     if summary["records_dropped"]:
         missing = f"{summary['records_dropped']} records are missing"
         text += "\n" + "; ".join(part for part in (missing, summary["disk_trouble"]) if part)
@@ -232,13 +234,16 @@ async def _sail(
             await ready
         except (TimeoutError, EOFError, OSError) as error:
             raise JobError(f"the planner's process did not start: {error!r}") from error
-        with ProgressLine(out) as progress, ServiceManager(os.environ) as manager:
+        chosen = options()
+        with ProgressLine(out, chosen.epoch_s) as progress, ServiceManager(os.environ) as manager:
 
             def show(status: Any, step: Any) -> None:
                 progress.show(status, step)
                 manager.alive(f"{step.state.phase.value}: {step.state.why}")
 
-            return await sail(mission, transport, planner, folder, options(), on_status=show, stop=stop)
+            return await sail(
+                mission, transport, planner, folder, chosen, on_status=show, stop=stop,
+                on_refusal=lambda text: out.write(f"note: {text}\n"))
 
 
 def _signing(path: Path | None) -> Any:

@@ -1,19 +1,29 @@
-"""The one live line of a voyage: on a terminal it is rewritten in place, elsewhere it is a line now and then."""
+"""A voyage on the console: what is announced as lines that stay, and below them how it stands.
+
+On a terminal the standing is rewritten in place, its sentence in full over as many lines as it takes; elsewhere it is a
+line now and then.
+"""
 
 from __future__ import annotations
 
 import math
 import shutil
+import textwrap
+from datetime import UTC, datetime
 from types import TracebackType
 from typing import Any, Protocol, Self
 
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
+from companion.messages import Mode
+from companion.skipper.actions import Announce, Severity
 from companion.skipper.state import Phase
 from companion.telemetry.records import sigma_ahead_rad
 
 # Without a terminal a line is written this often [s of the voyage], and whenever the phase changes.
 PLAIN_EVERY_S = 15.0
+LOUD = Severity.NOTICE   # what is said more quietly than this is in the records only
+COLUMNS_MOST = 120       # longer lines are hard to read
 DISK = "disk"   # the alert of trouble with the disk, which no state of the voyage tells
 
 
@@ -34,13 +44,16 @@ class Stream(Protocol):
 
 
 class ProgressLine:
-    """Shows steps on ``stream``. A context manager: the last line is left standing."""
+    """Shows steps on ``stream``. A context manager: the last lines are left standing.
 
-    def __init__(self, stream: Stream) -> None:
-        self._stream = stream
+    ``epoch_s`` is the Unix time [s] of the loop's time 0.
+    """
+
+    def __init__(self, stream: Stream, epoch_s: float = 0.0) -> None:
+        self._stream, self._epoch_s = stream, epoch_s
         self._is_terminal = stream.isatty()
         self._last: tuple[float, str] = (-math.inf, "")
-        self._dirty = False
+        self._standing = 0   # lines that are rewritten
 
     def __enter__(self) -> Self:
         return self
@@ -48,7 +61,7 @@ class ProgressLine:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._dirty:
+        if self._standing:
             self._stream.write("\n")
             self._stream.flush()
 
@@ -57,16 +70,36 @@ class ProgressLine:
         text = progress_text(step, getattr(status, "next_tack_s", None))
         if getattr(status, "alert_code", "") == DISK:
             text += f" | {status.alert_text}"
+        said = [self._said(step.snapshot.t_s, a) for a in step.actions
+                if isinstance(a, Announce) and a.severity <= LOUD]
         t_s, phase = step.snapshot.t_s, step.state.phase.value
         if self._is_terminal:
-            columns = shutil.get_terminal_size((120, 24)).columns
-            self._stream.write("\r" + text[:columns - 1].ljust(columns - 1))
+            columns = min(COLUMNS_MOST, shutil.get_terminal_size((COLUMNS_MOST, 24)).columns) - 1
+            back = f"\r\x1b[{self._standing - 1}A" if self._standing > 1 else "\r"
+            stays = "".join(f"{line}\n" for line in wrapped(said, columns))
+            standing = wrapped([text], columns)
+            # one write: a line that waits for its rest would flicker
+            self._stream.write(f"{back}\x1b[J{stays}" + "\n".join(standing))
             self._stream.flush()
-            self._dirty = True
-        elif t_s - self._last[0] >= PLAIN_EVERY_S or phase != self._last[1]:
-            self._stream.write(text + "\n")
-            self._stream.flush()
+            self._standing = len(standing)
+            return
+        is_due = t_s - self._last[0] >= PLAIN_EVERY_S or phase != self._last[1]
+        if is_due:
+            said.append(text)
             self._last = (t_s, phase)
+        if said:
+            self._stream.write("".join(f"{line}\n" for line in said))
+            self._stream.flush()
+
+    def _said(self, t_s: float, announced: Announce) -> str:
+        clock = datetime.fromtimestamp(self._epoch_s + t_s, UTC).strftime("%H:%M:%S")
+        loud = f"{announced.severity.name}: " if announced.severity <= Severity.WARNING else ""
+        return f"{clock} {loud}{announced.text}"
+
+
+def wrapped(lines: list[str], columns: int) -> list[str]:
+    """Return lines of at most ``columns`` characters."""
+    return [part for line in lines for part in textwrap.wrap(line, max(20, columns), subsequent_indent="    ") or [""]]
 
 
 def progress_text(step: Step, next_tack_s: float | None = None) -> str:
@@ -96,3 +129,18 @@ def progress_text(step: Step, next_tack_s: float | None = None) -> str:
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)
     return " | ".join(parts)
+
+
+def left_behind(step: Step) -> str:
+    """Return what the boat does without us: what a person who stops the companion has to know."""
+    status, route = step.snapshot.autopilot, step.state.route
+    if status is None:
+        return "the autopilot is not heard: what it does is not known"
+    if not status.is_armed:
+        return "the boat is disarmed"
+    if status.mode is not Mode.AUTO or route is None or step.state.foreign:
+        return f"the boat is left in {status.mode.name if status.mode is not None else 'an unknown mode'}, armed"
+    end = route.items[-1].point
+    left = len(route.items) - step.state.index
+    way = f"{left} items to go, the last a loiter" if left > 1 else "she loiters"
+    return f"the boat sails on in AUTO: {way} at {end.lat_deg:.5f}, {end.lon_deg:.5f}"

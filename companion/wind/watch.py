@@ -11,7 +11,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 
-from companion.geo.angles import wrap_pi
+from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
 from companion.wind.estimator import gain
 from companion.wind.faults import FrozenVane, Spikes, TackOffset
@@ -68,6 +68,7 @@ class WindStatus:
 _GAP_S = 10.0             # [s] without a sample is a gap
 _RETURN_S = 30.0          # [s] after it during which the estimate settles
 _HELD_S = 10.0            # [s] of the very same true wind on a boat that moves
+_AGREES_RAD, _AGREES_MPS = math.radians(10.0), 0.5   # vane and anemometer make the same true wind
 _HELD_BLIND_S = 20.0      # [s] likewise when the boat's motion is not known
 _ZERO_S = 10.0            # [s] of a speed of exactly nothing
 _NEAR_S = 1.5             # [s] vehicle and wind of one instant
@@ -225,7 +226,13 @@ class WindWatch:
         if least and self._apparent is not None and sample.t_s - self._apparent.t_s < 3.0:
             return self._apparent.aws_mps < least
         same_s = sample.t_s - self._same_s
-        return same_s >= _HELD_S and (self._has_moved or (self._vehicle is None and same_s >= _HELD_BLIND_S))
+        if same_s < _HELD_S or not (self._has_moved or (self._vehicle is None and same_s >= _HELD_BLIND_S)):
+            return False
+        # A wind that blows on unchanged, on a bench, is measured as the same again and again.
+        measured = self._measured(sample)
+        return measured is None or not (
+            abs(difference_rad(measured.twd_from_rad, sample.twd_from_rad)) <= _AGREES_RAD
+            and abs(measured.tws_mps - sample.tws_mps) <= _AGREES_MPS)
 
     def _frozen_for(self, t_s: float) -> float:
         """Return for how long the vane has been seen frozen [s], 0 when it is not."""

@@ -57,7 +57,7 @@ def folder(tmp_path_factory):
 
 
 def command(mission, link, *more):
-    return [*COMPANION, "run", mission, "--link", link, "--speedup", str(PACE), *more]
+    return [*COMPANION, "run", mission, "--link", link, "--speedup", str(PACE), "--exit-on-arrival", *more]
 
 
 def wait_for(what, seconds=PATIENCE_S):
@@ -72,10 +72,11 @@ def records(path):
 
 
 @pytest.fixture(scope="module")
-def first(link, folder):
+def first(link, folder, request):
     """The first mission, sailed through everything: its exit code, its folder, what a second companion said."""
     run = subprocess.Popen(command("first.toml", link, "--out", "first/v"), cwd=folder, text=True,
                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    request.addfinalizer(run.kill)
     assert run.stdout.readline()
     run.stdout.close()                                    # | head -1
     second = subprocess.run(command("second.toml", link, "--out", "first/w"), cwd=folder, text=True,

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from companion.geo.angles import wrap_pi
-from companion.messages import ApparentWind, WindQuality, WindSample, WindSource
-from companion.wind import VaneParameters, Verdict, WindRoom
-from tests.wind.boat import sail, turned, voyage
+from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
+from companion.wind import VaneParameters, Verdict, WindRoom, apparent_wind
+from tests.wind.boat import HERE, sail, turned, voyage
 
 QUIET = {Verdict.GOOD, Verdict.TURNING}
 
@@ -269,3 +269,22 @@ def test_wind_is_preferred_to_apparent_wind_while_it_comes():
 def test_widening_reaches_the_table():
     room = sail(seconds=300.0, parameters=VaneParameters(vane_type=2))[1]
     assert np.all(room.forecast_table(300.0).sigma_twd_rad >= math.radians(44.9))
+
+
+def test_a_steady_wind_over_a_drifting_boat_is_a_wind():
+    """On the bench it was "an old true wind", for ever (issue 13, point 5): vane and anemometer make the same one."""
+    room = WindRoom()
+    true = WindSample(t_s=0.0, twd_from_rad=0.0, tws_mps=5.0)
+    for t in range(180):
+        boat = VehicleState(t_s=float(t), boot_s=float(t), position=HERE, velocity_en_mps=(0.0, -0.9), heading_rad=0.0)
+        sample = replace(true, t_s=float(t))
+        room.update(boat)
+        room.update(apparent_wind(sample, boat))
+        assert Verdict.HELD not in room.update(sample).verdicts
+    later = replace(true, t_s=200.0, twd_from_rad=1.0)      # the same true wind, though the vane has turned
+    for t in range(180, 200):
+        boat = replace(boat, t_s=float(t))
+        room.update(boat)
+        room.update(apparent_wind(replace(later, t_s=float(t)), boat))
+        status = room.update(replace(true, t_s=float(t)))
+    assert Verdict.HELD in status.verdicts
