@@ -9,7 +9,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode
 from companion.skipper.actions import ReplanReason, Severity
 from companion.skipper.config import SafeEnd
-from companion.skipper.errands import home_trouble
+from companion.skipper.errands import FAR_M, home_trouble
 from companion.skipper.geometry import distance_m, leg_distance_m
 from companion.skipper.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning import lacks, request
@@ -19,6 +19,7 @@ from companion.skipper.turn import Turn
 from companion.skipper.uploads import upload
 
 ARRIVED_BEFORE = "all goals were reached before this start; --again sails the mission again"
+MAY_UPLOAD = "[operator] set_auto = true in the mission, and no --dry-run"
 STALE_S = 60.0           # a plan that waits for permission is renewed no more often than this
 
 
@@ -32,7 +33,7 @@ def start(turn: Turn) -> None:
         turn.phase(Phase.NEW_CALCULATION, "making the first plan")
         return
     if state.ready_route is not None and turn.t_s - state.ready_route.plan_t_s < 60.0:
-        turn.phase(Phase.WAITING, "a plan is ready; waiting for permission to upload it")
+        turn.phase(Phase.WAITING, f"a plan is ready; waiting for permission to upload it: {MAY_UPLOAD}")
         if snapshot.permissions.may_upload:
             upload(turn, state.ready_route, 1, "the first plan")
         return
@@ -50,7 +51,8 @@ def start(turn: Turn) -> None:
         wants.append(f"{turn.config.wind_settle_s - wind.record_s:.0f} s more of wind")
     wait_s = max(state.plan_retry.not_before_s, state.upload_retry.not_before_s) - turn.t_s
     if wait_s > 0.0:
-        wants.append(f"the next try in {wait_s:.0f} s")
+        wrong = _misplaced(turn)
+        wants.append(f"the next try in {wait_s:.0f} s" + (f": {wrong}" if wrong else ""))
     turn.update(wants=tuple(wants))
     if wants:
         turn.phase(Phase.WAITING, "waiting for " + ", ".join(wants))
@@ -59,6 +61,22 @@ def start(turn: Turn) -> None:
         turn.phase(Phase.NEW_CALCULATION, "making the first plan")
     else:
         turn.phase(Phase.WAITING, f"waiting for {lacks(turn) or 'the next try: no problem can be stated'}")
+
+
+def _misplaced(turn: Turn) -> str:
+    """Return what is wrong with where she lies, empty: nothing that would keep a plan from starting there."""
+    here = turn.boat_en
+    if here is None:
+        return ""
+    far_m = distance_m(here, turn.voyage.goals[0].en_m)
+    if far_m > FAR_M:
+        return f"she is {far_m / 1000.0:.0f} km from the first goal; is it the right mission, and the right home?"
+    clearance_m = float(turn.voyage.area.clearance_m([here])[0])
+    if clearance_m > 0.0:
+        return ""
+    if clearance_m < float(turn.voyage.area.unfenced.clearance_m([here])[0]):
+        return f"she is {-clearance_m:.0f} m outside the fence"
+    return f"her position is inside {turn.voyage.area.nearest_name(here) or 'an obstacle'}"
 
 
 def finished(turn: Turn) -> None:
@@ -113,11 +131,12 @@ def launch(turn: Turn) -> None:
     elif status.is_armed and status.mode is not Mode.AUTO:
         turn.phase(Phase.WAITING, f"armed in {mode}: waiting for the operator to give AUTO")
     elif status.mode is not Mode.AUTO:
-        who = "the autopilot to take AUTO" if may.may_set_mode else "the operator to set AUTO"
+        by_hand = "the operator to set AUTO (or [operator] set_auto = true)"
+        who = "the autopilot to take AUTO" if may.may_set_mode else by_hand
         turn.phase(Phase.WAITING, f"waiting for {who}")
         set_mode(turn, Mode.AUTO, "setting sail")
     else:
-        who = "the autopilot to arm" if may.may_arm else "the operator to arm"
+        who = "the autopilot to arm" if may.may_arm else "the operator to arm (or [operator] arm = true)"
         turn.phase(Phase.WAITING, f"ready: waiting for {who}")
         arm(turn)
 
@@ -146,6 +165,9 @@ def _stale(turn: Turn) -> str:
     boat, leg, wind, route = turn.boat_en, turn.leg(), turn.wind_mean, turn.state.route
     if boat is None or leg is None or wind is None or route is None or turn.snapshot.wind.forecast is None:
         return ""
+    wrong = _misplaced(turn)
+    if wrong:
+        return wrong
     age_s, config = turn.t_s - turn.state.last_plan_s, turn.config
     clear_m = turn.voyage.area.path_clearance_m([boat, leg[1]])
     if clear_m < min(config.margin_floor_m, config.margin_m):

@@ -117,9 +117,9 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         _rebooted(turn)
     if turn.autopilot is None:
         age = turn.snapshot.heartbeat_age_s
-        heard = "never heard" if age is None else f"silent for {age:.0f} s"
+        heard = "nothing yet" if age is None else f"silent for {age:.0f} s; what it has on board sails on"
         phase = Phase.WAITING if not state.sailing else turn.state.phase
-        turn.phase(phase, f"waiting to hear the autopilot: {heard}; what it has sails on")
+        turn.phase(phase, f"waiting to hear the autopilot: {heard}")
         return
     if stand_by(turn) or _operator_has_it(turn):
         return

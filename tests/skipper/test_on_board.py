@@ -67,7 +67,7 @@ def test_a_dry_run_plans_beside_an_earlier_mission_and_leaves_it_there():
     world.skipper, world.state = moved, moved.initial()
     before = len(world.actions)
     world.run(60)
-    assert world.state.why == "a plan is ready; waiting for permission to upload it"
+    assert "waiting for permission to upload it: [operator] set_auto = true" in world.state.why
     assert world.mission == there
     assert not {type(a) for _, a in world.actions[before:]} & {act.UploadMission, act.SetMode, act.Arm, act.SetCurrent}
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import shapely
 from shapely.geometry import box
 
 from companion.geo.angles import difference_rad
@@ -715,3 +716,14 @@ def test_by_headings_it_rounds_buoys(side):
     assert world.run(3000, is_done)
     assert len(world.state.reached) == 6
     assert min(distance_m(places[0], p) for p in world.track) > 3.0
+
+
+@pytest.mark.parametrize(("place", "words"), [
+    ((0.0, -267.0), "she is 167 m outside the fence"),
+    ((0.0, -111_000.0), "she is 111 km from the first goal"),
+])
+def test_a_boat_that_lies_elsewhere_is_told_so(place, words):
+    """It said "next try in 10 s" and nothing else (issue 13, point 6)."""
+    world = make(voyage={"limits": shapely.box(-200.0, -100.0, 200.0, 400.0)})
+    world.position = place
+    assert world.run(60, lambda w: words in w.state.why), world.state.why
