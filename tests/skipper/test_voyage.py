@@ -240,7 +240,7 @@ def test_does_not_take_a_boat_that_somebody_drives():
 
 @pytest.mark.parametrize(("missing", "words"), [
     ({"vehicle": None, "position_en_m": None, "vehicle_age_s": None}, "position"),
-    ({"heartbeat_age_s": None}, "never heard"),
+    ({"heartbeat_age_s": None}, "nothing yet"),
 ])
 def test_waiting_names_what_is_missing(missing, words):
     world = make(extra=missing)
