@@ -107,6 +107,8 @@ FORGERIES: tuple[Forgery, ...] = (
         0, 0, 0, 0, 9000, 0, 3, 0, 0, 0, 0, 0, 0)),
     Forgery(message="FENCE_STATUS", says="the fence is breached",
             build=lambda _: wire.MAVLink_fence_status_message(1, 1, 3, 0)),
+    Forgery(message="RC_CHANNELS", says="a person moves the sticks", build=lambda k: wire.MAVLink_rc_channels_message(
+        k.boot_ms, 8, *(1900 if k.boot_ms % 2 else 1100 for _ in range(8)), *([0] * 10), 255)),
     Forgery(message="STATUSTEXT", says='"EKF failsafe"',
             build=lambda _: wire.MAVLink_statustext_message(2, b"EKF failsafe", 0, 0)),
     Forgery(message="STATUSTEXT", says='"Flight plan received"',

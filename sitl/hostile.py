@@ -22,8 +22,10 @@ from companion.geo.angles import difference_rad
 from companion.geofence import load_mission
 from companion.mavlink.reads import READS
 from companion.mavlink.signing import SigningStore
+from companion.messages import GeoPoint
 from companion.options import SailOptions, at_once
 from companion.skipper import actions as act
+from companion.skipper.failsafe import TOLD_S
 from companion.skipper.state import Phase
 from sitl.air import Air
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
@@ -127,9 +129,7 @@ def _false(step: Step, autopilot: Autopilot) -> list[str]:
     truth, snapshot = autopilot.truth, step.snapshot
     status, vehicle, out = snapshot.autopilot, snapshot.vehicle, []
     if vehicle is not None:
-        off = math.dist((vehicle.position.lat_deg, vehicle.position.lon_deg),
-                        (truth.position.lat_deg, truth.position.lon_deg)) * 111_195.0
-        out += ["false position"] * (off > FALSE_PLACE_M)
+        out += ["false position"] * (_apart_m(vehicle.position, truth.position) > FALSE_PLACE_M)
         out += ["false heading"] * (abs(difference_rad(vehicle.heading_rad, truth.heading_rad)) > FALSE_ANGLE_RAD)
     if snapshot.wind.present_twd_from_rad is not None:
         out += ["false wind"] * (
@@ -143,10 +143,18 @@ def _false(step: Step, autopilot: Autopilot) -> list[str]:
         out += ["false GPS state"] * (status.gps_fix is not None and status.gps_fix < 3)
         out += ["false battery"] * (status.battery_remaining is not None and status.battery_remaining < 0.5)
         out += ["false fence state"] * bool(status.fence_breached)
+        out += ["a person at the sticks"] * (snapshot.t_s - step.state.signs.rc_moved_s <= TOLD_S)
+        if status.home is not None and autopilot.home_en is not None:
+            out += ["false home"] * (_apart_m(status.home, autopilot.chart.point(autopilot.home_en)) > FALSE_PLACE_M)
     if snapshot.limits is not None:
         out += ["false limit"] * (math.degrees(snapshot.limits.sail_no_go_angle_rad) > 50.0)
     out += ["a ghost ship"] * (snapshot.traffic is not None and bool(snapshot.traffic.vessels))
     return out
+
+
+def _apart_m(a: GeoPoint, b: GeoPoint) -> float:
+    """Return about how far two places are apart [m]: a degree of longitude is taken for one of latitude."""
+    return math.dist((a.lat_deg, a.lon_deg), (b.lat_deg, b.lon_deg)) * 111_195.0
 
 
 async def _measure(

@@ -145,7 +145,7 @@ def _cross_track(b: Boat, h: float, dx: float, dy: float) -> float:
 @jit
 def track(b: Boat, dx: float, dy: float, t: float) -> tuple[float, float]:
     """Return (TWA of the heading, speed over ground) that makes the ground direction (dx, dy) good."""
-    course = math.atan2(dx, dy)
+    course = wrap(math.atan2(dx, dy))   # dead down wind is -π, as everywhere
     if b.cx == 0.0 and b.cy == 0.0:
         return course, speed_at(b, course)
     size = math.hypot(dx, dy)

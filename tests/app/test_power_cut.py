@@ -17,6 +17,7 @@ from companion.clock import run_virtual
 from companion.compose import config_of, voyage_of
 from companion.disk import Disk
 from companion.geofence import load_mission
+from companion.mavlink.identity import Identity
 from companion.messages import AutopilotStatus, MissionItem, MissionState, Mode
 from companion.options import SailOptions
 from companion.skipper import Skipper, actions
@@ -125,13 +126,15 @@ def durable(monkeypatch):
 def whose(skipper, saved, aboard):
     """Return what a companion that starts with this state says of the mission that it finds, the boat under way."""
     state = skipper.initial(saved)
+    ours = Identity(system=1, uid=state.uid or "5a", is_confirmed=True, vehicle_type=11, frame_class=2, sails=True)
     status = AutopilotStatus(t_s=0.0, mode=Mode.AUTO, is_armed=True, ekf_ok=True, mission_seq=1,
                              mission_total=len(aboard), mission_state=MissionState.ACTIVE)
-    seen = Snapshot(t_s=0.0, autopilot=status, autopilot_age_s=0.0, heartbeat_age_s=0.0, permissions=ALL_PERMITTED)
+    seen = Snapshot(t_s=0.0, autopilot=status, autopilot_age_s=0.0, heartbeat_age_s=0.0, permissions=ALL_PERMITTED,
+                    identity=ours)
     state, asked = skipper.step(state, seen)
     read = next(a for a in asked if isinstance(a, actions.ReadMission))
     state, said = skipper.step(state, Snapshot(
-        t_s=1.0, autopilot=status, autopilot_age_s=0.0, heartbeat_age_s=0.0, permissions=ALL_PERMITTED,
+        t_s=1.0, autopilot=status, autopilot_age_s=0.0, heartbeat_age_s=0.0, permissions=ALL_PERMITTED, identity=ours,
         outcomes=(ReadOutcome(read_id=read.read_id, items=aboard),)))
     return state, {a.code for a in said if isinstance(a, actions.Announce)}
 

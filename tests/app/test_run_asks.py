@@ -34,14 +34,14 @@ def mission(tmp_path):
     return load_mission(path)
 
 
-def save(path, gate):
-    saved = Persisted(voyage="lake", gate=gate, sailing=False, route=None, pending=None)
+def save(path, *, arrived):
+    saved = Persisted(voyage="lake", gate=1, sailing=False, route=None, pending=None, arrived=arrived)
     run_virtual(StateFile(path, disk=Disk(), offload=at_once).save(saved))
 
 
 @pytest.mark.parametrize(("answer", "again"), [("y", True), ("yes", True), ("n", None), ("", None)])
 def test_a_mission_that_has_arrived_is_asked_for(answer, again, terminal, mission, tmp_path):
-    save(tmp_path / "state.json", gate=1)
+    save(tmp_path / "state.json", arrived=True)
     keyboard, stream = terminal
     os.write(keyboard, answer.encode() + b"\n")
     with Console(stream) as console:
@@ -52,7 +52,7 @@ def test_a_mission_that_has_arrived_is_asked_for(answer, again, terminal, missio
 
 
 def test_one_that_has_not_is_sailed_on_without_a_question(terminal, mission, tmp_path):
-    save(tmp_path / "state.json", gate=0)
+    save(tmp_path / "state.json", arrived=False)
     with Console(terminal[1]) as console:
         assert _asked(mission, tmp_path / "state.json", console) is False
         (tmp_path / "state.json").write_text("[" * 100_000)
@@ -61,7 +61,7 @@ def test_one_that_has_not_is_sailed_on_without_a_question(terminal, mission, tmp
 
 
 def test_a_service_is_not_asked(mission, tmp_path, monkeypatch):
-    save(tmp_path / "state.json", gate=1)
+    save(tmp_path / "state.json", arrived=True)
     monkeypatch.setattr(sys, "stdin", None)
     with Console(None) as console:
         assert _asked(mission, tmp_path / "state.json", console) is False

@@ -72,11 +72,10 @@ def records(path):
 
 
 @pytest.fixture(scope="module")
-def first(link, folder, request):
+def first(link, folder):
     """The first mission, sailed through everything: its exit code, its folder, what a second companion said."""
     run = subprocess.Popen(command("first.toml", link, "--out", "first/v"), cwd=folder, text=True,
                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    request.addfinalizer(run.kill)
     assert run.stdout.readline()
     run.stdout.close()                                    # | head -1
     second = subprocess.run(command("second.toml", link, "--out", "first/w"), cwd=folder, text=True,
@@ -98,7 +97,10 @@ def first(link, folder, request):
         assert decisions.stat().st_size - size < 4096
         (folder / "filler").unlink()
     run.stderr.close()
-    return run.wait(PATIENCE_S), folder / "first/v", second, is_small
+    try:
+        return run.wait(PATIENCE_S), folder / "first/v", second, is_small
+    finally:
+        run.kill()
 
 
 def test_neither_a_closed_pipe_nor_a_hangup_ends_a_voyage(first):

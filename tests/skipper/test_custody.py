@@ -24,8 +24,8 @@ def orders(world):
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    ({"is_confirmed": False}, "asking the autopilot who it is"),
-    ({"frame_class": None}, "asking the autopilot for its frame"),
+    ({"is_confirmed": False}, "waiting for the autopilot to tell who it is"),
+    ({"frame_class": None}, "waiting for the autopilot to tell its frame"),
     ({"frame_class": 1}, "FRAME_CLASS is 1, not a boat's: set it to 2"),
     ({"sails": False}, 'SAIL_ENABLE is 0, the boat does not sail: set it to 1, or write frame = "motor"'),
     ({"vehicle_type": 2}, "the vehicle is a quadrotor, not a rover"),
