@@ -119,7 +119,8 @@ class Shore:
         deadline_s = time.monotonic() + self._timeout_s
         while time.monotonic() < deadline_s:
             for system in self._mavsdk.get_systems():
-                if system.get_system_id() == wanted and system.has_autopilot():
+                # not before it is connected: requests would go unanswered, to a peer that is not yet known
+                if system.get_system_id() == wanted and system.has_autopilot() and system.is_connected():
                     return system
             time.sleep(0.05)
         return None

@@ -74,7 +74,7 @@ OTHER = {
 }
 # What does not sail: pictures and previews, and what `companion run` itself takes. Tried below.
 DRAWN = {("start", "heading_deg"), ("wind", "preview_from_deg")}
-RUN = {("skipper", "expansions"), ("skipper", "seed")}
+RUN = {("skipper", "expansions"), ("skipper", "seed"), ("autopilot", "system")}   # the last: test_whose
 
 
 def folder_with(path):
