@@ -6,6 +6,7 @@ from companion.boat import required_margin
 from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode
 from companion.skipper.actions import ReplanReason, Severity
+from companion.skipper.gates import Approach
 from companion.skipper.geometry import distance_m, leg_distance_m
 from companion.skipper.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning import request
@@ -50,10 +51,17 @@ def start(turn: Turn) -> None:
     if wants:
         turn.phase(Phase.WAITING, "waiting for " + ", ".join(wants))
         return
-    if request(turn, ReplanReason.START):
+    if _request_start(turn):
         turn.phase(Phase.NEW_CALCULATION, "making the first plan")
     else:
         turn.phase(Phase.WAITING, "no problem can be stated yet")
+
+
+def _request_start(turn: Turn, text: str = "") -> bool:
+    """Ask for a plan from where the boat lies: until a gate is passed, the way to the first goal begins here."""
+    if turn.state.gate == 0 and turn.boat_en is not None:
+        turn.approach(Approach(goal=0, en_m=turn.boat_en))
+    return request(turn, ReplanReason.START, text=text)
 
 
 def launch(turn: Turn) -> None:
@@ -76,7 +84,7 @@ def launch(turn: Turn) -> None:
         return
     turn.update(sailing=False)
     if _is_stale(turn) and turn.t_s >= max(state.plan_retry.not_before_s, state.upload_retry.not_before_s):
-        request(turn, ReplanReason.START, text="the boat drifted or the wind turned before setting sail")
+        _request_start(turn, "the boat drifted or the wind turned before setting sail")
         turn.phase(Phase.WAITING, "renewing the plan before setting sail")
         return
     may = turn.snapshot.permissions

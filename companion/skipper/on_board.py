@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from companion.messages import MissionItem, Mode
 from companion.skipper.actions import ReadMission, Severity
 from companion.skipper.route import held_back, is_mixture, is_same_mission
@@ -83,13 +85,14 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
     if not items:
         turn.update(route=None, unsure_route=None)
         if saved is not None:
-            turn.update(gate=saved.gate)
+            _take_up(turn, saved)
         return True
     if any(is_mixture(items, a.items, b.items) for a in routes for b in routes):
         newest = state.unsure_route or (saved.pending if saved else None) or routes[0]
         turn.say(Severity.WARNING, "mixture", "an upload was cut short: the mission is put right", every_s=0.0)
         if saved is not None:
-            turn.update(gate=saved.gate, sailing=state.sailing or _under_way(turn))
+            _take_up(turn, saved)
+            turn.update(sailing=state.sailing or _under_way(turn))
         turn.update(route=state.route or newest, unsure_route=newest, repair=True)
         return True
     if state.replace_foreign or turn.snapshot.permissions.may_replace_foreign:
@@ -107,12 +110,18 @@ def _under_way(turn: Turn) -> bool:
     return status is not None and status.is_armed and status.mode is Mode.AUTO
 
 
+def _take_up(turn: Turn, saved: Persisted) -> None:
+    """Take up the voyage where it was: the gates that are passed, and the way round the next buoy."""
+    turn.update(gate=saved.gate, approaches=saved.approaches, bearing_rad=0.5 * math.pi * saved.quarters)
+
+
 def _adopt(turn: Turn, saved: Persisted) -> None:
     """Take over the mission that sails, without an upload."""
     status = turn.autopilot
     index = (status.mission_seq or 1) - 1 if status is not None else 0
+    _take_up(turn, saved)
     turn.update(
-        gate=saved.gate, index=index, own_index=index, after_restart=True, own_mode=saved.own_mode,
+        index=index, own_index=index, after_restart=True, own_mode=saved.own_mode,
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         sailing=_under_way(turn) or (saved.sailing and status is not None and status.is_armed),
     )

@@ -6,14 +6,15 @@ the boat: nobody yet (start), somebody else (operator), we (sail).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass
 
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
 from companion.skipper.config import SkipperConfig
 from companion.skipper.doubt import follow
 from companion.skipper.failsafe import has_stopped
-from companion.skipper.gates import Gate, gates_of
+from companion.skipper.gates import gates_of
 from companion.skipper.helm import hand_back, is_busy, repair
 from companion.skipper.intake import (
     locate,
@@ -42,20 +43,19 @@ class Skipper:
 
     voyage: Voyage
     config: SkipperConfig
-    gates: tuple[Gate, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "gates", gates_of(self.voyage))
 
     def initial(self, persisted: Persisted | None = None) -> SkipperState:
         """Return the first state; with ``persisted`` the mission on the autopilot may be adopted by its content."""
-        if persisted is not None and (persisted.voyage != self.voyage.name or persisted.gate > len(self.gates)):
+        if persisted is not None and (
+            persisted.voyage != self.voyage.name
+            or persisted.gate > len(gates_of(self.voyage, persisted.approaches))
+        ):
             return SkipperState(why="the saved state is of another voyage")
         return SkipperState(adoptable=persisted)
 
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
-        turn = Turn(self.voyage, self.config, self.gates, state, snapshot)
+        turn = Turn(self.voyage, self.config, state, snapshot)
         take_events(turn)
         take_outcomes(turn)
         follow(turn)
@@ -82,7 +82,7 @@ class Skipper:
             return state.adoptable
         return Persisted(
             voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route, pending=pending,
-            own_mode=state.own_mode,
+            own_mode=state.own_mode, approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
         )
 
 

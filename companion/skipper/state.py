@@ -11,6 +11,7 @@ from companion.field.station import StationState
 from companion.field.values import GuidanceState
 from companion.messages import MissionItem, Mode
 from companion.skipper.actions import ReplanReason
+from companion.skipper.gates import Approach
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.voyage import PointEn
 from companion.traffic import Assessment
@@ -168,8 +169,9 @@ class SkipperState:
     wish: OperatorWish | None = None    # the operator's last wish, until it is answered
     read_items: tuple[MissionItem, ...] | None = None      # the mission as last read
     read_t_s: float = float("-inf")
-    missed_gate: int | None = None      # a gate that was missed and is to be sailed again
-    track: tuple[PointEn, ...] = ()     # near a buoy
+    approaches: tuple[Approach, ...] = ()   # where the way to a goal began, see companion.skipper.gates
+    bearing_rad: float = 0.0            # how far the boat has come round the buoy that is next, see gates.bearing_on
+    missed_s: float | None = None       # when a gate was missed to which no upload since leads
     history_plan: int = -1
     history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
     last_seen: Fix | None = None        # the last position
@@ -207,6 +209,8 @@ class Persisted:
     route: Route | None
     pending: Route | None
     own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
+    approaches: tuple[Approach, ...] = ()   # the numbering of the gates hangs on them
+    quarters: int = 0                  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""
@@ -214,6 +218,7 @@ class Persisted:
             "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
             "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
             "own_mode": None if self.own_mode is None else self.own_mode.name,
+            "approaches": [[a.goal, *a.en_m, a.turn_rad] for a in self.approaches], "quarters": self.quarters,
         }
 
     @classmethod
@@ -226,6 +231,10 @@ class Persisted:
                 voyage=str(data["voyage"]), gate=int(data["gate"]), sailing=bool(data["sailing"]),
                 route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
                 own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
+                approaches=tuple(
+                    Approach(goal=int(goal), en_m=(float(e), float(n)), turn_rad=None if turn is None else float(turn))
+                    for goal, e, n, turn in data.get("approaches", ())),
+                quarters=int(data.get("quarters", 0)),
             )
         except (KeyError, TypeError, IndexError, AttributeError) as error:
             raise ValueError(f"the saved state is damaged: {error!r}") from error

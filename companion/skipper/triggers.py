@@ -51,7 +51,7 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return Trigger(reason=ReplanReason.REFUGE, text="the battery is critical", urgent=True)
     if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:
         return Trigger(reason=ReplanReason.OPERATOR_WISH, text="the operator asked for it")
-    if state.missed_gate is not None:
+    if state.missed_s is not None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
