@@ -15,8 +15,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from companion.kernels.jit import kernel
 
 LOOP_S = 0.02
 SUBSTEPS = 4
@@ -81,22 +82,22 @@ _DRAG = np.array([0.1, 0.1, 0.2, 0.4, 0.8, 1.2, 1.5, 1.7, 1.9, 1.95, 1.9, 1.7, 1
 Vector = NDArray[np.float64]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _wrap(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _clip(x: float, low: float, high: float) -> float:
     return low if x < low else min(x, high)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _alpha(dt_s: float, cutoff_hz: float) -> float:
     return 1.0 if cutoff_hz <= 0.0 else dt_s / (dt_s + 1.0 / (2.0 * math.pi * cutoff_hz))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def sail_force(aws_mps: float, awa_rad: float, sail_rad: float) -> float:
     """Return the driving force [N]: F = aws (CL sin|b| - CD cos b), linear in the apparent wind speed."""
     angle = abs(awa_rad)
@@ -111,7 +112,7 @@ def sail_force(aws_mps: float, awa_rad: float, sail_rad: float) -> float:
     return float(aws_mps * (lift * math.sin(angle) - drag * math.cos(angle)))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _hull(s: Vector) -> None:
     """Move the hull by one loop: SIM_Sailboat's one-dimensional model with exact yaw kinematics."""
     dt = LOOP_S / SUBSTEPS
@@ -139,7 +140,7 @@ def _hull(s: Vector) -> None:
         s[S_RATE] = rate
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _vane(s: Vector, p: Vector, noise: float) -> None:
     """AP_WindVane: raw apparent wind, its filters, true wind from it and the ground velocity, its filter."""
     if p[P_VANE] == 0.0:
@@ -185,7 +186,7 @@ def _vane(s: Vector, p: Vector, noise: float) -> None:
     s[S_TWS] += a_true * (speed - s[S_TWS])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _indirect(s: Vector, p: Vector, yaw_rad: float) -> bool:
     """sailboat.cpp use_indirect_route: is this course within the no-go zone and its pad?"""
     if s[S_MOTOR] > 0.0:
@@ -196,7 +197,7 @@ def _indirect(s: Vector, p: Vector, yaw_rad: float) -> bool:
     return bool(abs(_wrap(twd - yaw_rad)) <= p[P_NOGO] + NOGO_PAD_RAD)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
     """sailboat.cpp calc_heading: the heading to steer for a course in the no-go zone, and events."""
     events = 0
@@ -235,7 +236,7 @@ def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
     return _wrap(twd + p[P_NOGO] if on_port else twd - p[P_NOGO]), events
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _target(s: Vector, p: Vector) -> tuple[float, float, float, float, bool]:
     """Move the target point along the leg; return its velocity, its acceleration and whether it has arrived.
 
@@ -311,7 +312,7 @@ def _target(s: Vector, p: Vector) -> tuple[float, float, float, float, bool]:
     return he, hn, a_e, a_n, arrived
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     """Follow the leg: return (heading, turn rate, heading is meant, events)."""
     events = 0
@@ -354,7 +355,7 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     return 0.0, _clip(lateral, -limit, limit) / speed, False, events
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _loiter(s: Vector, p: Vector) -> tuple[float, int]:
     """Mode loiter of a sailboat: keep the heading within the radius, sail to its centre from outside."""
     de, dn = s[S_LE] - (s[S_E] + s[S_GPS_E]), s[S_LN] - (s[S_N] + s[S_GPS_N])
@@ -372,7 +373,7 @@ def _loiter(s: Vector, p: Vector) -> tuple[float, int]:
     return s[S_LOITER_YAW], 0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _rudder(s: Vector, p: Vector, rate_rad: float) -> None:
     """AR_AttitudeControl: acceleration-limited turn rate, PI with feed-forward, less rudder at speed."""
     change = p[P_RATE_ACC] * LOOP_S
@@ -392,7 +393,7 @@ def _rudder(s: Vector, p: Vector, rate_rad: float) -> None:
     s[S_RUDDER] = out
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _control(s: Vector, p: Vector) -> int:
     """One loop of the vehicle: what to steer, rudder and sheet. Returns events."""
     steer = s[S_STEER]
@@ -434,7 +435,7 @@ def _control(s: Vector, p: Vector) -> int:
     return events
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def advance(
     s: Vector, p: Vector, wind: NDArray[np.float64], first_tick: int, noise: Vector, loops: int
 ) -> tuple[int, int]:

@@ -1,0 +1,81 @@
+"""Where machine code is kept, and the mark that says that all of it is there. Does not load numba.
+
+Looked for in what the package carries and then in a folder of the user's; written to the latter, which is
+``$COMPANION_KERNELS``, the service manager's ``$CACHE_DIRECTORY``, or ``sailboat-companion/kernels`` under
+``$XDG_CACHE_HOME`` (``~/.cache``).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import platform
+from collections.abc import Iterator, Sequence
+from importlib import metadata
+from pathlib import Path
+
+FILE = "kernels.txt"   # in each package: see ``listed``
+PACKAGES = Path(__file__).resolve().parents[2]
+CARRIED = Path(__file__).resolve().parent / "carried"   # filled when a package is built
+KEPT_S = 30 * 86_400.0     # a file that nobody has used for this long goes ...
+KEPT_BYTES = 200 * 2**20   # ... and the oldest beyond this, a dozen versions of everything
+_USED_S = 86_400.0         # the time of use is noted once a day: an SD card wears
+
+
+def folder() -> Path:
+    """Return the user's folder of machine code; it need not exist."""
+    for name, below in (("COMPANION_KERNELS", ""), ("CACHE_DIRECTORY", "kernels"),
+                        ("XDG_CACHE_HOME", "sailboat-companion/kernels")):
+        place = os.environ.get(name, "").partition(":")[0]   # the service manager separates several by colons
+        if place and Path(place).is_absolute():
+            return Path(place, below)
+    return Path("~/.cache/sailboat-companion/kernels").expanduser()
+
+
+@functools.cache
+def versions() -> str:
+    """Return what machine code depends on besides kernels, types and processor."""
+    libraries = " ".join(f"{name} {metadata.version(name)}" for name in ("numba", "llvmlite", "numpy"))
+    return f"{platform.python_implementation()} {platform.python_version()} {libraries} {platform.machine()}"
+
+
+def mark(packages: Sequence[str]) -> str:
+    """Return the name of the empty file that says: all that the packages list, as their files are now, is compiled."""
+    seen = hashlib.sha256(versions().encode())
+    for package in packages:
+        for path in sorted((PACKAGES / package).rglob("*.py")):
+            seen.update(path.read_bytes())
+        seen.update((PACKAGES / package / FILE).read_bytes())
+    return f"all-{'-'.join(packages)}-{seen.hexdigest()[:24]}"
+
+
+def used(path: Path, now_s: float) -> None:
+    """Note that a file was used."""
+    with contextlib.suppress(OSError):
+        if now_s - path.stat().st_mtime > _USED_S:
+            os.utime(path)
+
+
+def sweep(now_s: float) -> int:
+    """Remove what nobody has used for long, the oldest beyond the limit, and numba's own caches of before; count it."""
+    held = removed = 0
+    for used_s, size, path in sorted(_files(folder()), reverse=True):
+        held += size
+        if now_s - used_s > KEPT_S or held > KEPT_BYTES:
+            path.unlink(missing_ok=True)
+            removed += 1
+    for package in ("companion", "sitl"):
+        for path in (PACKAGES / package).glob("**/__pycache__/*.nb[ci]"):
+            with contextlib.suppress(OSError):
+                path.unlink()
+                removed += 1
+    return removed
+
+
+def _files(place: Path) -> Iterator[tuple[float, int, Path]]:
+    for path in place.glob("*") if place.is_dir() else ():
+        with contextlib.suppress(OSError):
+            status = path.stat()
+            yield status.st_mtime, status.st_size, path
