@@ -95,7 +95,7 @@ def main(argv=None):
     print(f"\n{kept / 2**20:.1f} MiB on the disk")
     if args.write:
         for package, entries in lists.items():
-            head = "# What a voyage calls: seconds to compile, kernel, types. Written by `python -m bench.kernels --write`.\n"
+            head = "# What a voyage calls: seconds to compile, kernel, types. By `python -m bench.kernels --write`.\n"
             Path(package, FILE).write_text(head + "".join(f"{e}\n" for e in entries), encoding="utf-8")
     return 0
 

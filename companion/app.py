@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
+import functools
 from collections.abc import Callable
-from datetime import UTC, datetime
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,26 +24,25 @@ from companion.geofence import Mission
 from companion.geofence.autopilot_fence import fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.tlog import stamp
 from companion.mavlink.transport import Transport
 from companion.messages import CompanionStatus
 from companion.options import SailOptions
-from companion.plots.voyage import AREA
 from companion.skipper import Skipper
 from companion.skipper.actions import Severity
-from companion.skipper.state import Persisted, Phase
-from companion.telemetry.description import chart_record, voyage_record
-from companion.telemetry.recorder import STATE, Recorder, write_atomically
-from companion.telemetry.records import action_record, ais_record, outcome_record, track_row
+from companion.skipper.state import Phase
+from companion.telemetry.logbook import Logbook
+from companion.telemetry.names import STATE
+from companion.telemetry.progress import DISK
+from companion.telemetry.radio import Radio
+from companion.telemetry.recorder import Recorder
+from companion.telemetry.records import ais_record, outcome_record
+from companion.telemetry.state_file import StateFile
 from companion.telemetry.status import companion_status
-from companion.telemetry.summary import VoyageFigures
 from companion.traffic.listening import Feeds
 from companion.wind import WindRoom
 
 STEP_S = 1.0
-# Status to the radio: a frame of it every so often [s]; see companion.mavlink.status_wire for its bytes.
-STATUS_EVERY_S = 2.0
-SYNC_EVERY_S = 5.0
+TEND_EVERY_S = 5.0        # records are synced, and taken up again after trouble
 LOOP_WATCH_S = 0.1
 # After arrival the boat loiters; the companion watches it for a moment before it ends [s].
 LINGER_S = 5.0
@@ -66,9 +65,9 @@ async def sail(
 
     Raises:
         LinkError: no autopilot was heard within ``options.wait_s``.
-        JobError: the folder cannot be written.
+        JobError: the folder's name cannot be one, or another companion is recording there.
     """
-    with Recorder(folder) as recorder:
+    with Recorder(folder, disk=options.disk, shelf=options.shelf, is_durable=options.is_durable) as recorder:
         shell = _Shell(mission, planner, recorder, options, on_status, stop or asyncio.Event())
         return await shell.run(transport)
 
@@ -84,37 +83,23 @@ class _Shell:
         self.planner, self.on_status, self.stop = planner, on_status, stop
         self.voyage = voyage_of(mission)
         self.config = config_of(mission)
-        self.state_path = options.state_path or recorder.folder / STATE
-        self.figures = VoyageFigures()
+        self.log = Logbook(recorder, self.config, options.epoch_s)
+        self.state_file = StateFile(
+            options.state_path or recorder.folder / STATE, disk=options.disk, offload=options.offload,
+            is_durable=options.is_durable, pace=1.0 / options.budget_scale)
         self.status: CompanionStatus | None = None
         self.end_reason = "stopped"
         self.loop_held_s = 0.0
-        self._persisted: Persisted | None = None
-        self._frames = 0
-        self._announced: tuple[str, str] = ("", "")
+        self._arrived_before = False
         self._refusals: list[str] = []
         self.feeds = Feeds()
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
-        persisted = self._load_state()
-        self.fold = VoyageFold(
-            Skipper(voyage=self.voyage, config=self.config),
-            WindRoom(estimator=estimator_of(self.mission)),
-            permissions_of(self.mission, dry_run=self.options.dry_run),
-            persisted, traffic=target_limits_of(self.mission),
-        )
-        # Growing a jagged coast takes seconds; under way the loop must not wait for it.
-        self.fold.skipper.prepare()
-        if persisted is not None and self.fold.state.adoptable is None:
-            self._refuse_state(self.fold.state.why)
-        self._write_description(transport.name)
-        self.recorder.decision(self._stamped(self._quantised(now_s())[1], {
-            "kind": "start", "persisted": None if persisted is None else persisted.to_dict(),
-        }))
+        self._begin(transport.name)
         try:
             async with (
-                Link(transport, sink=self._on_frame, signing=self.options.signing) as link,
+                Link(transport, sink=self.log.frame, signing=self.options.signing) as link,
                 contextlib.AsyncExitStack() as stack,
             ):
                 link.subscribe(self._on_message)
@@ -127,14 +112,15 @@ class _Shell:
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
                                     expansions=self.options.expansions,
                                     budget_scale=self.options.budget_scale, config=self.config)
+                radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
                 if self.fold.permissions.may_upload_fence:
                     await self._upload_fence(autopilot)
                 async with asyncio.TaskGroup() as group:
                     tasks = [
                         group.create_task(executor.run(), name="executor"),
                         group.create_task(self._keep_parameters(autopilot, link), name="parameters"),
-                        group.create_task(self._send_status(autopilot), name="radio status"),
-                        group.create_task(self._sync(), name="disk sync"),
+                        group.create_task(radio.run(), name="radio"),
+                        group.create_task(self._tend_records(), name="records"),
                         group.create_task(self._watch_loop(), name="loop watch"),
                     ]
                     await self._steps(executor, link)
@@ -148,29 +134,48 @@ class _Shell:
             self.recorder.summary(summary)
         return summary
 
+    def _begin(self, link: str) -> None:
+        """Begin the fold with what is known from before, and write that down."""
+        options = self.options
+        skipper = Skipper(voyage=self.voyage, config=self.config)
+        persisted, known = self.state_file.load(), self.state_file.known()
+        if persisted is not None and skipper.has_arrived(persisted):
+            self._arrived_before = not options.is_again
+            if options.is_again:
+                known = (*known, *persisted.names)
+                persisted = None
+        self.fold = VoyageFold(
+            skipper, WindRoom(estimator=estimator_of(self.mission)),
+            permissions_of(self.mission, dry_run=options.dry_run), persisted, known=known,
+            traffic=target_limits_of(self.mission),
+        )
+        # Growing a jagged coast takes seconds; under way the loop must not wait for it.
+        skipper.prepare()
+        t_s = self.log.now_s()
+        self.log.begin(t_s, self.mission, self.voyage, self.fold.permissions, persisted, known, {
+            "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
+            "expansions": options.expansions,
+        })
+        if self.state_file.refusal:
+            self._refuse("saved state", self.state_file.refusal)
+        elif persisted is not None and self.fold.state.adoptable is None:
+            self._refuse("saved state", f"{self.state_file.path.name} is not used: {self.fold.state.why}")
+
     # -------------------------------------------------------------------------------------- inputs
-    def _quantised(self, t_s: float) -> tuple[int, float]:
-        """Return a stamp [µs since 1970] as a tlog keeps it, and the loop time [s] that it stands for."""
-        stamp_us = int((self.options.epoch_s + t_s) * 1e6) & ~3
-        return stamp_us, stamp_us / 1e6 - self.options.epoch_s
-
-    def _on_frame(self, t_s: float, frame: bytes) -> None:
-        self.recorder.frame(stamp(self._quantised(t_s)[0], frame))
-
     def _on_message(self, t_s: float, message: Any) -> None:
-        self._frames += 1
-        self.fold.message(self._quantised(t_s)[1], message)
+        self.log.message()
+        self.fold.message(self.log.quantised(t_s)[1], message)
 
     def _on_outcome(self, outcome: Any) -> None:
-        t_s = self._quantised(now_s())[1]
-        self.recorder.decision(self._stamped(t_s, outcome_record(outcome)))
+        t_s = self.log.now_s()
+        self.log.note(t_s, outcome_record(outcome))
         self.fold.take_outcome(t_s, outcome)
 
     # --------------------------------------------------------------------------------------- steps
     def _tick(self, t_s: float) -> Step:
         """Fold what the feeds heard, after this step's messages as a replay does, and step."""
         for report in self.feeds.take():
-            self.recorder.decision(self._stamped(t_s, ais_record(report)))
+            self.log.note(t_s, ais_record(report))
             self.fold.take(report)
         return self.fold.tick(t_s)
 
@@ -178,7 +183,7 @@ class _Shell:
         started_s = next_s = now_s()
         done_s: float | None = None
         while True:
-            t_s = self._quantised(now_s())[1]
+            t_s = self.log.now_s()
             self.fold.planner_alive(self.planner.is_alive)
             step = self._tick(t_s)
             await self._after_step(step, link)
@@ -207,7 +212,7 @@ class _Shell:
         waiting = asyncio.create_task(link.wait_autopilot(self.options.wait_s), name="first heartbeat")
         try:
             while not (await asyncio.wait([waiting], timeout=STEP_S))[0]:
-                step = self._tick(self._quantised(now_s())[1])
+                step = self._tick(self.log.now_s())
                 await self._after_step(step, link)
             await waiting
         finally:
@@ -220,30 +225,24 @@ class _Shell:
         if snapshot.position_en_m is not None:
             value = float(self.voyage.area.clearance_m(np.array([snapshot.position_en_m]))[0])
             clearance_m = value if np.isfinite(value) else None
-        self.figures.take(step, clearance_m)
-        self.recorder.track(track_row(step, self._frames, clearance_m))
-        self._frames = 0
-        for action in step.actions:
-            self.recorder.decision(self._stamped(snapshot.t_s, action_record(action, snapshot, self.config)))
-        changed = (step.state.phase.value, step.state.why)
-        if changed[0] != self._announced[0]:
-            self.recorder.decision(self._stamped(
-                snapshot.t_s, {"kind": "phase", "phase": changed[0], "why": changed[1]}))
-        self._announced = changed
-        self.status = companion_status(step, self.voyage, self.figures, clearance_m, link.bytes_per_s()[1],
-                                       self.feeds.open_feeds, self.feeds.dropped)
-        persisted = self.fold.skipper.persisted(step.state)
-        if persisted != self._persisted:
-            self._persisted = persisted
-            data = json.dumps(persisted.to_dict()).encode()
-            await self.options.offload(lambda: write_atomically(
-                self.state_path, data, is_durable=self.options.is_durable))
+        self.log.step(step, clearance_m)
+        if not self.options.dry_run:   # which must not take the place of a voyage that is interrupted
+            await self.state_file.save(self.fold.skipper.persisted(step.state))
+        status = companion_status(step, self.voyage, self.log.figures, clearance_m, link.bytes_per_s()[1],
+                                  self.feeds.open_feeds, self.feeds.dropped)
+        trouble = self._trouble()
+        if trouble and not status.alert_code:
+            status = replace(status, alert_code=DISK, alert_text=trouble)
+        self.status = status
         if self.on_status is not None:
-            self.on_status(self.status, step)
+            self.on_status(status, step)
 
-    def _stamped(self, t_s: float, record: dict[str, Any]) -> dict[str, Any]:
-        utc = datetime.fromtimestamp(self.options.epoch_s + t_s, UTC).isoformat(timespec="milliseconds")
-        return {"t_s": t_s, "utc": utc.replace("+00:00", "Z"), **record}
+    def _trouble(self) -> str:
+        """Return what cannot be written now and why, empty when all is well."""
+        state, records = self.state_file.trouble, self.recorder.trouble
+        return "; ".join(text for text in (
+            f"no state for a restart is saved: {state}" if state else "",
+            f"nothing is recorded: {records}" if records else "") if text)
 
     # ----------------------------------------------------------------------------------- companions
     async def _keep_parameters(self, autopilot: Autopilot, link: Link) -> None:
@@ -267,22 +266,7 @@ class _Shell:
             record |= {"outcome": done.outcome.value, "text": done.text, "count": len(fence.items)}
             if done.is_ok:
                 record["enabled"] = (await autopilot.enable_fence()).outcome.value
-        self.recorder.decision(self._stamped(self._quantised(now_s())[1], record))
-
-    async def _send_status(self, autopilot: Autopilot) -> None:
-        while True:
-            if self.status is not None:
-                autopilot.send_status(self.status)
-            self._tell_silence(autopilot)
-            await asyncio.sleep(STATUS_EVERY_S)
-
-    def _tell_silence(self, autopilot: Autopilot) -> None:
-        """Say and record that a feed has fallen silent, and that it is heard again."""
-        for feed in self.feeds.changed():
-            text = f"AIS feed {'silent' if feed.is_silent else 'heard again'}: {feed.sentence()}"
-            self.recorder.decision(self._stamped(
-                self._quantised(now_s())[1], {"kind": "feed", "silent": feed.is_silent, "text": text}))
-            autopilot.say(int(Severity.WARNING if feed.is_silent else Severity.NOTICE), text)
+        self.log.note(self.log.now_s(), record)
 
     async def _watch_loop(self) -> None:
         """Measure how long the event loop was held: a timer that fires late was kept waiting by somebody."""
@@ -291,39 +275,17 @@ class _Shell:
             await asyncio.sleep(LOOP_WATCH_S)
             self.loop_held_s = max(self.loop_held_s, now_s() - due_s)
 
-    async def _sync(self) -> None:
+    async def _tend_records(self) -> None:
         while True:
-            await asyncio.sleep(SYNC_EVERY_S)
-            if self.options.is_durable:
-                await self.options.offload(self.recorder.sync)
+            await asyncio.sleep(TEND_EVERY_S)
+            stamps = self.log.stamps(self.log.now_s())
+            await self.options.offload(functools.partial(self.recorder.tend, stamps))
 
     # ---------------------------------------------------------------------------------------- files
-    def _load_state(self) -> Persisted | None:
-        try:
-            return Persisted.from_dict(json.loads(self.state_path.read_bytes()))
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError) as error:
-            self._refuse_state(str(error))
-            return None
-
-    def _refuse_state(self, why: str) -> None:
-        """Record that the saved state is not resumed, and keep the sentence for the radio."""
-        self._refuse("saved state", f"{self.state_path.name} is not used: {why}")
-
     def _refuse(self, what: str, text: str) -> None:
-        self.recorder.decision(self._stamped(now_s(), {"kind": "refusal", "what": what, "text": text}))
+        """Record that something given is not used, and keep the sentence for the radio."""
+        self.log.note(self.log.now_s(), {"kind": "refusal", "what": what, "text": text})
         self._refusals.append(text)
-
-    def _write_description(self, link: str) -> None:
-        chart = chart_record(self.mission, self.voyage, self.config.margin_m)
-        write_atomically(self.recorder.folder / AREA, json.dumps(chart).encode())
-        options = self.options
-        self.recorder.voyage(voyage_record(self.mission, self.fold.permissions, {
-            "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
-            "expansions": options.expansions, "epoch_s": options.epoch_s,
-            "started_utc": datetime.fromtimestamp(options.epoch_s + now_s(), UTC).isoformat(),
-        }))
 
     def _summary(self) -> dict[str, Any]:
         state = self.fold.state
@@ -331,7 +293,8 @@ class _Shell:
         return {
             "mission": self.mission.name,
             "arrived": state.phase is Phase.DONE,
-            **self.figures.to_dict(),
+            "arrived_before": self._arrived_before,
+            **self.log.figures.to_dict(),
             "goals_reached": min(goals, len(state.reached)),
             "goals": goals,
             "end_phase": state.phase.value,
@@ -340,6 +303,7 @@ class _Shell:
             "ais_feeds": [feed.sentence() for feed in self.feeds.open_feeds],
             "ais_dropped": self.feeds.dropped,
             "records_dropped": self.recorder.dropped,
+            "disk_trouble": self._trouble(),
             "planner_restarts": self.planner.restarts,
             "loop_held_max_s": round(self.loop_held_s * self.options.budget_scale, 4),
         }

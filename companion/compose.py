@@ -100,7 +100,7 @@ def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
     operator = mission.operator
     return Permissions(
         may_upload=operator.set_auto, may_upload_fence=operator.upload_fence, may_arm=operator.arm,
-        may_set_mode=operator.set_auto, may_steer=operator.guided,
+        may_set_mode=operator.set_auto, may_steer=operator.guided, may_replace_foreign=operator.replace_foreign,
     )
 
 

@@ -27,6 +27,7 @@ from companion.messages import (
 from companion.skipper import Skipper
 from companion.skipper.actions import Action
 from companion.skipper.config import Permissions
+from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import (
     AutopilotRebooted,
     Event,
@@ -39,7 +40,7 @@ from companion.skipper.snapshot import (
     WindHealth,
     WindView,
 )
-from companion.skipper.state import Persisted, SkipperState
+from companion.skipper.state import SkipperState
 from companion.traffic import TargetLimits, Targets
 from companion.wind import Estimator, Verdict, WindRoom, make
 
@@ -73,10 +74,10 @@ class VoyageFold:
 
     def __init__(
         self, skipper: Skipper, wind: WindRoom, permissions: Permissions, persisted: Persisted | None = None,
-        *, traffic: TargetLimits | None = None,
+        *, known: tuple[str, ...] = (), traffic: TargetLimits | None = None,
     ) -> None:
         self.skipper, self.wind, self.permissions = skipper, wind, permissions
-        self.state: SkipperState = skipper.initial(persisted)
+        self.state: SkipperState = skipper.initial(persisted, known)
         self.assembler = VehicleAssembler()
         self._parameters: dict[str, float] = {}
         self._targets = Targets.empty(skipper.voyage.frame, traffic)

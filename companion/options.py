@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from companion.disk import Disk
 from companion.mavlink.signing import SigningStore
+from companion.telemetry.shelf import Shelf
 
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
 
@@ -36,6 +38,9 @@ class SailOptions:
         wait_s: how long to wait for the autopilot's first heartbeat [s].
         offload: where disk work is done.
         is_durable: force files to the disk, against power cuts; a simulation has none.
+        disk: what is written to.
+        shelf: the older voyages beside this one and what all may take together; None: they are left alone.
+        is_again: sail the mission again although the saved state says that it has arrived.
         signing: key and timestamp for a signed link.
         budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
         command: what was typed, for the record.
@@ -50,6 +55,9 @@ class SailOptions:
     wait_s: float = 30.0
     offload: Offload = in_thread
     is_durable: bool = True
+    disk: Disk = field(default_factory=Disk)
+    shelf: Shelf | None = None
+    is_again: bool = False
     signing: SigningStore | None = None
     budget_scale: float = 1.0
     command: str = ""

@@ -27,6 +27,7 @@ from companion.messages import MissionItem
 from companion.planner import Plan
 from companion.skipper import Skipper
 from companion.skipper.config import Permissions
+from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import (
     CommandOutcome,
     CommandResult,
@@ -36,8 +37,8 @@ from companion.skipper.snapshot import (
     UploadOutcome,
     UploadResult,
 )
-from companion.skipper.state import Persisted
-from companion.telemetry.recorder import DECISIONS, TLOG, TRACK, VOYAGE, jsonable, read_jsonl
+from companion.telemetry.names import DECISIONS, TLOG, TRACK, VOYAGE
+from companion.telemetry.recorder import jsonable, read_jsonl
 from companion.telemetry.records import action_record, ais_of
 from companion.wind import WindRoom
 
@@ -57,9 +58,10 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayReport:
-    """What a replay did."""
+    """What a replay did. ``unrecorded`` steps came after a gap in the records, and could not be folded again."""
 
     steps: int
+    unrecorded: int
     messages: int
     actions: int
     restarts: int
@@ -81,18 +83,21 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             raise InputError(str(folder), name, "is missing", "name a folder that `companion run` left")
     description = tomllib.loads((folder / VOYAGE).read_text(encoding="utf-8"))
     epoch_s = float(description["run"]["epoch_s"])
-    mission = load_mission(mission_path or Path(description["mission"]["path"]))
+    mission = load_mission(mission_path or _mission_path(folder, description["mission"]))
     skipper = Skipper(voyage=voyage_of(mission), config=config_of(mission))
     decisions = read_jsonl(folder / DECISIONS)
     rows = _rows(folder / TRACK)
-    starts = [(float(d["t_s"]), d["persisted"]) for d in decisions if d["kind"] == "start"] or [(-1e18, None)]
-    ends = [*(t for t, _ in starts[1:]), 1e18]
+    starts = [
+        (float(d["t_s"]), d["persisted"], tuple(d.get("known", ()))) for d in decisions if d["kind"] == "start"
+    ] or [(-1e18, None, ())]
+    ends = [*(start[0] for start in starts[1:]), 1e18]
     differences: list[Difference] = []
-    steps = messages = actions = 0
-    for (start_s, persisted), end_s in zip(starts, ends, strict=True):
+    steps = unrecorded = messages = actions = 0
+    for (start_s, persisted, known), end_s, gap_s in zip(starts, ends, _gaps(decisions), strict=True):
         fold = VoyageFold(
             skipper, WindRoom(estimator=estimator_of(mission)), Permissions(**description["permissions"]),
-            None if persisted is None else Persisted.from_dict(persisted), traffic=target_limits_of(mission),
+            None if persisted is None else Persisted.from_dict(persisted), known=known,
+            traffic=target_limits_of(mission),
         )
         heard = _messages(folder / TLOG, epoch_s, start_s, end_s)
         outcomes = iter([d for d in decisions if start_s <= d["t_s"] < end_s and d["kind"] in {"plan", "outcome"}])
@@ -103,6 +108,9 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
         recorded = _actions_by_time([d for d in decisions if start_s <= d["t_s"] < end_s])
         for t_s, n_messages, n_outcomes in rows:
             if not start_s <= t_s < end_s:
+                continue
+            if t_s >= gap_s:
+                unrecorded += 1
                 continue
             # A power cut may take the last line of one file and leave the row that counted it in another.
             for at_s, message in itertools.islice(heard, n_messages):
@@ -120,7 +128,28 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             if not _same(mine, theirs):
                 differences.append(Difference(t_s=t_s, recorded=theirs, replayed=mine))
     return ReplayReport(
-        steps=steps, messages=messages, actions=actions, restarts=len(starts) - 1, differences=tuple(differences))
+        steps=steps, unrecorded=unrecorded, messages=messages, actions=actions, restarts=len(starts) - 1,
+        differences=tuple(differences))
+
+
+def _gaps(decisions: list[dict[str, Any]]) -> list[float]:
+    """Return, for each life of the companion, since when records of it are missing [s]."""
+    gaps, has_begun = [1e18], False
+    for record in decisions:
+        if record["kind"] == "start":
+            if has_begun:
+                gaps.append(1e18)
+            has_begun = True
+        elif record["kind"] == "gap":
+            since_s = record["since_s"]
+            gaps[-1] = min(gaps[-1], -1e18 if since_s is None else float(since_s))
+    return gaps
+
+
+def _mission_path(folder: Path, recorded: dict[str, Any]) -> Path:
+    """Return the voyage's own copy of its mission; where it has none, the place that the mission had."""
+    copy = folder / recorded.get("copy", "")
+    return copy if copy.is_file() else Path(recorded["path"])
 
 
 def _rows(path: Path) -> list[tuple[float, int, int]]:

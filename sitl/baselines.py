@@ -33,6 +33,7 @@ from sitl.ardurover import ArduRover
 from sitl.ardurover_program import require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.config import Truth as Now
+from sitl.hull import own_polar
 from sitl.live import run_live
 from sitl.runner import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.scenario import load_scenario
@@ -177,7 +178,7 @@ def sail_alone(path: Path, seed: int) -> dict[str, Any]:
         mission, wind = track.mission, Held(scenario_wind(scenario, path, seed))
         autopilot = Autopilot(
             AutopilotConfig(home=mission.start or mission.origin, heading_rad=_heading_rad(mission), is_warm=True,
-                            is_moored=True, parameters=scenario.parameters), wind, seed=seed)
+                            is_moored=True, parameters=scenario.parameters, polar=own_polar(mission)), wind, seed=seed)
         wires = MemoryLink("shore", seed=seed)
         async with (
             serve(autopilot, [wires.far]),

@@ -16,16 +16,17 @@ from pathlib import Path
 from typing import Any
 
 from companion.clock import now_s, run
+from companion.disk import Disk
 from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
 from companion.planner.warm import warm
-from companion.telemetry.recorder import DECISIONS, write_atomically
+from companion.telemetry.names import DECISIONS, VERDICT
 from companion.wind.forecaster import compile_kernels
 from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
-from sitl.runner import TRUTH_EVERY_S, VERDICT, break_vane, marks_of, solid_of
+from sitl.runner import TRUTH_EVERY_S, break_vane, marks_of, solid_of
 from sitl.scenario import EventSpec, Scenario
 from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge
@@ -168,7 +169,7 @@ async def _run(
         summary=summary, status_times_s=None, alerts=summary.get("alerts", {}), errors=errors,
         marks=marks_of(mission),
     )
-    write_atomically(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
+    Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict
 
 

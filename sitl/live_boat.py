@@ -14,6 +14,7 @@ from pathlib import Path
 from companion.clock import run
 from companion.geofence import load_mission
 from sitl.autopilot import Autopilot, AutopilotConfig, serve
+from sitl.hull import own_polar
 from sitl.scenario import load_scenario
 from sitl.weather import scenario_wind
 
@@ -31,7 +32,7 @@ def main() -> int:
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     autopilot = Autopilot(
         AutopilotConfig(home=mission.start or mission.origin, heading_rad=math.radians(heading_deg), is_warm=True,
-                        is_moored=True, parameters=scenario.parameters),
+                        is_moored=True, parameters=scenario.parameters, polar=own_polar(mission)),
         scenario_wind(scenario, args.scenario, args.seed), args.seed,
     )
 

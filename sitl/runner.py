@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.app import sail
 from companion.clock import now_s
+from companion.disk import Disk
 from companion.errors import LinkError
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
@@ -28,7 +29,7 @@ from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link, LinkIdentity
 from companion.messages import MissionItem, Mode, waypoint
 from companion.options import SailOptions, at_once
-from companion.telemetry.recorder import write_atomically
+from companion.telemetry.names import STATE, VERDICT
 from sitl.autopilot import (
     Autopilot,
     AutopilotConfig,
@@ -40,10 +41,12 @@ from sitl.autopilot import (
 )
 from sitl.autopilot.memory import MemoryEnd
 from sitl.fragile import FragilePlanner
+from sitl.hull import own_polar
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, befall
 from sitl.scenario import EventSpec, Scenario
 from sitl.ships import Motion, free_port
+from sitl.sick_disk import SickDisk
 from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
 
@@ -52,7 +55,6 @@ MAX_TRUTH_SAMPLES = 20_000
 # Unix time of every simulated voyage's start: stamps must not depend on when it was run.
 EPOCH_S = 1_781_000_000.0
 # The simulated boat lies still until it sails, so that every voyage starts where its mission says.
-VERDICT = "verdict.json"
 # Effort of one plan under the virtual clock, where time cannot stop it.
 EXPANSIONS = 15_000
 
@@ -87,6 +89,7 @@ class _World:
     summary: dict[str, Any] = field(default_factory=dict)
     set_sail_s: float | None = None
     planner: FragilePlanner = field(default_factory=FragilePlanner)
+    disk: SickDisk = field(default_factory=SickDisk)
     observer: Observer | None = None
     stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
 
@@ -148,7 +151,7 @@ async def run_embedded(
         heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     autopilot = Autopilot(
         AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
-                        parameters=scenario.parameters, has_ftp=scenario.has_ftp),
+                        parameters=scenario.parameters, has_ftp=scenario.has_ftp, polar=own_polar(mission)),
         wind, seed=seed,
     )
     link = MemoryLink("companion", seed=seed)
@@ -174,7 +177,7 @@ async def run_embedded(
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
         status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
     )
-    write_atomically(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
+    Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict
 
 
@@ -187,7 +190,7 @@ async def _sail_and_restart(
     deadline_s = now_s() + scenario.limit_s
     options = SailOptions(
         seed=seed, epoch_s=EPOCH_S, expansions=expansions, offload=at_once, is_durable=False,
-        state_path=folder / "state.json", command=f"sitl run {scenario.name}",
+        state_path=folder / STATE, disk=world.disk, command=f"sitl run {scenario.name}",
     )
 
     def on_status(status: Any, step: Step) -> None:  # noqa: ARG001 - the interface has both
@@ -286,6 +289,11 @@ async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
         world.planner.die()
     elif event.kind == "planner_hang":
         world.planner.hang(math.inf if event.for_s is None else now_s() + event.for_s)
+    elif event.kind == "disk":
+        world.disk.become(event.state or "full")
+        if event.for_s is not None:
+            await asyncio.sleep(event.for_s)
+            world.disk.become("ok")
     elif event.kind == "vane":
         await break_vane(autopilot.set_vane, event)
     elif event.kind == "battery":

@@ -27,6 +27,7 @@ EventKind = Literal[
     "kill_companion",    # restart_after_s: SIGKILL in the middle of whatever it does
     "kill_planner",      # its process dies; the next request starts another
     "planner_hang",      # for_s: requests are not answered in time
+    "disk",              # state: full | sick | read_only | ok; for_s: the companion's
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
     "current",           # set_deg, drift_mps

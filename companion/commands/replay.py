@@ -30,6 +30,8 @@ def run(args: argparse.Namespace) -> int:
     report = replay(args.voyage, args.mission)
     print(f"{report.steps} steps, {report.messages} messages, {report.actions} actions, {report.restarts} restarts: "
           f"{len(report.differences)} steps differ")
+    if report.unrecorded:
+        print(f"{report.unrecorded} more steps came after a gap in the records, and were not compared")
     for difference in report.differences[:SHOWN]:
         print(f"  t = {difference.t_s:.1f} s")
         print(f"    recorded {json.dumps(difference.recorded)[:400]}")

@@ -22,7 +22,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.plots.voyage import PICTURE, plot_voyage, read_voyage
+    from companion.plots.voyage import plot_voyage, read_voyage
+    from companion.telemetry.names import PICTURE
 
     record = read_voyage(args.voyage)
     if args.json:

@@ -5,15 +5,19 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import math
 import os
 import re
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TextIO, cast
+
+if TYPE_CHECKING:
+    from companion.telemetry.console import Console
 
 # Loading takes about two seconds; beyond this the operator is told why nothing happens [s].
 PATIENCE_S = 4.0
@@ -35,7 +39,13 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--dry-run", action="store_true", help="look, plan and speak; touch nothing")
     parser.add_argument("--seed", type=int, default=None, help="of the planner (default: the mission's)")
     parser.add_argument("--state", type=Path, metavar="FILE",
-                        help="where the state for a restart is kept (default: voyages/<mission>.state.json)")
+                        help="where the state for a restart is kept (default: voyages/<mission>.state.json); its "
+                        "folder is one boat's, and locked")
+    parser.add_argument("--again", action="store_true",
+                        help="sail the mission again when its state says that it has arrived (asked at a terminal)")
+    parser.add_argument("--keep-gb", type=float, metavar="GB",
+                        help="what all voyages in the folder may take together; the oldest finished ones give way, "
+                        "telemetry logs first, decisions last (default: 5, and without end where --out is given)")
     parser.add_argument("--wait", type=float, default=30.0, metavar="S",
                         help="give up when no autopilot is heard for this long (default: 30)")
     parser.add_argument("--limit", type=float, metavar="S", help="end after this many seconds")
@@ -50,48 +60,147 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from companion import kernel_cache
+    from companion.telemetry.console import Console
+
+    with (
+        _outliving_the_terminal(), Console(sys.stdout) as out, Console(sys.stderr) as err,
+        contextlib.redirect_stderr(cast("TextIO", err)),   # what is logged must not wait for a terminal either
+    ):
+        kernels = kernel_cache.keep_usable(os.environ)
+        if kernels is not None:
+            os.environ[kernel_cache.VARIABLE] = str(kernels)
+            err.write(f"companion run: the compiled kernels are in {kernels}: their own place is read-only\n")
+        return _run(args, out, err)
+
+
+@contextlib.contextmanager
+def _outliving_the_terminal() -> Iterator[None]:
+    """Let no terminal end the voyage: not by hanging up (a dropped ssh), not by stopping who writes to it.
+
+    What is ignored here is ignored by the planner's process too.
+    """
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGHUP, signal.SIGTTOU)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     from companion.clock import run as run_loop
     from companion.errors import InputError
     from companion.geofence import load_mission
     from companion.mavlink.transport import open_link
+    from companion.telemetry.shelf import DEFAULT_BUDGET_BYTES, Shelf
     from companion.traffic.feeds import parse_feed
 
     if not args.speedup > 0.0:
         raise InputError("--speedup", str(args.speedup), "must be positive")
+    if args.keep_gb is not None and not 0.0 < args.keep_gb < math.inf:
+        raise InputError("--keep-gb", str(args.keep_gb), "must be positive")
     for name in args.feed:
         parse_feed(name)
     mission = load_mission(args.mission).with_feeds(*args.feed)
     for finding in mission.findings:
-        sys.stderr.write(f"companion run: note: {finding}\n")
+        err.write(f"companion run: note: {finding}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
     transport = open_link(args.link, seed=seed)
     name = re.sub(r"[^A-Za-z0-9_-]+", "-", mission.name).strip("-") or "voyage"
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{name}"
     state_path = args.state or (folder.parent / f"{name}.state.json")
-    state_path.parent.mkdir(parents=True, exist_ok=True)
     signing = _signing(args.signing_key)
+    shelf = None   # a folder that was named is not ours to tidy
+    if args.out is None or args.keep_gb is not None:
+        shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
+    with _alone(state_path, err):
+        again = args.again or _asked(mission, state_path, err)
+        if again is None:
+            return 0
 
-    def options() -> Any:
-        from companion.options import SailOptions
+        def options() -> Any:
+            from companion.options import SailOptions
 
-        return SailOptions(
-            seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
-            expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
-            wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
-            command=" ".join(sys.argv),
-        )
+            return SailOptions(
+                seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
+                expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
+                wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
+                shelf=shelf, is_again=again, command=" ".join(sys.argv),
+            )
 
-    summary = run_loop(_sail(mission, transport, folder, options, args.speedup), speedup=args.speedup)
-    _report(folder)
-    arrived = bool(summary.get("arrived"))
-    end = "arrived" if arrived else f"not arrived: {summary.get('end_reason')}, {summary.get('end_why')}"
-    print(f"{end}; {summary.get('time_s') or 0.0:.0f} s, {summary['tacks']} tacks, {summary['replans']} replans")
-    print(folder)
-    return 0 if arrived else 1
+        summary = run_loop(_sail(mission, transport, folder, options, args.speedup, out), speedup=args.speedup)
+    if not summary["arrived_before"]:
+        _report(folder, err)
+    code, text = last_words(mission.name, summary)
+    out.write(f"{text}\n{folder}\n")
+    return code
+
+
+def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
+    """Return the exit code and what is said of a voyage at its end."""
+    if summary["arrived_before"]:
+        # an order that gets no better by trying again
+        return 2, f"not sailed: {name} had arrived before this start; --again sails it again"
+    end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
+    text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {summary['tacks']} tacks, {summary['replans']} replans"
+    if summary["records_dropped"]:
+        missing = f"{summary['records_dropped']} records are missing"
+        text += "\n" + "; ".join(part for part in (missing, summary["disk_trouble"]) if part)
+    return 0 if summary["arrived"] else 1, text
+
+
+@contextlib.contextmanager
+def _alone(state_path: Path, err: Console) -> Iterator[None]:
+    """Hold the lock on the folder of the state: it is one boat's, and one companion commands a boat."""
+    from companion.disk import Disk, is_mistake, reason
+    from companion.errors import InputError, JobError
+    from companion.lock import FolderLock
+
+    if state_path.is_dir():
+        raise InputError("--state", str(state_path), "is a folder", "name a file")
+    lock = FolderLock(state_path.parent)
+    try:
+        Disk().make_folder(state_path.parent)
+        is_alone = lock.take()
+    except OSError as error:
+        if is_mistake(error):
+            raise InputError(str(state_path.parent), "", f"cannot hold the state: {reason(error)}",
+                             "name another place with --state or --out") from error
+        err.write(f"companion run: {state_path.parent} cannot be locked: {reason(error)}; sailing all the same\n")
+        is_alone = True
+    if not is_alone:
+        raise JobError(f"{state_path.parent}: another companion is sailing with the state kept here, and two must not "
+                       "command one boat; end that one, or keep another boat's state elsewhere with --state")
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _asked(mission: Any, state_path: Path, err: Console) -> bool | None:
+    """Return whether a mission that has arrived is sailed again: what a terminal answers; None: it is not wanted."""
+    if not (state_path.is_file() and sys.stdin is not None and sys.stdin.isatty() and err.isatty()):
+        return False
+    from companion.compose import config_of, voyage_of
+    from companion.skipper import Skipper
+    from companion.telemetry.state_file import read_state
+
+    try:
+        saved = read_state(state_path)
+    except (OSError, ValueError):
+        return False   # the voyage says what is wrong with it
+    if not Skipper(voyage=voyage_of(mission), config=config_of(mission)).has_arrived(saved):
+        return False
+    day = datetime.fromtimestamp(state_path.stat().st_mtime, UTC)
+    err.write(f"{mission.name} has arrived already ({day:%d %b %Y %H:%M} UTC). Sail it again? [y/N] ")
+    if sys.stdin.readline().strip().lower() in {"y", "yes"}:
+        return True
+    return None
 
 
 async def _sail(
-    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], speedup: float
+    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], speedup: float, out: Console,
 ) -> dict[str, Any]:
     from companion.errors import JobError
     from companion.planner.worker import PlannerWorker
@@ -109,12 +218,12 @@ async def _sail(
 
         ready = asyncio.ensure_future(planner.ready())
         if not (await asyncio.wait({ready}, timeout=PATIENCE_S * speedup))[0]:
-            print("preparing the planner: its kernels are compiled once on each machine", flush=True)
+            out.write("preparing the planner: its kernels are compiled once on each machine\n")
         try:
             await ready
         except (TimeoutError, EOFError, OSError) as error:
             raise JobError(f"the planner's process did not start: {error!r}") from error
-        with ProgressLine(sys.stdout) as progress, ServiceManager(os.environ) as manager:
+        with ProgressLine(out) as progress, ServiceManager(os.environ) as manager:
 
             def show(status: Any, step: Any) -> None:
                 progress.show(status, step)
@@ -131,11 +240,12 @@ def _signing(path: Path | None) -> Any:
     return SigningStore(path, time.time())
 
 
-def _report(folder: Path) -> None:
+def _report(folder: Path, err: Console) -> None:
     """Draw the voyage; a picture that fails must not hide how the voyage ended."""
     try:
-        from companion.plots.voyage import PICTURE, plot_voyage, read_voyage
+        from companion.plots.voyage import plot_voyage, read_voyage
+        from companion.telemetry.names import PICTURE
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:
-        sys.stderr.write(f"companion run: the picture could not be drawn: {error!r}\n")
+        err.write(f"companion run: the picture could not be drawn: {error!r}\n")

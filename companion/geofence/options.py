@@ -90,6 +90,8 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     set_auto: bool = False
     guided: bool = False
     upload_fence: bool = False
+    replace_foreign: bool = False
+    """Overwrite a mission on the autopilot that is not ours, before setting sail; under way somebody else's stays."""
 
 
 class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

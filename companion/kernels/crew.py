@@ -15,6 +15,7 @@ from numba.core.registry import cpu_target
 
 from companion.errors import JobError
 from companion.kernels.build import AGAIN
+from companion.kernels.cache import KernelCache
 from companion.kernels.listed import Entry, read_list
 from companion.kernels.places import CARRIED, folder
 from companion.kernels.stamp import callees
@@ -28,9 +29,9 @@ class Work:
 
     def __init__(self, entry: Entry) -> None:
         self.entry = entry
-        self.dispatcher: Any = entry.dispatcher()
+        self.dispatcher = entry.dispatcher()
         self.types: tuple[Any, ...] = entry.types()
-        self.file = self.dispatcher._cache.file_name(self.types, cpu_target.target_context.codegen())  # noqa: SLF001
+        self.file = KernelCache(self.dispatcher).file_name(self.types, cpu_target.target_context.codegen())
         self.before: list[Work] = []
         self.urgency_s = entry.seconds   # of it and the longest row of kernels that wait for it
         self._is_done = False

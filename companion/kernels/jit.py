@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core import types
 from numba.core.registry import CPUDispatcher
+from numba.core.types.misc import unliteral
 
 from companion.kernels.cache import KernelCache
 
@@ -37,5 +37,5 @@ class _Kernel(CPUDispatcher):  # type: ignore[misc]
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return how a kernel is called from another: a literal is a number like any other, not a type of its own."""
-        plain = tuple(types.unliteral(a) for a in args)
-        return super().get_call_template(plain, {name: types.unliteral(a) for name, a in kws.items()})
+        plain = tuple(unliteral(a) for a in args)
+        return super().get_call_template(plain, {name: unliteral(a) for name, a in kws.items()})

@@ -77,7 +77,7 @@ def _code(code: types.CodeType) -> Iterator[str]:
             yield repr(constant)
 
 
-def _globals_of(function: types.FunctionType) -> list[tuple[str, Any]]:
+def _globals_of(function: Any) -> list[tuple[str, Any]]:
     """Return the module's names that the function uses, and what they are."""
     names: set[str] = set()
     left = [function.__code__]

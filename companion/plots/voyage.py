@@ -18,10 +18,9 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.errors import InputError
-from companion.telemetry.recorder import DECISIONS, SUMMARY, TRACK, read_jsonl
+from companion.telemetry.names import AREA, DECISIONS, SUMMARY, TRACK
+from companion.telemetry.recorder import read_jsonl
 
-AREA = "area.json"
-PICTURE = "voyage.png"
 PORT_RED, STARBOARD_GREEN, WIND_BLUE, PLAN_GREY = "#b3261e", "#1b7f3b", "#1f5fa8", "#5b6472"
 LAND, LAND_EDGE, WATER = "#e7dcc3", "#8a7a55", "#f4f8fb"
 

@@ -5,8 +5,9 @@ Pure rules. ``Skipper(voyage=..., config=...).step(state, snapshot) -> (state, a
 
 from companion.skipper.config import ALL_PERMITTED, DRY_RUN, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.rules import Skipper
+from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import Snapshot
-from companion.skipper.state import Persisted, Phase, SkipperState
+from companion.skipper.state import Phase, SkipperState
 from companion.skipper.voyage import Goal, Side, Voyage
 
 __all__ = [

@@ -41,7 +41,7 @@ class Permissions:
     may_arm: bool = False
     may_set_mode: bool = False         # AUTO to begin with, and the modes of the watchdogs
     may_steer: bool = False            # GUIDED headings (out of irons, buoys by heading)
-    may_replace_foreign: bool = False  # a mission that is not ours may be overwritten
+    may_replace_foreign: bool = False  # a mission that is not ours may be overwritten before setting sail
 
 
 DRY_RUN = Permissions()

@@ -92,7 +92,8 @@ def take_events(turn: Turn) -> None:
         if isinstance(event, StatusText):
             ours = turn.state.pending_upload is not None or turn.t_s - turn.state.current_asked_s < turn.config.settle_s
             if event.text.startswith(FOREIGN_TEXTS) and not ours and event.source_component == 1:
-                turn.update(checked_mission=False, read_since_s=turn.t_s)
+                # A read that is under way, or came in this very step, may tell of the mission before.
+                turn.update(checked_mission=False, read_since_s=turn.t_s, pending_read=None)
             note(turn, event)
         elif isinstance(event, OperatorWish):
             turn.update(wish=event)

@@ -1,15 +1,21 @@
-"""The mission on the autopilot: read, compared, and known to be ours, empty, a mixture of ours, or foreign."""
+"""The mission on the autopilot: read, compared, and known to be ours, an earlier one of ours, a mixture, or foreign."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from companion.messages import MissionItem, Mode
+from companion.mavlink.items import mission_hash
+from companion.messages import Command, MissionItem, Mode
 from companion.skipper.actions import ReadMission, Severity
-from companion.skipper.route import held_back, is_mixture, is_same_mission
+from companion.skipper.mark import are_marked, marked
+from companion.skipper.route import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
+from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import OperatorWish
-from companion.skipper.state import Persisted, Phase
+from companion.skipper.state import Phase, Route
 from companion.skipper.turn import Turn
+
+REMEDY = "it is not resumed, and replaced only where [operator] replace_foreign allows it"
 
 
 def mission_is_known(turn: Turn) -> bool:
@@ -19,11 +25,10 @@ def mission_is_known(turn: Turn) -> bool:
         turn.update(wish=None, foreign="", replace_foreign=True)
         state = turn.state
     if state.foreign:
-        if turn.snapshot.permissions.may_replace_foreign:
+        if _may_replace(turn):
             turn.update(foreign="", route=None, replace_foreign=True)
             return True
-        phase = Phase.OPERATOR if state.sailing else Phase.WAITING
-        turn.phase(phase, f"{state.foreign}; it is not resumed and not replaced without permission")
+        turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{state.foreign}; {REMEDY}")
         return False
     if state.pending_upload is not None:
         return True
@@ -62,13 +67,11 @@ def _read(turn: Turn, text: str) -> None:
 
 
 def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
-    """Judge the mission that was read: ours, empty, a mixture of ours, or foreign."""
+    """Judge the mission that was read: ours, empty, a mixture of ours, an earlier one of ours, or foreign."""
     state = turn.state
     saved = state.adoptable
     turn.update(checked_mission=True, read_t_s=turn.t_s, adoptable=None)
-    routes = [r for r in (
-        state.route, state.unsure_route, saved.route if saved else None, saved.pending if saved else None,
-    ) if r is not None]
+    routes = [r for r in (state.route, state.unsure_route, *(saved.lists if saved else ())) if r is not None]
     for route in routes:
         if is_same_mission(items, route.items):
             turn.update(route=route, unsure_route=None)
@@ -88,21 +91,59 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
             _take_up(turn, saved)
         return True
     if any(is_mixture(items, a.items, b.items) for a in routes for b in routes):
-        newest = state.unsure_route or (saved.pending if saved else None) or routes[0]
+        newest = state.unsure_route or (saved.pending or saved.unsure if saved else None) or routes[0]
         turn.say(Severity.WARNING, "mixture", "an upload was cut short: the mission is put right", every_s=0.0)
         if saved is not None:
             _take_up(turn, saved)
             turn.update(sailing=state.sailing or _under_way(turn))
         turn.update(route=state.route or newest, unsure_route=newest, repair=True)
         return True
-    if state.replace_foreign or turn.snapshot.permissions.may_replace_foreign:
+    # Under way we know what we have put there: a list of ours that we did not put there is somebody's order.
+    if not state.sailing and (mission_hash(items) in state.known or are_marked(items)):
+        _take_over(turn, items, saved)
+        return True
+    if state.replace_foreign or _may_replace(turn):
         turn.update(route=None, unsure_route=None, replace_foreign=True)
         return True
     text = f"the mission on the autopilot ({len(items)} items) is not ours"
     turn.update(foreign=text, route=None, unsure_route=None)
-    turn.say(Severity.ERROR, "foreign mission", turn.state.foreign, every_s=0.0)
-    turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{turn.state.foreign}; it is not resumed")
+    turn.say(Severity.ERROR, "foreign mission", f"{text}; {REMEDY}", every_s=0.0)
+    turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{text}; {REMEDY}")
     return False
+
+
+def _may_replace(turn: Turn) -> bool:
+    """Return whether a stranger's mission may be overwritten: not one that somebody brings while we sail."""
+    return turn.snapshot.permissions.may_replace_foreign and not turn.state.sailing
+
+
+def _take_over(turn: Turn, items: tuple[MissionItem, ...], saved: Persisted | None) -> None:
+    """Take a list of ours that is no list we know: an earlier voyage's, or one whose upload was not saved.
+
+    A boat that sails by it keeps it until there is a plan from where she is; else it is replaced.
+    """
+    saved = saved or Persisted(voyage=turn.voyage.name, gate=0, sailing=True, route=None, pending=None)
+    if not _under_way(turn):
+        _take_up(turn, saved)
+        turn.update(route=None, unsure_route=None)
+        turn.say(Severity.NOTICE, "earlier mission", "the mission on board is an earlier one of ours: it is replaced",
+                 every_s=0.0)
+        return
+    turn.update(route=_route_of(turn, items), unsure_route=None)
+    _adopt(turn, saved, "an earlier one of ours: sailing on by it until there is a plan")
+
+
+def _route_of(turn: Turn, items: tuple[MissionItem, ...]) -> Route:
+    """Return a list that was read as the route that sails: where it leads is known, what for is not."""
+    whole = marked(effective(items))
+    home = turn.voyage.home_en_m or turn.boat_en or (0.0, 0.0)
+    points = tuple(
+        home if item.command == Command.NAV_RETURN_TO_LAUNCH else turn.voyage.frame.en_from_geo(item.point)
+        for item in whole)
+    facts = turn.blank_facts(NO_PLAN, turn.config.margin_m, turn.config.delta_s, HELD_BACK)
+    return replace(
+        facts, items=whole, points_en_m=points, leg_from_en_m=(points[0], *points[:-1]), gate_of=(-1,) * len(whole),
+        why="a mission of ours that was not saved")
 
 
 def _under_way(turn: Turn) -> bool:
@@ -115,7 +156,7 @@ def _take_up(turn: Turn, saved: Persisted) -> None:
     turn.update(gate=saved.gate, approaches=saved.approaches, bearing_rad=0.5 * math.pi * saved.quarters)
 
 
-def _adopt(turn: Turn, saved: Persisted) -> None:
+def _adopt(turn: Turn, saved: Persisted, what: str = "ours") -> None:
     """Take over the mission that sails, without an upload."""
     status = turn.autopilot
     index = (status.mission_seq or 1) - 1 if status is not None else 0
@@ -125,4 +166,4 @@ def _adopt(turn: Turn, saved: Persisted) -> None:
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         sailing=_under_way(turn) or (saved.sailing and status is not None and status.is_armed),
     )
-    turn.say(Severity.NOTICE, "adopted", f"the mission on board is ours: taken over at item {index + 1}", every_s=0.0)
+    turn.say(Severity.NOTICE, "adopted", f"the mission on board is {what}, taken over at item {index + 1}", every_s=0.0)

@@ -147,6 +147,7 @@ def splice(
 
 # ----------------------------------------------------------------------------------------- transfer
 HELD_BACK = "held back"   # the rung of a route that ends in a stopgap
+NO_PLAN = -1              # the plan of a route that was found on board: ours, and nobody knows what for
 
 
 def stopgap(route: Route, keep: int, index: int) -> MissionItem | None:

@@ -27,9 +27,10 @@ from companion.skipper.ladder import rungs
 from companion.skipper.launch import launch, start
 from companion.skipper.lookout import look_out
 from companion.skipper.on_board import mission_is_known
-from companion.skipper.sailing import sail
+from companion.skipper.sailing import ARRIVED_BEFORE, sail
+from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import OperatorWish, Snapshot
-from companion.skipper.state import PATIENT, ByField, Persisted, Phase, SkipperState
+from companion.skipper.state import PATIENT, ByField, Phase, SkipperState
 from companion.skipper.turn import Turn
 from companion.skipper.voyage import Voyage
 from companion.skipper.watchdogs import watch
@@ -44,14 +45,26 @@ class Skipper:
     voyage: Voyage
     config: SkipperConfig
 
-    def initial(self, persisted: Persisted | None = None) -> SkipperState:
-        """Return the first state; with ``persisted`` the mission on the autopilot may be adopted by its content."""
-        if persisted is not None and (
-            persisted.voyage != self.voyage.name
-            or persisted.gate > len(gates_of(self.voyage, persisted.approaches))
-        ):
-            return SkipperState(why="the saved state is of another voyage")
-        return SkipperState(adoptable=persisted)
+    def initial(self, persisted: Persisted | None = None, known: tuple[str, ...] = ()) -> SkipperState:
+        """Return the first state.
+
+        With ``persisted`` the mission on the autopilot may be adopted by its content; ``known`` are the hashes of lists
+        that earlier voyages of ours may have left there.
+        """
+        if persisted is None:
+            return SkipperState(known=known)
+        if not self.fits(persisted):
+            return SkipperState(why="the saved state is of another voyage", known=(*known, *persisted.names))
+        return SkipperState(adoptable=persisted, known=known)
+
+    def fits(self, persisted: Persisted) -> bool:
+        """Return whether a saved state is one of this voyage."""
+        gates = [persisted.gate, *(g + 1 for route in persisted.lists for g in route.gate_of)]
+        return persisted.voyage == self.voyage.name and max(gates) <= len(gates_of(self.voyage, persisted.approaches))
+
+    def has_arrived(self, persisted: Persisted) -> bool:
+        """Return whether a saved state of this voyage has all its goals behind it."""
+        return self.fits(persisted) and persisted.gate == len(gates_of(self.voyage, persisted.approaches))
 
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
@@ -77,12 +90,13 @@ class Skipper:
 
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
-        pending = state.pending_upload.route if state.pending_upload is not None else state.unsure_route
         if not state.checked_mission and state.adoptable is not None:
             return state.adoptable
         return Persisted(
-            voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route, pending=pending,
-            own_mode=state.own_mode, approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
+            voyage=self.voyage.name, gate=state.gate, sailing=state.sailing, route=state.route,
+            pending=state.pending_upload.route if state.pending_upload is not None else None,
+            unsure=state.unsure_route, own_mode=state.own_mode, approaches=state.approaches,
+            quarters=round(state.bearing_rad / (0.5 * math.pi)),
         )
 
 
@@ -105,7 +119,9 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         if not repair(turn):
             hand_back(turn)
         return
-    if turn.state.wish is OperatorWish.HOLD and not turn.state.sailing:
+    if turn.gate is None and not turn.state.sailing:
+        turn.phase(Phase.DONE, ARRIVED_BEFORE)
+    elif turn.state.wish is OperatorWish.HOLD and not turn.state.sailing:
         turn.phase(Phase.WAITING, "the operator asked to hold")
     elif turn.state.route is None:
         start(turn)

@@ -26,6 +26,7 @@ from companion.skipper.triggers import find_trigger, is_buoy
 from companion.skipper.turn import Turn
 from companion.traffic.plans import MIN_INTERVAL_S
 
+ARRIVED_BEFORE = "all goals were reached before this start; --again sails the mission again"
 STEER_S = 25.0               # bearing away longer than this has failed
 SAILS_MPS = 0.8              # out of irons
 SAILS_TWA_RAD = math.radians(60.0)
@@ -120,7 +121,8 @@ def _finish(turn: Turn) -> None:
         turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
         turn.update(pending_plan=None)
     end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
-    turn.phase(Phase.DONE, f"all {len(turn.state.reached)} goals reached{end}")
+    done = f"all {len(turn.voyage.legs)} goals reached" if turn.state.reached else ARRIVED_BEFORE
+    turn.phase(Phase.DONE, f"{done}{end}")
     turn.say(Severity.NOTICE, "done", turn.state.why, every_s=0.0)
 
 

@@ -1,10 +1,10 @@
-"""What the skipper remembers from step to step, and what of it survives a restart."""
+"""What the skipper remembers from step to step; what of it survives a restart is in ``saved``."""
 
 from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from companion.field.guidance import LastResort
 from companion.field.station import StationState
@@ -15,6 +15,9 @@ from companion.skipper.gates import Approach
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.voyage import PointEn
 from companion.traffic import Assessment
+
+if TYPE_CHECKING:
+    from companion.skipper.saved import Persisted  # which is made of routes
 
 
 class Phase(enum.Enum):
@@ -137,6 +140,7 @@ class SkipperState:
     gate: int = 0                      # index of the gate being sailed to
     route: Route | None = None         # what is on the autopilot, as far as we know
     adoptable: Persisted | None = None  # from before a restart, until the autopilot's mission has been compared
+    known: tuple[str, ...] = ()        # hashes of lists that earlier voyages of ours may have left on board
     checked_mission: bool = False      # the mission on board has been compared with ours since link, reboot, operator
     foreign: str = ""                  # why the mission on board is not ours; empty: it is, or there is none
     sailing: bool = False              # has been in AUTO and armed with our route
@@ -197,82 +201,3 @@ class SkipperState:
     reached: tuple[int, ...] = ()                  # goals reached, in order
     missed: int = 0                                # buoys passed on the wrong side and sailed again
     wants: tuple[str, ...] = ()                    # what is missing, in words
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Persisted:
-    """What survives a kill: written whenever it changes, before the actions of the step are carried out."""
-
-    voyage: str
-    gate: int
-    sailing: bool
-    route: Route | None
-    pending: Route | None
-    own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
-    approaches: tuple[Approach, ...] = ()   # the numbering of the gates hangs on them
-    quarters: int = 0                  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        return {
-            "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
-            "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
-            "own_mode": None if self.own_mode is None else self.own_mode.name,
-            "approaches": [[a.goal, *a.en_m, a.turn_rad] for a in self.approaches], "quarters": self.quarters,
-        }
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Persisted:
-        """Read ``to_dict``'s result; ValueError when it cannot be believed."""
-        try:
-            if data["format"] != FORMAT:
-                raise ValueError(f"state format {data['format']}, not {FORMAT}")
-            return cls(
-                voyage=str(data["voyage"]), gate=int(data["gate"]), sailing=bool(data["sailing"]),
-                route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
-                own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
-                approaches=tuple(
-                    Approach(goal=int(goal), en_m=(float(e), float(n)), turn_rad=None if turn is None else float(turn))
-                    for goal, e, n, turn in data.get("approaches", ())),
-                quarters=int(data.get("quarters", 0)),
-            )
-        except (KeyError, TypeError, IndexError, AttributeError) as error:
-            raise ValueError(f"the saved state is damaged: {error!r}") from error
-
-
-FORMAT = 1
-_FIGURES = (
-    "plan_id", "plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s", "rung",
-    "risk", "cost_s", "why",
-)
-_VESSEL_FIGURES = ("vessel_risk", "vessels_part")
-
-
-def _route_to_dict(route: Route | None) -> dict[str, Any] | None:
-    if route is None:
-        return None
-    return {
-        "items": [[m.command, m.lat_e7, m.lon_e7, m.alt_m, m.frame, list(m.params)] for m in route.items],
-        "points": [list(p) for p in route.points_en_m],
-        "from": [list(p) for p in route.leg_from_en_m],
-        "gates": list(route.gate_of),
-        **{name: getattr(route, name) for name in (*_FIGURES, *_VESSEL_FIGURES)},
-    }
-
-
-def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
-    if data is None:
-        return None
-    items = tuple(
-        MissionItem(command=int(c), lat_e7=int(lat), lon_e7=int(lon), alt_m=float(alt), frame=int(frame),
-                    params=(float(p[0]), float(p[1]), float(p[2]), float(p[3])))
-        for c, lat, lon, alt, frame, p in data["items"]
-    )
-    points = tuple((float(e), float(n)) for e, n in data["points"])
-    starts = tuple((float(e), float(n)) for e, n in data["from"])
-    gates = tuple(int(g) for g in data["gates"])
-    if not len(items) == len(points) == len(starts) == len(gates):
-        raise ValueError("the saved state is damaged: its lists differ in length")
-    return Route(items=items, points_en_m=points, leg_from_en_m=starts, gate_of=gates,
-                 **{name: data[name] for name in _FIGURES},
-                 vessel_risk=float(data.get("vessel_risk", 0.0)), vessels_part=float(data.get("vessels_part", 0.0)))

@@ -13,7 +13,7 @@ from companion.skipper.gates import Gate
 from companion.skipper.geometry import bearing_rad, distance_m
 from companion.skipper.judge import predicted_beat
 from companion.skipper.planning import seeks_refuge
-from companion.skipper.route import path_length_m
+from companion.skipper.route import NO_PLAN, path_length_m
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.state import Phase, Route
 from companion.skipper.traffic import meetings
@@ -47,6 +47,12 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return None
     if state.after_operator:
         return Trigger(reason=ReplanReason.OPERATOR_BACK, text="the operator gave the boat back")
+    if state.route is not None and state.route.plan_id == NO_PLAN:
+        # It need not lead to our goals: nothing is planned but another way, and that as soon as the wind is known.
+        if turn.snapshot.wind.record_s < config.wind_settle_s:
+            return None
+        return Trigger(reason=ReplanReason.MISMATCH, text="the mission on board is of no plan that is known",
+                       interval_s=config.min_replan_interval_s)
     if "battery critical" in fresh and turn.voyage.refuges:
         return Trigger(reason=ReplanReason.REFUGE, text="the battery is critical", urgent=True)
     if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:

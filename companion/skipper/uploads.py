@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from companion.skipper.actions import Change, Severity, UploadMission
+from companion.skipper.mark import marked
 from companion.skipper.route import common_prefix, stopgap
 from companion.skipper.snapshot import UploadOutcome, UploadResult
 from companion.skipper.state import PendingUpload, Retry, Route
@@ -12,16 +15,17 @@ from companion.skipper.turn import Turn
 def upload(
     turn: Turn, route: Route, set_current: int | None, text: str, *, whole: bool = False, change: Change | None = None,
 ) -> None:
-    """Ask for the upload of a route; without permission it stays ready and the status says so."""
+    """Ask for the upload of a route, with our mark; without permission it stays ready and the status says so."""
+    route = replace(route, items=marked(route.items))
     old = turn.state.route
     known = old is not None and not turn.state.foreign and turn.state.checked_mission and not whole
     on_board = old.items if old is not None and known else ()
     number = turn.new_id()
     keep = common_prefix(on_board, route.items)
+    closing = stopgap(old, keep, turn.state.index) if old is not None and known else None
     action = UploadMission(
         upload_id=number, items=route.items, keep_first=keep, set_current=set_current, plan_id=route.plan_id,
-        text=text, stopgap=stopgap(old, keep, turn.state.index) if old is not None and known else None,
-        change=change or Change(),
+        text=text, stopgap=None if closing is None else marked([closing])[0], change=change or Change(),
     )
     if not turn.act(action):
         turn.update(ready_route=route)

@@ -31,10 +31,10 @@ def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str,
     }
 
 
-def voyage_record(mission: Mission, permissions: Permissions, run: dict[str, Any]) -> dict[str, Any]:
-    """Return the content of voyage.toml: the mission, how it is run, what is permitted and with what versions."""
+def voyage_record(mission: Mission, permissions: Permissions, run: dict[str, Any], copy: str) -> dict[str, Any]:
+    """Return the content of voyage.toml: the mission and its copy, how it is run, what is permitted, the versions."""
     return {
-        "mission": {"name": mission.name, "path": str(mission.path)},
+        "mission": {"name": mission.name, "path": str(mission.path), "copy": copy},
         "run": run,
         "permissions": {name: getattr(permissions, name) for name in type(permissions).__slots__},
         "versions": {

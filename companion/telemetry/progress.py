@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 from types import TracebackType
-from typing import Any, Self, TextIO
+from typing import Any, Protocol, Self
 
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
@@ -14,12 +14,29 @@ from companion.telemetry.records import sigma_ahead_rad
 
 # Without a terminal a line is written this often [s of the voyage], and whenever the phase changes.
 PLAIN_EVERY_S = 15.0
+DISK = "disk"   # the alert of trouble with the disk, which no state of the voyage tells
+
+
+class Stream(Protocol):
+    """What lines are written to: a file, or the console of a voyage."""
+
+    def write(self, text: str, /) -> object:
+        """Write ``text``."""
+        ...
+
+    def flush(self) -> object:
+        """Let it be seen."""
+        ...
+
+    def isatty(self) -> bool:
+        """Return whether it is a terminal."""
+        ...
 
 
 class ProgressLine:
     """Shows steps on ``stream``. A context manager: the last line is left standing."""
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: Stream) -> None:
         self._stream = stream
         self._is_terminal = stream.isatty()
         self._last: tuple[float, str] = (-math.inf, "")
@@ -38,6 +55,8 @@ class ProgressLine:
     def show(self, status: Any, step: Step) -> None:
         """Show one step."""
         text = progress_text(step, getattr(status, "next_tack_s", None))
+        if getattr(status, "alert_code", "") == DISK:
+            text += f" | {status.alert_text}"
         t_s, phase = step.snapshot.t_s, step.state.phase.value
         if self._is_terminal:
             columns = shutil.get_terminal_size((120, 24)).columns

@@ -77,9 +77,11 @@ class VoyageFigures:
                 self.path_risk = max(self.path_risk or 0.0, route.risk)
         autopilot = snapshot.autopilot
         sails = autopilot is not None and autopilot.is_armed and autopilot.mode in {Mode.AUTO, Mode.GUIDED}
+        if step.state.phase is Phase.DONE:
+            return
         if sails and self.first_s is None:
             self.first_s = snapshot.t_s
-        if self.first_s is None or step.state.phase is Phase.DONE:
+        if self.first_s is None:
             return
         self.last_s = snapshot.t_s
         if snapshot.position_en_m is not None:

@@ -62,7 +62,8 @@ class Autopilot:
         self.parameters.put("SIM_WIND_SPD", tws)
         self.parameters.put("SYSID_THISMAV", float(config.sysid))
         self.vehicle: Vehicle = Vehicle(
-            wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed
+            wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed,
+            polar=config.polar,
         )
         self.battery_v = config.battery_v
         self._reboots = 0

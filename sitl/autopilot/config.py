@@ -6,6 +6,7 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from companion.boat import Polar
 from companion.messages import GeoPoint, Mode
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
@@ -29,6 +30,7 @@ class AutopilotConfig:
         parameters: values other than the fresh boat's, by name.
         battery_v: at the start; ``Autopilot.set_battery`` changes it.
         has_ftp: offer MAVFTP; small boards are built without it.
+        polar: of a boat that is not the simulator's own; None: hers.
         new_parameter_names: answer to ArduPilot 4.7's names (MAV_SYSID) instead of the older ones.
     """
 
@@ -41,6 +43,7 @@ class AutopilotConfig:
     battery_v: float = 12.6
     new_parameter_names: bool = False
     has_ftp: bool = True
+    polar: Polar | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

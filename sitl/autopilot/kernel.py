@@ -66,6 +66,7 @@ TACK_TIMEOUT_S = 5.0
 TACK_RETRY_S = 5.0
 TACK_REQUEST_S = 0.5
 MASS_KG = 2.0
+POLAR_STEP_MPS = 0.5
 TURNING_CIRCLE_M = 1.8
 RUDDER_MAX_RAD = math.radians(35.0)
 WIND_DELAY_S = 5.0
@@ -113,7 +114,30 @@ def sail_force(aws_mps: float, awa_rad: float, sail_rad: float) -> float:
 
 
 @kernel
-def _hull(s: Vector) -> None:
+def polar_speed(polar: NDArray[np.float64], twa_rad: float, tws_mps: float) -> float:
+    """Return the speed [m/s] in a table by whole degrees (0..180) and steps of POLAR_STEP_MPS; its last one above."""
+    row = min(abs(math.degrees(twa_rad)), 180.0)
+    column = min(tws_mps / POLAR_STEP_MPS, polar.shape[1] - 1.0)
+    i, j = min(int(row), 179), min(int(column), polar.shape[1] - 2)
+    f, g = row - i, column - j
+    low = (1.0 - g) * polar[i, j] + g * polar[i, j + 1]
+    return float((1.0 - f) * low + f * ((1.0 - g) * polar[i + 1, j] + g * polar[i + 1, j + 1]))
+
+
+@kernel
+def _polar_force(speed_mps: float, force: float, awa_rad: float, sail_rad: float, ideal_rad: float) -> float:
+    """Return the driving force [N] of a boat whose polar says ``speed_mps``; ``force`` is that of SIM_Sailboat's sail.
+
+    Sheeted as the autopilot does for full speed it balances the drag at that speed; eased by the sail's ideal angle of
+    attack it is none. Near head to wind the sail pushes her astern as it does there.
+    """
+    eased = sail_rad - _clip(abs(awa_rad) - ideal_rad, 0.0, 0.5 * math.pi)
+    drawing = 1.0 - _clip(eased / max(ideal_rad, 0.1), 0.0, 1.0)
+    return 0.5 * speed_mps * speed_mps * drawing + min(force, 0.0)
+
+
+@kernel
+def _hull(s: Vector, p: Vector, polar: NDArray[np.float64]) -> None:
     """Move the hull by one loop: SIM_Sailboat's one-dimensional model with exact yaw kinematics."""
     dt = LOOP_S / SUBSTEPS
     we, wn = -s[S_WSPD] * math.sin(s[S_WDIR]), -s[S_WSPD] * math.cos(s[S_WDIR])
@@ -125,6 +149,11 @@ def _hull(s: Vector) -> None:
         aws = math.hypot(ae, an)
         awa = _wrap(math.atan2(ae, an) - yaw)
         force = sail_force(aws, awa, s[S_SAIL])
+        if polar.shape[0] > 0:
+            # a polar is of the wind over the water
+            twa = _wrap(math.atan2(ce - we, cn - wn) - yaw)
+            speed = polar_speed(polar, twa, math.hypot(ce - we, cn - wn))
+            force = _polar_force(speed, force, awa, s[S_SAIL], p[P_IDEAL])
         rate = v * math.sin(s[S_RUDDER] * RUDDER_MAX_RAD) * 2.0 / (TURNING_CIRCLE_M * math.sin(RUDDER_MAX_RAD))
         if s[S_MOTOR] > 0.0:
             # a motorboat: full throttle balances the drag at WP_SPEED 5 m/s, and a rudder in its wash turns it
@@ -437,12 +466,13 @@ def _control(s: Vector, p: Vector) -> int:
 
 @kernel
 def advance(
-    s: Vector, p: Vector, wind: NDArray[np.float64], first_tick: int, noise: Vector, loops: int
+    s: Vector, p: Vector, wind: NDArray[np.float64], first_tick: int, noise: Vector, loops: int,
+    polar: NDArray[np.float64],
 ) -> tuple[int, int]:
     """Run up to ``loops`` loops; return (loops done, events). Stops after the loop in which an event happens.
 
     ``wind[i]`` is (from [rad], speed [m/s]) of the loops first_tick + 5 i .. + 4; ``noise`` is one number on 0..1
-    per loop for a faulty vane, or empty.
+    per loop for a faulty vane, or empty; ``polar`` the table of ``polar_speed``, or empty for SIM_Sailboat's own hull.
     """
     for done in range(loops):
         s[S_TICK] += 1.0
@@ -453,7 +483,7 @@ def advance(
         s[S_WSPD] += a * (wind[i, 1] - s[S_WSPD])
         s[S_WDIR] = _wrap(s[S_WDIR] + a * _wrap(wind[i, 0] - s[S_WDIR]))
         if not (s[S_MOORED] and not s[S_ARMED]):
-            _hull(s)
+            _hull(s, p, polar)
         if tick % VANE_LOOPS == 0:
             _vane(s, p, noise[done] if noise.shape[0] > 0 else 1.0)
         events = _control(s, p)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
+from companion.boat import Polar
 from companion.geo.angles import wrap_two_pi
 from sitl.autopilot import kernel as k
 from sitl.autopilot.parameters import Parameters
@@ -49,23 +51,39 @@ _SETTINGS: tuple[tuple[int, str, float], ...] = (
 )
 
 
+def _table(polar: Polar) -> NDArray[np.float64]:
+    """Return a polar as the kernel looks it up: by whole degrees, and steps of wind up to its last and one more.
+
+    Without wind nobody sails, not even a boat whose polar is one speed for every wind.
+    """
+    winds = np.arange(0.0, float(polar.tws_mps[-1]) + 2.0 * k.POLAR_STEP_MPS, k.POLAR_STEP_MPS)
+    angles = np.radians(np.arange(181.0))
+    table = np.stack([polar.speeds_mps(angles, float(tws)) for tws in winds], axis=1)
+    table[:, 0] = 0.0
+    return table
+
+
 class Vehicle:
     """The boat on the water. Positions are (east, north) [m] from home, headings compass radians."""
 
-    def __init__(self, wind: Wind, parameters: Parameters, *, heading_rad: float, is_moored: bool, seed: int) -> None:
+    def __init__(
+        self, wind: Wind, parameters: Parameters, *, heading_rad: float, is_moored: bool, seed: int,
+        polar: Polar | None = None,
+    ) -> None:
         self.state = np.zeros(k.S_SIZE)
         self.wind = wind
         self._parameters = parameters
         self._settings = np.zeros(k.P_SIZE)
         self._seen = -1
         self._seed = seed
+        self._polar = np.zeros((0, 0)) if polar is None else _table(polar)
         self._still_until_s = 0.0
         self.state[k.S_YAW] = heading_rad
         self.state[k.S_MOORED] = float(is_moored)
         self.state[k.S_TACK_END] = -k.TACK_RETRY_S
         self.load_parameters()
         # compiles the kernel, or loads it, now rather than in the middle of a voyage in real time
-        k.advance(self.state, self._settings, np.zeros((1, 2)), 0, _NONE, 0)
+        k.advance(self.state, self._settings, np.zeros((1, 2)), 0, _NONE, 0, self._polar)
 
     # ------------------------------------------------------------------------------------------- time
     def load_parameters(self) -> None:
@@ -126,7 +144,7 @@ class Vehicle:
         noise = _NONE
         if self.state[k.S_VANE_FAULT] == k.FAULT_SPIKES:
             noise = np.array([_hash01(self._seed, self.tick + 1 + i) for i in range(loops)])
-        done, events = k.advance(self.state, self._settings, wind, first, noise, loops)
+        done, events = k.advance(self.state, self._settings, wind, first, noise, loops, self._polar)
         return int(done), int(events)
 
     # ----------------------------------------------------------------------------------------- orders

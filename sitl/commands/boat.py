@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from pathlib import Path
 
 from companion.errors import InputError
 
@@ -38,6 +39,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument("--moored", action="store_true", help="lies still until it is armed")
     parser.add_argument("--sysid", type=int, default=1, help="MAVLink system id (default 1)")
     parser.add_argument("--param", metavar="NAME=VALUE", action="append", default=[], help="set a parameter")
+    parser.add_argument("--polar", type=Path, metavar="FILE", help="a boat that sails by this polar")
     parser.add_argument("--for", dest="for_s", type=float, metavar="S", help="end after S simulated seconds")
     parser.set_defaults(run=run)
 
@@ -63,6 +65,7 @@ def run(args: argparse.Namespace) -> int:
     import asyncio
 
     from companion import clock
+    from companion.boat import read_polar
     from companion.errors import LinkError
     from companion.mavlink.transport import parse_link
     from companion.messages import GeoPoint
@@ -88,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
     config = AutopilotConfig(
         home=GeoPoint(lat_deg=lat, lon_deg=lon), heading_rad=math.radians(args.heading), is_warm=args.warm,
         is_moored=args.moored, sysid=args.sysid, parameters=parameters,
+        polar=None if args.polar is None else read_polar(args.polar).polar,
     )
     autopilot = Autopilot(config, parse_wind(args.wind, seed=args.seed), args.seed)
     endpoints = [f"tcpin:{args.host}:{args.port}"] if args.port else []

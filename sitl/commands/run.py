@@ -33,8 +33,10 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run_virtual
     from companion.errors import InputError
+    from companion.geofence import load_mission
+    from companion.telemetry.names import DECISIONS
     from companion.telemetry.progress import ProgressLine
-    from companion.telemetry.recorder import DECISIONS
+    from sitl.hull import own_polar
     from sitl.runner import run_embedded
     from sitl.scenario import load_scenario
 
@@ -43,6 +45,8 @@ def run(args: argparse.Namespace) -> int:
     if (folder / DECISIONS).exists():
         raise InputError("--out", str(folder), "holds a voyage already, which this one would resume",
                          "name another folder, or remove that one")
+    if args.autopilot == "ardurover" and own_polar(load_mission(scenario.mission_path(args.scenario))) is not None:
+        sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
     if args.autopilot == "ardurover" or args.live:
         from sitl.live import run_live
 
@@ -63,7 +67,8 @@ def run(args: argparse.Namespace) -> int:
 def draw(folder: Path) -> None:
     """Draw the voyage; a picture that fails must not hide the verdict."""
     try:
-        from companion.plots.voyage import PICTURE, plot_voyage, read_voyage
+        from companion.plots.voyage import plot_voyage, read_voyage
+        from companion.telemetry.names import PICTURE
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:

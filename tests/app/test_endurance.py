@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from companion.clock import run_virtual
-from companion.telemetry.recorder import DECISIONS, STATE, TLOG, TRACK
+from companion.telemetry.names import DECISIONS, STATE, TLOG, TRACK
 from sitl.runner import run_embedded
 from sitl.scenario import load_scenario
 

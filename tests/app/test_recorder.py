@@ -1,22 +1,21 @@
-"""The voyage folder: what is written survives a torn last line; whole files are whole or absent."""
+"""The voyage folder: what is written survives a torn last line and a sick disk; whole files are whole or absent."""
 
+import contextlib
+import errno
 import json
 import math
+import os
+import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from companion.disk import Disk
 from companion.errors import JobError
 from companion.telemetry import recorder as module
-from companion.telemetry.recorder import (
-    DECISIONS,
-    TLOG,
-    TRACK_COLUMNS,
-    Recorder,
-    jsonable,
-    read_jsonl,
-    write_atomically,
-)
+from companion.telemetry.names import DECISIONS, TLOG
+from companion.telemetry.recorder import TRACK_COLUMNS, Recorder, jsonable, read_jsonl
 
 
 def test_records_survive_a_torn_last_line(tmp_path):
@@ -45,28 +44,107 @@ def test_a_second_run_appends_and_has_one_header(tmp_path):
     assert all(line.count(",") == len(TRACK_COLUMNS) - 1 for line in lines)
 
 
-def test_a_failed_whole_file_leaves_the_old_one(tmp_path, monkeypatch):
-    path = tmp_path / "state.json"
-    write_atomically(path, b"old")
+@pytest.fixture
+def small(tmp_path):
+    """A real file system of 600 kB."""
+    folder = tmp_path / "small"
+    folder.mkdir()
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", folder], capture_output=True, check=False)
+    if done.returncode != 0:
+        pytest.skip(f"no file system can be mounted here: {done.stderr.decode().strip()}")
+    yield folder
+    subprocess.run(["umount", "-l", folder], check=True)
 
-    def full(_):
-        raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(module.os, "fsync", full)
-    with pytest.raises(OSError, match="No space"):
-        write_atomically(path, b"new and longer")
-    assert path.read_bytes() == b"old"
+STAMPS = {"t_s": 99.0, "utc": "then"}
 
 
-def test_a_full_disk_drops_records_and_counts_them(tmp_path, monkeypatch):
-    def full(*_):
-        raise OSError(28, "No space left on device")
+def row(t_s):
+    return [repr(t_s), *[None] * (len(TRACK_COLUMNS) - 1)]
 
-    with Recorder(tmp_path) as recorder:
-        monkeypatch.setattr(module.os, "write", full)
+
+def test_a_real_full_disk_pauses_all_records_leaves_none_torn_and_takes_them_up_again(small):
+    with Recorder(small / "v") as recorder:
+        recorder.track(row(1.0))
+        filler = small / "filler"
+        with filler.open("wb") as file, contextlib.suppress(OSError):
+            file.write(bytes(1 << 20))
+        for k in range(300):
+            recorder.decision({"k": k, "text": 100 * "x"})
+        assert recorder.trouble == os.strerror(errno.ENOSPC)
+        kept = [r["k"] for r in read_jsonl(small / "v" / DECISIONS)]
+        assert kept == list(range(len(kept)))      # not one torn line among them
+        assert 0 < recorder.dropped == 300 - len(kept)
+        recorder.frame(b"12345678")                # none of them tells of what another lacks
+        assert (small / "v" / TLOG).stat().st_size == 0
+        recorder.tend(STAMPS)
+        assert recorder.trouble
+        filler.unlink()
+        recorder.tend(STAMPS)
+        assert recorder.trouble == ""
+        recorder.decision({"k": "again"})
+    *_, gap, last = read_jsonl(small / "v" / DECISIONS)
+    assert gap == {**STAMPS, "kind": "gap", "since_s": 1.0, "dropped": 301 - len(kept), "why": gap["why"]}
+    assert last == {"k": "again"}
+
+
+def test_records_stop_before_the_disk_is_full_and_the_state_still_finds_room(small):
+    with Recorder(small / "v") as recorder:
+        room = Disk().room(small)
+        assert 0 < room.reserve_bytes < 100_000
+        (small / "filler").write_bytes(bytes(room.free_bytes - room.reserve_bytes + 5000))
+        recorder.tend(STAMPS)
+        assert "kept for the state" in recorder.trouble
         recorder.decision({"kind": "x"})
-        recorder.frame(b"12345678")
-        assert recorder.dropped == 2
+        assert read_jsonl(small / "v" / DECISIONS) == []
+        Disk().replace(small / "state.json", 20_000 * b"x")
+        recorder.summary({"arrived": True})        # the last chance: it may use the reserve
+        assert (small / "v" / "summary.json").exists()
+
+
+def test_a_failed_whole_file_leaves_the_old_one_and_no_rubbish(small):
+    path = small / "state.json"
+    Disk().replace(path, b"old")
+    with pytest.raises(OSError, match="No space"):
+        Disk().replace(path, bytes(1 << 20))
+    assert path.read_bytes() == b"old"
+    assert [p.name for p in small.iterdir()] == ["state.json"]
+
+
+def test_a_read_only_disk_is_no_end_and_what_is_written_once_comes_when_it_can(small):
+    (small / "v").mkdir()
+    subprocess.run(["mount", "-o", "remount,ro", small], check=True)
+    with Recorder(small / "v") as recorder:
+        assert recorder.trouble == os.strerror(errno.EROFS)
+        recorder.voyage({"name": "n"})
+        recorder.whole("mission/mission.toml", b"m")
+        recorder.decision({"kind": "start"})
+        recorder.summary({"arrived": False})
+        recorder.tend(STAMPS)
+        assert recorder.trouble == os.strerror(errno.EROFS)
+        subprocess.run(["mount", "-o", "remount,rw", small], check=True)
+        recorder.tend(STAMPS)
+        assert recorder.trouble == ""
+    assert (small / "v" / "mission" / "mission.toml").read_bytes() == b"m"
+    assert (small / "v" / "voyage.toml").read_text() == 'name = "n"\n'
+    assert [r["kind"] for r in read_jsonl(small / "v" / DECISIONS)] == ["gap"]
+
+
+def test_the_kernel_says_full_in_the_middle_of_a_write():
+    """/dev/full takes the opening and no byte."""
+    fd = Disk().open_to_append(Path("/dev/full"))
+    with pytest.raises(OSError, match="No space"):
+        Disk().append(fd, b"x")
+    os.close(fd)
+
+
+def test_two_companions_do_not_record_into_one_folder(tmp_path):
+    with Recorder(tmp_path / "v"), pytest.raises(JobError, match="another companion is recording"), \
+            Recorder(tmp_path / "v"):
+        pass
+    with Recorder(tmp_path / "v") as recorder:
+        assert recorder.trouble == ""
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):

@@ -191,17 +191,55 @@ def damage(folder):
     (folder / "state.json").write_bytes((folder / "state.json").read_bytes()[:100])
 
 
+def lose(folder):
+    (folder / "state.json").unlink()
+
+
 @pytest.mark.parametrize(("change", "refusal"), [
-    (stale, "another voyage"), (damage, "is not used"), (strangers, ""),
+    (stale, "another voyage"), (damage, "it is kept as state.json.damaged"), (strangers, ""), (lose, ""),
 ])
-def test_a_state_that_does_not_fit_is_reported_and_not_resumed(change, refusal, tmp_path):
-    sail(tmp_path, kill_at_s=70.0, change=change, limit_s=130.0, arrived=False)
+def test_a_state_that_does_not_fit_is_reported_and_the_boat_is_sailed_on_by_the_mark_in_her_mission(
+    change, refusal, tmp_path,
+):
+    """It ended as "foreign" and without control (issue 12, points 14 and 15)."""
+    verdict, _ = sail(tmp_path, kill_at_s=70.0, change=change)
+    assert verdict.passed, verdict.checks
     records = decisions(tmp_path)
     begin = [n for n, r in enumerate(records) if r["kind"] == "start"][1]
-    after = records[begin - 1:]
+    after = records[begin:]
     refused = [r["text"] for r in after if r["kind"] == "refusal"]
     assert (refusal in " ".join(refused)) if refusal else not refused
     codes = [r.get("code") for r in after if r.get("action") == "Announce"]
-    assert "foreign mission" in codes
-    assert "adopted" not in codes
+    assert "foreign mission" not in codes
+    assert "adopted" in codes
+    # what is on board is of no plan that is known: there is a plan before anything else is uploaded
+    assert next(r for r in after if r.get("action") == "RequestPlan")["reason"] == "mismatch"
+    assert not replay(tmp_path).differences
+
+
+@dataclass
+class Stranger(PowerCut):
+    """Changes the list on the autopilot, while the companion is away, into one that is nobody's."""
+
+    autopilot: object = None
+
+    def truth(self, t_s, autopilot, link):
+        self.autopilot = autopilot
+
+    def life(self, start_s, end_s):
+        super().life(start_s, end_s)
+        items = self.autopilot.helm.mission.items
+        items[1:] = [item._replace(x=item.x + 500, z=0.0) for item in items[1:]]
+
+
+def test_a_strangers_mission_is_not_resumed_and_nothing_is_asked_of_the_boat(tmp_path):
+    scenario = msgspec.structs.replace(
+        load_scenario(BASE), limit_s=130.0, expect=ExpectSpec(arrived=False),
+        events=(EventSpec(at_s=70.0, kind="kill_companion", restart_after_s=4.0),))
+    run_virtual(run_embedded(scenario, BASE, 1, tmp_path, expansions=EXPANSIONS, observer=Stranger(tmp_path)))
+    records = decisions(tmp_path)
+    after = records[[n for n, r in enumerate(records) if r["kind"] == "start"][1]:]
+    said = [(r["code"], r["text"]) for r in after if r.get("action") == "Announce"]
+    assert any(code == "foreign mission" and "replace_foreign" in text for code, text in said)
+    assert "adopted" not in dict(said)
     assert not [r for r in after if r.get("action") in {"UploadMission", "SetMode", "Arm"}]

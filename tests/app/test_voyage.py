@@ -1,6 +1,7 @@
 """Whole voyages under the virtual clock: real MAVLink bytes between companion and simulated autopilot."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -103,8 +104,7 @@ def test_a_recorded_voyage_replays_exactly(voyage):
 
 
 def test_a_changed_record_does_not_replay(voyage, tmp_path):
-    for file in voyage[1].iterdir():
-        (tmp_path / file.name).write_bytes(file.read_bytes())
+    shutil.copytree(voyage[1], tmp_path, dirs_exist_ok=True)
     lines = (tmp_path / "decisions.jsonl").read_text().splitlines()
     kept = [line for line in lines if '"action":"UploadMission"' not in line]
     assert len(kept) < len(lines)
@@ -140,6 +140,18 @@ def test_a_killed_companion_takes_its_mission_over(short, tmp_path):
     said = [d.get("code") for d in decisions(tmp_path) if d.get("action") == "Announce"]
     assert "adopted" in said
     assert not replay(tmp_path).differences
+
+
+@pytest.mark.parametrize("allowed", [False, True])
+def test_a_strangers_mission_at_the_start_is_replaced_where_the_mission_file_allows_it(allowed, short, tmp_path):
+    """The permission existed, and no key of the mission gave it (issue 13, point 1)."""
+    (tmp_path / "rock.wkt").write_text(ROCK)
+    (tmp_path / "mission.toml").write_text(SHORT_MISSION + f"replace_foreign = {str(allowed).lower()}\n")
+    verdict = sail(tmp_path, tmp_path / "v", limit_s=400.0 if allowed else 60.0, events=[
+        EventSpec(at_s=0.5, kind="foreign_mission", east_m=60.0, north_m=80.0)])
+    summary = json.loads((tmp_path / "v/summary.json").read_text())
+    assert summary["arrived"] is allowed, verdict.checks
+    assert allowed or "[operator] replace_foreign" in summary["end_why"]
 
 
 def test_a_silent_link_leaves_the_boat_sailing(short, tmp_path):

@@ -245,6 +245,20 @@ def test_health_tells_fresh_from_on_rate_from_trusted():
     assert not monitor.health(25.0)[0].is_fresh
 
 
+def test_a_signing_timestamp_that_cannot_be_stored_ends_nothing(tmp_path):
+    """It raised in the link's heartbeat, on a full disk (issue 13, point 3)."""
+    key = tmp_path / "key"
+    key.write_text("ab" * 32)
+    key.chmod(0o600)
+    (tmp_path / "key.timestamp").mkdir()      # no file can take its place
+    store = SigningStore(key, EPOCH_S + 1e8)
+    store.state.timestamp += 10**9
+    store.save()
+    (tmp_path / "key.timestamp").rmdir()
+    store.save()
+    assert int((tmp_path / "key.timestamp").read_text()) > store.state.timestamp
+
+
 def test_the_signing_clock_never_goes_back(tmp_path):
     key = tmp_path / "key"
     key.write_text("correct horse battery staple\n")

@@ -13,7 +13,8 @@ from companion.skipper import actions as act
 from companion.skipper.by_field import NAME
 from companion.skipper.config import ALL_PERMITTED, Guidance
 from companion.skipper.geometry import distance_m
-from companion.skipper.state import Persisted, Phase
+from companion.skipper.saved import Persisted
+from companion.skipper.state import Phase
 from companion.skipper.voyage import Goal
 from companion.traffic import Targets
 from tests.skipper.world import FRAME, World, restarted, skipper, voyage

@@ -20,7 +20,8 @@ from companion.skipper.route import (
     loiter_place,
     splice,
 )
-from companion.skipper.state import Persisted, Route
+from companion.skipper.saved import Persisted
+from companion.skipper.state import Route
 from tests.skipper.world import voyage
 
 CONFIG = SkipperConfig()

@@ -421,18 +421,6 @@ def test_failed_uploads_are_looked_at_and_made_good(result):
     assert is_same_mission(world.mission, route.items)
 
 
-def test_a_state_of_another_voyage_is_not_used():
-    world = make()
-    world.run(30)
-    saved = world.skipper.persisted(world.state)
-    other = skipper(voyage(GOAL, obstacles=ISLANDS))
-    stale = type(saved)(voyage="another", gate=0, sailing=True, route=saved.route, pending=None)
-    world.skipper, world.state = other, other.initial(stale)
-    world.pending = []
-    world.run(30)
-    assert "not ours" in world.state.why
-
-
 def test_the_autopilot_reboots_under_way():
     world = make()
     world.run(80)

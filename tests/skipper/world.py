@@ -31,6 +31,7 @@ from companion.skipper import actions as act
 from companion.skipper.config import ALL_PERMITTED, Permissions, SkipperConfig
 from companion.skipper.geometry import bearing_rad, cross_track_m, distance_m, is_past, moved
 from companion.skipper.rules import Skipper
+from companion.skipper.saved import Persisted
 from companion.skipper.snapshot import (
     CommandOutcome,
     CommandResult,
@@ -44,7 +45,7 @@ from companion.skipper.snapshot import (
     WindHealth,
     WindView,
 )
-from companion.skipper.state import Persisted, SkipperState
+from companion.skipper.state import SkipperState
 from companion.skipper.voyage import Goal, Voyage
 
 FRAME = LocalFrame(GeoPoint(lat_deg=51.1, lon_deg=-1.3))

@@ -1,0 +1,133 @@
+"""The disk: whole files that a power cut leaves old or new, appended records whole or absent, the room that is left.
+
+Everything that a voyage writes goes through a ``Disk``. Tests and the simulator put another in its place: one that
+is full, sick or read-only, or that forgets what was not synced.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+# A restart must find room for its state on a disk that records have filled: they stop at this much [bytes] ...
+RESERVE_BYTES = 8 << 20
+# ... or, on a small disk, at this share of it.
+RESERVE_SHARE = 0.1
+NEW = ".new"
+
+# What a wrong name raises, and a sick disk does not.
+_MISTAKES = frozenset({errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP, errno.EISDIR})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Room:
+    """What is left on a disk, and what records leave alone [bytes]."""
+
+    free_bytes: int
+    reserve_bytes: int
+
+    @property
+    def is_short(self) -> bool:
+        """Whether records must stop."""
+        return self.free_bytes < self.reserve_bytes
+
+    @property
+    def is_ample(self) -> bool:
+        """Whether records may begin again: not at the very edge where they stopped."""
+        return self.free_bytes >= self.reserve_bytes + self.reserve_bytes // 4
+
+
+class Disk:
+    """The operating system's files. Every method raises OSError as it does."""
+
+    def make_folder(self, path: Path) -> None:
+        """Make a folder and those above it."""
+        path.mkdir(parents=True, exist_ok=True)
+
+    def open_to_append(self, path: Path) -> int:
+        """Open a file to be appended to, and make it if it is not there."""
+        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
+
+    def append(self, fd: int, data: bytes) -> None:
+        """Append ``data`` whole, or not at all: a disk that fills in the middle of it leaves no half record."""
+        done = 0
+        try:
+            while done < len(data):
+                done += self.write(fd, data[done:])
+        except OSError:
+            if done:
+                with contextlib.suppress(OSError):
+                    os.ftruncate(fd, os.fstat(fd).st_size - done)
+            raise
+
+    def replace(self, path: Path, data: bytes, *, is_durable: bool = True) -> None:
+        """Put ``data`` in the place of ``path``, whole or not at all.
+
+        A new file beside it is written, synced and renamed, and then the folder is synced: only that makes the new
+        name outlive a power cut.
+        """
+        beside = path.with_name(path.name + NEW)
+        try:
+            fd = self.create(beside)
+            try:
+                done = 0
+                while done < len(data):
+                    done += self.write(fd, data[done:])
+                if is_durable:
+                    self.sync(fd)
+            finally:
+                os.close(fd)
+            self.rename(beside, path)
+        except OSError:
+            with contextlib.suppress(OSError):
+                beside.unlink()   # a full disk needs the room
+            raise
+        if is_durable:
+            self.sync_folder(path.parent)
+
+    # ---------------------------------------------------------------------------------- what the above is made of
+    def create(self, path: Path) -> int:
+        """Open a new, empty file."""
+        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
+
+    def write(self, fd: int, data: bytes) -> int:
+        """Write some of ``data``; return how many bytes."""
+        return os.write(fd, data)
+
+    def sync(self, fd: int) -> None:
+        """Force a file's content to the disk."""
+        os.fsync(fd)
+
+    def rename(self, source: Path, target: Path) -> None:
+        """Give a file another name, in place of the one that has it."""
+        source.replace(target)
+
+    def sync_folder(self, path: Path) -> None:
+        """Force the names in a folder to the disk."""
+        fd = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            self.sync(fd)
+        except OSError as error:
+            if error.errno not in {errno.EINVAL, errno.ENOTSUP}:   # some file systems cannot, and need not
+                raise
+        finally:
+            os.close(fd)
+
+    def room(self, folder: Path) -> Room:
+        """Return what is left on the disk that ``folder`` is on."""
+        status = os.statvfs(folder)
+        share = int(status.f_blocks * status.f_frsize * RESERVE_SHARE)
+        return Room(free_bytes=status.f_bavail * status.f_frsize, reserve_bytes=min(RESERVE_BYTES, share))
+
+
+def reason(error: OSError) -> str:
+    """Return what a disk's error says, in the operating system's words."""
+    return error.strerror or str(error) or type(error).__name__
+
+
+def is_mistake(error: OSError) -> bool:
+    """Return whether the name was wrong: whoever typed it must hear so, and waiting does not mend it."""
+    return error.errno in _MISTAKES
