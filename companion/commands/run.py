@@ -16,11 +16,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-if TYPE_CHECKING:
-    from companion.telemetry.console import Console
+from companion.program import INTERRUPTED
 
-# Loading takes about two seconds; beyond this the operator is told why nothing happens [s].
-PATIENCE_S = 4.0
+if TYPE_CHECKING:
+    from companion.planner.worker import PlannerWorker
+    from companion.telemetry.console import Console
+    from companion.telemetry.service import ServiceManager
+
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -60,17 +62,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion import kernel_cache
     from companion.telemetry.console import Console
 
     with (
         _outliving_the_terminal(), Console(sys.stdout) as out, Console(sys.stderr) as err,
         contextlib.redirect_stderr(cast("TextIO", err)),   # what is logged must not wait for a terminal either
     ):
-        kernels = kernel_cache.keep_usable(os.environ)
-        if kernels is not None:
-            os.environ[kernel_cache.VARIABLE] = str(kernels)
-            err.write(f"companion run: the compiled kernels are in {kernels}: their own place is read-only\n")
         return _run(args, out, err)
 
 
@@ -129,7 +126,9 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
                 shelf=shelf, is_again=again, command=" ".join(sys.argv),
             )
 
-        summary = run_loop(_sail(mission, transport, folder, options, args.speedup, out), speedup=args.speedup)
+        summary = run_loop(_sail(mission, transport, folder, options, out), speedup=args.speedup)
+    if summary is None:
+        return INTERRUPTED
     if not summary["arrived_before"]:
         _report(folder, err)
     code, text = last_words(mission.name, summary)
@@ -200,36 +199,52 @@ def _asked(mission: Any, state_path: Path, err: Console) -> bool | None:
 
 
 async def _sail(
-    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], speedup: float, out: Console,
-) -> dict[str, Any]:
-    from companion.errors import JobError
+    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], out: Console,
+) -> dict[str, Any] | None:
+    """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker
+    from companion.telemetry.service import ServiceManager
 
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
             loop.add_signal_handler(number, stop.set)
-    async with PlannerWorker() as planner:
-        # The child loads its kernels while this process imports the rest.
-        from companion.app import sail
-        from companion.telemetry.progress import ProgressLine
-        from companion.telemetry.service import ServiceManager
+    with ServiceManager(os.environ) as manager:
+        async with PlannerWorker() as planner:
+            # The child loads its kernels while this process imports the rest.
+            from companion.app import sail
+            from companion.telemetry.progress import ProgressLine
 
-        ready = asyncio.ensure_future(planner.ready())
-        if not (await asyncio.wait({ready}, timeout=PATIENCE_S * speedup))[0]:
-            out.write("preparing the planner: its kernels are compiled once on each machine\n")
-        try:
-            await ready
-        except (TimeoutError, EOFError, OSError) as error:
-            raise JobError(f"the planner's process did not start: {error!r}") from error
-        with ProgressLine(out) as progress, ServiceManager(os.environ) as manager:
+            if not await _is_ready(planner, stop, out, manager):
+                return None
 
-            def show(status: Any, step: Any) -> None:
-                progress.show(status, step)
-                manager.alive(f"{step.state.phase.value}: {step.state.why}")
+            with ProgressLine(out) as progress:
+                def show(status: Any, step: Any) -> None:
+                    progress.show(status, step)
+                    manager.alive(f"{step.state.phase.value}: {step.state.why}")
 
-            return await sail(mission, transport, planner, folder, options(), on_status=show, stop=stop)
+                return await sail(mission, transport, planner, folder, options(), on_status=show, stop=stop)
+
+
+async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, manager: ServiceManager) -> bool:
+    """Wait for the planner's kernels and say how far they are; return False when ``stop`` comes first."""
+    from companion.errors import JobError
+    from companion.telemetry.preparing import Preparing
+
+    with Preparing(out) as preparing:
+        def say(text: str) -> None:
+            preparing.say(text)
+            manager.starting(text)
+
+        waits = [asyncio.ensure_future(planner.ready(say)), asyncio.ensure_future(stop.wait())]
+        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+        for wait in waits:
+            wait.cancel()
+        ready, _ = await asyncio.gather(*waits, return_exceptions=True)
+    if isinstance(ready, TimeoutError | EOFError | OSError):
+        raise JobError(f"the planner's process did not start: {ready!r}")
+    return not stop.is_set()
 
 
 def _signing(path: Path | None) -> Any:

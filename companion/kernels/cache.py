@@ -19,7 +19,7 @@ from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 
-from companion.kernels.places import CARRIED, folder, used, versions
+from companion.kernels.places import folder, looked_in, used, versions, written_to
 from companion.kernels.stamp import name_of, stamp
 
 _LOG = logging.getLogger(__name__)
@@ -48,7 +48,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
         """Return what was compiled before, None when nothing that can be used is there."""
         target_context.refresh()
         name = self.file_name(sig, target_context.codegen())
-        for place in (CARRIED, folder()):
+        for place in looked_in():
             payload = _read(place / name)
             if payload is None:
                 continue
@@ -63,7 +63,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
         if data.library.has_dynamic_globals or any(not x.can_cache for x in data.lifted):
             return
         try:
-            _write(folder() / self.file_name(sig, data.codegen), dumps(data._reduce()))  # noqa: SLF001
+            _write(written_to() / self.file_name(sig, data.codegen), dumps(data._reduce()))  # noqa: SLF001
         except OSError as error:
             _LOG.warning("compiled kernels cannot be kept in %s (%s)", folder(), error.strerror)
 
@@ -90,7 +90,6 @@ def _read(path: Path) -> bytes | None:
 
 
 def _write(path: Path, payload: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     handle, beside = tempfile.mkstemp(dir=path.parent, prefix=".")
     try:
         with os.fdopen(handle, "wb") as file:

@@ -1,8 +1,9 @@
 """Where machine code is kept, and the mark that says that all of it is there. Does not load numba.
 
-Looked for in what the package carries and then in a folder of the user's; written to the latter, which is
+Looked for in what the package carries, in a folder of the user's, and in memory. Written to the folder, which is
 ``$COMPANION_KERNELS``, the service manager's ``$CACHE_DIRECTORY``, or ``sailboat-companion/kernels`` under
-``$XDG_CACHE_HOME`` (``~/.cache``).
+``$XDG_CACHE_HOME`` (``~/.cache``); where that cannot be written, to memory: a Pi's card that fails is mounted read-only
+by the kernel, and a companion that starts again then must not compile for minutes at every start.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ import functools
 import hashlib
 import os
 import platform
+import stat
+import tempfile
 from collections.abc import Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 
 FILE = "kernels.txt"   # in each package: see ``listed``
 PACKAGES = Path(__file__).resolve().parents[2]
+IN_MEMORY = (Path("/dev/shm"), Path("/run"))  # noqa: S108 - see _is_private
 CARRIED = Path(__file__).resolve().parent / "carried"   # filled when a package is built
 KEPT_S = 30 * 86_400.0     # a file that nobody has used for this long goes ...
 KEPT_BYTES = 200 * 2**20   # ... and the oldest beyond this, a dozen versions of everything
@@ -32,6 +36,47 @@ def folder() -> Path:
         if place and Path(place).is_absolute():
             return Path(place, below)
     return Path("~/.cache/sailboat-companion/kernels").expanduser()
+
+
+def looked_in() -> tuple[Path, ...]:
+    """Return where machine code may lie, in the order in which it is looked for."""
+    return CARRIED, folder(), *(place for place in map(_of_user, IN_MEMORY) if _is_private(place))
+
+
+def written_to() -> Path:
+    """Return where machine code is written: the folder, or memory where the folder takes nothing. It exists.
+
+    Raises:
+        OSError: there is no such place.
+    """
+    try:
+        return _tried(folder())
+    except OSError as error:
+        for place in map(_of_user, IN_MEMORY):
+            with contextlib.suppress(OSError):
+                place.mkdir(mode=0o700, exist_ok=True)
+                if _is_private(place):
+                    return _tried(place)
+        raise error from None
+
+
+def _of_user(place: Path) -> Path:
+    return place / f"companion-kernels-{os.getuid()}"
+
+
+def _is_private(place: Path) -> bool:
+    """Return whether nobody else can put anything into it: what lies there is run."""
+    try:
+        status = place.lstat()
+    except OSError:
+        return False
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077
+
+
+def _tried(place: Path) -> Path:
+    place.mkdir(parents=True, exist_ok=True, mode=0o700)
+    with tempfile.TemporaryFile(dir=place):
+        return place
 
 
 @functools.cache
@@ -61,11 +106,12 @@ def used(path: Path, now_s: float) -> None:
 def sweep(now_s: float) -> int:
     """Remove what nobody has used for long, the oldest beyond the limit, and numba's own caches of before; count it."""
     held = removed = 0
-    for used_s, size, path in sorted(_files(folder()), reverse=True):
+    for used_s, size, path in sorted((file for place in looked_in()[1:] for file in _files(place)), reverse=True):
         held += size
         if now_s - used_s > KEPT_S or held > KEPT_BYTES:
-            path.unlink(missing_ok=True)
-            removed += 1
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+                removed += 1
     for package in ("companion", "sitl"):
         for path in (PACKAGES / package).glob("**/__pycache__/*.nb[ci]"):
             with contextlib.suppress(OSError):

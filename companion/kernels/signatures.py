@@ -13,8 +13,8 @@ from numba import types
 from companion.errors import JobError
 
 _SCALARS = {str(t): t for t in (
-    types.float64, types.float32, types.int64, types.int32, types.int8, types.uint64, types.uint32, types.uint8)}
-_SCALARS["boolean"] = types.boolean
+    types.float64, types.float32, types.int64, types.int32, types.int8, types.uint64, types.uint32, types.uint8,
+    types.boolean)}
 _ENDS = {"C": "::1", "A": ":"}
 
 
@@ -41,7 +41,7 @@ def from_text(text: str) -> tuple[Any, ...]:
 
 
 def _text(t: Any) -> str:
-    name = "boolean" if t == types.boolean else str(t)
+    name = str(t)
     if name in _SCALARS:
         return name
     if isinstance(t, types.Array) and t.layout in _ENDS and t.mutable and str(t.dtype) in _SCALARS:
