@@ -12,7 +12,7 @@ from companion.errors import InputError
 from companion.geofence.formats import parse
 from companion.geofence.shapes import ZoneKind
 
-FEW, MANY = 100, 500
+FEW, MANY = 200, 800
 OURS = str(Path(companion.geofence.__file__).parent)
 WAYS = [(name, way) for name, ways in FILES.items() for way in ways if way != "a tangle"]
 
@@ -49,7 +49,7 @@ def work(format_name, text):
 
 @pytest.mark.parametrize(("format_name", "way"), WAYS)
 def test_reading_is_linear(format_name, way):
-    """WKT with a vertex a line took 7.7 s for 80,000 points (issue 12, point 16); `python -m bench.reading` has times."""
+    """WKT with a vertex a line took 7.7 s for 80,000 points (issue 12, point 16): see `python -m bench.reading`."""
     make = FILES[format_name][way]
     ratio = work(format_name, make(MANY)) / work(format_name, make(FEW))
     assert ratio < 1.25 * MANY / FEW
