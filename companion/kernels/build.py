@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from companion.errors import JobError
 from companion.kernels.places import looked_in, mark, sweep, written_to
 
 KILLED = 9   # exit code of a crew whose hands were killed
@@ -45,17 +44,13 @@ def _rough(seconds: float) -> str:
 
 def is_ready(packages: Sequence[str]) -> bool:
     """Return whether the packages' kernels, as their source is now, were all compiled before."""
-    name = mark(packages)
-    return any((place / name).exists() for place in looked_in())
+    return all(any((place / name).exists() for place in looked_in()) for name in map(mark, packages))
 
 
 def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
     """Compile what is missing of the packages' lists and say how far it is; return at once when nothing is.
 
-    What cannot be compiled ahead is compiled when it is called.
-
-    Raises:
-        JobError: the processes that compile die again and again.
+    What cannot be compiled ahead, because the processes that do it die again and again, is compiled when it is called.
     """
     if is_ready(packages):
         return
@@ -74,9 +69,10 @@ def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
         finally:
             crew.kill()   # its hands see it, and leave after the kernel in hand
     if code != 0:
-        raise JobError("the kernels cannot be compiled: " + (
-            "killed, most likely for want of memory; close other programs, or add swap" if code in {KILLED, -KILLED}
-            else f"exit code {code}"))
+        why = "killed, most likely for want of memory" if code in {KILLED, -KILLED} else f"exit code {code}"
+        say(f"kernels cannot be compiled ahead ({why}): they are compiled one by one as they are called")
+        return
     with contextlib.suppress(OSError):
-        (written_to() / mark(packages)).touch()
+        for name in map(mark, packages):
+            (written_to() / name).touch()
     sweep(time.time())

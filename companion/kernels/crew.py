@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import math
 import os
 import signal
 import sys
@@ -134,7 +133,7 @@ def main(packages: Sequence[str]) -> int:
     """Keep hands at work until nothing is left; return 0, or how they died (a signal's number is negative)."""
     parent, place, works = os.getppid(), written_to(), planned(packages)
     # What each of them needs is loaded before they part.
-    numba.njit("float64(float64)")(lambda x: math.sqrt(x))
+    numba.njit("float64(float64)")(_square)
     crew: set[int] = set()
     deaths = 0
     while _report(works) and os.getppid() == parent:
@@ -149,6 +148,10 @@ def main(packages: Sequence[str]) -> int:
                 if deaths >= _TRIES:
                     return KILLED if os.waitstatus_to_exitcode(status) == -signal.SIGKILL else 1
     return 0
+
+
+def _square(x: float) -> float:
+    return x * x
 
 
 def hands() -> int:
@@ -168,4 +171,7 @@ def size_bytes() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except BrokenPipeError:   # who asked for it has gone; there is nobody to flush for either
+        os._exit(1)

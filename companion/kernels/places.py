@@ -15,7 +15,7 @@ import os
 import platform
 import stat
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
@@ -86,14 +86,13 @@ def versions() -> str:
     return f"{platform.python_implementation()} {platform.python_version()} {libraries} {platform.machine()}"
 
 
-def mark(packages: Sequence[str]) -> str:
-    """Return the name of the empty file that says: all that the packages list, as their files are now, is compiled."""
+def mark(package: str) -> str:
+    """Return the name of the empty file that says: all that the package lists, as its files are now, is compiled."""
     seen = hashlib.sha256(versions().encode())
-    for package in packages:
-        for path in sorted((PACKAGES / package).rglob("*.py")):
-            seen.update(path.read_bytes())
-        seen.update((PACKAGES / package / FILE).read_bytes())
-    return f"all-{'-'.join(packages)}-{seen.hexdigest()[:24]}"
+    for path in sorted((PACKAGES / package).rglob("*.py")):
+        seen.update(path.read_bytes())
+    seen.update((PACKAGES / package / FILE).read_bytes())
+    return f"all-{package}-{seen.hexdigest()[:24]}"
 
 
 def used(path: Path, now_s: float) -> None:

@@ -58,7 +58,7 @@ def _own(dispatcher: Dispatcher) -> str:
     function = dispatcher.py_func
     if function.__closure__:
         raise JobError(f"{name_of(dispatcher)}: a kernel is a function of its module, not of another function")
-    said = [*_code(function.__code__), repr(sorted(dispatcher.targetoptions.items(), key=str))]
+    said = [*_code(function.__code__, function.__doc__), repr(sorted(dispatcher.targetoptions.items(), key=str))]
     for default in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()):
         said.append(_constant(default, name_of(dispatcher)))
     for name, value in _globals_of(function):
@@ -66,14 +66,13 @@ def _own(dispatcher: Dispatcher) -> str:
     return hashlib.sha256("\n".join(said).encode()).hexdigest()
 
 
-def _code(code: types.CodeType) -> Iterator[str]:
-    """Yield what a code object does; comments, docstrings and line numbers are not in it."""
-    has_doc = bool(code.co_flags & 0x2) and bool(code.co_consts) and isinstance(code.co_consts[0], str)
+def _code(code: types.CodeType, doc: str | None = "") -> Iterator[str]:
+    """Yield what a code object does; comments, the docstring (the first constant) and line numbers are not in it."""
     yield f"{code.co_code.hex()} {code.co_names} {code.co_varnames} {code.co_argcount} {code.co_kwonlyargcount}"
     for n, constant in enumerate(code.co_consts):
         if isinstance(constant, types.CodeType):
             yield from _code(constant)
-        elif n > 0 or not has_doc:
+        elif n > 0 or constant != doc:
             yield repr(constant)
 
 

@@ -24,7 +24,6 @@ from typing import Any, Self
 import numpy as np
 
 from companion.clock import effort_s
-from companion.errors import JobError
 from companion.kernels.build import prepare
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem import Problem
@@ -90,10 +89,9 @@ class PlannerWorker:
         self._grace_s = grace_s
         self._command = command or [sys.executable, "-m", "companion.planner.worker"]
         self._child: asyncio.subprocess.Process | None = None
-        self._is_warm = False
+        self._is_warm, self._silence_s = False, math.inf
         self._lock = asyncio.Lock()
         self.restarts = 0
-        self.doing = ""     # what a child that is not ready says it does
 
     @property
     def is_alive(self) -> bool:
@@ -167,7 +165,7 @@ class PlannerWorker:
 
     # ------------------------------------------------------------------------------------ the child
     async def _start(self) -> None:
-        self._is_warm = False
+        self._is_warm, self._silence_s = False, math.inf
         # In a session of its own: Ctrl-C is for this process, which ends its child itself.
         self._child = await asyncio.create_subprocess_exec(
             *self._command, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, start_new_session=True,
@@ -175,14 +173,12 @@ class PlannerWorker:
 
     async def _warm(self, say: Callable[[str], None] = lambda _: None) -> None:
         """Wait for the child's kernels; it is alive as long as it says so, and until its first word while it runs."""
-        limit_s = math.inf
         while not self._is_warm:
-            word = await self._answer(limit_s)
-            limit_s = _SILENCE_S
+            word = await self._answer(self._silence_s)
+            self._silence_s = _SILENCE_S
             self._is_warm = word == _READY
-            self.doing = "" if self._is_warm else word.decode()
-            if self.doing:
-                say(self.doing)
+            if not self._is_warm:
+                say(word.decode())
 
     async def _stop(self) -> None:
         child, self._child = self._child, None
@@ -239,10 +235,7 @@ def serve() -> None:
     from companion.planner.warm import warm
 
     with _Pulse(sink) as pulse:
-        try:
-            prepare(("companion",), say=pulse.say)
-        except JobError as error:
-            _LOG.warning("%s; compiling them in one process", error)
+        prepare(("companion",), say=pulse.say)
         warm()
     _write(sink, _READY)
     while True:

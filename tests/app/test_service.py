@@ -74,7 +74,10 @@ def test_companion_run_tells_the_manager_while_it_waits_for_an_autopilot(manager
          str(tmp_path / "voyage"), "--wait", "3"],
         env={**os.environ, **environment}, capture_output=True, text=True, timeout=300, check=False)
     assert ended.returncode == 1
-    told = heard(listening)
+    before, told = [], heard(listening)
+    while not told[0].startswith("READY=1"):
+        before.append(told.pop(0))
+    assert all(text.endswith("EXTEND_TIMEOUT_USEC=120000000") for text in before)   # it may take long to get ready
     assert told[0].startswith("READY=1\nSTATUS=waiting: ")
     assert sum("WATCHDOG=1" in text for text in told) >= 2
     assert told[-1] == "STOPPING=1"
