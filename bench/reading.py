@@ -212,8 +212,10 @@ def measure(path: Path) -> tuple[float, int]:
 
 def largest(name: str, make: Callable[[int], str], n: int) -> int:
     """Return how many of n points fit into a file of the largest size."""
-    per_point = len(make(10_000)) / 10_000
-    return min(n, MOST.get(name, MAX_POSITIONS), int(0.97 * MAX_BYTES / per_point) // 1000 * 1000)
+    n = min(n, MOST.get(name, MAX_POSITIONS))
+    while (size := len(make(n))) > MAX_BYTES:
+        n = int(0.99 * n * MAX_BYTES / size) // 1000 * 1000
+    return n
 
 
 def power(first: tuple[int, float], last: tuple[int, float]) -> float:

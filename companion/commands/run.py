@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from companion.telemetry.service import ServiceManager
 
 
+NOT_THERE = 66   # exit code (EX_NOINPUT of sysexits.h): a card mounted a second late is no reason to give up
+
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
@@ -31,7 +33,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "run", help=summary,
         description="Sail a mission: estimate the wind, plan, upload, and plan again at each waypoint. Nothing is "
         "sent to the boat that the mission's [operator] table does not allow.",
-        epilog="Example: companion run missions/archipelago.toml --link udpin:127.0.0.1:14551",
+        epilog="Exit codes: 0 arrived, 1 not, 2 an order that gets no better by trying again, 66 a file that is not "
+        "there or cannot be read. Example: companion run missions/archipelago.toml --link udpin:127.0.0.1:14551",
     )
     parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="the mission file")
     parser.add_argument("--link", required=True, metavar="LINK",
@@ -62,13 +65,18 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from companion.errors import UnreadableError
     from companion.telemetry.console import Console
 
     with (
         _outliving_the_terminal(), Console(sys.stdout) as out, Console(sys.stderr) as err,
         contextlib.redirect_stderr(cast("TextIO", err)),   # what is logged must not wait for a terminal either
     ):
-        return _run(args, out, err)
+        try:
+            return _run(args, out, err)
+        except UnreadableError as error:
+            err.write(f"companion run: {error}\n")
+            return NOT_THERE
 
 
 @contextlib.contextmanager

@@ -1,7 +1,10 @@
 """What the service manager is told, heard on a real socket, and the unit file that is handed out."""
 
 import configparser
+import errno
+import io
 import os
+import re
 import shlex
 import socket
 import subprocess
@@ -94,3 +97,43 @@ def test_the_unit_file_starts_the_program_as_it_is():
     assert Path(program).name == "companion"
     parsed = cli.PROGRAM.parser().parse_args(arguments)
     assert str(parsed.link) == "udpin:127.0.0.1:14551"
+
+
+@pytest.mark.parametrize("number", [errno.ENOENT, errno.EIO, errno.ESTALE, errno.ENODEV, errno.ENOMEM])
+@pytest.mark.parametrize("name", ["lake.toml", "rocks.wkt", "boat.pol", "key"])
+def test_a_file_that_is_not_there_for_a_moment_is_no_reason_to_give_up(tmp_path, monkeypatch, capfd, name, number):
+    """Exit code 2 was final for the unit: a card mounted a second late ended the voyage (issue 12, point 15)."""
+    assert leave(tmp_path, monkeypatch, name, number) == 66
+    assert re.fullmatch(rf"companion run: .*{re.escape(name)}.*: (no such file|cannot be read \(.*\)); .*\n",
+                        capfd.readouterr().err)
+
+
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EISDIR])
+def test_a_file_that_is_no_file_or_forbidden_is_given_up(tmp_path, monkeypatch, capfd, number):
+    assert leave(tmp_path, monkeypatch, "lake.toml", number) == 2
+    assert "cannot be read" in capfd.readouterr().err
+
+
+def leave(folder, monkeypatch, name, number):
+    """Run a mission with one of its files missing or failing; return the exit code."""
+    (folder / "lake.toml").write_text(
+        'name = "lake"\n[[goal]]\nlat = 50.817\nlon = -1.3085\n[area]\nobstacles = ["rocks.wkt"]\n'
+        '[boat]\npolar = "boat.pol"\n')
+    (folder / "rocks.wkt").write_text("POLYGON ((-1.3 50.81, -1.299 50.81, -1.299 50.811, -1.3 50.81))")
+    (folder / "boat.pol").write_text("TWA\\TWS;4;8\n0;0;0\n90;3;5\n180;2;4\n")
+    (folder / "key").write_text("a passphrase")
+    (folder / "key").chmod(0o600)
+    if number == errno.ENOENT:
+        (folder / name).unlink()
+    else:
+        really = io.open
+
+        def failing(file, *args, **kwargs):
+            if Path(file) == folder / name:
+                raise OSError(number, os.strerror(number))
+            return really(file, *args, **kwargs)
+
+        monkeypatch.setattr(io, "open", failing)   # what pathlib calls
+    monkeypatch.chdir(folder)
+    return cli.main(["run", str(folder / "lake.toml"), "--link", f"udpin:127.0.0.1:{free_port()}", "--wait", "1",
+                     "--signing-key", str(folder / "key")])
