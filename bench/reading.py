@@ -158,7 +158,7 @@ FILES: dict[str, dict[str, Callable[[int], str]]] = {
         "fence vertices without a ring": lambda n: _waypoints(
             [(5001 + k % 2, n, p) for k, p in enumerate(places(n))]),
     },
-    "fen": {"a coast": lambda n: "# a\n" + _swapped([coast(n)[0], *coast(n)])},
+    "fen": {"a coast": lambda n: "# a\n" + _swapped([ORIGIN, *coast(n - 1)])},
     "poly": {"a coast": lambda n: _swapped(coast(n)), "rocks": lambda n: _name(rocks(n))},
     "gpx": {
         "a route": lambda n: _gpx(f"<rte>{_gpx_points('rtept', coast(n))}</rte>"),

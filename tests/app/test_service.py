@@ -6,6 +6,7 @@ import io
 import os
 import re
 import shlex
+import shutil
 import socket
 import subprocess
 import sys
@@ -97,6 +98,20 @@ def test_the_unit_file_starts_the_program_as_it_is():
     assert Path(program).name == "companion"
     parsed = cli.PROGRAM.parser().parse_args(arguments)
     assert str(parsed.link) == "udpin:127.0.0.1:14551"
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="needs systemd-analyze")
+def test_the_unit_is_exposed_little(tmp_path):
+    """It was 8.3, exposed (issue 12, point 17)."""
+    said = subprocess.run(["systemd-analyze", "security", "--offline=true", "--no-pager", "--threshold=20", str(UNIT)],
+                          capture_output=True, text=True, check=False)
+    if "offline" in said.stderr:
+        pytest.skip("this systemd-analyze reads no unit files")
+    assert said.returncode == 0, said.stdout[-300:] + said.stderr
+    unit = tmp_path / UNIT.name
+    unit.write_text(UNIT.read_text().replace("/opt/companion/.venv/bin/companion", "/bin/true"))
+    checked = subprocess.run(["systemd-analyze", "verify", str(unit)], capture_output=True, text=True, check=False)
+    assert unit.name not in checked.stderr   # it names what it does not know
 
 
 @pytest.mark.parametrize("number", [errno.ENOENT, errno.EIO, errno.ESTALE, errno.ENODEV, errno.ENOMEM])
