@@ -119,7 +119,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     shelf = None   # a folder that was named is not ours to tidy
     if args.out is None or args.keep_gb is not None:
         shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
-    with _alone(state_path, err):
+    with _alone(state_path, folder, err):
         again = args.again or _asked(mission, state_path, err)
         if again is None:
             return 0
@@ -158,14 +158,20 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 
 @contextlib.contextmanager
-def _alone(state_path: Path, err: Console) -> Iterator[None]:
-    """Hold the lock on the folder of the state: it is one boat's, and one companion commands a boat."""
+def _alone(state_path: Path, folder: Path, err: Console) -> Iterator[None]:
+    """Hold the lock on the folder of the state: it is one boat's, and one companion commands a boat.
+
+    A state within the voyage's own folder is guarded by whoever records there.
+    """
     from companion.disk import Disk, is_mistake, reason
     from companion.errors import InputError, JobError
     from companion.lock import FolderLock
 
     if state_path.is_dir():
         raise InputError("--state", str(state_path), "is a folder", "name a file")
+    if state_path.parent.resolve() == folder.resolve():
+        yield
+        return
     lock = FolderLock(state_path.parent)
     try:
         Disk().make_folder(state_path.parent)
