@@ -2,6 +2,7 @@
 
     CompanionError
     ├── InputError          a file, mission, problem or option cannot be believed    -> exit 2
+    │   └── UnreadableError it is not there, or the disk fails: perhaps soon         -> exit 2, of ``run`` 66
     ├── LinkError           the link to the autopilot is dead or never answered      -> exit 1
     │   └── TransferError   a mission, fence, parameter or file transfer failed      -> exit 1
     └── JobError            the job was understood and could not be done             -> exit 1
@@ -28,6 +29,17 @@ class InputError(CompanionError):
         self.source, self.place, self.problem, self.remedy = source, place, problem, remedy
         where = f"{source}: {place}" if place else source
         super().__init__(f"{where}: {problem}" + (f"; {remedy}" if remedy else ""))
+
+
+class UnreadableError(InputError):
+    """A file that is not there or a disk that fails: a card that is mounted late, or tried again, may have it."""
+
+
+def unreadable(source: str, error: OSError, place: str = "", remedy: str = "check the path") -> InputError:
+    """Return what to raise for a file that could not be read: tried again unless its name or its rights are wrong."""
+    is_wrong = isinstance(error, PermissionError | IsADirectoryError | NotADirectoryError)
+    problem = "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error.strerror or error})"
+    return (InputError if is_wrong else UnreadableError)(source, place, problem, remedy)
 
 
 class LinkError(CompanionError):

@@ -21,9 +21,7 @@ from companion.disk import Disk
 from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
-from companion.planner.warm import warm
 from companion.telemetry.names import DECISIONS, VERDICT
-from companion.wind.forecaster import compile_kernels
 from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
@@ -34,8 +32,6 @@ from sitl.verdict import Truth, Verdict, judge
 from sitl.weather import scenario_wind
 
 COMPANION_STOP_S = 20.0
-# Loading and compiling may take this long before the companion opens its voyage folder [s of real time].
-COMPANION_START_S = 300.0
 # What befalls the companion's process or its link, and what the wind is made of.
 ON_THE_LINK = LINK_EVENTS | {"vane"}
 OURS = TRAFFIC | ON_THE_LINK | {"kill_companion", "wind_shift", "wind_speed"}
@@ -66,10 +62,9 @@ class _Companion:
         if not self._expects_death:
             self._is_over.set()
 
-    async def opened(self, path: Path, pace: float) -> None:
-        """Wait until it has made ``path``, or has ended."""
-        until_s = now_s() + COMPANION_START_S * pace
-        while not path.exists() and not self._is_over.is_set() and now_s() < until_s:
+    async def opened(self, path: Path) -> None:
+        """Wait until it has made ``path``, or has ended: a slow machine takes long to load and compile."""
+        while not path.exists() and not self._is_over.is_set():
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._is_over.wait(), TRUTH_EVERY_S)
 
@@ -128,9 +123,6 @@ async def _run(
     async with contextlib.AsyncExitStack() as stack:
         boat: Boat
         if kind == "ardurover":
-            # A disarmed boat drifts: the companion must not compile its kernels while it is afloat.
-            await asyncio.to_thread(warm)
-            await asyncio.to_thread(compile_kernels)
             boat = await stack.enter_async_context(RealBoat.start(scenario, mission, wind, program, pace, folder))
         else:
             boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace))
@@ -147,7 +139,7 @@ async def _run(
         ])
         await companion.start()
         # The scenario's clock starts when the companion does its first work, as it does on the embedded autopilot.
-        await companion.opened(folder / DECISIONS, pace)
+        await companion.opened(folder / DECISIONS)
         began_s = now_s()
         side = [
             asyncio.create_task(_watch(boat, frame, truth, others, began_s), name="judge"),

@@ -30,10 +30,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from companion.boat import Polar
+from companion.kernels.jit import kernel
 
 STEP_S = 0.05
 
@@ -74,7 +74,7 @@ def state_at(east_m: float, north_m: float, heading_rad: float, speed_mps: float
     return np.array([east_m, north_m, heading_rad, 0.0, 0.0, speed_mps, 0.0])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def sail_heading(
     state: NDArray[np.float64], p: NDArray[np.float64], wanted_rad: float, twd_from_rad: float, tws_mps: float,
     seconds: float, step_s: float, thrust: float = 1.0,
@@ -99,7 +99,7 @@ def sail_heading(
     return s
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def step(
     state: NDArray[np.float64], p: NDArray[np.float64], rudder_rad: float, sheet_rad: float, twd_from_rad: float,
     tws_mps: float, step_s: float,
@@ -110,7 +110,7 @@ def step(
     return s
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _advance(s, p, rudder_rad, sheet_rad, twd_from_rad, tws_mps, h):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     heading, sail, rudder, v, w = s[2], s[3], s[4], s[5], s[6]
     # The wind's motion over the water, ahead and to starboard of the boat, and what the boat feels of it.

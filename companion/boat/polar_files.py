@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.boat.polar import MPS_PER_KNOT, Polar
-from companion.errors import InputError
+from companion.errors import InputError, unreadable
 
 MAX_TWS_KN = 200.0
 MAX_SPEED_KN = 100.0
@@ -47,7 +47,7 @@ def read_polar(path: str | Path) -> PolarFile:
     try:
         raw = Path(path).read_bytes()
     except OSError as error:
-        raise InputError(source, "", f"cannot be read ({error.strerror or error})", "check the path") from error
+        raise unreadable(source, error) from error
     if len(raw) > MAX_FILE_BYTES:
         raise InputError(source, "", f"{len(raw)} bytes is no polar", "give a .pol or .csv file of boat speeds")
     try:

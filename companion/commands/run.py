@@ -17,13 +17,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
+from companion.program import INTERRUPTED, system_id
+
 if TYPE_CHECKING:
+    from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
+    from companion.telemetry.service import ServiceManager
 
-from companion.program import system_id
 
-# Loading takes about two seconds; beyond this the operator is told why nothing happens [s].
-PATIENCE_S = 4.0
+NOT_THERE = 66   # exit code (EX_NOINPUT of sysexits.h): a card mounted a second late is no reason to give up
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -32,7 +34,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "run", help=summary,
         description="Sail a mission: estimate the wind, plan, upload, and plan again at each waypoint. Nothing is "
         "sent to the boat that the mission's [operator] table does not allow.",
-        epilog="Example: companion run missions/archipelago.toml --link udpin:127.0.0.1:14551",
+        epilog="Exit codes: 0 arrived, 1 not, 2 an order that gets no better by trying again, 66 a file that is not "
+        "there or cannot be read. Example: companion run missions/archipelago.toml --link udpin:127.0.0.1:14551",
     )
     parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="the mission file")
     parser.add_argument("--link", required=True, metavar="LINK",
@@ -68,18 +71,18 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion import kernel_cache
+    from companion.errors import UnreadableError
     from companion.telemetry.console import Console
 
     with (
         _outliving_the_terminal(), Console(sys.stdout) as out, Console(sys.stderr) as err,
         contextlib.redirect_stderr(cast("TextIO", err)),   # what is logged must not wait for a terminal either
     ):
-        kernels = kernel_cache.keep_usable(os.environ)
-        if kernels is not None:
-            os.environ[kernel_cache.VARIABLE] = str(kernels)
-            err.write(f"companion run: the compiled kernels are in {kernels}: their own place is read-only\n")
-        return _run(args, out, err)
+        try:
+            return _run(args, out, err)
+        except UnreadableError as error:
+            err.write(f"companion run: {error}\n")
+            return NOT_THERE
 
 
 @contextlib.contextmanager
@@ -122,7 +125,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     shelf = None   # a folder that was named is not ours to tidy
     if args.out is None or args.keep_gb is not None:
         shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
-    with _alone(state_path, err):
+    with _alone(state_path, folder, err):
         again = args.again or _asked(mission, state_path, err)
         if again is None:
             return 0
@@ -138,7 +141,9 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
                 token=secrets.randbelow(0xFFFFFFFF) + 1,
             )
 
-        summary = run_loop(_sail(mission, transport, folder, options, args.speedup, out), speedup=args.speedup)
+        summary = run_loop(_sail(mission, transport, folder, options, out), speedup=args.speedup)
+    if summary is None:
+        return INTERRUPTED
     if not summary["arrived_before"]:
         _report(folder, err)
     code, text = last_words(mission.name, summary)
@@ -162,14 +167,20 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 
 @contextlib.contextmanager
-def _alone(state_path: Path, err: Console) -> Iterator[None]:
-    """Hold the lock on the folder of the state: it is one boat's, and one companion commands a boat."""
+def _alone(state_path: Path, folder: Path, err: Console) -> Iterator[None]:
+    """Hold the lock on the folder of the state: it is one boat's, and one companion commands a boat.
+
+    A state within the voyage's own folder is guarded by whoever records there.
+    """
     from companion.disk import Disk, is_mistake, reason
     from companion.errors import InputError, JobError
     from companion.lock import FolderLock
 
     if state_path.is_dir():
         raise InputError("--state", str(state_path), "is a folder", "name a file")
+    if state_path.parent.resolve() == folder.resolve():
+        yield
+        return
     lock = FolderLock(state_path.parent)
     try:
         Disk().make_folder(state_path.parent)
@@ -211,39 +222,55 @@ def _asked(mission: Any, state_path: Path, err: Console) -> bool | None:
 
 
 async def _sail(
-    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], speedup: float, out: Console,
-) -> dict[str, Any]:
-    from companion.errors import JobError
+    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], out: Console,
+) -> dict[str, Any] | None:
+    """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker
+    from companion.telemetry.service import ServiceManager
 
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
             loop.add_signal_handler(number, stop.set)
-    async with PlannerWorker() as planner:
-        # The child loads its kernels while this process imports the rest.
-        from companion.app import sail
-        from companion.telemetry.progress import ProgressLine
-        from companion.telemetry.service import ServiceManager
+    with ServiceManager(os.environ) as manager:
+        async with PlannerWorker() as planner:
+            # The child loads its kernels while this process imports the rest.
+            from companion.app import sail
+            from companion.telemetry.progress import ProgressLine
 
-        ready = asyncio.ensure_future(planner.ready())
-        if not (await asyncio.wait({ready}, timeout=PATIENCE_S * speedup))[0]:
-            out.write("preparing the planner: its kernels are compiled once on each machine\n")
-        try:
-            await ready
-        except (TimeoutError, EOFError, OSError) as error:
-            raise JobError(f"the planner's process did not start: {error!r}") from error
-        chosen = options()
-        with ProgressLine(out, chosen.epoch_s) as progress, ServiceManager(os.environ) as manager:
+            if not await _is_ready(planner, stop, out, manager):
+                return None
+            chosen = options()
 
-            def show(status: Any, step: Any) -> None:
-                progress.show(status, step)
-                manager.alive(f"{step.state.phase.value}: {step.state.why}")
+            with ProgressLine(out, chosen.epoch_s) as progress:
+                def show(status: Any, step: Any) -> None:
+                    progress.show(status, step)
+                    manager.alive(f"{step.state.phase.value}: {step.state.why}")
 
-            return await sail(
-                mission, transport, planner, folder, chosen, on_status=show, stop=stop,
-                on_refusal=lambda text: out.write(f"note: {text}\n"))
+                return await sail(
+                    mission, transport, planner, folder, chosen, on_status=show, stop=stop,
+                    on_refusal=lambda text: out.write(f"note: {text}\n"))
+
+
+async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, manager: ServiceManager) -> bool:
+    """Wait for the planner's kernels and say how far they are; return False when ``stop`` comes first."""
+    from companion.errors import JobError
+    from companion.telemetry.preparing import Preparing
+
+    with Preparing(out) as preparing:
+        def say(text: str) -> None:
+            preparing.say(text)
+            manager.starting(text)
+
+        waits = [asyncio.ensure_future(planner.ready(say)), asyncio.ensure_future(stop.wait())]
+        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+        for wait in waits:
+            wait.cancel()
+        ready, _ = await asyncio.gather(*waits, return_exceptions=True)
+    if isinstance(ready, TimeoutError | EOFError | OSError):
+        raise JobError(f"the planner's process did not start: {ready!r}")
+    return not stop.is_set()
 
 
 def _signing(path: Path | None) -> Any:

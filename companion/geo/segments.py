@@ -14,9 +14,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.base import BaseGeometry
+
+from companion.kernels.jit import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -88,7 +89,7 @@ def _edges(union: BaseGeometry) -> Floats:
     return np.ascontiguousarray(np.vstack(out)) if out else np.zeros((0, 4))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _sort_into_cells(edges: Floats, grid: Floats) -> tuple[Ints, Ints]:
     """Return the edges of each cell in compressed rows: start (cells + 1) and members."""
     columns, rows = int(grid[3]), int(grid[4])
@@ -123,12 +124,12 @@ def _sort_into_cells(edges: Floats, grid: Floats) -> tuple[Ints, Ints]:
     return counts, members
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _side(ax: float, ay: float, bx: float, by: float, px: float, py: float) -> float:
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _meet(ax: float, ay: float, bx: float, by: float, edge: Floats, k: int) -> bool:
     """Whether a closed segment shares a point with edge ``k``."""
     cx, cy, dx, dy = edge[k, 0], edge[k, 1], edge[k, 2], edge[k, 3]
@@ -143,7 +144,7 @@ def _meet(ax: float, ay: float, bx: float, by: float, edge: Floats, k: int) -> b
     return not ((t0 > 0.0 and t1 > 0.0) or (t0 < 0.0 and t1 < 0.0))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _inside(
     px: float, py: float, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
 ) -> bool:
@@ -169,7 +170,7 @@ def _inside(
     return inside
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _contains(
     points: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
@@ -179,7 +180,7 @@ def _contains(
     return out
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _intersects(
     segments: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
@@ -244,7 +245,7 @@ def _intersects(
     return out
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _distance2(px: float, py: float, edge: Floats, k: int) -> float:
     ax, ay, bx, by = edge[k, 0], edge[k, 1], edge[k, 2], edge[k, 3]
     dx, dy = bx - ax, by - ay
@@ -254,7 +255,7 @@ def _distance2(px: float, py: float, edge: Floats, k: int) -> float:
     return float(ox * ox + oy * oy)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _signed_distance(
     points: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
 ) -> Floats:

@@ -127,12 +127,16 @@ def items_to_zones(
             index += 1
         elif item.command in _VERTEX:
             count = int(item.params[0]) if math.isfinite(item.params[0]) else 0
-            run = items[index: index + max(1, count)]
-            same = [i for i in run if i.command == item.command and i.params[0] == item.params[0]]
-            if count < 3 or len(same) != count:
+            end = index + 1
+            while end < min(index + count, len(items)) and (
+                (items[end].command, items[end].params[0]) == (item.command, item.params[0])
+            ):
+                end += 1
+            run = items[index:end]
+            if count < 3 or len(run) != count:
                 findings.add(
                     Severity.ERROR, Code.FORMAT, place,
-                    f"the polygon announces {item.params[0]:g} vertices and {len(same)} follow",
+                    f"the polygon announces {item.params[0]:g} vertices and {len(run)} follow",
                     "each vertex carries the number of vertices; at least 3",
                 )
                 while index < len(items) and items[index].command == item.command:

@@ -43,9 +43,9 @@ EXTENSIONS = {
 }
 _WKT_WORD = re.compile(
     r"\b(POINT|LINESTRING|LINEARRING|POLYGON|TRIANGLE|TIN|MULTI\w+|GEOMETRYCOLLECTION|POLYHEDRALSURFACE|"
-    r"CURVEPOLYGON|CIRCULARSTRING|COMPOUNDCURVE)\s*(Z|M|ZM)?\s*(\(|EMPTY)", re.IGNORECASE,
+    r"CURVEPOLYGON|CIRCULARSTRING|COMPOUNDCURVE)\s*+((ZM|Z|M)\s*+)?(\(|EMPTY)", re.IGNORECASE,
 )
-_PAIR = re.compile(r"\s*-?\d+[.,]?\d*[\s;,]+-?\d+[.,]?\d*")
+_PAIR = re.compile(r"\s*+-?\d++([.,]\d*+)?[\s;,]++-?\d")
 
 
 def read(

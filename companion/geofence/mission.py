@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 import tomli_w
 
-from companion.errors import InputError
+from companion.errors import InputError, unreadable
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Document
@@ -185,9 +185,9 @@ def load_mission(path: str | Path) -> Mission:
         start=GeoPoint(lat_deg=options.start.lat, lon_deg=options.start.lon) if options.start else None,
         area=area, path=path, findings=findings, refuges=tuple(_refuge(r, n) for n, r in enumerate(options.refuge)),
     )
-    if mission.polar_path is not None and not mission.polar_path.is_file():
-        raise InputError(source, "[boat] polar", f"no such file: {mission.polar_path}",
-                         'write a file beside the mission, "ardurover" or a speed in m/s')
+    if mission.polar_path is not None:
+        _require(mission.polar_path, source, "[boat] polar",
+                 'write a file beside the mission, "ardurover" or a speed in m/s')
     check_places(mission)
     return mission
 
@@ -312,6 +312,14 @@ def _value_at(raw: dict[str, Any], path: str) -> object:
     return value
 
 
+def _require(path: Path, source: str, place: str, remedy: str) -> None:
+    """Raise InputError, which names the place in the mission, when a file that it names cannot be read."""
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        raise unreadable(source, error, f"{place} {path}", remedy) from None
+
+
 def load_area(options: AreaOptions, mission_path: Path, origin: GeoPoint) -> tuple[Area, tuple[Finding, ...]]:
     """Return the area that ``[area]`` names and what its files gave rise to. Raises InputError."""
     folder = mission_path.parent
@@ -321,9 +329,7 @@ def load_area(options: AreaOptions, mission_path: Path, origin: GeoPoint) -> tup
 
     def load(name: str, key: str, kind: ZoneKind) -> Document:
         path = folder / name
-        if not path.is_file():
-            raise InputError(str(mission_path), f"[area] {key}", f"no such file: {path}",
-                             "paths are relative to the mission file")
+        _require(path, str(mission_path), f"[area] {key}", "paths are relative to the mission file")
         document = read(path, kind=kind, axis=options.axis, near=origin, areas=True).require_clean()
         findings.extend(f for f in document.findings if f.severity is not Severity.NOTE)
         return document

@@ -25,7 +25,7 @@ Row = tuple[float, float, str]  # lon, lat, place
 def read_fen(text: str, source: str) -> Document:
     """Return a .fen: the first data line is the return point, the rest the closed keep-in ring."""
     findings = Findings()
-    rows = _rows(text, source, findings)
+    rows = _rows(text.split("\n"), source, findings)
     if len(rows) < 2:
         findings.add(Severity.ERROR, Code.EMPTY, "", "holds no fence ring",
                      "line 1 is the return point, the ring follows")
@@ -48,17 +48,17 @@ def read_poly(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION) ->
     """Return a .poly: one closed ring, or several named ones in the Regions variant."""
     findings = Findings()
     zones: list[Zone] = []
-    blocks: list[tuple[str, list[str]]] = [("", [])]
-    for raw in text.split("\n"):
+    blocks: list[tuple[str, int, list[str]]] = [("", 1, [])]   # name, number of the first line, lines
+    for line_number, raw in enumerate(text.split("\n"), start=1):
         named = re.match(r"\s*Name\s*:(.*)", raw, re.IGNORECASE)
         if named:
-            blocks.append((named.group(1).strip(), [""] * (len(blocks[-1][1]) + 1)))
+            blocks.append((named.group(1).strip(), line_number + 1, []))
             continue
         if re.match(r"\s*Colou?r\s*:", raw, re.IGNORECASE):
             raw = ""  # noqa: PLW2901 - the line is kept, empty, so that numbers stay
-        blocks[-1][1].append(raw)
-    for name, lines in blocks:
-        rows = _rows("\n".join(lines), source, findings)
+        blocks[-1][2].append(raw)
+    for name, first, lines in blocks:
+        rows = _rows(lines, source, findings, first=first)
         if not rows:
             continue
         place = f"region '{name}'" if name else "ring"
@@ -94,10 +94,10 @@ def read_rally(text: str, source: str) -> Document:
     return Document(source=source, format="rally", rally=tuple(rally), findings=tuple(findings))
 
 
-def _rows(text: str, source: str, findings: Findings) -> list[Row]:
+def _rows(lines: list[str], source: str, findings: Findings, *, first: int = 1) -> list[Row]:
     rows: list[Row] = []
     commas = False
-    for line_number, raw in enumerate(text.split("\n"), start=1):
+    for line_number, raw in enumerate(lines, start=first):
         line = raw.split("#", 1)[0].strip()
         if not line:
             continue

@@ -20,7 +20,16 @@ from companion.geofence.shapes import ZoneKind, unwrapped
 
 Ring = Sequence[Sequence[float]]
 
-MAX_FACES = 2000  # of a self-crossing keep-in ring; a worse tangle is not repaired
+# A tangle worse than this is not repaired: n edges can cross n² / 2 times, so a small file would take hours.
+MAX_CROSSINGS = 5000
+MAX_FACES = 2000             # of a self-crossing keep-in ring ...
+MAX_FACE_EDGES = 50_000_000  # ... and that times its edges: each face is held against each edge
+HOPELESS_EDGES = 20_000      # from here on GEOS takes too long to see that a tangle is none of its business ...
+HOPELESS_CROSSINGS = 500_000  # ... as one with more crossings than this is
+_DRAWN = 32
+
+_TANGLED = "it is too tangled to be repaired"
+_REDRAW = "redraw it, or write the repair with 'companion fence convert --repair'"
 
 
 class Findings(list[Finding]):
@@ -55,6 +64,9 @@ def polygons_from_rings(
         findings.add(Severity.ERROR, Code.EMPTY, place, "the polygon has no vertices", "draw it or remove it")
         return []
     polygon = Polygon(fixed[0], fixed[1:])
+    if is_hopeless(polygon):
+        findings.add(Severity.ERROR, Code.SELF_CROSSING, place, f"the ring crosses itself; {_TANGLED}", _REDRAW)
+        return []
     if polygon.is_valid and polygon.area > 0.0:
         return [polygon]
     return _repaired(polygon, kind, place, findings)
@@ -125,23 +137,68 @@ def _on_globe(coordinates: NDArray[np.float64], place: str, findings: Findings) 
 def _repaired(polygon: Polygon, kind: ZoneKind, place: str, findings: Findings) -> list[Polygon]:
     """Return a safe repair of an invalid polygon, and say what it does."""
     reason = shapely.is_valid_reason(polygon)
+    tangled = is_tangled(polygon)
     try:
-        fixed = enclosed_faces(polygon) if kind is ZoneKind.EXCLUSION else odd_faces(polygon)
+        fixed = Polygon() if tangled else enclosed_faces(polygon) if kind is ZoneKind.EXCLUSION else odd_faces(polygon)
     except shapely.errors.GEOSException:  # lines too close together for double precision
         fixed = Polygon()
     pieces = [p for p in shapely.get_parts(fixed) if isinstance(p, Polygon) and p.area > 0.0]
     effect = (
         f"a repair would make {len(pieces)} polygon{'s' if len(pieces) != 1 else ''} of "
         f"{_hectares(pieces)} ha in place of {_hectares([polygon])} ha"
-        if pieces else "nothing would be left of it"
+        if pieces else _TANGLED if tangled else "nothing would be left of it"
     )
     code = Code.SELF_CROSSING if "intersect" in reason.lower() else Code.DEGENERATE
     name = "the ring crosses itself" if code is Code.SELF_CROSSING else "the polygon is not valid"
     findings.add(
         Severity.ERROR, code, place, f"{name} ({_plain(reason)}); {effect}",
-        "redraw it, or write the repair with 'companion fence convert --repair'",
+        _REDRAW,
     )
     return pieces
+
+
+def _edges(polygon: Polygon) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where the edges of all rings begin and end, (n, 2) each."""
+    rings = [np.asarray(r.coords)[:, :2] for r in (polygon.exterior, *polygon.interiors)]
+    return np.vstack([r[:-1] for r in rings]), np.vstack([r[1:] for r in rings])
+
+
+def is_hopeless(polygon: Polygon) -> bool:
+    """Return whether a large polygon crosses itself at every turn, judged by a few of its edges."""
+    start, end = _edges(polygon)
+    n = len(start)
+    if n < HOPELESS_EDGES:
+        return False
+
+    def side(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
+        east, north = (b - a).T
+        return np.asarray(east * (c[:, 1] - a[:, 1]) - north * (c[:, 0] - a[:, 0]))
+
+    crossings = 0
+    for k in np.random.default_rng(0).choice(n, _DRAWN, replace=False):
+        a, b = start[k:k + 1], end[k:k + 1]
+        cut = (side(a, b, start) * side(a, b, end) < 0.0) & (side(start, end, a) * side(start, end, b) < 0.0)
+        crossings += int(np.count_nonzero(cut))
+    return crossings * n > 2 * _DRAWN * HOPELESS_CROSSINGS
+
+
+def is_tangled(polygon: Polygon) -> bool:
+    """Return whether the rings' edges cross more than ``MAX_CROSSINGS`` times.
+
+    The edges are looked at in a drawn order, twice as many at a time while few cross: the pairs that are found, and
+    with them time and memory, stay near the limit whatever the file.
+    """
+    edges = shapely.linestrings(np.stack(_edges(polygon), axis=1))
+    tree = shapely.STRtree(edges)
+    order = np.random.default_rng(0).permutation(len(edges))
+    seen = pairs = 0
+    while seen < len(edges):
+        some = order[seen: 2 * seen + 1]
+        pairs += tree.query(edges[some], predicate="intersects").shape[1] - 3 * len(some)  # itself and its neighbours
+        seen += len(some)
+        if pairs > 2 * MAX_CROSSINGS:   # each is found from both edges
+            return True
+    return False
 
 
 def enclosed_faces(polygon: Polygon) -> BaseGeometry:
@@ -157,9 +214,9 @@ def odd_faces(polygon: Polygon) -> BaseGeometry:
     rings = [np.asarray(r.coords)[:, :2] for r in (polygon.exterior, *polygon.interiors)]
     lines = shapely.union_all([shapely.linestrings(r) for r in rings])
     faces = [f for f in shapely.get_parts(shapely.polygonize(shapely.get_parts(lines))) if f.area > 0.0]
-    if len(faces) > MAX_FACES:
+    start, end = _edges(polygon)
+    if len(faces) > MAX_FACES or len(faces) * len(start) > MAX_FACE_EDGES:
         return Polygon()
-    start, end = np.vstack([r[:-1] for r in rings]), np.vstack([r[1:] for r in rings])
     odd = []
     for face in faces:
         inside = face.representative_point()

@@ -6,7 +6,7 @@ import math
 import re
 from pathlib import Path
 
-from companion.errors import InputError
+from companion.errors import InputError, unreadable
 
 MAX_BYTES = 16 * 1024 * 1024  # a coast of 500,000 vertices; more is a mistake or an attack
 MAX_POSITIONS = 500_000       # vertices and items that one file may hold
@@ -16,14 +16,12 @@ _DECIMAL_COMMA = re.compile(r"(?<![\d,])(-?\d+),(\d+)(?![\d,])")
 
 
 def read_bytes(path: Path, *, max_bytes: int = MAX_BYTES) -> bytes:
-    """Return the file's bytes. Raises InputError if it is missing, a directory, or over ``max_bytes``."""
+    """Return the file's bytes. Raises InputError if it cannot be read or is over ``max_bytes``."""
     try:
         with path.open("rb") as file:
             data = file.read(max_bytes + 1)
-    except FileNotFoundError:
-        raise InputError(str(path), "", "no such file", "check the path") from None
     except OSError as error:
-        raise InputError(str(path), "", f"cannot be read ({error.strerror})") from None
+        raise unreadable(str(path), error) from None
     if len(data) > max_bytes:
         raise InputError(str(path), "", f"is larger than {max_bytes // 2**20} MiB", "split or simplify it")
     return data

@@ -58,15 +58,15 @@ def read_wkt(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, lat
     findings = Findings()
     zones: list[Zone] = []
     marks: list[Mark] = []
-    positions = 0
+    held = 0
     for statement in _statements(text, source):
         place = f"line {statement.line}"
         scanner = _Scanner(statement.text, source, statement.line, findings, latlon=latlon)
         for name, body in scanner.geometries():
-            positions += scanner.positions
-            if positions > MAX_POSITIONS:
+            if held + scanner.positions > MAX_POSITIONS:
                 raise InputError(source, place, f"holds more than {MAX_POSITIONS} positions", "simplify it")
             _collect(name, body, statement, kind, findings=findings, zones=zones, marks=marks)
+        held += scanner.positions
     if not zones and not marks and not findings:
         findings.add(Severity.ERROR, Code.EMPTY, "", "holds no geometry", "an empty file is not 'no obstacles'")
     return Document(
@@ -106,22 +106,25 @@ def _collect(
 def _statements(text: str, source: str) -> Iterator[_Statement]:
     """Yield the statements: a geometry may run over several lines; it ends where its brackets close."""
     require_shallow("\n".join(line.split("#", 1)[0] for line in text.split("\n")), source)
-    pending, start, depth = "", 0, 0
+    pending: list[str] = []   # the lines of the statement being gathered
+    start, depth, is_whole = 0, 0, False
     for number, raw in enumerate(text.split("\n"), start=1):
         line = raw.split("#", 1)[0].rstrip()
         if not line.strip():
             continue
         if not pending:
             start = number
-        pending = f"{pending}\n{line}" if pending else line
+        pending.append(line)
         depth += line.count("(") - line.count(")")
-        if depth <= 0 and ("(" in pending or "EMPTY" in pending.upper()):
-            yield _statement(pending, start, source)
-            pending, depth = "", 0
+        is_whole = is_whole or "(" in line or "EMPTY" in line.upper()
+        if depth <= 0 and is_whole:
+            yield _statement("\n".join(pending), start, source)
+            pending, depth, is_whole = [], 0, False
     if pending:
-        if "(" in pending:
+        text = "\n".join(pending)
+        if "(" in text:
             raise InputError(source, f"line {start}", "the geometry's brackets do not close", "is the file cut off?")
-        raise InputError(source, f"line {start}", f"{pending.strip()[:40]!r} is not WKT", _hint(pending))
+        raise InputError(source, f"line {start}", f"{text.strip()[:40]!r} is not WKT", _hint(text))
 
 
 def _statement(text: str, line: int, source: str) -> _Statement:
@@ -151,7 +154,7 @@ class _Scanner:
     def __init__(self, text: str, source: str, line: int, findings: Findings, *, latlon: bool) -> None:
         self._latlon = latlon
         self._source, self._line, self._findings = source, line, findings
-        self._text, self._at = text, 0
+        self._text, self._at, self._counted = text, 0, 0
         self.positions = 0
         srid = _SRID.match(text)
         if srid:
@@ -164,7 +167,9 @@ class _Scanner:
         self._kind, self._word = self._next()
 
     def _place(self) -> str:
-        return f"line {self._line + self._text.count(chr(10), 0, self._at)}"
+        self._line += self._text.count("\n", self._counted, self._at)
+        self._counted = self._at
+        return f"line {self._line}"
 
     def _fail(self, problem: str, remedy: str = "") -> InputError:
         return InputError(self._source, self._place(), problem, remedy)

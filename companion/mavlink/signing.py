@@ -14,7 +14,7 @@ import stat
 from pathlib import Path
 
 from companion.disk import Disk
-from companion.errors import InputError
+from companion.errors import InputError, unreadable
 from companion.mavlink.frames import SigningState
 
 # 2015-01-01T00:00:00Z in Unix seconds: the zero of MAVLink signing timestamps, which count 10 µs.
@@ -34,7 +34,9 @@ def read_key(path: Path) -> bytes:
     try:
         mode = path.stat().st_mode
         text = path.read_text("utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise unreadable(str(path), error, "the signing key", "make it with mode 0600") from error
+    except UnicodeDecodeError as error:
         raise InputError(str(path), "", f"signing key cannot be read ({error})", "make it with mode 0600") from error
     if mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise InputError(str(path), "", "the signing key can be read by others", f"chmod 600 {path}")

@@ -13,12 +13,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.kernels.jit import kernel
 from companion.planner.kernels import (
     Boat,
     Floats,
     Grid,
     is_free,
-    jit,
     track,
     turn_time,
     walk,
@@ -30,7 +30,7 @@ from companion.planner.proposals import MOST_POINTS, propose
 from companion.planner.xorshift import uniform
 
 
-@jit
+@kernel
 def shared(xs: Floats, ys: Floats, n: int, ox: Floats, oy: Floats, on: int) -> tuple[int, int]:
     """Return how many points two paths share at their beginning and, apart from those, at their end."""
     head = 0
@@ -44,7 +44,7 @@ def shared(xs: Floats, ys: Floats, n: int, ox: Floats, oy: Floats, on: int) -> t
     return head, tail
 
 
-@jit
+@kernel
 def timetable(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, at: Floats, course: Floats) -> None:
     """Fill in when the boat is at each point and the TWA that it arrives there with."""
     t, h = 0.0, h0
@@ -59,7 +59,7 @@ def timetable(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, at: Floats, co
         at[i + 1], course[i + 1] = t, h
 
 
-@jit
+@kernel
 def time_after(
     b: Boat, xs: Floats, ys: Floats, n: int, head: int, tail: int, at: Floats, course: Floats, on: int
 ) -> float:
@@ -84,7 +84,7 @@ def time_after(
     return t
 
 
-@jit
+@kernel
 def collides(g: Grid, xs: Floats, ys: Floats, n: int, head: int, tail: int) -> bool:
     """Does one of the legs that are not shared collide?"""
     for i in range(max(0, head - 1), min(n - 1, n - tail)):
@@ -93,7 +93,7 @@ def collides(g: Grid, xs: Floats, ys: Floats, n: int, head: int, tail: int) -> b
     return False
 
 
-@jit
+@kernel
 def anneal(
     g: Grid, b: Boat, points: Floats, h0: float, goal: Floats, size: float, spots: Floats, rounds: int,
     hot: float, cold: float, price: float, rng: NDArray[np.uint64],

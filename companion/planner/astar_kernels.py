@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from companion.kernels.jit import kernel
 from companion.planner.heap import sift_down, sift_up
 from companion.planner.reference_kernels import TWD, first_hit, meets_target, turn_time, worst_no_go, wrap
 
@@ -18,7 +18,7 @@ HEADINGS = 16
 MAX_STEP_TURN = 0.5 * math.pi
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _push(heap_f, heap_state, count, f, state):  # type: ignore[no-untyped-def]
     i = count[HEAP]
     count[HEAP] += 1
@@ -26,7 +26,7 @@ def _push(heap_f, heap_state, count, f, state):  # type: ignore[no-untyped-def]
     sift_up(heap_f, heap_state, i)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _pop(heap_f, heap_state, count):  # type: ignore[no-untyped-def]
     top = heap_state[0]
     count[HEAP] -= 1
@@ -34,7 +34,7 @@ def _pop(heap_f, heap_state, count):  # type: ignore[no-untyped-def]
     return top
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _in_disc(ax, ay, bx, by, disc):  # type: ignore[no-untyped-def]
     """Tell whether a segment enters one of the discs (x, y, radius)."""
     dx, dy = bx - ax, by - ay
@@ -48,7 +48,7 @@ def _in_disc(ax, ay, bx, by, disc):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def expand(  # type: ignore[no-untyped-def]
     most, g, clock, parent, closed, heap_f, heap_state, count, frame, shape, start, goal, goal_heading, step, way,
     weight, disc, edge, cell_first, cell_edge, grid, edge_shape, number, model, table, target,

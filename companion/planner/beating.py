@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 
-from companion.planner.kernels import Boat, Floats, Grid, is_free, jit, track, walk, worst_half
+from companion.kernels.jit import kernel
+from companion.planner.kernels import Boat, Floats, Grid, is_free, track, walk, worst_half
 from companion.planner.moves import corner
 
 
-@jit
+@kernel
 def check_path(g: Grid, b: Boat, points: Floats, h0: float) -> float:
     """Return the time of a path, inf where it collides or breaks an angle limit."""
     n = points.shape[0]
@@ -20,7 +21,7 @@ def check_path(g: Grid, b: Boat, points: Floats, h0: float) -> float:
     return walk(b, points[:, 0].copy(), points[:, 1].copy(), n, h0)
 
 
-@jit
+@kernel
 def zigzag(
     g: Grid, b: Boat, ax: float, ay: float, h: float, t: float, ex: float, ey: float, most: int
 ) -> tuple[Floats, float, float, bool]:
@@ -64,7 +65,7 @@ def zigzag(
     return empty, t, h, False
 
 
-@jit
+@kernel
 def follow(
     g: Grid, b: Boat, ax: float, ay: float, h: float, t: float, ex: float, ey: float, deepest: int
 ) -> tuple[Floats, float, float, bool]:

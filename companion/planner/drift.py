@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from companion.kernels.jit import kernel
 from companion.planner.gauge import Gauge
 from companion.planner.heap import sift_down, sift_up
 from companion.planner.kernels import (
@@ -20,7 +21,6 @@ from companion.planner.kernels import (
     Grid,
     Ints,
     is_free,
-    jit,
     meets_target,
     speed_at,
     track,
@@ -35,7 +35,7 @@ from companion.planner.world import World
 _FIXED = 16
 
 
-@jit
+@kernel
 def drift_search(
     g: Grid, b: Boat, h0: float, goal: Floats, box: Floats, shape: Ints, step: float, gauge: Floats, slack: float,
     bound: float, max_pops: int, side: int,

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.planner.kernels import Floats, jit
+from companion.kernels.jit import kernel
+from companion.planner.kernels import Floats
 from companion.planner.problem import NO_GO_SLACK_RAD, Problem
 
 _SAMPLES = 1800
@@ -43,7 +44,7 @@ class Gauge:
         return float(disc_time(self.normals, self.blocked, dx, dy, radius_m))
 
 
-@jit
+@kernel
 def disc_time(normals: Floats, blocked: Floats, dx: float, dy: float, radius: float) -> float:
     """Return max over normals n of (n·d - radius |n|), at least 0: by duality the gauge distance to the disc."""
     best = 0.0
@@ -59,7 +60,7 @@ def disc_time(normals: Floats, blocked: Floats, dx: float, dy: float, radius: fl
     return best
 
 
-@jit
+@kernel
 def _chain(order: Floats) -> Floats:
     """Return one half of the convex hull of points sorted by x (Andrew's monotone chain), last point left out."""
     out = np.empty_like(order)
@@ -82,7 +83,7 @@ def _hull(points: Floats) -> Floats:
     return np.vstack([_chain(order), _chain(np.ascontiguousarray(order[::-1]))])
 
 
-@jit
+@kernel
 def _tabulate(normals: Floats, size: int) -> Floats:
     """Return max(normals @ u) for unit vectors u at the ``size`` + 1 directions of a table over [-π, π]."""
     out = np.zeros(size + 1)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from companion.planner.kernels import Floats, Ints, jit
+from companion.kernels.jit import kernel
+from companion.planner.kernels import Floats, Ints
 
 
-@jit
+@kernel
 def sift_up(keys: Floats, items: Ints, i: int) -> None:
     """Restore the heap after its item ``i`` was put there."""
     key, item = keys[i], items[i]
@@ -18,7 +19,7 @@ def sift_up(keys: Floats, items: Ints, i: int) -> None:
     keys[i], items[i] = key, item
 
 
-@jit
+@kernel
 def sift_down(keys: Floats, items: Ints, n: int) -> None:
     """Restore the heap of ``n`` after its top was taken; item ``n`` moves there."""
     key, item = keys[n], items[n]

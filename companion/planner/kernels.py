@@ -8,16 +8,14 @@ grid, ``Boat`` the boat, the wind's uncertainty and the moving targets; ``world.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from companion.kernels.jit import kernel
 from companion.planner.problem import CLEAR_TURN_RAD
 
-F = TypeVar("F", bound=Callable[..., Any])
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
@@ -67,13 +65,7 @@ class Boat(NamedTuple):
     round_s: float
 
 
-def jit(function: F) -> F:
-    """Compile with numba, releasing the interpreter lock and keeping the machine code on disk."""
-    compiled: Any = njit(nogil=True, cache=True)(function)
-    return cast("F", compiled)
-
-
-@jit
+@kernel
 def wrap(a: float) -> float:
     """Return the angle on [-π, π)."""
     if a >= math.pi:
@@ -83,7 +75,7 @@ def wrap(a: float) -> float:
     return a
 
 
-@jit
+@kernel
 def half_at(b: Boat, t: float) -> float:
     """Return the no-go half angle at time t [rad]."""
     if b.kind == 0:
@@ -104,7 +96,7 @@ def half_at(b: Boat, t: float) -> float:
     return float(b.base + b.width[n - 1])
 
 
-@jit
+@kernel
 def worst_half(b: Boat, t0: float, t1: float) -> float:
     """Return the largest no-go half angle over [t0, t1] [rad]."""
     if b.kind == 0:
@@ -117,7 +109,7 @@ def worst_half(b: Boat, t0: float, t1: float) -> float:
     return worst
 
 
-@jit
+@kernel
 def speed_at(b: Boat, a: float) -> float:
     """Return the speed [m/s] at |TWA| a [rad]."""
     a = abs(a)
@@ -136,13 +128,13 @@ def speed_at(b: Boat, a: float) -> float:
     return float(b.mps[lo] + (b.mps[hi] - b.mps[lo]) * (a - b.twa[lo]) / (b.twa[hi] - b.twa[lo]))
 
 
-@jit
+@kernel
 def _cross_track(b: Boat, h: float, dx: float, dy: float) -> float:
     v = speed_at(b, wrap(h))
     return (v * math.sin(h) + b.cx) * dy - (v * math.cos(h) + b.cy) * dx
 
 
-@jit
+@kernel
 def track(b: Boat, dx: float, dy: float, t: float) -> tuple[float, float]:
     """Return (TWA of the heading, speed over ground) that makes the ground direction (dx, dy) good."""
     course = wrap(math.atan2(dx, dy))   # dead down wind is -π, as everywhere
@@ -177,7 +169,7 @@ def track(b: Boat, dx: float, dy: float, t: float) -> tuple[float, float]:
     return (best_h, best) if best > 0.0 else (any_h, any_v)
 
 
-@jit
+@kernel
 def turn_time(b: Boat, h0: float, h1: float) -> float:
     """Return the time [s] to turn from TWA h0 to h1 the shorter way, losses included; inf for a tack it cannot do."""
     t = abs(wrap(h1 - h0)) / b.omega
@@ -189,7 +181,7 @@ def turn_time(b: Boat, h0: float, h1: float) -> float:
     return t
 
 
-@jit
+@kernel
 def turn_guess(b: Boat, h0: float, h1: float) -> float:
     """Return ``turn_time``, or about what it takes to turn the other way, through a leg of its own, if that is less."""
     t = turn_time(b, h0, h1)
@@ -202,7 +194,7 @@ def turn_guess(b: Boat, h0: float, h1: float) -> float:
     return t
 
 
-@jit
+@kernel
 def wound_at(b: Boat, xs: Floats, ys: Floats, course: Floats, i: int) -> float:
     """Return how far the boat has turned [rad, signed] at point ``i``, before its turn there, since its last long leg.
 
@@ -215,7 +207,7 @@ def wound_at(b: Boat, xs: Floats, ys: Floats, course: Floats, i: int) -> float:
     return wound
 
 
-@jit
+@kernel
 def meets_target(b: Boat, ax: float, ay: float, bx: float, by: float, t0: float, t1: float) -> bool:
     """Does the boat, at a at t0 and at b at t1, enter a target's disc?"""
     span = t1 - t0
@@ -240,7 +232,7 @@ def meets_target(b: Boat, ax: float, ay: float, bx: float, by: float, t0: float,
     return False
 
 
-@jit
+@kernel
 def is_free(g: Grid, ax: float, ay: float, bx: float, by: float) -> bool:
     """Is the segment clear of every boundary segment? Exact; walks the grid's rows that it crosses."""
     if g.edges.shape[0] == 0:
@@ -284,7 +276,7 @@ def is_free(g: Grid, ax: float, ay: float, bx: float, by: float) -> bool:
     return True
 
 
-@jit
+@kernel
 def rasterise(edges: Floats, x0: float, y0: float, inv: float, nx: int, ny: int) -> tuple[Ints, Ints]:
     """Return (start, item): the segments of every grid cell, a cell more than needed at worst."""
     start = np.zeros(nx * ny + 1, np.int32)
@@ -320,7 +312,7 @@ def rasterise(edges: Floats, x0: float, y0: float, inv: float, nx: int, ny: int)
     return start, item
 
 
-@jit
+@kernel
 def walk_on(b: Boat, xs: Floats, ys: Floats, first: int, last: int, t: float, h: float, wound: float) -> float:
     """Return when the boat is at point ``last``, having come to ``first`` at ``t`` on TWA ``h``; inf as ``walk``.
 
@@ -353,7 +345,7 @@ def walk_on(b: Boat, xs: Floats, ys: Floats, first: int, last: int, t: float, h:
     return t
 
 
-@jit
+@kernel
 def walk(b: Boat, xs: Floats, ys: Floats, n: int, h0: float) -> float:
     """Return the time [s] of the path of n points; inf where it breaks a limit of angles or turns or meets a target."""
     return walk_on(b, xs, ys, 0, n - 1, 0.0, h0, 0.0)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.kernels.jit import kernel
 from companion.planner.gauge import Gauge
 from companion.planner.heap import sift_down, sift_up
 from companion.planner.kernels import (
@@ -24,7 +25,6 @@ from companion.planner.kernels import (
     Grid,
     Ints,
     is_free,
-    jit,
     meets_target,
     track,
     turn_guess,
@@ -38,7 +38,7 @@ from companion.planner.world import World
 _START, _CLOCKWISE, _COUNTER, _MOVE, _ROUND = 1, 2, 3, 4, 5
 
 
-@jit
+@kernel
 def _misses(
     b: Boat, x: float, y: float, h: float, t: float, mx: float, my: float, ex: float, ey: float
 ) -> bool:
@@ -54,7 +54,7 @@ def _misses(
     return True
 
 
-@jit
+@kernel
 def _wound(
     b: Boat, came: NDArray[np.uint8], s: int, nj: int, steps: Ints, angle: Floats, lengths: Floats, h0: float,
     deep: float,
@@ -85,7 +85,7 @@ def _wound(
     return wound
 
 
-@jit
+@kernel
 def lattice_search(
     g: Grid, b: Boat, origin: Floats, axes: Floats, shape: Ints, steps: Ints, goal: Floats, box: Floats,
     gauge: Floats, slack: float, bound: float, max_pops: int, shot_m: float, side: int,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
+from companion.kernels.jit import kernel
 from companion.planner.kernels import (
     SLACK_RAD,
     Boat,
     Floats,
-    jit,
     speed_at,
     track,
     turn_guess,
@@ -21,7 +21,7 @@ UP_STARBOARD, UP_PORT, DOWN_STARBOARD, DOWN_PORT = 0, 1, 2, 3
 """Kinds of an edge course: close hauled or at the best gybing angle, TWA positive or negative."""
 
 
-@jit
+@kernel
 def edge_angle(b: Boat, kind: int, t0: float, t1: float) -> float:
     """Return the TWA [rad] of an edge course sailed from t0 to t1; NaN where there is none."""
     half = worst_half(b, t0, t1)
@@ -31,7 +31,7 @@ def edge_angle(b: Boat, kind: int, t0: float, t1: float) -> float:
     return a if kind % 2 == 0 else -a
 
 
-@jit
+@kernel
 def corner(
     b: Boat, px: float, py: float, h: float, t: float, qx: float, qy: float, k1: int, k2: int
 ) -> tuple[float, float, float, bool]:
@@ -70,7 +70,7 @@ def corner(
     return px + l1 * vx, py + l1 * vy, t2, True
 
 
-@jit
+@kernel
 def kind_of(a: float) -> int:
     """Return the edge course nearest to a leg's TWA."""
     if abs(a) <= 0.5 * math.pi:
@@ -78,7 +78,7 @@ def kind_of(a: float) -> int:
     return 2 if a >= 0.0 else 3
 
 
-@jit
+@kernel
 def fit_corners(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, first: int, force: bool) -> None:
     """Re-solve corners from point ``first`` on so that their courses fit the times they are sailed at.
 
@@ -116,7 +116,7 @@ def fit_corners(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, first: int, 
             break
 
 
-@jit
+@kernel
 def _laid(b: Boat, kind: int, t: float, h: float, length: float) -> tuple[float, float]:
     """Return (TWA, end time) of an edge course of this length begun from TWA h at time t."""
     a = edge_angle(b, kind, t, t)
@@ -130,7 +130,7 @@ def _laid(b: Boat, kind: int, t: float, h: float, length: float) -> tuple[float,
     return a, t2
 
 
-@jit
+@kernel
 def relay(
     b: Boat, xs: Floats, ys: Floats, n: int, h0: float, i: int, j: int, longer: int, by: float
 ) -> bool:

@@ -12,7 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.planner.kernels import Boat, Floats, jit, track, turn_guess
+from companion.kernels.jit import kernel
+from companion.planner.kernels import Boat, Floats, track, turn_guess
 from companion.planner.moves import corner, fit_corners, kind_of, relay
 from companion.planner.rounds import WAYS, cross, overshoot, round_vector
 from companion.planner.xorshift import uniform
@@ -20,7 +21,7 @@ from companion.planner.xorshift import uniform
 MOST_POINTS = 1200
 
 
-@jit
+@kernel
 def arrive(b: Boat, ax: float, ay: float, ex: float, ey: float, t: float, h: float) -> tuple[float, float]:
     """Return (time, TWA) on arrival at e from a, where the boat is at time t with TWA h."""
     dx, dy = ex - ax, ey - ay
@@ -31,21 +32,21 @@ def arrive(b: Boat, ax: float, ay: float, ex: float, ey: float, t: float, h: flo
     return t + turn_guess(b, h, a) + length / max(v, 1e-9), a
 
 
-@jit
+@kernel
 def _course(xs: Floats, ys: Floats, i: int) -> tuple[float, float]:
     dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
     d = math.hypot(dx, dy)
     return (dx / d, dy / d) if d > 1e-12 else (0.0, 0.0)
 
 
-@jit
+@kernel
 def _delete(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
     for k in range(i, n - count):
         xs[k], ys[k] = xs[k + count], ys[k + count]
     return n - count
 
 
-@jit
+@kernel
 def _insert(xs: Floats, ys: Floats, n: int, i: int, x: float, y: float) -> int:
     for k in range(n, i, -1):
         xs[k], ys[k] = xs[k - 1], ys[k - 1]
@@ -53,7 +54,7 @@ def _insert(xs: Floats, ys: Floats, n: int, i: int, x: float, y: float) -> int:
     return n + 1
 
 
-@jit
+@kernel
 def _pair(r: float, low: bool) -> tuple[int, int]:
     """Return two edge courses: mostly a tack or a gybe, sometimes a mixture."""
     if r < 0.4:
@@ -69,7 +70,7 @@ def _pair(r: float, low: bool) -> tuple[int, int]:
     return 3, 1
 
 
-@jit
+@kernel
 def go_round(b: Boat, xs: Floats, ys: Floats, n: int, i: int, at: Floats, course: Floats, way: int) -> int:
     """Turn corner ``i`` the long way round, the lines of its two legs kept; return the number of points, 0: cannot."""
     h, a = course[i], course[i + 1]
@@ -91,7 +92,7 @@ def go_round(b: Boat, xs: Floats, ys: Floats, n: int, i: int, at: Floats, course
     return n
 
 
-@jit
+@kernel
 def straighten(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
     """Put one corner in place of point ``i`` and ``count`` after it, where the legs around them meet; 0: nowhere."""
     j = i + count
@@ -105,7 +106,7 @@ def straighten(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
     return _delete(xs, ys, n, i + 1, count)
 
 
-@jit
+@kernel
 def propose(
     b: Boat, xs: Floats, ys: Floats, n: int, h0: float, goal: Floats, size: float, spots: Floats,
     at: Floats, course: Floats, rng: NDArray[np.uint64],

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from companion.kernels.jit import kernel
 from companion.planner.problem import CLEAR_TURN_RAD
 
 TWO_PI = 2.0 * math.pi
@@ -19,13 +19,13 @@ STEER_ROUNDS = 6    # of the fixed point between a leg's heading and its end's n
 TWD, HALF, DEEP, RATE, TACK, GYBE, W0, W1, RHO, CX, CY = range(11)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def wrap(a):  # type: ignore[no-untyped-def]
     """Return the angle on [-π, π)."""
     return (a + math.pi) % TWO_PI - math.pi
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def polar_speed(twa, polar):  # type: ignore[no-untyped-def]
     """Return the speed [m/s] at |TWA|, linear between nodes, flat beyond them."""
     a = abs(twa)
@@ -45,7 +45,7 @@ def polar_speed(twa, polar):  # type: ignore[no-untyped-def]
     return polar[1, lo] + f * (polar[1, hi] - polar[1, lo])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def no_go(t, number, model, table):  # type: ignore[no-untyped-def]
     """Return the tightened no-go half angle at t (eq. 15, widening)."""
     half = number[HALF]
@@ -59,7 +59,7 @@ def no_go(t, number, model, table):  # type: ignore[no-untyped-def]
     return half
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def worst_no_go(t0, t1, number, model, table):  # type: ignore[no-untyped-def]
     """Return the largest half angle over [t0, t1]."""
     worst = max(no_go(t0, number, model, table), no_go(t1, number, model, table))
@@ -70,7 +70,7 @@ def worst_no_go(t0, t1, number, model, table):  # type: ignore[no-untyped-def]
     return worst
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _first_on(edge, i, ax, ay, dx, dy):  # type: ignore[no-untyped-def]
     """Return where along a + s d, s in [0, 1], edge i is first met; 2 when it is not."""
     px, py = edge[i, 0], edge[i, 1]
@@ -94,7 +94,7 @@ def _first_on(edge, i, ax, ay, dx, dy):  # type: ignore[no-untyped-def]
     return max(0.0, low) if high >= 0.0 and low <= 1.0 else 2.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def first_hit(ax, ay, bx, by, edge, cell_first, cell_edge, grid, shape):  # type: ignore[no-untyped-def]
     """Return where along a..b, on [0, 1], the segment first meets an edge; 2 when it is free."""
     if edge.shape[0] == 0:
@@ -121,7 +121,7 @@ def first_hit(ax, ay, bx, by, edge, cell_first, cell_edge, grid, shape):  # type
     return best
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def meets_target(ax, ay, bx, by, t0, t1, target):  # type: ignore[no-untyped-def]
     """Tell whether the boat, from a at t0 to b at t1, enters a moving disc."""
     for i in range(target.shape[0]):
@@ -150,7 +150,7 @@ def meets_target(ax, ay, bx, by, t0, t1, target):  # type: ignore[no-untyped-def
     return False
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def way_on(course, number, polar, table_course):  # type: ignore[no-untyped-def]
     """Return heading and speed over ground along a course; speed 0 when the boat cannot."""
     n = table_course.shape[1]
@@ -165,7 +165,7 @@ def way_on(course, number, polar, table_course):  # type: ignore[no-untyped-def]
     return wrap(h), (1.0 - f) * table_course[1, i] + f * table_course[1, i + 1]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def turn_time(before, after, number):  # type: ignore[no-untyped-def]
     """Return the time [s] of a change of heading, a tack's or gybe's loss included; inf for a tack it cannot do."""
     spent = abs(wrap(after - before)) / number[RATE]
@@ -178,7 +178,7 @@ def turn_time(before, after, number):  # type: ignore[no-untyped-def]
     return spent
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def straight(  # type: ignore[no-untyped-def]
     x, y, heading, t, tx, ty, number, model, table, polar, course,
 ):
@@ -200,7 +200,7 @@ def straight(  # type: ignore[no-untyped-def]
     return True, h, t0, t1
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def steer(  # type: ignore[no-untyped-def]
     x, y, heading, t, tx, ty, reach, number, model, table, polar, course,
 ):

@@ -14,8 +14,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from companion.kernels.jit import kernel
 
 NONE, KALMAN, AR1, TABLE = 0, 1, 2, 3
 
@@ -27,7 +28,7 @@ R_STEP = 0.965       # correlation over one step: its standard deviation, 0.26, 
 BARRIER_SHIFT = 0.5826
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def sigma_at(  # type: ignore[no-untyped-def]
     t_s, model, s0, s1, rho, table_t, table_s,
 ):
@@ -41,7 +42,7 @@ def sigma_at(  # type: ignore[no-untyped-def]
     return 0.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _step_for(t_s, r, model, s0, s1, rho, tau, table_t, table_s):  # type: ignore[no-untyped-def]
     """Return the time [s] over which the correlation falls to r; infinite when it never does."""
     sigma = sigma_at(t_s, model, s0, s1, rho, table_t, table_s)
@@ -55,7 +56,7 @@ def _step_for(t_s, r, model, s0, s1, rho, tau, table_t, table_s):  # type: ignor
     return -tau * math.log(r)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def correlation(t_s, d_s, model, s0, s1, rho, tau, table_t, table_s):  # type: ignore[no-untyped-def]
     """Return the correlation of X(t) and X(t + d)."""
     if model == 3:
@@ -70,12 +71,12 @@ def correlation(t_s, d_s, model, s0, s1, rho, tau, table_t, table_s):  # type: i
     return min(1.0, r)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _phi(x):  # type: ignore[no-untyped-def]
     return 0.5 * math.erfc(-x / math.sqrt(2.0))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _kernel(r, dz, out):  # type: ignore[no-untyped-def]
     """Fill out[i, j]: the probability to go from the centre of cell i into cell j."""
     n = out.shape[0]
@@ -93,7 +94,7 @@ def _kernel(r, dz, out):  # type: ignore[no-untyped-def]
             out[i, j] /= total
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _spread(p, kernel, reach, r, out):  # type: ignore[no-untyped-def]
     """Move the mass one step; only cells within ``reach`` of the mean receive any."""
     n = p.shape[0]
@@ -106,7 +107,7 @@ def _spread(p, kernel, reach, r, out):  # type: ignore[no-untyped-def]
                 out[j] += p[i] * kernel[i, j]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _absorb(p, low, high, dz):  # type: ignore[no-untyped-def]
     """Take the mass of cells (and parts of cells) within [low, high] out of p and return it."""
     taken = 0.0
@@ -123,7 +124,7 @@ def _absorb(p, low, high, dz):  # type: ignore[no-untyped-def]
     return taken
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def first_passage(  # type: ignore[no-untyped-def]
     start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, max_steps, out,
 ):
@@ -217,12 +218,12 @@ def first_passage(  # type: ignore[no-untyped-def]
     return steps
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _tail(z):  # type: ignore[no-untyped-def]
     return 0.5 * math.erfc(z / math.sqrt(2.0))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def leg_risk(  # type: ignore[no-untyped-def]
     t0, t1, twa, before_twa, before_t, half, model, s0, s1, rho, tau, table_t, table_s,
 ):
@@ -271,7 +272,7 @@ def leg_risk(  # type: ignore[no-untyped-def]
     return min(1.0, entry + total)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def simulate(  # type: ignore[no-untyped-def]
     start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, step_s, generator, count, hits,
 ):

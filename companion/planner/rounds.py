@@ -13,7 +13,8 @@ import math
 
 import numpy as np
 
-from companion.planner.kernels import Boat, Floats, Grid, half_at, is_free, jit, speed_at, track, turn_guess, turn_time
+from companion.kernels.jit import kernel
+from companion.planner.kernels import Boat, Floats, Grid, half_at, is_free, speed_at, track, turn_guess, turn_time
 from companion.planner.moves import fit_corners
 
 WAYS = 3
@@ -22,7 +23,7 @@ _DEAD_RAD = 0.1
 _LONGEST = 8.0
 
 
-@jit
+@kernel
 def round_vector(b: Boat, a0: float, a1: float, t: float, way: int) -> tuple[float, float, float, float, bool]:
     """Return (x1, y1, x2, y2, ok): the leg or legs [m] from TWA a0 round to a1 the long way; (x2, y2) 0 for one leg."""
     side = 1.0 if a0 > 0.0 else -1.0
@@ -48,7 +49,7 @@ def round_vector(b: Boat, a0: float, a1: float, t: float, way: int) -> tuple[flo
     return x1 * length / size1, y1 * length / size1, x2 * length / size2, y2 * length / size2, True
 
 
-@jit
+@kernel
 def overshoot(ux: float, uy: float, wx: float, wy: float, dx: float, dy: float) -> tuple[float, float, bool]:
     """Return (e, f, ok) [m]: from a corner e on along unit vector u, then (dx, dy), then f along w is the corner."""
     det = ux * wy - uy * wx
@@ -59,7 +60,7 @@ def overshoot(ux: float, uy: float, wx: float, wy: float, dx: float, dy: float) 
     return e, f, e >= 0.0 and f >= 0.0 and e < longest and f < longest
 
 
-@jit
+@kernel
 def cross(
     ax: float, ay: float, ux: float, uy: float, bx: float, by: float, wx: float, wy: float
 ) -> tuple[float, float, bool]:
@@ -71,7 +72,7 @@ def cross(
     return ax + s * ux, ay + s * uy, s > 1e-9
 
 
-@jit
+@kernel
 def _sailed(b: Boat, xs: Floats, ys: Floats, n: int, t: float, h: float) -> tuple[float, float]:
     for i in range(n - 1):
         dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
@@ -83,7 +84,7 @@ def _sailed(b: Boat, xs: Floats, ys: Floats, n: int, t: float, h: float) -> tupl
     return t, h
 
 
-@jit
+@kernel
 def _free(g: Grid, xs: Floats, ys: Floats, n: int) -> bool:
     for i in range(n - 1):  # noqa: SIM110 - compiled
         if not is_free(g, xs[i], ys[i], xs[i + 1], ys[i + 1]):
@@ -91,7 +92,7 @@ def _free(g: Grid, xs: Floats, ys: Floats, n: int) -> bool:
     return True
 
 
-@jit
+@kernel
 def rounded(g: Grid, b: Boat, points: Floats, h0: float) -> Floats:
     """Return the path with each turn that cannot be done, or is dearer, made the long way round; (0, 2): no room.
 
@@ -173,7 +174,7 @@ def rounded(g: Grid, b: Boat, points: Floats, h0: float) -> Floats:
     return out
 
 
-@jit
+@kernel
 def fitted(b: Boat, points: Floats, h0: float) -> Floats:
     """Return the path with its close-hauled corners moved to the courses of the times at which they are now sailed."""
     n = points.shape[0]

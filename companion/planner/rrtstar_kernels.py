@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from companion.kernels.jit import kernel
 from companion.planner.reference_kernels import HALF, TWD, TWO_PI, first_hit, meets_target, steer, straight, wrap
 from companion.planner.risk_kernels import leg_risk
 from companion.planner.xorshift import uniform
@@ -19,7 +19,7 @@ PARENT, CHILD, NEXT, BEFORE = range(4)
 N, GOALS, BEST, DRAWN, REFUSED, REWIRED = range(6)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _unlink(link, i):  # type: ignore[no-untyped-def]
     parent, after, before = link[i, PARENT], link[i, NEXT], link[i, BEFORE]
     if before >= 0:
@@ -30,7 +30,7 @@ def _unlink(link, i):  # type: ignore[no-untyped-def]
         link[after, BEFORE] = before
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _hang(link, i, parent):  # type: ignore[no-untyped-def]
     first = link[parent, CHILD]
     link[i, PARENT], link[i, NEXT], link[i, BEFORE] = parent, first, -1
@@ -39,7 +39,7 @@ def _hang(link, i, parent):  # type: ignore[no-untyped-def]
     link[parent, CHILD] = i
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _reach(  # type: ignore[no-untyped-def]
     node, i, tx, ty, before_twa, before_t, number, model, table, polar, course, target, risk_number, risk_table,
 ):
@@ -58,7 +58,7 @@ def _reach(  # type: ignore[no-untyped-def]
     return True, h, t1, risk
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _twa_before(node, link, i, number):  # type: ignore[no-untyped-def]
     """Return the angle that node i was reached at and when; time -1 at the root, where no leg came before."""
     if link[i, PARENT] < 0:
@@ -66,7 +66,7 @@ def _twa_before(node, link, i, number):  # type: ignore[no-untyped-def]
     return wrap(node[i, H] - number[TWD]), node[i, T]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _adopt(  # type: ignore[no-untyped-def]
     node, link, new, j, h, t, risk, stack, fresh, number, model, table, polar, course, target, risk_number,
     risk_table,
@@ -106,7 +106,7 @@ def _adopt(  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def grow(  # type: ignore[no-untyped-def]
     samples, node, link, goal_node, count, random, box, goal, reach, goal_bias, near, near_d, stack, fresh,
     edge, cell_first, cell_edge, grid, shape, number, model, table, polar, course, target, risk_number, risk_table,

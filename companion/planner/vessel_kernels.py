@@ -15,19 +15,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from companion.kernels.jit import kernel
 
 FAR_SIGMAS = 6.5       # farther outside than this nothing happens
 LEAST_SIGMA_M = 0.3    # a spread is not taken smaller: no report is better
 MOST_ANGLES = 1440
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _cdf(z):  # type: ignore[no-untyped-def]
     return 0.5 * math.erfc(-z / math.sqrt(2.0))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def spread_at(t, errors, out):  # type: ignore[no-untyped-def]
     """Fill out (9,) with S, K = Cov(V, X) and C = Cov(V), each as (xx, xy, yy).
 
@@ -51,7 +52,7 @@ def spread_at(t, errors, out):  # type: ignore[no-untyped-def]
     out[2] += LEAST_SIGMA_M * LEAST_SIGMA_M
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def axes_of(sxx, sxy, syy):  # type: ignore[no-untyped-def]
     """Return (larger sigma, smaller sigma, x and y of the larger one's direction)."""
     mean, half = 0.5 * (sxx + syy), 0.5 * (sxx - syy)
@@ -60,7 +61,7 @@ def axes_of(sxx, sxy, syy):  # type: ignore[no-untyped-def]
     return math.sqrt(mean + root), math.sqrt(max(mean - root, 1e-12)), math.cos(turn), math.sin(turn)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def inside(mx, my, s, radius):  # type: ignore[no-untyped-def]
     """Return P(|X| < radius) for X of mean (mx, my) and covariance s (xx, xy, yy first)."""
     big, small, ux, uy = axes_of(s[0], s[1], s[2])
@@ -84,7 +85,7 @@ def inside(mx, my, s, radius):  # type: ignore[no-untyped-def]
     return min(1.0, total)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def entry_rate(mx, my, vx, vy, s, radius):  # type: ignore[no-untyped-def]
     """Return the expected number of entries into the disc in a second."""
     big, small, _, _ = axes_of(s[0], s[1], s[2])
@@ -120,7 +121,7 @@ def entry_rate(mx, my, vx, vy, s, radius):  # type: ignore[no-untyped-def]
     return total * radius * 2.0 * math.pi / n
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def piece(  # type: ignore[no-untyped-def]
     t0, t1, bx, by, wx, wy, errors, radius, before, out,
 ):

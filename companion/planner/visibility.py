@@ -12,14 +12,15 @@ import math
 
 import numpy as np
 
+from companion.kernels.jit import kernel
 from companion.planner.gauge import Gauge, disc_time
-from companion.planner.kernels import Floats, Grid, Ints, is_free, jit
+from companion.planner.kernels import Floats, Grid, Ints, is_free
 
 _EXACT = 5_000
 """Corners up to which each one's least time is worked out to the last digit; of more, from the gauge's table."""
 
 
-@jit
+@kernel
 def _time(normals: Floats, dx: float, dy: float) -> float:
     best = 0.0
     for i in range(normals.shape[0]):
@@ -27,7 +28,7 @@ def _time(normals: Floats, dx: float, dy: float) -> float:
     return best
 
 
-@jit
+@kernel
 def geodesics(
     g: Grid, nodes: Floats, normals: Floats, blocked: Floats, table: Floats, goal: Floats, mode: int,
     bound: float, budget: int, ends: Floats,
@@ -121,7 +122,7 @@ def geodesics(
                 parent[i] = k
 
 
-@jit
+@kernel
 def _entry_free(g: Grid, x: float, y: float, px: float, py: float, goal: Floats) -> bool:
     """Is the segment from (x, y) to p free up to where it enters the goal's disc?"""
     dx, dy = px - x, py - y
@@ -135,7 +136,7 @@ def _entry_free(g: Grid, x: float, y: float, px: float, py: float, goal: Floats)
     return is_free(g, x, y, x + f * dx, y + f * dy)
 
 
-@jit
+@kernel
 def disc_open(g: Grid, x: float, y: float, goal: Floats, ends: Floats) -> bool:
     """Can any part of the goal's disc be seen from (x, y)?
 
@@ -194,7 +195,7 @@ def _table_time(gauge: Gauge, d: Floats) -> Floats:
     return np.asarray(gauge.table[cell % len(gauge.table)] * np.hypot(d[:, 0], d[:, 1]), np.float64)
 
 
-@jit
+@kernel
 def crossings(points: Floats, marks: Floats) -> Ints:
     """Return how often the path passes below each mark, eastward minus westward: which side it takes of each."""
     out = np.zeros(marks.shape[0], np.int32)

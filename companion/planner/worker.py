@@ -11,16 +11,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import os
 import pickle
 import struct
 import sys
+import threading
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
 from companion.clock import effort_s
+from companion.kernels.build import prepare
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem import Problem
 from companion.planner.solve import DEFAULT_BUDGET_S, plan
@@ -30,9 +34,11 @@ _LENGTH = struct.Struct("<Q")
 _READY = b"ready"
 DEFAULT_GRACE_S = 3.0
 """How much longer than its budget an answer may take [s] before the child is taken for hung."""
-_START_LIMIT_S = 180.0
-"""Kernels compile once per machine; a Raspberry Pi takes a minute or two."""
 _PULSE_S = 0.5
+_SILENCE_S = 60.0
+"""A child that gets ready may take as long as it takes, and says once in ``_BEAT_S`` that it lives; this long without a
+word [s] and it is taken for hung."""
+_BEAT_S = 1.0
 
 
 def failed(reason: str, *, seed: int, algorithm: str, elapsed_s: float = 0.0) -> Plan:
@@ -83,7 +89,7 @@ class PlannerWorker:
         self._grace_s = grace_s
         self._command = command or [sys.executable, "-m", "companion.planner.worker"]
         self._child: asyncio.subprocess.Process | None = None
-        self._is_warm = False
+        self._is_warm, self._silence_s = False, math.inf
         self._lock = asyncio.Lock()
         self.restarts = 0
 
@@ -108,18 +114,18 @@ class PlannerWorker:
         """End the child."""
         await self._stop()
 
-    async def ready(self) -> None:
-        """Wait until the child's kernels are loaded (compiled, the first time on a machine).
+    async def ready(self, say: Callable[[str], None] = lambda _: None) -> None:
+        """Wait until the child's kernels are loaded (compiled, the first time on a machine), however long that takes.
+
+        ``say`` is told once a second what it does.
 
         Raises:
-            TimeoutError: they are not after three minutes; EOFError or OSError: the child died.
+            TimeoutError: it has fallen silent; EOFError or OSError: it died.
         """
         async with self._lock:
             if not self.is_alive:
                 await self._replace()
-            if not self._is_warm:
-                await self._answer(_START_LIMIT_S)
-                self._is_warm = True
+            await self._warm(say)
 
     async def plan(
         self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
@@ -139,9 +145,7 @@ class PlannerWorker:
             try:
                 if not self.is_alive:
                     await self._replace()
-                if not self._is_warm:
-                    await self._answer(_START_LIMIT_S)
-                    self._is_warm = True
+                await self._warm()
                 began_s = effort_s()
                 await self._send(request)
                 answer = await self._answer((60.0 if budget_s is None else budget_s) + self._grace_s)
@@ -161,10 +165,20 @@ class PlannerWorker:
 
     # ------------------------------------------------------------------------------------ the child
     async def _start(self) -> None:
-        self._is_warm = False
+        self._is_warm, self._silence_s = False, math.inf
+        # In a session of its own: Ctrl-C is for this process, which ends its child itself.
         self._child = await asyncio.create_subprocess_exec(
-            *self._command, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE
+            *self._command, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, start_new_session=True,
         )
+
+    async def _warm(self, say: Callable[[str], None] = lambda _: None) -> None:
+        """Wait for the child's kernels; it is alive as long as it says so, and until its first word while it runs."""
+        while not self._is_warm:
+            word = await self._answer(self._silence_s)
+            self._silence_s = _SILENCE_S
+            self._is_warm = word == _READY
+            if not self._is_warm:
+                say(word.decode())
 
     async def _stop(self) -> None:
         child, self._child = self._child, None
@@ -220,7 +234,9 @@ def serve() -> None:
 
     from companion.planner.warm import warm
 
-    warm()
+    with _Pulse(sink) as pulse:
+        prepare(("companion",), say=pulse.say)
+        warm()
     _write(sink, _READY)
     while True:
         head = source.read(_LENGTH.size)
@@ -232,6 +248,37 @@ def serve() -> None:
         except Exception as error:
             answer = f"{type(error).__name__}: {error}"
         _write(sink, pickle.dumps(answer))
+
+
+class _Pulse:
+    """Tells the parent once a second what is being done, from a thread: compiling holds the others up."""
+
+    def __init__(self, sink: Any) -> None:
+        self._sink = sink
+        self._doing = "loading kernels"
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="pulse", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *unused: object) -> None:
+        self._is_over.set()
+        self._thread.join()
+
+    def say(self, text: str) -> None:
+        """Tell this from now on."""
+        self._doing = text
+
+    def _run(self) -> None:
+        while True:
+            try:
+                _write(self._sink, self._doing.encode())
+            except OSError:
+                os._exit(1)   # nobody waits for the kernels any more
+            if self._is_over.wait(_BEAT_S):
+                return
 
 
 def _write(sink: Any, payload: bytes) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.planner.kernels import jit
+from companion.kernels.jit import kernel
 
 
-@jit
+@kernel
 def uniform(state: NDArray[np.uint64]) -> float:
     """Return the next number on [0, 1) of a xorshift generator whose state is ``state[0]``."""
     x = state[0]

@@ -137,10 +137,6 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
         why=plan.why.text or plan.reason)
     old = turn.state.route
-    if old is not None:
-        # A gate that was missed is to be passed by the new tail: what the kept items counted for is void.
-        old = replace(old, gate_of=tuple(
-            -1 if n < turn.state.index and g >= turn.state.gate else g for n, g in enumerate(old.gate_of)))
     if keep + len(tail.points_en) + 1 > turn.config.max_items and old is not None:
         # Start the numbering again with what is still ahead of the boat.
         ahead = slice(turn.state.index, keep)
@@ -150,7 +146,8 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     route = splice(
         turn.voyage, turn.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts)
     if turn.state.route is not None and _is_same(turn.state.route, route):
-        turn.update(route=replace(route, items=turn.state.route.items, points_en_m=turn.state.route.points_en_m))
+        turn.update(
+            missed_s=None, route=replace(route, items=turn.state.route.items, points_en_m=turn.state.route.points_en_m))
         turn.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
         return
     way = route.points_en_m[turn.state.index if set_current is None else set_current - 1:-1]

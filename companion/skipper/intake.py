@@ -10,7 +10,7 @@ from companion.skipper.actions import CancelPlan, Severity
 from companion.skipper.answers import take_plan
 from companion.skipper.config import Guidance
 from companion.skipper.failsafe import note
-from companion.skipper.gates import Gate, passed_on
+from companion.skipper.gates import Gate, again, bearing_on, is_on_wrong_side
 from companion.skipper.geometry import distance_m, leg_distance_m, waypoint_done
 from companion.skipper.helm import MOTOR_OFF, MOTOR_ON
 from companion.skipper.snapshot import (
@@ -27,7 +27,6 @@ from companion.skipper.snapshot import (
 from companion.skipper.state import PATIENT, Fix, Phase
 from companion.skipper.turn import FRESH_S, Turn
 from companion.skipper.uploads import take_upload
-from companion.skipper.voyage import Side
 
 HISTORY_STEP_S = 10.0
 HISTORY_KEPT = 19            # 180 s and the present
@@ -119,6 +118,8 @@ def locate(turn: Turn) -> None:
     """Say where the boat is on its route: the autopilot's count, our own count, gates passed, way made good."""
     state, status = turn.state, turn.autopilot
     route = state.route
+    if turn.gate is not None and turn.boat_en is not None:
+        turn.update(bearing_rad=bearing_on(turn.gate, turn.boat_en, state.bearing_rad))
     guided = turn.steers and state.sailing and status is not None and status.mode is Mode.GUIDED
     if route is not None and status is not None and status.mission_seq is not None and _counts(turn) and not guided:
         index = min(max(status.mission_seq - 1, 0), len(route.items) - 1)
@@ -184,34 +185,32 @@ def _own_count(turn: Turn) -> None:
 
 def _pass_gates(turn: Turn) -> None:
     """Count the gates passed: by being there, or by the autopilot's count."""
-    boat, route = turn.boat_en, turn.state.route
-    if boat is None or route is None:
+    boat = turn.boat_en
+    if boat is None:
         return
     _approach(turn)
-    while turn.gate is not None:
+    while turn.gate is not None and turn.state.route is not None:
         gate, number = turn.gate, turn.state.gate
         left = distance_m(boat, gate.en_m)
-        # What the old route counted for is void from a miss on: its items were passed on the wrong side.
-        counted = turn.state.missed_gate is None and any(g == number for g in route.gate_of[: turn.state.index])
+        counted = number in turn.state.route.gate_of[: turn.state.index]
         near = max(gate.radius_m, turn.config.grid_size_m)
         if not (turn.state.closest_m <= gate.radius_m or (counted and left <= near and not _is_last(turn))
                 or _is_near_enough(turn, gate, counted)):
             if counted and left > near and not _is_last(turn):
                 # The autopilot has left it behind and we were never near.
-                turn.update(missed=turn.state.missed + 1, missed_gate=number)
+                turn.void_route()
+                _missed(turn)
             return
-        if gate.side is not Side.NONE and gate.buoy_en_m is not None and gate.ends_goal and not _rounded(turn, number):
-            first = _first_gate(turn, gate.goal)
-            turn.update(missed=turn.state.missed + 1, missed_gate=first, gate=first, track=(), closest_m=math.inf)
+        if is_on_wrong_side(gate, turn.state.bearing_rad):
+            turn.approach(again(gate, boat, turn.state.bearing_rad))
+            _missed(turn)
             turn.say(Severity.WARNING, "buoy missed", f"{gate.name} was left on the wrong side: again", every_s=0.0)
             return
         closest = turn.state.closest_m
         reached = (*turn.state.reached, gate.goal) if gate.ends_goal else turn.state.reached
-        turn.update(gate=number + 1, reached=reached, missed_gate=None, closest_m=math.inf)
-        if gate.is_first and not gate.ends_goal:
-            turn.update(track=(boat,))   # the way here, back round the buoy after a miss, is not the rounding
+        turn.update(gate=number + 1, reached=reached, missed_s=None, closest_m=math.inf)
         if gate.ends_goal:
-            turn.update(track=())
+            turn.update(bearing_rad=0.0)
             turn.say(Severity.NOTICE, "goal", f"{gate.name} reached, {min(left, closest):.1f} m from it", every_s=0.0)
 
 
@@ -242,30 +241,18 @@ def _is_last(turn: Turn) -> bool:
     return turn.state.gate == len(turn.gates) - 1
 
 
-def _first_gate(turn: Turn, goal: int) -> int:
-    return next(n for n, gate in enumerate(turn.gates) if gate.goal == goal)
-
-
-def _rounded(turn: Turn, number: int) -> bool:
-    """Return whether the track since the buoy's first gate goes round it on the right hand."""
-    gate = turn.gates[number]
-    if gate.buoy_en_m is None or len(turn.state.track) < 2:
-        return True
-    return passed_on(gate.side, list(turn.state.track), gate.buoy_en_m)
+def _missed(turn: Turn) -> None:
+    """Have the gate that is next planned for from where the boat is; what is being planned was for another."""
+    if turn.state.pending_plan is not None:
+        turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
+    turn.update(missed=turn.state.missed + 1, missed_s=turn.t_s, pending_plan=None)
 
 
 def _remember(turn: Turn) -> None:
-    """Keep the way made good (for the progress watchdog) and the track near a buoy."""
+    """Keep the way made good, for the progress watchdog."""
     boat, ahead = turn.boat_en, turn.ahead()
     if boat is None:
         return
-    gate = turn.gate
-    if gate is not None and gate.buoy_en_m is not None:
-        near = distance_m(boat, gate.buoy_en_m) < 4.0 * distance_m(gate.en_m, gate.buoy_en_m)
-        if near and (not turn.state.track or distance_m(turn.state.track[-1], boat) > 0.5):
-            turn.update(track=(*turn.state.track[-399:], boat))
-    elif turn.state.track:
-        turn.update(track=())
     history = turn.state.history if ahead else ()   # at rest no way is made
     if history and turn.t_s - history[-1][0] < HISTORY_STEP_S:
         return

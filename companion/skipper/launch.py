@@ -10,6 +10,7 @@ from companion.messages import MissionState, Mode
 from companion.skipper.actions import ReplanReason, Severity
 from companion.skipper.config import SafeEnd
 from companion.skipper.errands import FAR_M, home_trouble
+from companion.skipper.gates import Approach
 from companion.skipper.geometry import distance_m, leg_distance_m
 from companion.skipper.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning import lacks, request
@@ -57,7 +58,7 @@ def start(turn: Turn) -> None:
     if wants:
         turn.phase(Phase.WAITING, "waiting for " + ", ".join(wants))
         return
-    if request(turn, ReplanReason.START):
+    if _request_start(turn):
         turn.phase(Phase.NEW_CALCULATION, "making the first plan")
     else:
         turn.phase(Phase.WAITING, f"waiting for {lacks(turn) or 'the next try: no problem can be stated'}")
@@ -88,6 +89,13 @@ def finished(turn: Turn) -> None:
     turn.phase(Phase.DONE, ARRIVED_BEFORE)
 
 
+def _request_start(turn: Turn, text: str = "") -> bool:
+    """Ask for a plan from where the boat lies: until a gate is passed, the way to the first goal begins here."""
+    if turn.state.gate == 0 and turn.boat_en is not None:
+        turn.approach(Approach(goal=0, en_m=turn.boat_en))
+    return request(turn, ReplanReason.START, text=text)
+
+
 def launch(turn: Turn) -> None:
     """Set AUTO and arm, as far as the operator allows; otherwise wait and say for what."""
     status, state = turn.autopilot, turn.state
@@ -115,7 +123,7 @@ def launch(turn: Turn) -> None:
         wait_s = max(state.plan_retry.not_before_s, state.upload_retry.not_before_s, earliest_s) - turn.t_s
         if wait_s > 0.0:
             why = f"the next try in {wait_s:.0f} s to plan anew"
-        elif request(turn, ReplanReason.START, text=f"{stale}, before setting sail"):
+        elif _request_start(turn, f"{stale}, before setting sail"):
             why = "a new plan before setting sail"
         else:
             why = lacks(turn) or "the next try: no problem can be stated"

@@ -96,13 +96,14 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
     if not items:
         turn.update(route=None, unsure_route=None)
         if saved is not None:
-            turn.update(gate=saved.gate)
+            _take_up(turn, saved)
         return True
     if any(is_mixture(items, a.items, b.items) for a in routes for b in routes):
         newest = state.unsure_route or (saved.pending or saved.unsure if saved else None) or routes[0]
         turn.say(Severity.WARNING, "mixture", "an upload was cut short: the mission is put right", every_s=0.0)
         if saved is not None:
-            turn.update(gate=saved.gate, sailing=state.sailing or _under_way(turn))
+            _take_up(turn, saved)
+            turn.update(sailing=state.sailing or _under_way(turn))
         turn.update(route=state.route or newest, unsure_route=newest, repair=True)
         return True
     # Under way we know what we have put there: a list of ours that we did not put there is somebody's order.
@@ -153,15 +154,15 @@ def _take_over(turn: Turn, items: tuple[MissionItem, ...], saved: Persisted | No
 
     A boat that sails by it keeps it until there is a plan from where she is; else it is replaced.
     """
-    gate = 0 if saved is None else saved.gate
+    saved = saved or Persisted(voyage=turn.voyage.name, gate=0, sailing=True, route=None, pending=None)
     if not _under_way(turn):
-        turn.update(route=None, unsure_route=None, gate=gate)
+        _take_up(turn, saved)
+        turn.update(route=None, unsure_route=None)
         turn.say(Severity.NOTICE, "earlier mission", "the mission on board is an earlier one of ours: it is replaced",
                  every_s=0.0)
         return
     turn.update(route=_route_of(turn, items), unsure_route=None)
-    _adopt(turn, saved or Persisted(voyage=turn.voyage.name, gate=gate, sailing=True, route=None, pending=None),
-           "an earlier one of ours: sailing on by it until there is a plan")
+    _adopt(turn, saved, "an earlier one of ours: sailing on by it until there is a plan")
 
 
 def _route_of(turn: Turn, items: tuple[MissionItem, ...]) -> Route:
@@ -182,12 +183,18 @@ def _under_way(turn: Turn) -> bool:
     return status is not None and status.is_armed and status.mode is Mode.AUTO
 
 
+def _take_up(turn: Turn, saved: Persisted) -> None:
+    """Take up the voyage where it was: the gates that are passed, and the way round the next buoy."""
+    turn.update(gate=saved.gate, approaches=saved.approaches, bearing_rad=0.5 * math.pi * saved.quarters)
+
+
 def _adopt(turn: Turn, saved: Persisted, what: str = "ours") -> None:
     """Take over the mission that sails, without an upload."""
     status = turn.autopilot
     index = (status.mission_seq or 1) - 1 if status is not None else 0
+    _take_up(turn, saved)
     turn.update(
-        gate=saved.gate, index=index, own_index=index, own_mode=saved.own_mode,
+        index=index, own_index=index, own_mode=saved.own_mode,
         adrift=replace(turn.state.adrift, motor=saved.motor),
         after_operator=saved.own_mode in STOPPING,   # she has drifted since
         # Armed but not in AUTO: somebody else has taken the boat while we were away.

@@ -6,7 +6,7 @@ watchdogs, then act by who has the boat: nobody yet (start), somebody else (oper
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from companion.messages import Mode
 from companion.skipper.actions import Action, CancelPlan, Severity
@@ -16,7 +16,7 @@ from companion.skipper.config import SkipperConfig
 from companion.skipper.custody import judge, stand_by
 from companion.skipper.doubt import follow
 from companion.skipper.failsafe import follow_answer, follow_stops, take_over
-from companion.skipper.gates import Gate, gates_of
+from companion.skipper.gates import gates_of
 from companion.skipper.helm import is_busy
 from companion.skipper.intake import (
     count_time,
@@ -48,10 +48,6 @@ class Skipper:
 
     voyage: Voyage
     config: SkipperConfig
-    gates: tuple[Gate, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "gates", gates_of(self.voyage))
 
     def initial(self, persisted: Persisted | None = None, known: tuple[str, ...] = ()) -> SkipperState:
         """Return the first state.
@@ -70,7 +66,7 @@ class Skipper:
     def fits(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage."""
         gates = [persisted.gate, *(g + 1 for route in persisted.lists for g in route.gate_of)]
-        return persisted.voyage == self.voyage.name and max(gates) <= len(self.gates)
+        return persisted.voyage == self.voyage.name and max(gates) <= len(gates_of(self.voyage, persisted.approaches))
 
     def has_arrived(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage, sailed to its end."""
@@ -78,7 +74,7 @@ class Skipper:
 
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
-        turn = Turn(self.voyage, self.config, self.gates, state, snapshot)
+        turn = Turn(self.voyage, self.config, state, snapshot)
         judge(turn)
         take_events(turn)
         take_outcomes(turn)

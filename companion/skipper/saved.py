@@ -8,10 +8,13 @@ from typing import Any
 
 from companion.mavlink.items import mission_hash
 from companion.messages import MissionItem, Mode
+from companion.skipper.gates import Approach
 from companion.skipper.state import Route, SkipperState
 
 FORMAT = 1
 MAX_ITEMS = 2000       # no autopilot holds more
+MAX_GOALS = 10**6
+MAX_QUARTERS = 10**6   # turns round one buoy
 _NUMBERS = ("plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s",
             "vessel_risk", "vessels_part")
 _MAYBE = ("risk", "cost_s")
@@ -40,6 +43,8 @@ class Persisted:
     arrived: bool = False              # nothing is left to sail, the way home included
     uid: str | None = None             # of the autopilot, and ...
     system: int | None = None          # ... its system id
+    approaches: tuple[Approach, ...] = ()   # the numbering of the gates hangs on them
+    quarters: int = 0                  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
 
     @property
     def lists(self) -> tuple[Route, ...]:
@@ -59,6 +64,7 @@ class Persisted:
             "unsure": _route_to_dict(self.unsure), "own_mode": None if self.own_mode is None else self.own_mode.name,
             "motor": self.motor, "under_way_s": self.under_way_s, "arrived": self.arrived, "uid": self.uid,
             "system": self.system,
+            "approaches": [[a.goal, *a.en_m, a.turn_rad] for a in self.approaches], "quarters": self.quarters,
         }
 
     @classmethod
@@ -80,6 +86,11 @@ class Persisted:
                 under_way_s=_number(data.get("under_way_s", 0.0)), arrived=_truth(data.get("arrived", False)),
                 uid=None if data.get("uid") is None else _words(data["uid"]),
                 system=None if data.get("system") is None else _whole(data["system"], 1, 255),
+                approaches=tuple(
+                    Approach(goal=_whole(goal, 0, MAX_GOALS), en_m=(_number(e), _number(n)),
+                             turn_rad=None if turn is None else _number(turn))
+                    for goal, e, n, turn in data.get("approaches", ())[:MAX_GOALS + 1]),
+                quarters=_whole(data.get("quarters", 0), -MAX_QUARTERS, MAX_QUARTERS),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
@@ -92,6 +103,7 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         pending=state.pending_upload.route if state.pending_upload is not None else None,
         unsure=state.unsure_route, own_mode=state.own_mode, motor=state.adrift.motor,
         under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived, uid=state.uid, system=state.system,
+        approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
     )
 
 

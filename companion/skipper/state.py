@@ -11,6 +11,7 @@ from companion.field.station import StationState
 from companion.field.values import GuidanceState
 from companion.messages import MissionItem, Mode
 from companion.skipper.actions import ReplanReason
+from companion.skipper.gates import Approach
 from companion.skipper.snapshot import OperatorWish
 from companion.skipper.voyage import PointEn
 from companion.traffic import Assessment
@@ -220,8 +221,9 @@ class SkipperState:
     wish: OperatorWish | None = None    # the operator's last wish, until it is answered
     read_items: tuple[MissionItem, ...] | None = None      # the mission as last read
     read_t_s: float = float("-inf")
-    missed_gate: int | None = None      # a gate that was missed and is to be sailed again
-    track: tuple[PointEn, ...] = ()     # near a buoy
+    approaches: tuple[Approach, ...] = ()   # where the way to a goal began, see companion.skipper.gates
+    bearing_rad: float = 0.0            # how far the boat has come round the buoy that is next, see gates.bearing_on
+    missed_s: float | None = None       # when a gate was missed to which no upload since leads
     history_plan: int = -1
     history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
     last_seen: Fix | None = None        # the last position

@@ -62,7 +62,7 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return changed
     if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:
         return Trigger(reason=ReplanReason.OPERATOR_WISH, text="the operator asked for it")
-    if state.missed_gate is not None and bound is None:
+    if state.missed_s is not None and bound is None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)

@@ -7,7 +7,6 @@ the frozen state and the tuple of actions. Permissions are checked here too, so 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,7 +27,7 @@ from companion.skipper.actions import (
 )
 from companion.skipper.causes import STOPPING
 from companion.skipper.config import Guidance, Permissions, SkipperConfig
-from companion.skipper.gates import Gate
+from companion.skipper.gates import Approach, Gate, gates_of
 from companion.skipper.problem import wind_mean, wind_now
 from companion.skipper.route import ends_safely
 from companion.skipper.snapshot import Snapshot
@@ -63,9 +62,9 @@ class Turn:
     """The work of one step."""
 
     def __init__(
-        self, voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], state: SkipperState, snapshot: Snapshot,
+        self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot,
     ) -> None:
-        self.voyage, self.config, self.gates = voyage, config, gates
+        self.voyage, self.config = voyage, config
         self.state, self.snapshot = state, snapshot
         self.actions: list[Action] = []
 
@@ -109,7 +108,34 @@ class Turn:
             self.config.backoff_first_s * self.config.backoff_factor**retry.failures, self.config.backoff_max_s)
         return Retry(failures=retry.failures + 1, not_before_s=self.t_s + wait)
 
+    def approach(self, approach: Approach) -> None:
+        """Begin the way to the goal that is next where ``approach`` says, from its first gate.
+
+        The gates are others from here on: what the mission on board, or on its way there, counted for is void.
+        """
+        others = tuple(a for a in self.state.approaches if a.goal != approach.goal)
+        self.update(
+            approaches=(*others, approach), bearing_rad=0.0, closest_m=math.inf,
+            gate=next(n for n, gate in enumerate(self.gates) if gate.goal == approach.goal))
+        self.void_route()
+
+    def void_route(self) -> None:
+        """Let no item of the mission on board, or on its way there, count for the gate that is next or a later one."""
+        def void(route: Route) -> Route:
+            return replace(route, gate_of=tuple(-1 if g >= self.state.gate else g for g in route.gate_of))
+
+        if self.state.route is not None:
+            self.update(route=void(self.state.route))
+        if self.state.pending_upload is not None:
+            pending = self.state.pending_upload
+            self.update(pending_upload=replace(pending, route=void(pending.route)))
+
     # -------------------------------------------------------------------------------------- reading
+    @property
+    def gates(self) -> tuple[Gate, ...]:
+        """The voyage's gates, in order."""
+        return gates_of(self.voyage, self.state.approaches)
+
     @property
     def t_s(self) -> float:
         """Now [s]."""

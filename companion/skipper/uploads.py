@@ -42,12 +42,14 @@ def take_upload(turn: Turn, outcome: UploadOutcome) -> None:
     if pending is None or pending.upload_id != outcome.upload_id:
         return
     if outcome.result is UploadResult.OK:
-        index = turn.state.index
+        index, missed_s = turn.state.index, turn.state.missed_s
         if pending.set_current is not None:
             index = pending.set_current - 1
         turn.update(
             pending_upload=None, route=pending.route, index=index, own_index=max(index, 0), upload_retry=Retry(),
-            checked_mission=True, foreign="", unsure_route=None, replace_foreign=False, missed_gate=None,
+            checked_mission=True, foreign="", unsure_route=None, replace_foreign=False,
+            # An upload that was on its way at the miss does not lead back.
+            missed_s=missed_s if missed_s is not None and pending.t_s <= missed_s else None,
             no_go_since_s=None, uploaded_s=turn.t_s,
             current_asked_s=turn.t_s if pending.set_current is not None else turn.state.current_asked_s,
             asked_seq=pending.set_current if turn.state.sailing else None,

@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Self
 
 STATUS_CHARACTERS = 200
+PATIENCE_S = 120     # after each word that it is still being started
 
 
 class ServiceManager:
@@ -39,6 +40,10 @@ class ServiceManager:
         if self._socket is not None:
             self._socket.close()
             self._socket = None
+
+    def starting(self, doing: str) -> None:
+        """Say what is done before it is ready, and ask for patience: the first start compiles for minutes on a Pi."""
+        self._send(f"STATUS={' '.join(doing.split())[:STATUS_CHARACTERS]}\nEXTEND_TIMEOUT_USEC={PATIENCE_S * 10**6}")
 
     def alive(self, doing: str) -> None:
         """Say that the loop turns, and what it is doing in one line; the first time also that it is ready."""

@@ -12,8 +12,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from companion.kernels.jit import kernel
 
 Array = NDArray[np.float64]
 
@@ -95,13 +96,13 @@ def new_state(constants: Constants) -> State:
     )
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def wrap(a: float) -> float:
     """Return the angle on [-π, π)."""
     return (a + math.pi) % (2.0 * math.pi) - math.pi
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _interpolation(h: float) -> tuple[int, float]:
     """Return the knot below ``h`` and the share of the next, linear in log h, flat outside."""
     if h <= KNOT_S[0]:
@@ -112,7 +113,7 @@ def _interpolation(h: float) -> tuple[int, float]:
     return J - 2, 1.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _trend(st: State, con: Constants, h: float) -> float:
     """Multi-scale mean (1)."""
     k = SCALE_S.size - 1
@@ -122,7 +123,7 @@ def _trend(st: State, con: Constants, h: float) -> float:
     return m
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _speed(st: State, con: Constants, h: float) -> float:
     """Multi-scale mean speed, as (1)."""
     k = SPEED_SCALE_S.size - 1
@@ -134,7 +135,7 @@ def _speed(st: State, con: Constants, h: float) -> float:
     return max(0.0, m)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _shown(st: State, con: Constants, m: float, h: float) -> float:
     """Rms of the last hours' readings about ``m`` [rad], larger while less than ``h`` has been seen (4c)."""
     about = wrap(m - st.mean[SCALE_S.size - 1]) ** 2
@@ -142,19 +143,19 @@ def _shown(st: State, con: Constants, m: float, h: float) -> float:
     return spread * max(1.0, h / (st.now[CLOCK] + _YOUNG_S)) ** con.error[1]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _rough(st: State) -> float:
     """Log of the mean departure from the 90 s mean in the last minute."""
     return math.log((st.now[ROUGH] + 0.1) / (st.now[ROUGH_N] + 1.0))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _wind(st: State) -> float:
     """Log of the wind speed of the last seconds."""
     return math.log(max(WIND_MIN_MPS, st.now[WIND] / max(1e-9, st.now[WIND_N])))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _refresh(st: State, con: Constants) -> None:
     """Turn the sums of every knot into what ``predict`` reads."""
     m = st.mean[SCALE_S.size - 1]
@@ -174,7 +175,7 @@ def _refresh(st: State, con: Constants) -> None:
         kn[SPEED_LEVEL] = (kn[SPEED_ERR] + weight * expected) / (kn[SPEED_ERR_N] + weight)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def predict(st: State, con: Constants, h: float) -> tuple[float, float, float, float, float, float]:
     """Return mean x, sigma, mean speed, its sigma, and the two parts of the mean (trend, return)."""
     j, f = _interpolation(h)
@@ -197,7 +198,7 @@ def predict(st: State, con: Constants, h: float) -> tuple[float, float, float, f
     return m, sigma, _speed(st, con, h), sigma_speed, trend, back
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def half_width_ratio(st: State, h: float, z: Array, zp: float) -> float:
     """Return the half width in sigmas at the normal quantile ``zp``; ``z`` holds the normal quantiles of QUANTILE_P."""
     j, f = _interpolation(h)
@@ -212,7 +213,7 @@ def half_width_ratio(st: State, h: float, z: Array, zp: float) -> float:
     return a + g * (b - a)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def correlation_time(st: State) -> float:
     """Return where phi(h) / phi(shortest) falls to 1/e [s]; beyond 600 s by its slope so far, at most an hour."""
     top = max(0.05, st.knot[0, PHI])
@@ -226,7 +227,7 @@ def correlation_time(st: State) -> float:
     return min(3600.0, max(h0, -h0 / min(-1e-3, math.log(p0))))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _learn(st: State, con: Constants, prior: Array, j: int, row: int, x: float, speed: float) -> None:
     """Score a kept forecast against the reading that it was for."""
     r, kn, mem, h = st.ring[row], st.knot[j], con.memory, KNOT_S[j]
@@ -259,7 +260,7 @@ def _learn(st: State, con: Constants, prior: Array, j: int, row: int, x: float, 
             st.quantile[j, i] = max(st.quantile[j, i], st.quantile[j, i - 1])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _speeds(st: State, step: float, speed: float, weight: float) -> None:
     """Move every running mean of the speed by a reading that stands for ``step`` seconds."""
     now = st.now
@@ -272,7 +273,7 @@ def _speeds(st: State, step: float, speed: float, weight: float) -> None:
     now[WIND_N] = now[WIND_N] * keep + (1.0 - keep)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _directions(st: State, con: Constants, step: float, x: float, speed: float, weight: float) -> None:
     """Move every running mean of the direction by a reading that stands for ``step`` seconds."""
     now, mem = st.now, con.memory
@@ -295,7 +296,7 @@ def _directions(st: State, con: Constants, step: float, x: float, speed: float, 
     now[SEEN] += 1.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _remember(st: State, con: Constants) -> None:
     """Keep a forecast for every knot, to be scored when its time comes."""
     now = st.now
@@ -318,7 +319,7 @@ def _remember(st: State, con: Constants) -> None:
             st.pointer[j] = (head + 1) % ROWS
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def update(
     st: State, con: Constants, prior: Array, dt: float, x: float, speed: float, weight: float, speed_weight: float,
 ) -> None:
@@ -345,7 +346,7 @@ def update(
         _remember(st, con)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def replay(
     st: State, con: Constants, prior: Array, t: Array, x: Array, speed: Array, ask: NDArray[np.bool_], horizon: Array,
     z: Array, zp: Array,

@@ -15,8 +15,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from companion.kernels.jit import kernel
 
 LOOP_S = 0.02
 SUBSTEPS = 4
@@ -85,22 +86,22 @@ _DRAG = np.array([0.1, 0.1, 0.2, 0.4, 0.8, 1.2, 1.5, 1.7, 1.9, 1.95, 1.9, 1.7, 1
 Vector = NDArray[np.float64]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _wrap(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _clip(x: float, low: float, high: float) -> float:
     return low if x < low else min(x, high)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _alpha(dt_s: float, cutoff_hz: float) -> float:
     return 1.0 if cutoff_hz <= 0.0 else dt_s / (dt_s + 1.0 / (2.0 * math.pi * cutoff_hz))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def sail_force(aws_mps: float, awa_rad: float, sail_rad: float) -> float:
     """Return the driving force [N]: F = aws (CL sin|b| - CD cos b), linear in the apparent wind speed."""
     angle = abs(awa_rad)
@@ -115,7 +116,7 @@ def sail_force(aws_mps: float, awa_rad: float, sail_rad: float) -> float:
     return float(aws_mps * (lift * math.sin(angle) - drag * math.cos(angle)))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def polar_speed(polar: NDArray[np.float64], twa_rad: float, tws_mps: float) -> float:
     """Return the speed [m/s] in a table by whole degrees (0..180) and steps of POLAR_STEP_MPS; its last one above."""
     row = min(abs(math.degrees(twa_rad)), 180.0)
@@ -126,7 +127,7 @@ def polar_speed(polar: NDArray[np.float64], twa_rad: float, tws_mps: float) -> f
     return float((1.0 - f) * low + f * ((1.0 - g) * polar[i + 1, j] + g * polar[i + 1, j + 1]))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _polar_force(speed_mps: float, force: float, awa_rad: float, sail_rad: float, ideal_rad: float) -> float:
     """Return the driving force [N] of a boat whose polar says ``speed_mps``; ``force`` is that of SIM_Sailboat's sail.
 
@@ -138,7 +139,7 @@ def _polar_force(speed_mps: float, force: float, awa_rad: float, sail_rad: float
     return 0.5 * speed_mps * speed_mps * drawing + min(force, 0.0)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _hull(s: Vector, p: Vector, polar: NDArray[np.float64]) -> None:
     """Move the hull by one loop: SIM_Sailboat's one-dimensional model with exact yaw kinematics."""
     dt = LOOP_S / SUBSTEPS
@@ -171,7 +172,7 @@ def _hull(s: Vector, p: Vector, polar: NDArray[np.float64]) -> None:
         s[S_RATE] = rate
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _vane(s: Vector, p: Vector, noise: float) -> None:
     """AP_WindVane: raw apparent wind, its filters, true wind from it and the ground velocity, its filter."""
     if p[P_VANE] == 0.0:
@@ -217,7 +218,7 @@ def _vane(s: Vector, p: Vector, noise: float) -> None:
     s[S_TWS] += a_true * (speed - s[S_TWS])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _indirect(s: Vector, p: Vector, yaw_rad: float) -> bool:
     """sailboat.cpp use_indirect_route: is this course within the no-go zone and its pad?"""
     if s[S_MOTOR] > 0.0:
@@ -228,7 +229,7 @@ def _indirect(s: Vector, p: Vector, yaw_rad: float) -> bool:
     return bool(abs(_wrap(twd - yaw_rad)) <= p[P_NOGO] + NOGO_PAD_RAD)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
     """sailboat.cpp calc_heading: the heading to steer for a course in the no-go zone, and events."""
     events = 0
@@ -267,7 +268,7 @@ def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
     return _wrap(twd + p[P_NOGO] if on_port else twd - p[P_NOGO]), events
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _target(s: Vector, p: Vector) -> tuple[float, float, float, float, bool]:
     """Move the target point along the leg; return its velocity, its acceleration and whether it has arrived.
 
@@ -343,7 +344,7 @@ def _target(s: Vector, p: Vector) -> tuple[float, float, float, float, bool]:
     return he, hn, a_e, a_n, arrived
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     """Follow the leg: return (heading, turn rate, heading is meant, events)."""
     events = 0
@@ -386,7 +387,7 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     return 0.0, _clip(lateral, -limit, limit) / speed, False, events
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _loiter(s: Vector, p: Vector) -> tuple[float, int]:
     """Mode loiter of a sailboat: keep the heading within the radius, sail to its centre from outside."""
     de, dn = s[S_LE] - (s[S_E] + s[S_GPS_E]), s[S_LN] - (s[S_N] + s[S_GPS_N])
@@ -404,7 +405,7 @@ def _loiter(s: Vector, p: Vector) -> tuple[float, int]:
     return s[S_LOITER_YAW], 0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _rudder(s: Vector, p: Vector, rate_rad: float) -> None:
     """AR_AttitudeControl: acceleration-limited turn rate, PI with feed-forward, less rudder at speed."""
     change = p[P_RATE_ACC] * LOOP_S
@@ -424,7 +425,7 @@ def _rudder(s: Vector, p: Vector, rate_rad: float) -> None:
     s[S_RUDDER] = out
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _control(s: Vector, p: Vector) -> int:
     """One loop of the vehicle: what to steer, rudder and sheet. Returns events."""
     steer = s[S_STEER]
@@ -468,7 +469,7 @@ def _control(s: Vector, p: Vector) -> int:
     return events
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def advance(
     s: Vector, p: Vector, wind: NDArray[np.float64], first_tick: int, noise: Vector, loops: int,
     polar: NDArray[np.float64],

@@ -31,8 +31,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from sitl.compiled import compile_ahead
     from sitl.figures import SCENARIOS, run_baselines
 
+    compile_ahead()
     return run_baselines(
         who=args.who, scenarios=args.scenarios or SCENARIOS, seeds=args.seeds, workers=args.workers,
         speedup=args.speedup, out=args.out,

@@ -28,8 +28,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from sitl.compiled import compile_ahead
     from sitl.faults import run_faults, sail_seed
 
+    compile_ahead()
     if args.keep is not None:
         record = sail_seed(args.first_seed, keep=args.keep)
         for key, value in record.items():

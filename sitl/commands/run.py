@@ -36,6 +36,7 @@ def run(args: argparse.Namespace) -> int:
     from companion.geofence import load_mission
     from companion.telemetry.names import DECISIONS
     from companion.telemetry.progress import ProgressLine
+    from sitl.compiled import compile_ahead
     from sitl.hull import own_polar
     from sitl.runner import run_embedded
     from sitl.scenario import load_scenario
@@ -47,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
                          "name another folder, or remove that one")
     if args.autopilot == "ardurover" and own_polar(load_mission(scenario.mission_path(args.scenario))) is not None:
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
+    compile_ahead()
     if args.autopilot == "ardurover" or args.live:
         from sitl.live import run_live
 

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from companion.clock import now_s, run, run_virtual
-from companion.planner import PlanStatus, Problem, plan
+from companion.planner import PlanStatus, Problem, plan, worker
 from companion.planner.worker import InlinePlanner, PlannerWorker
 from tests.planner.problems import load, simple
 
@@ -45,6 +45,56 @@ def test_a_worker_that_cannot_start_is_an_outcome():
             answer = await worker.plan(Problem.from_json(simple()), budget_s=0.2)
             assert answer.status is PlanStatus.UNANSWERED
             assert "died" in answer.reason
+
+    run(main())
+
+
+# A machine so slow that compiling takes twice as long as any silence is borne.
+SLOW = """
+import time
+from companion.planner import worker
+
+def prepare(packages, *, say):
+    for n in range(20):
+        say(f"{n} of 20")
+        time.sleep(0.1)
+
+worker.prepare, worker._BEAT_S = prepare, 0.1
+worker.serve()
+"""
+
+
+def test_a_child_that_compiles_is_alive_however_long_it_takes(monkeypatch):
+    """It was given 180 s, and taken for hung: the first start on a slow or busy machine failed (issue 12, point 18)."""
+    monkeypatch.setattr(worker, "_SILENCE_S", 1.0)
+
+    async def main():
+        said = []
+        async with PlannerWorker(command=[sys.executable, "-c", SLOW]) as planner:
+            await planner.ready(said.append)
+            assert planner.restarts == 0
+            assert {"3 of 20", "19 of 20"} <= set(said)
+            os.kill(planner.pid, signal.SIGKILL)   # under way: a request waits for the new one's kernels
+            await asyncio.sleep(0.2)
+            assert (await planner.plan(Problem.from_json(simple()), expansions=3_000)).has_path
+            assert planner.restarts == 1
+
+    run(main())
+
+
+def test_a_child_that_falls_silent_while_it_compiles_is_replaced(monkeypatch):
+    monkeypatch.setattr(worker, "_SILENCE_S", 1.0)
+
+    async def main():
+        async with PlannerWorker(command=[sys.executable, "-c", SLOW]) as planner:
+            def stop_it(word):
+                os.kill(planner.pid, signal.SIGSTOP)
+
+            with pytest.raises(TimeoutError):
+                await planner.ready(stop_it)
+            assert (await planner.plan(Problem.from_json(simple()), expansions=3_000)).status is PlanStatus.TIMEOUT
+            await planner.ready()
+            assert planner.restarts == 1
 
     run(main())
 

@@ -26,7 +26,7 @@ def turn(*obstacles, at=(0.0, 0.0), xtrack_m=10.0, irons=(), **config) -> Turn:
         items=(), points_en_m=(), plan_id=1, plan_t_s=0.0, plan_twd_from_rad=0.0, plan_tws_mps=5.0,
         plan_half_width_rad=0.0, margin_m=15.0, delta_s=0.9)
     state = replace(world.state, route=route, irons_s=irons)
-    out = Turn(world.skipper.voyage, world.skipper.config, world.skipper.gates, state, world.snapshot())
+    out = Turn(world.skipper.voyage, world.skipper.config, state, world.snapshot())
     out.leg = lambda: NORTH  # type: ignore[method-assign]
     return out
 

@@ -10,7 +10,7 @@ from companion.messages import Mode
 from companion.skipper import actions as act
 from companion.skipper.geometry import bearing_rad, distance_m, moved
 from companion.skipper.state import Phase
-from tests.skipper.test_voyage import is_done, make, said
+from tests.skipper.test_voyage import GOAL, is_done, make, said
 
 
 def raised(world):
@@ -78,7 +78,7 @@ def test_it_loiters_while_the_other_place_is_not_clear_ahead_and_sails_on_when_t
     assert world.count(act.RequestPlan) > asked         # from where it is
     assert not said(world, "operator")
     assert world.run(1500, is_done)
-    assert distance_m(world.position, world.skipper.gates[-1].en_m) < 25.0
+    assert distance_m(world.position, GOAL.en_m) < 25.0
 
 
 def test_without_permission_it_does_not_touch_the_mode():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapely.geometry import box
 
 from companion.geo.angles import difference_rad
-from companion.skipper.gates import gates_of, passed_on
+from companion.skipper.gates import Approach, again, bearing_on, gates_of, is_on_wrong_side
 from companion.skipper.geometry import (
     along_m,
     bearing_rad,
@@ -94,6 +94,11 @@ def test_bear_away_takes_the_clear_side():
     assert bear_away_rad((0, 0), 0.1, 0.0, area(box(5.0, -50.0, 50.0, 50.0))) < 0.0
 
 
+def turned_round(buoy, *track):
+    """The boat's bearing from the buoy, counted on along the track."""
+    return sum(difference_rad(bearing_rad(buoy, b), bearing_rad(buoy, a)) for a, b in pairwise(track))
+
+
 @pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
 @pytest.mark.parametrize("turned", range(0, 360, 45))
 def test_gates_go_round_each_buoy_on_the_right_hand(side, turned):
@@ -101,25 +106,60 @@ def test_gates_go_round_each_buoy_on_the_right_hand(side, turned):
     hand = 1.0 if side is Side.PORT else -1.0
     places = [(0.0, 200.0), (-150.0 * hand, 100.0), (0.0, 0.0)]
     places = [(e * math.cos(angle) + n * math.sin(angle), n * math.cos(angle) - e * math.sin(angle)) for e, n in places]
-    made = voyage(*(Goal(en_m=p, side=side) for p in places), laps=2, home=places[2])
-    gates = gates_of(made)
+    made = voyage(*(Goal(en_m=p, side=side) for p in places), laps=2)
+    gates = gates_of(made, (Approach(goal=0, en_m=places[2]),))
     for goal, place in enumerate(places * 2):
         mine = [g for g in gates if g.goal == goal]
         assert [g.ends_goal for g in mine] == [False] * (len(mine) - 1) + [True]
         assert all(math.isclose(distance_m(g.en_m, place), 12.0) for g in mine)
-        if 0 < goal < 5:
-            before, after = (places * 2)[goal - 1], (places * 2)[goal + 1]
-            assert passed_on(side, [before, *(g.en_m for g in mine), after], place)
-            assert not passed_on(Side.STARBOARD if side is Side.PORT else Side.PORT,
-                                 [before, *(g.en_m for g in mine), after], place)
+        before = (places * 2)[goal - 1]
+        bearing = 0.0
+        for there, gate in zip([before, *(g.en_m for g in mine)], mine, strict=False):
+            bearing = bearing_on(gate, gate.en_m, bearing_on(gate, there, bearing))
+            assert bearing == pytest.approx(gate.bearing_rad)
+            assert not is_on_wrong_side(gate, bearing)
+            assert is_on_wrong_side(gate, bearing + hand * 2.0 * math.pi)
+        if goal < 5:
+            turn = -hand * turned_round(place, before, *(g.en_m for g in mine), (places * 2)[goal + 1])
+            assert math.pi / 2.0 < turn < 2.0 * math.pi   # a string along this track touches the buoy
+
+
+@pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
+@pytest.mark.parametrize("out", range(0, 360, 30))
+@pytest.mark.parametrize("at", [0, -1])
+def test_a_buoy_left_on_the_wrong_side_is_rounded_from_there(side, out, at):
+    """What was turned the wrong way and the second approach make the rounding that was asked for."""
+    hand = 1.0 if side is Side.PORT else -1.0
+    start, buoy, after = (0.0, 0.0), (0.0, 200.0), moved((0.0, 200.0), math.radians(out), 150.0)
+    made = voyage(Goal(en_m=buoy, side=side), Goal(en_m=after))
+    first = [g for g in gates_of(made, (Approach(goal=0, en_m=start),)) if g.goal == 0]
+    wrong = first[at].bearing_rad + hand * 2.0 * math.pi
+    assert is_on_wrong_side(first[at], wrong)
+    second = [g for g in gates_of(made, (again(first[at], first[at].en_m, wrong),)) if g.goal == 0]
+    gone = wrong + turned_round(buoy, first[at].en_m, *(g.en_m for g in second))
+    want = first[-1].bearing_rad
+    if len(first) == 1:   # passed in the middle of its small bend; a round from there ends at the bend's end
+        want -= hand * 0.5 * first[0].turn_rad
+    assert gone == pytest.approx(want)
+    bearing = 0.0
+    for gate in second:
+        bearing = bearing_on(gate, gate.en_m, bearing)
+        assert bearing == pytest.approx(gate.bearing_rad)
+
+
+def test_a_buoy_that_is_the_whole_course_is_rounded_each_lap():
+    made = voyage(Goal(en_m=(0.0, 200.0), side=Side.PORT), laps=3)
+    gates = gates_of(made, (Approach(goal=0, en_m=(0.0, 0.0)),))
+    turn = turned_round((0.0, 200.0), (0.0, 0.0), *(g.en_m for g in gates))
+    assert turn == pytest.approx(-math.pi / 2.0 - 2.0 * 2.0 * math.pi)
 
 
 def test_barrier_closes_the_wrong_side():
     import shapely
     from shapely.geometry import LineString
 
-    made = voyage(Goal(en_m=(0.0, 200.0), side=Side.PORT), Goal(en_m=(-150.0, 100.0)), home=(0.0, 0.0))
-    gate = gates_of(made)[0]
+    made = voyage(Goal(en_m=(0.0, 200.0), side=Side.PORT), Goal(en_m=(-150.0, 100.0)))
+    gate = gates_of(made, (Approach(goal=0, en_m=(0.0, 0.0)),))[0]
     closed = shapely.union_all([shapely.from_wkt(w) for w in gate.keep_out])
     assert closed.intersects(LineString([(0.0, 0.0), (-40.0, 200.0), (0.0, 240.0)]))   # leaves it to starboard
     assert not closed.intersects(LineString([(0.0, 0.0), (40.0, 200.0), (0.0, 240.0)]))

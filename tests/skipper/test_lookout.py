@@ -22,7 +22,7 @@ def turn_among(*vessels, world=None):
         world = make()
         world.run(60)
     world.extra = {"traffic": TrafficPicture(t_s=world.t, vessels=vessels)}
-    return Turn(world.skipper.voyage, world.skipper.config, world.skipper.gates, world.state, world.snapshot())
+    return Turn(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
 
 
 def coming(turn, *, away_m, speed_mps=5.0, **more):

@@ -167,7 +167,7 @@ def turn_among(*vessels):
     world = make()
     world.run(60)
     world.extra = {"traffic": TrafficPicture(t_s=world.t, vessels=vessels)}
-    return Turn(world.skipper.voyage, world.skipper.config, world.skipper.gates, world.state, world.snapshot())
+    return Turn(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
 
 
 def test_a_plan_that_starts_within_a_disc_may_leave_it():

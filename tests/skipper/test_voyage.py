@@ -142,7 +142,7 @@ def test_five_laps_of_the_regatta_course_without_missing_a_buoy(side):
     places = [(0.0, 150.0), (-90.0 * hand, 75.0), (0.0, 0.0)]
     start = (20.0 * hand, -40.0)
     world = make(*(Goal(en_m=p, side=side, name=f"buoy {n}") for n, p in enumerate(places)), obstacles=(),
-                 voyage={"laps": 5, "home": start}, position=start, expansions=600)
+                 voyage={"laps": 5}, position=start, expansions=600)
     seen = set()
 
     def look(w):
@@ -160,24 +160,61 @@ def test_five_laps_of_the_regatta_course_without_missing_a_buoy(side):
         assert min(distance_m(place, p) for p in world.track) > 3.0
 
 
-def test_a_buoy_left_on_the_wrong_side_is_not_reached_before_it_is_rounded():
-    """Buoy course, seed 2, on the real ArduRover: missed, and a second later reached by the old route's count."""
+def regatta(**changes):
     places = [(0.0, 150.0), (-90.0, 75.0), (0.0, 0.0)]
-    start = (20.0, -40.0)
-    world = make(*(Goal(en_m=p, side=Side.PORT, name=f"buoy {n}") for n, p in enumerate(places)), obstacles=(),
-                 voyage={"home": start}, position=start, expansions=600, config={"grid_size_m": 30.0})
-    last = next(n for n, g in enumerate(world.skipper.gates) if g.ends_goal)
-    wrong = tuple((8.0 * math.sin(0.2 * n), 150.0 + 8.0 * math.cos(0.2 * n)) for n in range(12))   # clockwise
+    return make(*(Goal(en_m=p, side=Side.PORT, name=f"buoy {n}") for n, p in enumerate(places)), obstacles=(),
+                expansions=600, **changes)
 
-    def comes_to_the_last_gate(w):
-        return w.state.gate == last and distance_m(w.position, w.skipper.gates[last].en_m) < 12.0
 
-    assert world.run(600, comes_to_the_last_gate)
-    while not said(world, "buoy missed"):
-        world.state = replace(world.state, track=wrong)
+def turned(world, buoy):
+    return sum(difference_rad(bearing_rad(buoy, b), bearing_rad(buoy, a)) for a, b in pairwise(world.track))
+
+
+@pytest.mark.parametrize("start", [(60.0, -40.0), (-60.0, -40.0), (-70.0, 150.0), (-50.0, 210.0)])
+def test_the_first_buoy_is_rounded_from_wherever_the_voyage_begins(start):
+    """Buoy course, seed 0: the first leg had no beginning, so its buoy was passed with one gate on either hand."""
+    world = regatta(position=start)
+    assert world.run(900, lambda w: len(w.state.reached) == 1)
+    first = turned(world, (0.0, 150.0))
+    assert world.state.missed == 0
+    assert math.radians(-420.0) < first < math.radians(-20.0)
+
+
+def carry_round(world, buoy, until):
+    """Carry the boat to the buoy and round it clockwise, 6 m at a time."""
+    while not until(world):
+        off = distance_m(world.position, buoy)
+        bearing = bearing_rad(buoy, world.position) + (0.4 if off < 16.0 else 0.0)
+        world.position, world.speed = moved(buoy, bearing, max(15.0, off - 6.0)), 0.0
         world.run(1)
-    world.run(3)
+
+
+@pytest.mark.parametrize("killed", [False, True])
+@pytest.mark.parametrize(("under_way", "slow"), [
+    ("pending_plan", {"plan_s": 6.0}), ("pending_upload", {"upload_s": 8.0})], ids=["planned", "uploaded"])
+def test_a_buoy_left_on_the_wrong_side_is_not_reached_before_it_is_rounded(killed, under_way, slow):
+    """Buoy course, seeds 0 and 3: missed, and reached a second later, from where the boat had missed it.
+
+    What was being planned or uploaded when it was missed does not count for the second rounding either.
+    """
+    buoy = (0.0, 150.0)
+    config = {"grid_size_m": 30.0, "keep_gain_s": 0.0, "keep_gain": 0.0}   # whatever gains a little is uploaded
+    world = regatta(position=(20.0, -40.0), config=config, **slow)
+    assert world.run(600, lambda w: distance_m(w.position, buoy) < 60.0)
+    carry_round(world, buoy, lambda w: turned(w, buoy) > math.radians(150.0))
+    world.events.append(OperatorWish.REPLAN)
+    carry_round(world, buoy, lambda w: getattr(w.state, under_way) is not None)
+    if killed:
+        restarted(world)
+    carry_round(world, buoy, lambda w: said(w, "buoy missed"))
+    missed, since = len(world.actions), world.state.next_id - 1
+    world.run(12)
+    asked = [a for _, a in world.actions[missed - 1:]]
+    assert any(isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.MISSED_BUOY for a in asked)
+    assert all(a.plan_id >= since for a in asked if isinstance(a, act.UploadMission))
     assert world.state.reached == ()
+    assert world.run(1500, lambda w: w.state.reached)
+    assert turned(world, buoy) == pytest.approx(math.radians(-200.0), abs=math.radians(80.0))
     assert world.run(1500, is_done)
     assert world.state.reached == (0, 1, 2)
 

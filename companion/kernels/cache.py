@@ -1,0 +1,100 @@
+"""The cache of one kernel: a file for each signature, named by all that its machine code depends on.
+
+A file begins with the digest of the rest: a torn or damaged one is compiled again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import pickle
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.dispatcher import Dispatcher
+from numba.core.serialize import dumps
+
+from companion.kernels.places import folder, looked_in, used, versions, written_to
+from companion.kernels.stamp import name_of, stamp
+
+_LOG = logging.getLogger(__name__)
+_DIGEST_BYTES = hashlib.sha256().digest_size
+
+
+class KernelCache(_Cache):  # type: ignore[misc]
+    """A kernel's cache, as numba's dispatcher wants it."""
+
+    def __init__(self, dispatcher: Dispatcher) -> None:
+        self._dispatcher = dispatcher
+        self._stamp = ""   # known when the kernels that it calls are: when it is first compiled
+
+    @property
+    def cache_path(self) -> str:
+        """Where it writes."""
+        return str(folder())
+
+    def file_name(self, signature: Any, codegen: Any) -> str:
+        """Return the name of the file for a signature, a tuple of numba's types."""
+        self._stamp = self._stamp or stamp(self._dispatcher)
+        depends = f"{self._stamp} {signature} {codegen.magic_tuple()} {versions()}"
+        return f"{name_of(self._dispatcher)}-{hashlib.sha256(depends.encode()).hexdigest()[:24]}"
+
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        """Return what was compiled before, None when nothing that can be used is there."""
+        target_context.refresh()
+        name = self.file_name(sig, target_context.codegen())
+        for place in looked_in():
+            payload = _read(place / name)
+            if payload is None:
+                continue
+            try:
+                return CompileResult._rebuild(target_context, *pickle.loads(payload))  # noqa: S301, SLF001 - our own
+            except Exception:
+                _LOG.warning("%s cannot be loaded: compiled again", place / name, exc_info=True)
+        return None
+
+    def save_overload(self, sig: Any, data: CompileResult) -> None:
+        """Keep what was compiled; a folder that cannot be written costs nothing but the time to compile again."""
+        if data.library.has_dynamic_globals or any(not x.can_cache for x in data.lifted):
+            return
+        try:
+            _write(written_to() / self.file_name(sig, data.codegen), dumps(data._reduce()))  # noqa: SLF001
+        except OSError as error:
+            _LOG.warning("compiled kernels cannot be kept in %s (%s)", folder(), error.strerror)
+
+    def enable(self) -> None:
+        """Always on."""
+
+    def disable(self) -> None:
+        """Always on."""
+
+    def flush(self) -> None:
+        """Nothing is kept in memory."""
+
+
+def _read(path: Path) -> bytes | None:
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    if hashlib.sha256(data[_DIGEST_BYTES:]).digest() != data[:_DIGEST_BYTES]:
+        _LOG.warning("%s is damaged: compiled again", path)
+        return None
+    used(path, time.time())
+    return data[_DIGEST_BYTES:]
+
+
+def _write(path: Path, payload: bytes) -> None:
+    handle, beside = tempfile.mkstemp(dir=path.parent, prefix=".")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(hashlib.sha256(payload).digest() + payload)
+        Path(beside).replace(path)
+    except BaseException:
+        Path(beside).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,126 @@
+"""Where machine code is kept, and the mark that says that all of it is there. Does not load numba.
+
+Looked for in what the package carries, in a folder of the user's, and in memory. Written to the folder, which is
+``$COMPANION_KERNELS``, the service manager's ``$CACHE_DIRECTORY``, or ``sailboat-companion/kernels`` under
+``$XDG_CACHE_HOME`` (``~/.cache``); where that cannot be written, to memory: a Pi's card that fails is mounted read-only
+by the kernel, and a companion that starts again then must not compile for minutes at every start.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import platform
+import stat
+import tempfile
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+
+FILE = "kernels.txt"   # in each package: see ``listed``
+PACKAGES = Path(__file__).resolve().parents[2]
+IN_MEMORY = (Path("/dev/shm"), Path("/run"))  # noqa: S108 - see _is_private
+CARRIED = Path(__file__).resolve().parent / "carried"   # filled when a package is built
+KEPT_S = 30 * 86_400.0     # a file that nobody has used for this long goes ...
+KEPT_BYTES = 200 * 2**20   # ... and the oldest beyond this, a dozen versions of everything
+_USED_S = 86_400.0         # the time of use is noted once a day: an SD card wears
+
+
+def folder() -> Path:
+    """Return the user's folder of machine code; it need not exist."""
+    for name, below in (("COMPANION_KERNELS", ""), ("CACHE_DIRECTORY", "kernels"),
+                        ("XDG_CACHE_HOME", "sailboat-companion/kernels")):
+        place = os.environ.get(name, "").partition(":")[0]   # the service manager separates several by colons
+        if place and Path(place).is_absolute():
+            return Path(place, below)
+    return Path("~/.cache/sailboat-companion/kernels").expanduser()
+
+
+def looked_in() -> tuple[Path, ...]:
+    """Return where machine code may lie, in the order in which it is looked for."""
+    return CARRIED, folder(), *(place for place in map(_of_user, IN_MEMORY) if _is_private(place))
+
+
+def written_to() -> Path:
+    """Return where machine code is written: the folder, or memory where the folder takes nothing. It exists.
+
+    Raises:
+        OSError: there is no such place.
+    """
+    try:
+        return _tried(folder())
+    except OSError as error:
+        for place in map(_of_user, IN_MEMORY):
+            with contextlib.suppress(OSError):
+                place.mkdir(mode=0o700, exist_ok=True)
+                if _is_private(place):
+                    return _tried(place)
+        raise error from None
+
+
+def _of_user(place: Path) -> Path:
+    return place / f"companion-kernels-{os.getuid()}"
+
+
+def _is_private(place: Path) -> bool:
+    """Return whether nobody else can put anything into it: what lies there is run."""
+    try:
+        status = place.lstat()
+    except OSError:
+        return False
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077
+
+
+def _tried(place: Path) -> Path:
+    place.mkdir(parents=True, exist_ok=True, mode=0o700)
+    with tempfile.TemporaryFile(dir=place):
+        return place
+
+
+@functools.cache
+def versions() -> str:
+    """Return what machine code depends on besides kernels, types and processor."""
+    libraries = " ".join(f"{name} {metadata.version(name)}" for name in ("numba", "llvmlite", "numpy"))
+    return f"{platform.python_implementation()} {platform.python_version()} {libraries} {platform.machine()}"
+
+
+def mark(package: str) -> str:
+    """Return the name of the empty file that says: all that the package lists, as its files are now, is compiled."""
+    seen = hashlib.sha256(versions().encode())
+    for path in sorted((PACKAGES / package).rglob("*.py")):
+        seen.update(path.read_bytes())
+    seen.update((PACKAGES / package / FILE).read_bytes())
+    return f"all-{package}-{seen.hexdigest()[:24]}"
+
+
+def used(path: Path, now_s: float) -> None:
+    """Note that a file was used."""
+    with contextlib.suppress(OSError):
+        if now_s - path.stat().st_mtime > _USED_S:
+            os.utime(path)
+
+
+def sweep(now_s: float) -> int:
+    """Remove what nobody has used for long, the oldest beyond the limit, and numba's own caches of before; count it."""
+    held = removed = 0
+    for used_s, size, path in sorted((file for place in looked_in()[1:] for file in _files(place)), reverse=True):
+        held += size
+        if now_s - used_s > KEPT_S or held > KEPT_BYTES:
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+                removed += 1
+    for package in ("companion", "sitl"):
+        for path in (PACKAGES / package).glob("**/__pycache__/*.nb[ci]"):
+            with contextlib.suppress(OSError):
+                path.unlink()
+                removed += 1
+    return removed
+
+
+def _files(place: Path) -> Iterator[tuple[float, int, Path]]:
+    for path in place.glob("*") if place.is_dir() else ():
+        with contextlib.suppress(OSError):
+            status = path.stat()
+            yield status.st_mtime, status.st_size, path

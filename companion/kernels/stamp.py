@@ -1,0 +1,110 @@
+"""What a kernel is made of: its own code, the constants and kernels that it uses, and theirs."""
+
+from __future__ import annotations
+
+import dis
+import enum
+import functools
+import hashlib
+import types
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from companion.errors import JobError
+
+OURS = ("companion", "sitl")
+_LITERALS = (bool, int, float, complex, str, bytes, type(None), np.generic)
+
+
+def stamp(dispatcher: Dispatcher) -> str:
+    """Return a digest of everything that decides a kernel's machine code, apart from types, versions and processor.
+
+    Raises:
+        JobError: the kernel, or one that it calls, uses something whose changes cannot be seen.
+    """
+    whole = hashlib.sha256()
+    for name, digest in sorted((name_of(k), _own(k)) for k in _reachable(dispatcher)):
+        whole.update(f"{name} {digest}\n".encode())
+    return whole.hexdigest()
+
+
+def name_of(dispatcher: Dispatcher) -> str:
+    """Return a kernel's full name."""
+    return f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__qualname__}"
+
+
+@functools.cache
+def callees(dispatcher: Dispatcher) -> tuple[Dispatcher, ...]:
+    """Return the kernels that a kernel calls itself."""
+    return tuple(value for _, value in _globals_of(dispatcher.py_func) if isinstance(value, Dispatcher))
+
+
+def _reachable(dispatcher: Dispatcher) -> set[Dispatcher]:
+    found, left = {dispatcher}, [dispatcher]
+    while left:
+        for callee in callees(left.pop()):
+            if callee not in found:
+                found.add(callee)
+                left.append(callee)
+    return found
+
+
+@functools.cache
+def _own(dispatcher: Dispatcher) -> str:
+    """Return the digest of a kernel's own code, options and constants."""
+    function = dispatcher.py_func
+    if function.__closure__:
+        raise JobError(f"{name_of(dispatcher)}: a kernel is a function of its module, not of another function")
+    said = [*_code(function.__code__, function.__doc__), repr(sorted(dispatcher.targetoptions.items(), key=str))]
+    for default in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()):
+        said.append(_constant(default, name_of(dispatcher)))
+    for name, value in _globals_of(function):
+        said.append(f"{name}={_constant(value, f'{name_of(dispatcher)}, {name}')}")
+    return hashlib.sha256("\n".join(said).encode()).hexdigest()
+
+
+def _code(code: types.CodeType, doc: str | None = "") -> Iterator[str]:
+    """Yield what a code object does; comments, the docstring (the first constant) and line numbers are not in it."""
+    yield f"{code.co_code.hex()} {code.co_names} {code.co_varnames} {code.co_argcount} {code.co_kwonlyargcount}"
+    for n, constant in enumerate(code.co_consts):
+        if isinstance(constant, types.CodeType):
+            yield from _code(constant)
+        elif n > 0 or constant != doc:
+            yield repr(constant)
+
+
+def _globals_of(function: Any) -> list[tuple[str, Any]]:
+    """Return the module's names that the function uses, and what they are."""
+    names: set[str] = set()
+    left = [function.__code__]
+    while left:
+        code = left.pop()
+        names.update(i.argval for i in dis.get_instructions(code) if i.opname in {"LOAD_GLOBAL", "LOAD_NAME"})
+        left.extend(c for c in code.co_consts if isinstance(c, types.CodeType))
+    return [(name, function.__globals__[name]) for name in sorted(names) if name in function.__globals__]
+
+
+def _constant(value: Any, where: str) -> str:
+    """Return a text that is another one when the value is."""
+    if isinstance(value, Dispatcher):
+        return name_of(value)
+    if isinstance(value, enum.Enum):
+        return f"{type(value).__qualname__}.{value.name}={value.value!r}"
+    if isinstance(value, _LITERALS):
+        return f"{type(value).__name__} {value!r}"
+    if isinstance(value, tuple):
+        return f"{type(value).__qualname__}({', '.join(_constant(v, where) for v in value)})"
+    if isinstance(value, np.ndarray):
+        return f"array {value.dtype} {value.shape} {value.tobytes().hex()}"
+    if isinstance(value, type):
+        if issubclass(value, enum.Enum):
+            return f"{value.__qualname__}({', '.join(f'{m.name}={m.value!r}' for m in value)})"
+        fields = getattr(value, "_fields", ())
+        return f"{value.__module__}.{value.__qualname__}{fields}"
+    home = value.__name__ if isinstance(value, types.ModuleType) else str(getattr(value, "__module__", "") or "")
+    if home.partition(".")[0] in OURS or not (isinstance(value, types.ModuleType) or callable(value)):
+        raise JobError(f"{where}: a kernel cannot use {value!r}: no change of it would be seen; import what it needs")
+    return f"{home}.{getattr(value, '__qualname__', '')}"
