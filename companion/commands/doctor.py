@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from companion.arguments import number
+
 if TYPE_CHECKING:
     from companion.geofence import Mission
     from companion.mavlink.autopilot import Autopilot
@@ -64,7 +66,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (mode 0600)")
     parser.add_argument("--apply", action="store_true", help="set what the warnings and errors name, and read it back")
     parser.add_argument("--json", action="store_true", help="print findings and changes as JSON")
-    parser.add_argument("--wait", type=float, default=30.0, metavar="S", help="for the first heartbeat (default: 30)")
+    parser.add_argument("--wait", type=number("s", above=0.0), default=30.0, metavar="S",
+                        help="for the first heartbeat (default: 30)")
     parser.set_defaults(run=run)
 
 

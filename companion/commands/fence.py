@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from companion.arguments import number, picture, place
 from companion.errors import InputError, JobError
 
 if TYPE_CHECKING:
@@ -42,9 +43,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     check.add_argument("file", metavar="FILE")
     reading_options(check)
     place_options(check)
-    check.add_argument("--wind-from", type=float, metavar="DEG", help="wind for which gaps must be wide enough")
-    check.add_argument("--no-go", type=float, default=47.0, metavar="DEG", help="half angle of the no-go zone (47)")
-    check.add_argument("--plot", metavar="P.png", help="draw the area")
+    check.add_argument("--wind-from", type=number("deg", at_least=-360.0, at_most=360.0), metavar="DEG",
+                       help="wind for which gaps must be wide enough")
+    check.add_argument("--no-go", type=number("deg", at_least=0.0, at_most=89.0), default=47.0, metavar="DEG",
+                       help="half angle of the no-go zone (47)")
+    check.add_argument("--plot", type=picture, metavar="P.png", help="draw the area")
     check.set_defaults(run=_check)
 
     convert = verbs.add_parser("convert", help="write a file in another format and say what it does not carry")
@@ -79,7 +82,8 @@ def link_options(parser: argparse.ArgumentParser) -> None:
     """Add --link and --timeout."""
     parser.add_argument("--link", required=True, metavar="LINK",
                         help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
-    parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="wait this long for a heartbeat (10)")
+    parser.add_argument("--timeout", type=number("s", above=0.0), default=10.0, metavar="S",
+                        help="wait this long for a heartbeat (10)")
 
 
 def reading_options(parser: argparse.ArgumentParser) -> None:
@@ -88,42 +92,36 @@ def reading_options(parser: argparse.ArgumentParser) -> None:
                         help="what zones are where the file does not say (exclusion)")
     parser.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto",
                         help="order of WKT coordinates (longitude first, checked against the place)")
-    parser.add_argument("--near", metavar="LAT,LON", help="where the file should lie: farther than 50 km is an error")
-    parser.add_argument("--point-radius", type=float, default=10.0, metavar="M",
+    parser.add_argument("--near", type=place, metavar="LAT,LON",
+                        help="where the file should lie: farther than 50 km is an error")
+    parser.add_argument("--point-radius", type=number("m", above=0.0, at_most=5000.0), default=10.0, metavar="M",
                         help="radius of an obstacle that is a point or line (10)")
 
 
 def place_options(parser: argparse.ArgumentParser) -> None:
     """Add start, goals and margin."""
-    parser.add_argument("--start", metavar="LAT,LON")
-    parser.add_argument("--goal", metavar="LAT,LON", action="append", default=[])
-    parser.add_argument("--margin", type=float, metavar="M", help="what the planner keeps clear [m]")
+    parser.add_argument("--start", type=place, metavar="LAT,LON")
+    parser.add_argument("--goal", type=place, metavar="LAT,LON", action="append", default=[])
+    parser.add_argument("--margin", type=number("m", at_least=0.0, at_most=1000.0), metavar="M",
+                        help="what the planner keeps clear [m]")
 
 
 def read_input(args: argparse.Namespace) -> Document:
     """Return the document that the arguments name."""
-    from companion.commands.shore import place_argument
     from companion.geofence import ZoneKind, read
     from companion.geofence.mission import load_mission
     from companion.geofence.mission_files import document_of
 
-    near = args.near or args.start
-    place = place_argument(near, "--near") if near else None
     if Path(args.file).suffix.lower() == ".toml":
         return document_of(load_mission(args.file))
-    return read(args.file, kind=ZoneKind(args.kind), axis=args.axis, areas=True, near=place)
+    return read(args.file, kind=ZoneKind(args.kind), axis=args.axis, areas=True, near=args.near or args.start)
 
 
 def places(args: argparse.Namespace) -> tuple[GeoPoint | None, tuple[GeoPoint, ...], float | None]:
     """Return start, goals and margin of the arguments, or of a mission TOML."""
-    from companion.commands.shore import place_argument
     from companion.geofence.mission import load_mission
 
-    start = place_argument(args.start, "--start") if args.start else None
-    goals = tuple(place_argument(g, "--goal") for g in args.goal)
-    margin_m = args.margin
-    if margin_m is not None and not (math.isfinite(margin_m) and 0.0 <= margin_m <= 1000.0):
-        raise InputError("--margin", "", f"{margin_m:g} is outside 0..1000 m")
+    start, goals, margin_m = args.start, tuple(args.goal), args.margin
     if Path(args.file).suffix.lower() == ".toml":
         mission = load_mission(args.file)
         start = start or mission.origin

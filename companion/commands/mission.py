@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from companion.arguments import number, picture, place, wind
 from companion.errors import InputError, JobError
 
 if TYPE_CHECKING:
@@ -48,14 +49,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     new = verbs.add_parser("new", help="make a mission TOML with its area files")
     new.add_argument("out", metavar="OUT.toml")
     new.add_argument("--from", dest="source", metavar="FILE", help="a drawing: .plan, .waypoints, GPX, KML, GeoJSON")
-    new.add_argument("--start", metavar="LAT,LON", help="where the boat will start (else the drawing's home)")
-    new.add_argument("--goal", metavar="LAT,LON", action="append", default=[], help="in order; repeat it")
+    new.add_argument("--start", type=place, metavar="LAT,LON",
+                     help="where the boat will start (else the drawing's home)")
+    new.add_argument("--goal", type=place, metavar="LAT,LON", action="append", default=[], help="in order; repeat it")
     new.add_argument("--land", metavar="FILE", action="append", default=[], help="obstacles, any format; repeat it")
     new.add_argument("--fence", metavar="FILE", help="water to stay inside of, any format")
     new.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto", help="order of WKT coordinates")
     new.add_argument("--name", help="of the mission (else of the file)")
-    new.add_argument("--margin", type=float, metavar="M", help="what plans keep clear of everything (12)")
-    new.add_argument("--radius", type=float, metavar="M", help="of the goals (10)")
+    new.add_argument("--margin", type=number("m", at_least=0.0, at_most=1000.0), metavar="M",
+                     help="what plans keep clear of everything (12)")
+    new.add_argument("--radius", type=number("m", above=0.0, at_most=5000.0), metavar="M", help="of the goals (10)")
     new.add_argument("--force", action="store_true", help="overwrite files")
     preview_options(new)
     new.set_defaults(run=_new)
@@ -84,8 +87,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def preview_options(parser: argparse.ArgumentParser) -> None:
     """Add --plot and what it assumes."""
-    parser.add_argument("--plot", metavar="P.png", help="draw obstacles, fence, margins, laylines and a plan")
-    parser.add_argument("--wind", metavar="SPEED@FROM", help="for the picture [m/s, degrees] (else the mission's, 5@0)")
+    parser.add_argument("--plot", type=picture, metavar="P.png",
+                        help="draw obstacles, fence, margins, laylines and a plan")
+    parser.add_argument("--wind", type=wind, metavar="SPEED@FROM",
+                        help="for the picture [m/s, degrees] (else the mission's, 5@0)")
     parser.add_argument("--no-plan", action="store_true", help="draw no plan")
 
 
@@ -96,7 +101,7 @@ def _preview(mission: Mission, args: argparse.Namespace) -> None:
 
     tws_mps, from_deg = mission.wind.preview_speed_mps, mission.wind.preview_from_deg
     if args.wind:
-        tws_mps, from_deg = wind_argument(args.wind)
+        tws_mps, from_deg = args.wind
     twd_from_rad, boat = math.radians(from_deg), boat_of(mission)
     lines = save_mission(
         mission, args.plot, tws_mps=tws_mps, twd_from_rad=twd_from_rad,
@@ -139,17 +144,6 @@ def _plans(mission: Mission, boat: Boat, tws_mps: float, twd_from_rad: float) ->
     return plans
 
 
-def wind_argument(text: str) -> tuple[float, float]:
-    """Return (speed [m/s], from [deg]) of ``SPEED@FROM``. Raises InputError."""
-    try:
-        speed, direction = (float(part) for part in text.split("@"))
-    except ValueError:
-        raise InputError("--wind", "", f"{text[:30]!r} is not a wind", "write SPEED@FROM, as 5@350") from None
-    if not (0.0 < speed <= 50.0 and -360.0 <= direction <= 360.0):
-        raise InputError("--wind", "", f"{text[:30]!r} is out of range", "speed 0..50 m/s, direction in degrees")
-    return speed, direction % 360.0
-
-
 def _read(path: str) -> Document:
     from companion.geofence import read
     from companion.geofence.mission import load_mission
@@ -176,7 +170,7 @@ def _check(args: argparse.Namespace) -> int:
 
     polar_of(mission)
     bad = print_findings(mission.findings, args.file)
-    wind_deg = wind_argument(args.wind)[1] if args.wind else mission.wind.preview_from_deg
+    wind_deg = args.wind[1] if args.wind else mission.wind.preview_from_deg
     bad |= print_findings(check_area(mission.area, Conditions(
         start=mission.start, goals=tuple(g.point for g in mission.goals), margin_m=mission.margin_m,
         twd_from_rad=math.radians(wind_deg), no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
@@ -193,7 +187,6 @@ def _new(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from companion.commands.fence import print_findings, print_losses
-    from companion.commands.shore import place_argument
     from companion.geofence import Document, ZoneKind, read
     from companion.geofence.mission import load_mission
     from companion.geofence.mission_files import mission_files
@@ -202,22 +195,16 @@ def _new(args: argparse.Namespace) -> int:
     if out.suffix.lower() != ".toml":
         raise InputError(args.out, "", "a mission file ends in .toml")
     drawing = _read(args.source) if args.source else Document(source="--goal")
-    start = place_argument(args.start, "--start") if args.start else None
-    goals = tuple(place_argument(g, "--goal") for g in args.goal)
-    near = start or drawing.home or (goals[0] if goals else None)
+    near = args.start or drawing.home or (args.goal[0] if args.goal else None)
     land = Document()
     sources = [(f, ZoneKind.EXCLUSION) for f in args.land] + [(f, ZoneKind.INCLUSION) for f in [args.fence] if f]
     for name, kind in sources:
         more = read(name, kind=kind, axis=args.axis, near=near, areas=True).require_clean()
         print_findings(more.findings, name)
         land = replace(land, zones=(*land.zones, *more.zones), marks=(*land.marks, *more.marks))
-    if args.margin is not None and not (math.isfinite(args.margin) and 0.0 <= args.margin <= 1000.0):
-        raise InputError("--margin", "", f"{args.margin:g} is outside 0..1000 m")
-    if args.radius is not None and not (math.isfinite(args.radius) and 0.0 < args.radius <= 5000.0):
-        raise InputError("--radius", "", f"{args.radius:g} is outside 0..5000 m")
     try:
-        made = mission_files(drawing, args.name or out.stem, start=start, goals=goals, margin_m=args.margin,
-                             radius_m=args.radius, land=land)
+        made = mission_files(drawing, args.name or out.stem, start=args.start, goals=tuple(args.goal),
+                             margin_m=args.margin, radius_m=args.radius, land=land)
     except ValueError as error:
         raise InputError(args.source or "companion mission new", "", str(error)) from None
     print_losses(made.losses, args.out)

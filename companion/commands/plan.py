@@ -6,10 +6,9 @@ import argparse
 import json
 import math
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.errors import InputError
+from companion.arguments import number, out_file, picture, whole
 
 if TYPE_CHECKING:
     from companion.planner import Plan, Problem
@@ -33,14 +32,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("problem", metavar="PROBLEM.json", help="the planning problem")
-    parser.add_argument("--budget", type=float, metavar="S", help="computing time [s]; 1 unless --expansions is given")
-    parser.add_argument("--expansions", type=int, metavar="N", help="effort in the algorithm's own steps instead")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random choice (default 0)")
+    parser.add_argument("--budget", type=number("s", above=0.0), metavar="S",
+                        help="computing time [s]; 1 unless --expansions is given")
+    parser.add_argument("--expansions", type=whole(at_least=1), metavar="N",
+                        help="effort in the algorithm's own steps instead")
+    parser.add_argument("--seed", type=whole(), default=0, metavar="N", help="of every random choice (default 0)")
     parser.add_argument("--algorithm", default="auto", choices=("auto", "rrtstar", "astar"))
     parser.add_argument("--explain", action="store_true", help="say what bound each leg and what would change the plan")
-    parser.add_argument("--explain-budget", type=float, default=5.0, metavar="S", help="computing time for that [s]")
-    parser.add_argument("--out", metavar="PLAN.json", help="write the plan")
-    parser.add_argument("--plot", metavar="P.png", help="draw problem, search, path and bound")
+    parser.add_argument("--explain-budget", type=number("s", above=0.0), default=5.0, metavar="S",
+                        help="computing time for that [s]")
+    parser.add_argument("--out", type=out_file, metavar="PLAN.json", help="write the plan")
+    parser.add_argument("--plot", type=picture, metavar="P.png", help="draw problem, search, path and bound")
     parser.add_argument("--json", action="store_true", help="print the plan as JSON instead of text")
     parser.set_defaults(run=run)
 
@@ -49,9 +51,6 @@ def run(args: argparse.Namespace) -> int:
     """Plan, print, write and draw; return the exit code."""
     from companion.planner import PlanStatus, Problem, plan
 
-    for path, flag in ((args.out, "--out"), (args.plot, "--plot")):
-        if path is not None and not Path(path).absolute().parent.is_dir():
-            raise InputError(flag, path, "is in a folder that does not exist", "make the folder first")
     problem = Problem.from_json(args.problem)
     answer = plan(
         problem, budget_s=args.budget, expansions=args.expansions, seed=args.seed, algorithm=args.algorithm)
@@ -61,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         answer = explain(problem, answer, budget_s=args.explain_budget)
     answer = _completed(problem, answer)
     if args.out is not None:
-        _write(Path(args.out), json.dumps(_file(problem, answer), indent=1) + "\n")
+        args.out.write_text(json.dumps(_file(problem, answer), indent=1) + "\n", encoding="utf-8")
     if args.plot is not None:
         from companion.plots.plan import save_plan
 
@@ -76,13 +75,6 @@ def run(args: argparse.Namespace) -> int:
     if answer.status is PlanStatus.INVALID:
         return 2
     return 0 if answer.has_path else 1
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError("--out", str(path), f"cannot be written ({error.strerror})", "choose another file") from error
 
 
 def _completed(problem: Problem, answer: Plan) -> Plan:

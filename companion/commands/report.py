@@ -7,6 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from companion.arguments import picture
+
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
@@ -15,7 +17,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         epilog="Example: companion report voyages/20260714T101500Z-archipelago",
     )
     parser.add_argument("voyage", type=Path, metavar="VOYAGE_DIR", help="the folder that `companion run` left")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="the picture (default: voyage.png in the folder)")
+    parser.add_argument("--out", type=picture, metavar="FILE", help="the picture (default: voyage.png in the folder)")
     parser.add_argument("--json", action="store_true", help="print summary.json and draw nothing")
     parser.set_defaults(run=run)
 

@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from companion.arguments import number, out_folder, whole
+
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
@@ -23,9 +25,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--ardurover", type=Path, metavar="PATH", help="the ArduRover program (default: $ARDUROVER, "
                         "the PATH, what `sitl fetch` brought)")
     parser.add_argument("--live", action="store_true", help="separate processes over UDP, in (sped-up) real time")
-    parser.add_argument("--speedup", type=float, metavar="N", help="with --live or ardurover (default: the scenario's)")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="the voyage folder")
+    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), metavar="N",
+                        help="with --live or ardurover (default: the scenario's)")
+    parser.add_argument("--seed", type=whole(), default=0)
+    parser.add_argument("--out", type=out_folder, metavar="DIR", help="the voyage folder")
     parser.set_defaults(run=run)
 
 
