@@ -9,12 +9,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.arguments import number, picture, place
+from companion.commands.output import (
+    force_option,
+    print_findings,
+    print_losses,
+    refuse_existing,
+    summary,
+    write_out,
+)
 from companion.errors import InputError, JobError
 
 if TYPE_CHECKING:
-    from companion.geofence import Area, Document, Finding
+    from companion.geofence import Area, Document
     from companion.geofence.autopilot_fence import AutopilotFence
-    from companion.geofence.losses import Written
     from companion.messages import GeoPoint
 
 _EPILOG = """\
@@ -58,6 +65,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     convert.add_argument("--repair", action="store_true",
                          help="write broken rings repaired: no repair makes the sea larger")
     convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
+    force_option(convert)
     convert.add_argument("--simplify", action="store_true",
                          help="write the 84 items for the autopilot (needs --margin and --start, or a mission)")
     convert.set_defaults(run=_convert)
@@ -75,6 +83,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     download.add_argument("out", metavar="OUT", help="its extension is the format")
     link_options(download)
     download.add_argument("--lossy", action="store_true", help="write even if zones are left out")
+    force_option(download)
     download.set_defaults(run=_download)
 
 
@@ -94,8 +103,8 @@ def reading_options(parser: argparse.ArgumentParser) -> None:
                         help="order of WKT coordinates (longitude first, checked against the place)")
     parser.add_argument("--near", type=place, metavar="LAT,LON",
                         help="where the file should lie: farther than 50 km is an error")
-    parser.add_argument("--point-radius", type=number("m", above=0.0, at_most=5000.0), default=10.0, metavar="M",
-                        help="radius of an obstacle that is a point or line (10)")
+    parser.add_argument("--point-radius", type=number("m", above=0.0, at_most=5000.0), metavar="M",
+                        help="radius of an obstacle that is a point or line (10); a file is converted with it drawn")
 
 
 def place_options(parser: argparse.ArgumentParser) -> None:
@@ -115,6 +124,13 @@ def read_input(args: argparse.Namespace) -> Document:
     if Path(args.file).suffix.lower() == ".toml":
         return document_of(load_mission(args.file))
     return read(args.file, kind=ZoneKind(args.kind), axis=args.axis, areas=True, near=args.near or args.start)
+
+
+def point_radius_m(args: argparse.Namespace) -> float:
+    """Return the radius of an obstacle without area [m]: the argument, or what a mission file takes by default."""
+    from companion.geofence.options import AreaOptions
+
+    return AreaOptions().point_radius_m if args.point_radius is None else float(args.point_radius)
 
 
 def places(args: argparse.Namespace) -> tuple[GeoPoint | None, tuple[GeoPoint, ...], float | None]:
@@ -140,34 +156,15 @@ def area_of(document: Document, point_radius_m: float) -> Area:
     )
 
 
-def print_findings(findings: tuple[Finding, ...], source: str) -> bool:
-    """Print findings and return whether one of them is an error."""
-    from companion.geofence import Severity
+def grown_marks(document: Document, point_radius_m: float) -> Document:
+    """Return the document with its points and lines to keep out of as zones of that radius."""
+    from dataclasses import replace
 
-    for finding in findings:
-        print(finding.line(source))
-    return any(f.severity is Severity.ERROR for f in findings)
+    from companion.geofence import ZoneKind
+    from companion.geofence.mission_files import zones_only
 
-
-def print_losses(losses: tuple[Finding, ...], out: str) -> None:
-    """Print what a file does not carry."""
-    for loss in losses:
-        print(loss.line(out))
-
-
-def summary(document: Document) -> str:
-    """Return what a document holds in a few words."""
-    from companion.geofence import Circle, ZoneKind
-
-    counts = [
-        (sum(z.kind is ZoneKind.INCLUSION for z in document.zones), "keep-in zone"),
-        (sum(z.kind is ZoneKind.EXCLUSION for z in document.zones), "keep-out zone"),
-        (len(document.marks), "point or line"), (len(document.items), "mission item"),
-        (len(document.rally), "rally point"), (len(document.tracks), "track"),
-    ]
-    vertices = sum(1 if isinstance(z.shape, Circle) else len(z.shape.exterior.coords) - 1 for z in document.zones)
-    words = ", ".join(f"{n} {word}{'s' if n != 1 else ''}" for n, word in counts if n)
-    return (words or "nothing") + (f" ({vertices} fence items)" if document.zones else "")
+    return replace(document, zones=zones_only(document, point_radius_m),
+                   marks=tuple(m for m in document.marks if m.kind is not ZoneKind.EXCLUSION))
 
 
 def _check(args: argparse.Namespace) -> int:
@@ -182,7 +179,7 @@ def _check(args: argparse.Namespace) -> int:
         mission = load_mission(args.file)
         wind_deg = mission.wind.preview_from_deg if wind_deg is None else wind_deg
         args.no_go = mission.boat.no_go_half_deg
-    area = area_of(document, args.point_radius)
+    area = area_of(document, point_radius_m(args))
     bad = print_findings(document.findings, args.file)
     bad |= print_findings(check_area(area, Conditions(
         start=start, goals=goals, margin_m=margin_m, no_go_half_rad=math.radians(args.no_go),
@@ -198,19 +195,6 @@ def _check(args: argparse.Namespace) -> int:
     return int(bad)
 
 
-def write_out(written: Written, out: str, *, lossy: bool) -> None:
-    """Write a file, or refuse when it would protect less than its source and nobody said ``--lossy``."""
-    from companion.geofence import Severity
-
-    print_losses(written.losses, out)
-    if any(f.severity is Severity.ERROR for f in written.losses) and not lossy:
-        raise JobError(f"{out}: not written: zones would be missing; choose another format or say --lossy")
-    try:
-        Path(out).write_bytes(written.data)
-    except OSError as error:
-        raise InputError(out, "", f"cannot be written ({error.strerror})") from None
-
-
 def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
     """Return the autopilot's fence for the arguments. Raises JobError with the reason when there is none."""
     from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
@@ -219,7 +203,7 @@ def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
     if start is None or margin_m is None:
         raise InputError(args.file, "", "simplifying needs a margin and a start",
                          "give --margin M and --start LAT,LON, or a mission TOML")
-    result = fence_for_autopilot(area_of(document, args.point_radius), margin_m, inside=[start, *goals])
+    result = fence_for_autopilot(area_of(document, point_radius_m(args)), margin_m, inside=[start, *goals])
     if result.status is not FenceStatus.OK:
         raise JobError(f"{args.file}: no fence for the autopilot: {result.reason}")
     for note in result.notes:
@@ -236,9 +220,11 @@ def _convert(args: argparse.Namespace) -> int:
     if not args.repair:
         document.require_clean()
     print_findings(document.findings, args.file)
+    if args.point_radius is not None:
+        document = grown_marks(document, args.point_radius)
     if args.simplify:
         document = Document(source=document.source, format="simplified", zones=simplified(args, document).zones)
-    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy)
+    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy, force=args.force)
     print(f"{args.out}: written: {summary(document)}")
     return 0
 
@@ -250,7 +236,7 @@ def _upload(args: argparse.Namespace) -> int:
     from companion.messages import MissionType
 
     document = read_input(args).require_clean()
-    items, losses = zones_to_items(zones_only(document, args.point_radius), return_point=document.return_point)
+    items, losses = zones_to_items(zones_only(document, point_radius_m(args)), return_point=document.return_point)
     if not items:
         raise JobError(f"{args.file}: there is no zone to upload")
     start, _, margin_m = places(args)
@@ -287,6 +273,7 @@ def _download(args: argparse.Namespace) -> int:
     from companion.messages import MissionType
 
     format_of(args.out)
+    refuse_existing([args.out], force=args.force)
     with Shore(args.link, timeout_s=args.timeout) as shore:
         items = download_list(shore, MissionType.FENCE)
     findings = Findings()
@@ -296,7 +283,7 @@ def _download(args: argparse.Namespace) -> int:
     if not items:
         print("the autopilot holds no fence; nothing is written", file=sys.stderr)
         return 1
-    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy)
+    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy, force=args.force)
     print(f"{args.out}: written: {summary(document)}, hash {mission_hash(items)}")
     return int(bad)
 

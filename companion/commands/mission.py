@@ -8,8 +8,18 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from companion.arguments import number, picture, place, wind
+from companion.arguments import picture, wind
+from companion.commands import mission_new
+from companion.commands.output import (
+    force_option,
+    print_findings,
+    print_losses,
+    refuse_existing,
+    summary,
+    write_out,
+)
 from companion.errors import InputError, JobError
+from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.boat import Boat
@@ -21,7 +31,8 @@ examples:
   companion mission check missions/archipelago.toml --plot archipelago.png
   companion mission new bay.toml --start 50.817,-1.31 --goal 50.8203,-1.31 --land islands.wkt --margin 12 --plot bay.png
   companion mission new bay.toml --from drawn-in-qgroundcontrol.plan
-  companion mission convert bay.toml bay.plan          (also .waypoints, .gpx, .kml, .geojson)
+  companion mission convert bay.toml bay.plan          (also .gpx, .kml, .geojson)
+  companion mission convert bay.toml bay.waypoints --part mission
   companion mission convert route.gpx route.waypoints
   companion mission upload route.waypoints --link udpin:0.0.0.0:14550
   companion mission download boat.plan --link /dev/ttyUSB0:57600
@@ -46,30 +57,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     preview_options(check)
     check.set_defaults(run=_check)
 
-    new = verbs.add_parser("new", help="make a mission TOML with its area files")
-    new.add_argument("out", metavar="OUT.toml")
-    new.add_argument("--from", dest="source", metavar="FILE", help="a drawing: .plan, .waypoints, GPX, KML, GeoJSON")
-    new.add_argument("--start", type=place, metavar="LAT,LON",
-                     help="where the boat will start (else the drawing's home)")
-    new.add_argument("--goal", type=place, metavar="LAT,LON", action="append", default=[], help="in order; repeat it")
-    new.add_argument("--land", metavar="FILE", action="append", default=[], help="obstacles, any format; repeat it")
-    new.add_argument("--fence", metavar="FILE", help="water to stay inside of, any format")
-    new.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto", help="order of WKT coordinates")
-    new.add_argument("--name", help="of the mission (else of the file)")
-    new.add_argument("--margin", type=number("m", at_least=0.0, at_most=1000.0), metavar="M",
-                     help="what plans keep clear of everything (12)")
-    new.add_argument("--radius", type=number("m", above=0.0, at_most=5000.0), metavar="M", help="of the goals (10)")
-    new.add_argument("--force", action="store_true", help="overwrite files")
-    preview_options(new)
-    new.set_defaults(run=_new)
+    mission_new.add_parser(verbs)
 
     convert = verbs.add_parser("convert", help="write a mission in another format and say what it does not carry")
     convert.add_argument("file", metavar="FILE")
     convert.add_argument("out", metavar="OUT", help="its extension is the format")
-    convert.add_argument("--part", choices=("mission", "fence", "rally"), default="mission",
-                         help="what goes into a .waypoints file, which holds one list (mission)")
+    convert.add_argument("--part", choices=("mission", "fence", "rally"),
+                         help="write this alone (a .waypoints file holds no more than one of them)")
     convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
-    convert.add_argument("--force", action="store_true", help="overwrite the files of a mission TOML")
+    mission_new.point_radius_option(convert)
+    force_option(convert)
     convert.set_defaults(run=_convert)
 
     upload = verbs.add_parser("upload", help="write a waypoint file to the autopilot, read back, compare")
@@ -81,6 +78,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     download = verbs.add_parser("download", help="read the autopilot's mission into a file")
     download.add_argument("out", metavar="OUT", help="its extension is the format")
     download.add_argument("--part", choices=("mission", "rally"), default="mission")
+    force_option(download)
     link_options(download)
     download.set_defaults(run=_download)
 
@@ -94,7 +92,7 @@ def preview_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-plan", action="store_true", help="draw no plan")
 
 
-def _preview(mission: Mission, args: argparse.Namespace) -> None:
+def preview(mission: Mission, args: argparse.Namespace) -> None:
     """Draw the mission in the wind that the arguments or the mission give."""
     from companion.compose import boat_of
     from companion.plots.mission import save_mission
@@ -144,7 +142,8 @@ def _plans(mission: Mission, boat: Boat, tws_mps: float, twd_from_rad: float) ->
     return plans
 
 
-def _read(path: str) -> Document:
+def read_mission_file(path: str) -> Document:
+    """Return what a mission TOML or a drawing holds, with its only line as the route. Raises InputError."""
     from companion.geofence import read
     from companion.geofence.mission import load_mission
     from companion.geofence.mission_files import document_of
@@ -156,12 +155,11 @@ def _read(path: str) -> Document:
 
 
 def _check(args: argparse.Namespace) -> int:
-    from companion.commands.fence import print_findings, summary
     from companion.geofence.check import Conditions, check_area
     from companion.geofence.mission import load_mission
 
     if Path(args.file).suffix.lower() != ".toml":
-        document = _read(args.file)
+        document = read_mission_file(args.file)
         print_findings(document.findings, args.file)
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
@@ -176,66 +174,42 @@ def _check(args: argparse.Namespace) -> int:
         twd_from_rad=math.radians(wind_deg), no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
     )), args.file)
     if args.plot:
-        _preview(mission, args)
-    goals = f"{len(mission.goals)} goal{'s' if len(mission.goals) != 1 else ''}"
-    print(f"{args.file}: {mission.name}: {goals}, {len(mission.area.solids)} obstacles: "
+        preview(mission, args)
+    print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
+          f"{counted(len(mission.area.solids), 'obstacle')}: "
           f"{'NOT in order' if bad else 'in order'}")
     return int(bad)
 
 
-def _new(args: argparse.Namespace) -> int:
+def _only(document: Document, part: str) -> Document:
+    """Return one part of a document, and say what else it holds."""
     from dataclasses import replace
 
-    from companion.commands.fence import print_findings, print_losses
-    from companion.geofence import Document, ZoneKind, read
-    from companion.geofence.mission import load_mission
-    from companion.geofence.mission_files import mission_files
-
-    out = Path(args.out)
-    if out.suffix.lower() != ".toml":
-        raise InputError(args.out, "", "a mission file ends in .toml")
-    drawing = _read(args.source) if args.source else Document(source="--goal")
-    near = args.start or drawing.home or (args.goal[0] if args.goal else None)
-    land = Document()
-    sources = [(f, ZoneKind.EXCLUSION) for f in args.land] + [(f, ZoneKind.INCLUSION) for f in [args.fence] if f]
-    for name, kind in sources:
-        more = read(name, kind=kind, axis=args.axis, near=near, areas=True).require_clean()
-        print_findings(more.findings, name)
-        land = replace(land, zones=(*land.zones, *more.zones), marks=(*land.marks, *more.marks))
-    try:
-        made = mission_files(drawing, args.name or out.stem, start=args.start, goals=tuple(args.goal),
-                             margin_m=args.margin, radius_m=args.radius, land=land)
-    except ValueError as error:
-        raise InputError(args.source or "companion mission new", "", str(error)) from None
-    print_losses(made.losses, args.out)
-    _write_all({args.out: made.toml, **{str(out.parent / n): d for n, d in made.files.items()}}, force=args.force)
-    mission = load_mission(out)
-    if args.plot:
-        _preview(mission, args)
-    return 0
-
-
-def _write_all(files: dict[str, bytes], *, force: bool) -> None:
-    """Write all files or none: an existing one is not overwritten without ``force``."""
-    there = [name for name in files if Path(name).exists()]
-    if there and not force:
-        raise InputError(there[0], "", "exists", "say --force to overwrite it")
-    for name, data in files.items():
-        try:
-            Path(name).write_bytes(data)
-        except OSError as error:
-            raise InputError(name, "", f"cannot be written ({error.strerror})") from None
-        print(f"{name}: written")
+    parts: dict[str, Document] = {
+        "mission": replace(document, zones=(), marks=(), rally=(), return_point=None, tracks=()),
+        "fence": replace(document, items=(), item_names=(), rally=(), home=None, tracks=()),
+        "rally": replace(document, items=(), item_names=(), zones=(), marks=(), return_point=None, home=None,
+                         tracks=()),
+    }
+    if summary(parts[part]) == "nothing":
+        raise JobError(f"{document.source}: there is no {part} in it; it holds {summary(document)}")
+    others = [summary(parts[p]) for p in parts if p != part]
+    rest = ", ".join(words for words in others if words != "nothing")
+    if rest:
+        print(f"{document.source}: note: also holds {rest}: left out with --part {part}")
+    return parts[part]
 
 
 def _convert(args: argparse.Namespace) -> int:
-    from companion.commands.fence import print_findings, print_losses, summary, write_out
+    from companion.commands.fence import grown_marks
     from companion.geofence.formats import write
     from companion.geofence.mission import load_mission
     from companion.geofence.mission_files import goal_losses, mission_files
 
-    document = _read(args.file)
+    document = read_mission_file(args.file)
     print_findings(document.findings, args.file)
+    if args.point_radius is not None:
+        document = grown_marks(document, args.point_radius)
     if Path(args.file).suffix.lower() == ".toml":
         print_losses(tuple(goal_losses(load_mission(args.file))), args.out)
     out = Path(args.out)
@@ -244,13 +218,12 @@ def _convert(args: argparse.Namespace) -> int:
             made = mission_files(document, out.stem)
         except ValueError as error:
             raise InputError(args.file, "", str(error)) from None
-        print_losses(made.losses, args.out)
-        _write_all({args.out: made.toml, **{str(out.parent / n): d for n, d in made.files.items()}}, force=args.force)
-        load_mission(out)
+        mission_new.write_mission(made, out, force=args.force)
         return 0
-    only_mission = out.suffix.lower() in {".waypoints", ".txt"} and args.part == "mission"
-    # A .waypoints file is one list by design: that the others are not in it is said, and is no reason to refuse.
-    write_out(write(document, args.out, part=args.part), args.out, lossy=args.lossy or only_mission)
+    if args.part is not None:
+        document = _only(document, args.part)
+    write_out(write(document, args.out), args.out, lossy=args.lossy, force=args.force,
+              remedy="choose another format, or what to write with --part,")
     print(f"{args.out}: written from {summary(document)}")
     return 0
 
@@ -262,11 +235,9 @@ def _upload(args: argparse.Namespace) -> int:
     if Path(args.file).suffix.lower() == ".toml":
         raise InputError(args.file, "", "holds goals, not the way to them",
                          "sail it with 'companion run', or convert it to .waypoints to sail straight lines")
-    document = _read(args.file)
+    document = _only(read_mission_file(args.file), args.part)
     kind = MissionType.RALLY if args.part == "rally" else MissionType.MISSION
     items = document.rally if kind is MissionType.RALLY else document.items
-    if not items:
-        raise JobError(f"{args.file}: there is no {args.part} to upload")
     with Shore(args.link, timeout_s=args.timeout) as shore:
         name = upload_and_compare(shore, kind, items, home=document.home)
     print(f"{args.part} of {len(items)} items uploaded and read back the same, hash {name}")
@@ -274,7 +245,6 @@ def _upload(args: argparse.Namespace) -> int:
 
 
 def _download(args: argparse.Namespace) -> int:
-    from companion.commands.fence import summary, write_out
     from companion.commands.shore import Shore, download_list
     from companion.geofence import Document
     from companion.geofence.formats import format_of, write
@@ -282,6 +252,7 @@ def _download(args: argparse.Namespace) -> int:
     from companion.messages import MissionType
 
     format_of(args.out)
+    refuse_existing([args.out], force=args.force)
     kind = MissionType.RALLY if args.part == "rally" else MissionType.MISSION
     with Shore(args.link, timeout_s=args.timeout) as shore:
         items = download_list(shore, kind)
@@ -291,6 +262,6 @@ def _download(args: argparse.Namespace) -> int:
         return 1
     document = Document(source="autopilot", format="autopilot", items=items if args.part == "mission" else (),
                         rally=items if args.part == "rally" else (), home=home)
-    write_out(write(document, args.out, part=args.part), args.out, lossy=False)
+    write_out(write(document, args.out, part=args.part), args.out, lossy=False, force=args.force)
     print(f"{args.out}: written: {summary(document)}, hash {mission_hash(items)}")
     return 0
