@@ -77,9 +77,10 @@ def run(args: argparse.Namespace) -> int:
     from companion.geofence import load_mission
     from companion.mavlink.signing import SigningStore
     from companion.mavlink.transport import open_link
+    from companion.sailable import require_sailable
     from companion.skipper.findings import Level
 
-    mission = load_mission(args.mission) if args.mission is not None else None
+    mission = require_sailable(load_mission(args.mission)) if args.mission is not None else None
     transport = open_link(args.link)
     signing = SigningStore(args.signing_key, time.time()) if args.signing_key is not None else None
     findings, changes = run_loop(

@@ -163,10 +163,9 @@ def _check(args: argparse.Namespace) -> int:
         print_findings(document.findings, args.file)
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
-    mission = load_mission(args.file)
-    from companion.compose import polar_of
+    from companion.sailable import require_sailable
 
-    polar_of(mission)
+    mission = require_sailable(load_mission(args.file))
     bad = print_findings(mission.findings, args.file)
     wind_deg = args.wind[1] if args.wind else mission.wind.preview_from_deg
     bad |= print_findings(check_area(mission.area, Conditions(

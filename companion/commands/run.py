@@ -93,12 +93,13 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     from companion.clock import run as run_loop
     from companion.geofence import load_mission
     from companion.mavlink.transport import open_link
+    from companion.sailable import require_sailable
     from companion.telemetry.shelf import DEFAULT_BUDGET_BYTES, Shelf
     from companion.traffic.feeds import parse_feed
 
     for name in args.feed:
         parse_feed(name)
-    mission = load_mission(args.mission).with_feeds(*args.feed)
+    mission = require_sailable(load_mission(args.mission)).with_feeds(*args.feed)
     for finding in mission.findings:
         err.write(f"companion run: note: {finding}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
