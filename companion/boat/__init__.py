@@ -11,8 +11,12 @@ from companion.boat.margins import (
     AutopilotLimits,
     Margin,
     MarginPart,
+    ProposedMargin,
     fence_penetration,
+    narrowest_corridor_m,
+    proposed_margin,
     required_margin,
+    widest_corridor_m,
 )
 from companion.boat.polar import MPS_PER_KNOT, Polar, SailingAngle
 from companion.boat.polar_files import PolarFile, parse_polar, read_polar
@@ -26,12 +30,16 @@ __all__ = [
     "MarginPart",
     "Polar",
     "PolarFile",
+    "ProposedMargin",
     "SailingAngle",
     "ardurover_sitl",
     "avalon",
     "constant",
     "fence_penetration",
+    "narrowest_corridor_m",
     "parse_polar",
+    "proposed_margin",
     "read_polar",
     "required_margin",
+    "widest_corridor_m",
 ]

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from companion.arguments import number
 
 if TYPE_CHECKING:
+    from companion.boat import AutopilotLimits
     from companion.geofence import Mission
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.signing import SigningStore
@@ -110,6 +111,25 @@ def needs_of(mission: Mission | None) -> Needs:
         reach_m=max(math.hypot(*place) for place in places), has_fence=mission.operator.upload_fence,
         can_tack=boat.can_tack,
     )
+
+
+def limits_at(link: str, *, wait_s: float = 10.0) -> AutopilotLimits:
+    """Return what the autopilot on a link does with a plan. Raises InputError and LinkError."""
+    from companion.boat import AutopilotLimits
+    from companion.clock import run as run_loop
+    from companion.mavlink.autopilot import Autopilot
+    from companion.mavlink.link import Link
+    from companion.mavlink.transport import open_link
+
+    async def ask() -> AutopilotLimits:
+        async with Link(open_link(link)) as connected:
+            await connected.wait_autopilot(wait_s)
+            async with Autopilot(connected) as autopilot:
+                answers = {name: await autopilot.get_parameter(name) for name in AutopilotLimits.PARAMETERS}
+        return AutopilotLimits.from_params(
+            {name: answer.value for name, answer in answers.items() if answer.value is not None})
+
+    return run_loop(ask())
 
 
 async def diagnose(

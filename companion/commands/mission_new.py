@@ -12,6 +12,7 @@ from companion.commands.output import force_option, print_findings, print_losses
 from companion.errors import InputError
 
 if TYPE_CHECKING:
+    from companion.boat import ProposedMargin
     from companion.geofence import Mission
     from companion.geofence.mission_files import MissionFiles
 
@@ -31,12 +32,34 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
     new.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto", help="order of WKT coordinates")
     new.add_argument("--name", help="of the mission (else of the file)")
     new.add_argument("--margin", type=number("m", at_least=0.0, at_most=1000.0), metavar="M",
-                     help="what plans keep clear of everything (12)")
+                     help="what plans keep clear of everything (what the autopilot's habits ask for)")
+    new.add_argument("--link", metavar="LINK",
+                     help="ask the autopilot there for its habits (else ArduRover's defaults)")
     new.add_argument("--radius", type=number("m", above=0.0, at_most=5000.0), metavar="M", help="of the goals (10)")
     point_radius_option(new)
     force_option(new)
     preview_options(new)
     new.set_defaults(run=run)
+
+
+def _proposed_margin(args: argparse.Namespace) -> ProposedMargin | None:
+    """Return the margin that the doctor will find enough, and say what it is made of; None when one is given."""
+    if args.margin is not None:
+        return None
+    from companion.boat import AutopilotLimits, Boat, ardurover_sitl, proposed_margin
+    from companion.geofence.options import WindOptions
+
+    if args.link is not None:
+        from companion.commands.doctor import limits_at
+
+        limits, source = limits_at(args.link), f"the parameters at {args.link}"
+    else:
+        limits, source = AutopilotLimits(), "ArduRover's default parameters; --link asks the autopilot"
+    boat = Boat(polar=ardurover_sitl())
+    proposed = proposed_margin(
+        limits, speed_mps=boat.polar.max_speed_mps(WindOptions().preview_speed_mps), hull=boat.hull)
+    print(f"{args.out}: note: margin_m = {proposed.margin_m:g}: {proposed.margin.describe()} ({source})")
+    return proposed
 
 
 def point_radius_option(parser: argparse.ArgumentParser) -> None:
@@ -65,9 +88,13 @@ def run(args: argparse.Namespace) -> int:
         more = read(name, kind=kind, axis=args.axis, near=near, areas=True).require_clean()
         print_findings(more.findings, name)
         land = replace(land, zones=(*land.zones, *more.zones), marks=(*land.marks, *more.marks))
+    proposed = _proposed_margin(args)
     try:
-        made = mission_files(drawing, args.name or out.stem, start=args.start, goals=tuple(args.goal),
-                             margin_m=args.margin, radius_m=args.radius, point_radius_m=args.point_radius, land=land)
+        made = mission_files(
+            drawing, args.name or out.stem, start=args.start, goals=tuple(args.goal), land=land, radius_m=args.radius,
+            margin_m=args.margin if proposed is None else proposed.margin_m,
+            floor_m=None if proposed is None else proposed.floor_m, point_radius_m=args.point_radius,
+        )
     except ValueError as error:
         raise InputError(args.source or "companion mission new", "", str(error)) from None
     mission = write_mission(made, out, force=args.force)
