@@ -240,8 +240,9 @@ def _signing(path: Path | None) -> Any:
 def _report(folder: Path, err: Console) -> None:
     """Draw the voyage; a picture that fails must not hide how the voyage ended."""
     try:
-        from companion.plots.voyage import plot_voyage, read_voyage
+        from companion.plots.voyage import plot_voyage
         from companion.telemetry.names import PICTURE
+        from companion.telemetry.voyage_folder import read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:

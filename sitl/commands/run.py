@@ -70,8 +70,9 @@ def run(args: argparse.Namespace) -> int:
 def draw(folder: Path) -> None:
     """Draw the voyage; a picture that fails must not hide the verdict."""
     try:
-        from companion.plots.voyage import plot_voyage, read_voyage
+        from companion.plots.voyage import plot_voyage
         from companion.telemetry.names import PICTURE
+        from companion.telemetry.voyage_folder import read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:
