@@ -22,9 +22,8 @@ from companion.errors import InputError, JobError
 from companion.words import counted
 
 if TYPE_CHECKING:
-    from companion.boat import Boat
     from companion.geofence import Document, Mission
-    from companion.planner import Plan
+    from companion.planner import Plan, Problem
 
 _EPILOG = """\
 examples:
@@ -104,35 +103,27 @@ def preview(mission: Mission, args: argparse.Namespace) -> None:
     lines = save_mission(
         mission, args.plot, tws_mps=tws_mps, twd_from_rad=twd_from_rad,
         beat_rad=boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad,
-        plans=[] if args.no_plan else _plans(mission, boat, tws_mps, twd_from_rad),
+        plans=[] if args.no_plan else _plans(mission, tws_mps, twd_from_rad),
     )
     for line in lines:
         print(line)
     print(f"{args.plot}: written")
 
 
-def _plans(mission: Mission, boat: Boat, tws_mps: float, twd_from_rad: float) -> list[Plan]:
+def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
     """Return the planner's way from goal to goal, first lap, in a steady wind."""
-    from companion.planner import Problem, plan
+    from companion.planner import plan
 
     if mission.start is None:
         return []
     frame = mission.frame()
-    local = mission.area.local(frame)
     here = frame.en_from_geo(mission.start)
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
-    limits = boat.problem_boat(tws_mps)
     plans = []
     for goal in mission.goals:
         east_m, north_m = frame.en_from_geo(goal.point)
-        problem = Problem.from_json({
-            "id": mission.name, "title": mission.name,
-            "start": {"x": here[0], "y": here[1], "heading_deg": heading_deg % 360.0},
-            "goal": {"x": east_m, "y": north_m, "radius": goal.radius_m},
-            "obstacles": local.obstacles_wkt(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here),
-            "wind": {"from_deg": math.degrees(twd_from_rad), "speed_mps": tws_mps, "sigma": {"model": "none"}},
-            "boat": limits, "delta_s": mission.risk.delta_s,
-        })
+        problem = leg_problem(mission, here, heading_deg, (east_m, north_m), goal.radius_m, tws_mps=tws_mps,
+                              from_deg=math.degrees(twd_from_rad))
         answer = plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0)
         plans.append(answer)
         if not answer.has_path:
@@ -140,6 +131,25 @@ def _plans(mission: Mission, boat: Boat, tws_mps: float, twd_from_rad: float) ->
         here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
         heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
     return plans
+
+
+def leg_problem(
+    mission: Mission, here_en: tuple[float, float], heading_deg: float, goal_en: tuple[float, float], radius_m: float,
+    *, tws_mps: float, from_deg: float, title: str = "",
+) -> Problem:
+    """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady."""
+    from companion.compose import boat_of
+    from companion.planner import Problem
+
+    local = mission.area.local(mission.frame())
+    return Problem.from_json({
+        "id": mission.name, "title": title,
+        "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
+        "goal": {"x": goal_en[0], "y": goal_en[1], "radius": radius_m},
+        "obstacles": local.obstacles_wkt(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here_en),
+        "wind": {"from_deg": from_deg, "speed_mps": tws_mps, "sigma": {"model": "none"}},
+        "boat": boat_of(mission).problem_boat(tws_mps), "delta_s": mission.risk.delta_s,
+    })
 
 
 def read_mission_file(path: str) -> Document:
