@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from companion.arguments import number, picture, place
 from companion.commands.output import (
     force_option,
+    patience,
     print_findings,
     print_losses,
     refuse_existing,
@@ -173,12 +174,14 @@ def _check(args: argparse.Namespace) -> int:
     document = read_input(args)
     start, goals, margin_m = places(args)
     wind_deg = args.wind_from
+    names: list[str] = []
     if Path(args.file).suffix.lower() == ".toml":
         from companion.geofence.mission import load_mission
 
         mission = load_mission(args.file)
         wind_deg = mission.wind.preview_from_deg if wind_deg is None else wind_deg
         args.no_go = mission.boat.no_go_half_deg
+        names = [goal.name for goal in mission.goals] if not args.goal else []
     area = area_of(document, point_radius_m(args))
     bad = print_findings(document.findings, args.file)
     bad |= print_findings(check_area(area, Conditions(
@@ -188,9 +191,10 @@ def _check(args: argparse.Namespace) -> int:
     if args.plot:
         from companion.plots.mission import save_area
 
-        save_area(area, args.plot, start=start, goals=goals, margin_m=margin_m or 0.0,
-                  twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
-                  no_go_half_rad=math.radians(args.no_go), title=Path(args.file).name)
+        with patience("drawing"):
+            save_area(area, args.plot, start=start, goals=goals, margin_m=margin_m or 0.0,
+                      twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
+                      no_go_half_rad=math.radians(args.no_go), title=Path(args.file).name, names=names)
     print(f"{args.file}: {document.format}: {summary(document)}: {'NOT in order' if bad else 'in order'}")
     return int(bad)
 

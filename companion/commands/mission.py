@@ -12,6 +12,7 @@ from companion.arguments import picture, wind
 from companion.commands import mission_new
 from companion.commands.output import (
     force_option,
+    patience,
     print_findings,
     print_losses,
     refuse_existing,
@@ -100,11 +101,12 @@ def preview(mission: Mission, args: argparse.Namespace) -> None:
     if args.wind:
         tws_mps, from_deg = args.wind
     twd_from_rad, boat = math.radians(from_deg), boat_of(mission)
-    lines = save_mission(
-        mission, args.plot, tws_mps=tws_mps, twd_from_rad=twd_from_rad,
-        beat_rad=boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad,
-        plans=[] if args.no_plan else _plans(mission, tws_mps, twd_from_rad),
-    )
+    with patience("planning and drawing"):
+        lines = save_mission(
+            mission, args.plot, tws_mps=tws_mps, twd_from_rad=twd_from_rad,
+            beat_rad=boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad,
+            plans=[] if args.no_plan else _plans(mission, tws_mps, twd_from_rad),
+        )
     for line in lines:
         print(line)
     print(f"{args.plot}: written")

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-from collections.abc import Sequence
+import sys
+import threading
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.disk import NEW, reason
 from companion.errors import InputError, JobError
 from companion.words import counted
+
+# Beyond this it is told why nothing happens [s]: cached, planning and drawing each take less.
+PATIENCE_S = 3.0
 
 if TYPE_CHECKING:
     from companion.geofence import Document, Finding
@@ -84,6 +89,19 @@ def refuse_existing(names: Sequence[str], *, force: bool) -> None:
     there = [name for name in names if Path(name).exists()]
     if there and not force:
         raise InputError(there[0], "", "exists", "say --force to overwrite it")
+
+
+@contextlib.contextmanager
+def patience(doing: str) -> Iterator[None]:
+    """Say on stderr why nothing happens when the work within takes long: the first time on a machine it does."""
+    waiting = threading.Timer(PATIENCE_S, sys.stderr.write, (
+        f"note: {doing}; the first time on a machine kernels are compiled and fonts are listed, which takes long\n",))
+    waiting.daemon = True
+    waiting.start()
+    try:
+        yield
+    finally:
+        waiting.cancel()
 
 
 def force_option(parser: argparse.ArgumentParser) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import math
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.arguments import number, out_file, picture, whole, wind
+from companion.commands.output import patience
 from companion.errors import InputError
 from companion.planner.courses import courses
 from companion.words import counted
@@ -76,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
         if len(answers) > 1:
             raise InputError("--plot", str(args.plot), "one plan is drawn, and this mission wants several",
                              "companion mission check --plot draws them all")
-        save_plan(*answers[0], args.plot)
+        with patience("drawing"):
+            save_plan(*answers[0], args.plot)
     if args.json:
         sys.stdout.write(text)
     else:
@@ -93,8 +96,10 @@ def _answer(problem: Problem, args: argparse.Namespace) -> tuple[Problem, Plan]:
     """Return a problem with its plan, explained where that is asked for."""
     from companion.planner import plan
 
-    answer = plan(
-        problem, budget_s=args.budget, expansions=args.expansions, seed=args.seed, algorithm=args.algorithm)
+    # what is asked for may take long by itself: the time it was given is no surprise
+    with patience("planning") if args.budget is None else contextlib.nullcontext():
+        answer = plan(
+            problem, budget_s=args.budget, expansions=args.expansions, seed=args.seed, algorithm=args.algorithm)
     if args.explain:
         from companion.planner.explain import explain
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.arguments import out_file, picture
-from companion.commands.output import force_option, write_out
+from companion.commands.output import force_option, patience, write_out
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -48,7 +48,8 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(record.figures, indent=1))
         return 0
     out = args.out or args.voyage / PICTURE
-    plot_voyage(record, out)
+    with patience("drawing"):
+        plot_voyage(record, out)
     print("\n".join([*in_words(record), *(f"Track: {path}" for path in args.track), f"Picture: {out}"]))
     return 0
 
