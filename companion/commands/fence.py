@@ -217,7 +217,7 @@ def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
 
 
 def _convert(args: argparse.Namespace) -> int:
-    from companion.geofence import Document
+    from companion.geofence import Document, read
     from companion.geofence.formats import write
 
     document = read_input(args)
@@ -229,7 +229,7 @@ def _convert(args: argparse.Namespace) -> int:
     if args.simplify:
         document = Document(source=document.source, format="simplified", zones=simplified(args, document).zones)
     write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy, force=args.force)
-    print(f"{args.out}: written: {summary(document)}")
+    print(f"{args.out}: written: {summary(read(args.out, areas=True))}")   # what is in it, not what was meant to be
     return 0
 
 

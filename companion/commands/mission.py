@@ -213,6 +213,7 @@ def _only(document: Document, part: str) -> Document:
 
 def _convert(args: argparse.Namespace) -> int:
     from companion.commands.fence import grown_marks
+    from companion.geofence import read
     from companion.geofence.formats import write
     from companion.geofence.mission import load_mission
     from companion.geofence.mission_files import goal_losses, mission_files
@@ -235,7 +236,7 @@ def _convert(args: argparse.Namespace) -> int:
         document = _only(document, args.part)
     write_out(write(document, args.out), args.out, lossy=args.lossy, force=args.force,
               remedy="choose another format, or what to write with --part,")
-    print(f"{args.out}: written from {summary(document)}")
+    print(f"{args.out}: written: {summary(read(args.out))}")   # what is in it, not what was meant to be
     return 0
 
 

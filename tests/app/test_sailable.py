@@ -19,6 +19,8 @@ GOOD = (MISSIONS / "archipelago.toml").read_text()
 BAD = [
     ("estimator", '[wind]\nestimator = "kalmann"\n',
      "[wind] estimator: 'kalmann' is no wind estimator; did you mean 'kalman'?"),
+    ("choice", '[skipper]\nguidance = "fields"\n',
+     """[skipper] guidance: 'fields' is none of the choices; write "plan" or "heading" or "field\""""),
     ("feed", '[traffic]\nfeeds = ["upd:1234"]\n', "[traffic] feeds: 'upd:1234' is not a feed; write udpin:HOST:PORT"),
     ("floor", "margin_floor_m = 20.0", "[area] margin_floor_m: 20 m is more than margin_m"),
     ("field", '[skipper]\nguidance = "field"\n', '[skipper] guidance: "field" steers in GUIDED, which nobody allows'),

@@ -175,3 +175,24 @@ def test_what_an_upload_leaves_out_is_said(capsys, tmp_path):
     assert code == 1
     assert "keep-out zones" in out
     assert "left out with --part mission" in out
+
+
+def test_what_is_written_is_what_is_counted(capsys, tmp_path):
+    drawing = tmp_path / "a.geojson"
+    assert run(capsys, "mission", "convert", DEMO, drawing)[0] == 0
+    _, out, _ = run(capsys, "fence", "convert", drawing, tmp_path / "a.wkt")
+    written = out.splitlines()[-1]
+    assert "keep-out zones" in written
+    assert "mission item" not in written   # they are not in it
+
+
+@pytest.mark.parametrize(("line", "choices"), [
+    ('[[goal]]\nlat = 50.0\nlon = 1.0\nrounding = "left"\n', 'write "port" or "starboard"'),
+    ('[[goal]]\nlat = 50.0\nlon = 1.0\n[area]\naxis = "xy"\n', 'write "auto" or "lonlat" or "latlon"'),
+    ('[[goal]]\nlat = 50.0\nlon = 1.0\n[skipper]\nend = "stop"\n', 'write "loiter" or "home"'),
+])
+def test_a_wrong_word_is_told_its_choices(capsys, tmp_path, line, choices):
+    (tmp_path / "m.toml").write_text(line)
+    code, _, err = run(capsys, "mission", "check", tmp_path / "m.toml")
+    assert code == 2
+    assert choices in err
