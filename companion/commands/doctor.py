@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.arguments import number
+from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.boat import AutopilotLimits
@@ -245,5 +246,6 @@ def as_text(findings: Sequence[Finding], changes: Sequence[Change], *, applied: 
         lines.append(f"apply   {c.name} {before} -> {c.wanted:g}: {state} {after}")
     errors = sum(f.level is Level.ERROR for f in findings)
     warnings = sum(f.level is Level.WARNING for f in findings)
-    lines.append(f"{errors} errors, {warnings} warnings" + ("" if applied else "; nothing was changed"))
+    rest = "" if applied else "; nothing was changed"
+    lines.append(f"{counted(errors, 'error')}, {counted(warnings, 'warning')}{rest}")
     return "\n".join(lines) + "\n"

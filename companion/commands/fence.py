@@ -19,6 +19,7 @@ from companion.commands.output import (
     write_out,
 )
 from companion.errors import InputError, JobError
+from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.geofence import Area, Document
@@ -256,7 +257,7 @@ def _upload(args: argparse.Namespace) -> int:
         print_losses(tuple(losses), args.file)
     with Shore(args.link, timeout_s=args.timeout) as shore:
         name = upload_and_compare(shore, MissionType.FENCE, items)
-        print(f"fence of {len(items)} items uploaded and read back the same, hash {name}")
+        print(f"fence of {counted(len(items), 'item')} uploaded and read back the same, hash {name}")
         if args.enable:
             shore.set_param("FENCE_TYPE", 4.0)  # polygons alone: the default's 300 m circle round home would breach
             shore.set_param("FENCE_ENABLE", 1.0)

@@ -252,7 +252,7 @@ def _upload(args: argparse.Namespace) -> int:
     items = document.rally if kind is MissionType.RALLY else document.items
     with Shore(args.link, timeout_s=args.timeout) as shore:
         name = upload_and_compare(shore, kind, items, home=document.home)
-    print(f"{args.part} of {len(items)} items uploaded and read back the same, hash {name}")
+    print(f"{args.part} of {counted(len(items), 'item')} uploaded and read back the same, hash {name}")
     return 0
 
 
