@@ -86,9 +86,9 @@ def in_words(record: VoyageRecord) -> list[str]:
         touched = "no contact" if not s.contacts else f"{counted(s.contacts, 'contact')}!"
         lines.append(f"Nearest to an obstacle or the fence: {s.min_clearance_m:.1f} m, {touched}.")
     if s.promised_risk is not None:
-        whole = f", and on at most {100.0 * s.path_risk:.0f} % of such ways" if s.path_risk is not None else ""
-        lines.append(f"Plans allowed the wind to force her into the no-go zone with {100.0 * s.promised_risk:.0f} % at "
-                     f"each instant{whole}; it happened {_times(s.no_go_entries)}.")
+        whole = f" and {100.0 * s.path_risk:.0f} % over a whole way" if s.path_risk is not None else ""
+        lines.append(f"Chance that plans gave the wind to force her into the no-go zone: up to "
+                     f"{100.0 * s.promised_risk:.0f} % at each instant{whole}; entered {_times(s.no_go_entries)}.")
     if s.alerts:
         said = ", ".join(f"{code} {_times(number)}" for code, number in sorted(s.alerts.items()))
         lines.append(f"Announced: {said}.")

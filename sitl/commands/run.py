@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.arguments import number, out_folder, whole
+from companion.words import counted
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -86,5 +87,6 @@ def print_verdict(verdict: Any) -> None:
         print(f"{'pass' if check.passed else 'FAIL'}  {check.name}: {figure} ({check.required})")
     f = verdict.figures
     print(f"{'PASSED' if verdict.passed else 'FAILED'}  {verdict.scenario} seed {verdict.seed}: "
-          f"{f['time_s']:.0f} s, {f['distance_m']:.0f} m, {f['tacks']} tacks, {f['replans']} replans, "
-          f"clearance {f['min_clearance_m'] if f['min_clearance_m'] is None else round(f['min_clearance_m'], 1)} m")
+          f"{f['time_s']:.0f} s, {f['distance_m']:.0f} m, {counted(f['tacks'], 'tack')}, "
+          f"{counted(f['replans'], 'replan')}, " + (
+              "nothing to be clear of" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"))
