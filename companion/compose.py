@@ -111,8 +111,12 @@ def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
 
 
 def estimator_of(mission: Mission) -> Estimator:
-    """Return the mission's wind estimator."""
-    return make(mission.wind.estimator)
+    """Return the mission's wind estimator. Raises InputError for a name unknown."""
+    try:
+        return make(mission.wind.estimator)
+    except InputError as error:
+        name = mission.wind.estimator
+        raise InputError(str(mission.path), "[wind] estimator", f"{name!r} {error.problem}", error.remedy) from error
 
 
 def target_limits_of(mission: Mission) -> TargetLimits:

@@ -9,21 +9,28 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
 from companion import __version__
-from companion.errors import CompanionError
+from companion.disk import reason
+from companion.errors import CompanionError, InputError
 
 INTERRUPTED = 130
+# No option of ours begins with a digit, so this is a value; of all that begins with a minus argparse knows a lone
+# number only, and takes a place in the south for an option.
+_NEGATIVE = re.compile(r"-\.?\d")
 
 
-def system_id(text: str) -> int:
-    """Take the argument of ``--system``: a MAVLink system id."""
-    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 255):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a system id from 1 to 255")
-    return int(text)
+class Parser(argparse.ArgumentParser):
+    """A parser that says what is wrong in one line, without reciting its usage."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise InputError."""
+        raise InputError(self.prog, "", message, f"'{self.prog} --help' says more")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +44,7 @@ class Program:
 
     def parser(self, command: str | None = None) -> argparse.ArgumentParser:
         """Return the parser; only ``command``'s own options are loaded, or all of them when it is None."""
-        parser = argparse.ArgumentParser(
+        parser = Parser(
             prog=self.name, description=self.description,
             epilog="Exit codes: 0 success, 1 failed job, 2 bad usage or input. "
             f"'{self.name} COMMAND --help' says more.",
@@ -53,9 +60,13 @@ class Program:
 
     def run(self, argv: Sequence[str] | None = None) -> int:
         """Run one command of ``argv`` (None: of this process) and return its exit code."""
-        arguments = list(sys.argv[1:] if argv is None else argv)
+        arguments = with_negative_values(sys.argv[1:] if argv is None else argv)
         command = next((a for a in arguments if not a.startswith("-")), None)
-        args = self.parser(command if command in self.commands else "").parse_args(arguments)
+        try:
+            args = self.parser(command if command in self.commands else "").parse_args(arguments)
+        except InputError as error:
+            sys.stderr.write(f"{error}\n")
+            return error.exit_code
         try:
             return int(args.run(args))
         except CompanionError as error:
@@ -66,3 +77,23 @@ class Program:
         except BrokenPipeError:
             sys.stderr.close()
             return 0
+        except OSError as error:
+            if error.filename is None:
+                raise
+            sys.stderr.write(f"{self.name} {args.command}: {error.filename}: {reason(error)}\n")
+            return CompanionError.exit_code
+
+
+def with_negative_values(argv: Sequence[str]) -> list[str]:
+    """Return the arguments with a value that begins with a minus and a digit tied to the option before it.
+
+    >>> with_negative_values(["new", "--start", "-33.85,151.26", "--force"])
+    ['new', '--start=-33.85,151.26', '--force']
+    """
+    out: list[str] = []
+    for argument in argv:
+        if _NEGATIVE.match(argument) and out and out[-1].startswith("--") and out[-1] != "--" and "=" not in out[-1]:
+            out[-1] += f"={argument}"
+        else:
+            out.append(argument)
+    return out

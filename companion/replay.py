@@ -7,17 +7,14 @@ written in degrees.
 
 from __future__ import annotations
 
-import csv
 import itertools
 import json
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from companion.compose import config_of, estimator_of, target_limits_of, voyage_of
-from companion.errors import InputError
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.frames import Codec, Message
@@ -38,8 +35,9 @@ from companion.skipper.snapshot import (
     UploadResult,
 )
 from companion.telemetry.names import DECISIONS, TLOG, TRACK, VOYAGE
-from companion.telemetry.recorder import jsonable, read_jsonl
+from companion.telemetry.recorder import jsonable
 from companion.telemetry.records import action_record, ais_of
+from companion.telemetry.voyage_folder import believed, read_decisions, read_description, read_rows, require_files
 from companion.wind import WindRoom
 
 TOLERANCE = 1e-6
@@ -78,25 +76,27 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
     Raises:
         InputError: a file is missing or is not one of a voyage.
     """
-    for name in (VOYAGE, TLOG, DECISIONS, TRACK):
-        if not (folder / name).is_file():
-            raise InputError(str(folder), name, "is missing", "name a folder that `companion run` left")
-    description = tomllib.loads((folder / VOYAGE).read_text(encoding="utf-8"))
-    epoch_s = float(description["run"]["epoch_s"])
-    mission = load_mission(mission_path or _mission_path(folder, description["mission"]))
+    require_files(folder, VOYAGE, TLOG, DECISIONS, TRACK)
+    description = read_description(folder)
+    with believed(folder / VOYAGE, "[run], [mission] and [permissions]"):
+        epoch_s = float(description["run"]["epoch_s"])
+        recorded_path = _mission_path(folder, description["mission"])
+        permissions = Permissions(**description["permissions"])
+    mission = load_mission(mission_path or recorded_path)
     skipper = Skipper(voyage=voyage_of(mission), config=config_of(mission))
-    decisions = read_jsonl(folder / DECISIONS)
+    decisions = read_decisions(folder)
     rows = _rows(folder / TRACK)
-    starts = [
-        (float(d["t_s"]), d["persisted"], tuple(d.get("known", ()))) for d in decisions if d["kind"] == "start"
-    ] or [(-1e18, None, ())]
+    with believed(folder / DECISIONS, "a start"):
+        starts = [
+            (float(d["t_s"]), None if d["persisted"] is None else Persisted.from_dict(d["persisted"]),
+             tuple(d.get("known", ()))) for d in decisions if d["kind"] == "start"
+        ] or [(-1e18, None, ())]
     ends = [*(start[0] for start in starts[1:]), 1e18]
     differences: list[Difference] = []
     steps = unrecorded = messages = actions = 0
     for (start_s, persisted, known), end_s, gap_s in zip(starts, ends, _gaps(decisions), strict=True):
         fold = VoyageFold(
-            skipper, WindRoom(estimator=estimator_of(mission)), Permissions(**description["permissions"]),
-            None if persisted is None else Persisted.from_dict(persisted), known=known,
+            skipper, WindRoom(estimator=estimator_of(mission)), permissions, persisted, known=known,
             traffic=target_limits_of(mission),
         )
         found = next((d for d in decisions if d["kind"] == "autopilot" and start_s <= d["t_s"] < end_s), None)
@@ -118,12 +118,15 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             for at_s, message in itertools.islice(heard, n_messages):
                 fold.message(at_s, message)
             for record in itertools.islice(outcomes, n_outcomes):
-                fold.take_outcome(float(record["t_s"]), _outcome(record))
+                with believed(folder / DECISIONS, f"t_s = {record['t_s']}"):
+                    outcome = _outcome(record)
+                fold.take_outcome(float(record["t_s"]), outcome)
             for record in fed.get(t_s, ()):
-                if record["kind"] == "ais":
-                    fold.take(ais_of(record))
-                else:
-                    fold.others(tuple(record["neighbours"]), has_company=record["company"])
+                with believed(folder / DECISIONS, f"t_s = {record['t_s']}"):
+                    if record["kind"] == "ais":
+                        fold.take(ais_of(record))
+                    else:
+                        fold.others(tuple(record["neighbours"]), has_company=record["company"])
             step = fold.tick(t_s)
             mine = [
                 _plain(action_record(a, step.snapshot, skipper.config)) for a in step.actions
@@ -158,11 +161,8 @@ def _mission_path(folder: Path, recorded: dict[str, Any]) -> Path:
 
 
 def _rows(path: Path) -> list[tuple[float, int, int]]:
-    with path.open(newline="", encoding="utf-8") as file:
-        return [
-            (float(r["t_s"]), int(r["frames"]), int(r["outcomes"]))
-            for r in csv.DictReader(file) if None not in r.values() and r["outcomes"]
-        ]
+    with believed(path, "t_s, frames and outcomes"):
+        return [(r["t_s"], int(r["frames"]), int(r["outcomes"])) for r in read_rows(path)]
 
 
 def _messages(

@@ -60,9 +60,15 @@ def run_campaign(
     json_path: Path | None = None, keep: Path | None = None,
 ) -> int:
     """Run and print; return the exit code."""
+    from companion.geofence import load_mission
+    from companion.sailable import require_sailable
+    from sitl.runner import permitted
     from sitl.scenario import load_scenario
 
-    names = [load_scenario(path).name for path in scenarios]
+    loaded = [load_scenario(path) for path in scenarios]
+    for scenario, path in zip(loaded, scenarios, strict=True):
+        require_sailable(permitted(load_mission(scenario.mission_path(path))))
+    names = [scenario.name for scenario in loaded]
     jobs = [Job(scenario=p, seed=first_seed + k, keep=keep) for p in scenarios for k in range(runs)]
     records: list[dict[str, Any]] = []
     began = time.perf_counter()

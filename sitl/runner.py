@@ -31,6 +31,7 @@ from companion.mavlink.link import Link
 from companion.mavlink.reception import LinkIdentity
 from companion.messages import MissionItem, Mode, waypoint
 from companion.options import SailOptions, at_once
+from companion.sailable import require_sailable
 from companion.skipper.actions import Announce
 from companion.skipper.adrift import CALL
 from companion.telemetry.names import STATE, VERDICT
@@ -160,7 +161,8 @@ async def run_embedded(
     expansions: int | None = EXPANSIONS, observer: Observer | None = None,
 ) -> Verdict:
     """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json."""
-    mission, radio_port = with_radio(permitted(load_mission(scenario.mission_path(source))), scenario)
+    mission = require_sailable(permitted(load_mission(scenario.mission_path(source))))
+    mission, radio_port = with_radio(mission, scenario)
     wind = scenario_wind(scenario, source, seed)
     start = mission.start or mission.origin
     heading_deg = scenario.start_heading_deg

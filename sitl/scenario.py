@@ -175,8 +175,8 @@ def load_scenario(path: Path) -> Scenario:
         raise InputError(str(path), "", error.strerror or "cannot be read", "name a scenario TOML file") from error
     try:
         raw: dict[str, Any] = msgspec.toml.decode(text)
-    except msgspec.DecodeError as error:
-        raise InputError(str(path), "", f"is not TOML ({error})") from error
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:
+        raise InputError(str(path), "", f"is not TOML ({str(error)[:80]})", "is it the file that was meant?") from error
     if "mission" not in raw and "goal" in raw:
         raw = {"name": str(raw.get("name", path.stem)), "mission": path.name}
     try:
@@ -201,6 +201,6 @@ def _suggestion(error: msgspec.ValidationError) -> str:
     if "unknown field" not in str(error):
         return ""
     word = str(error).partition("`")[2].partition("`")[0]
-    known = {f for s in (Scenario, WindSpec, EventSpec, ExpectSpec) for f in s.__struct_fields__}
-    close = difflib.get_close_matches(word, sorted(known), n=1)
-    return f"did you mean `{close[0]}`?" if close else "remove it"
+    table = {"wind": WindSpec, "events": EventSpec, "expect": ExpectSpec}.get(_place(error).split("[")[0], Scenario)
+    close = difflib.get_close_matches(word, table.__struct_fields__, n=1)
+    return f"did you mean `{close[0]}`?" if close else f"known: {', '.join(table.__struct_fields__)}"

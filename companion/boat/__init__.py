@@ -11,8 +11,12 @@ from companion.boat.margins import (
     AutopilotLimits,
     Margin,
     MarginPart,
+    ProposedMargin,
     fence_penetration,
+    narrowest_corridor_m,
+    proposed_margin,
     required_margin,
+    widest_corridor_m,
 )
 from companion.boat.outline import outline_en_m
 from companion.boat.polar import MPS_PER_KNOT, Polar, SailingAngle
@@ -27,13 +31,17 @@ __all__ = [
     "MarginPart",
     "Polar",
     "PolarFile",
+    "ProposedMargin",
     "SailingAngle",
     "ardurover_sitl",
     "avalon",
     "constant",
     "fence_penetration",
+    "narrowest_corridor_m",
     "outline_en_m",
     "parse_polar",
+    "proposed_margin",
     "read_polar",
     "required_margin",
+    "widest_corridor_m",
 ]

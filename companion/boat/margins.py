@@ -1,8 +1,9 @@
 """How far from an obstacle to plan, from what the autopilot does with the plan.
 
 ArduRover does not sail the planned line. It cuts corners by WP_RADIUS, wanders about the line, and where the
-wind shifts a leg inside SAIL_NO_GO_ANGLE it beats in a corridor of SAIL_XTRACK_MAX to either side. Where a fence
-is the last barrier, it is crossed before the autopilot reacts. Each of these becomes a named part of the margin.
+wind shifts a leg inside SAIL_NO_GO_ANGLE it beats in a corridor of SAIL_XTRACK_MAX to either side. Each of these
+becomes a named part of the margin. How far a fence lets the boat in is told apart from it: who keeps his margin crosses
+no fence, and who switches one on needs no more margin than before.
 
 The figures are measured on ArduRover 4.7-dev's simulated sailboat at 2 to 3 m/s and scale with speed where the
 cause is a delay.
@@ -12,7 +13,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from companion.boat.boat import Hull
 
@@ -21,12 +23,18 @@ CORRIDOR_OVERSHOOT_S = 0.45  # 0.9 m beyond the corridor at 2.0 m/s before the t
 CORNER_S = 1.4              # |cross-track| <= 4 m at 2.9 m/s just after the corners of a planned beat
 HOLD_COAST_S = 3.6          # 10.4 m inside a fence at 2.93 m/s when the action is Hold (sails eased)
 RTL_TURN_S = 2.6            # 7.4 m when it is RTL (the boat turns round)
+# Narrower than this a corridor is crossed, at 45 degrees to the line, in less than 7 s; the autopilot tacks at most
+# every 5 s and would do little else.
+NARROWEST_S = 2.5
 DEFAULT_PAD_RAD = math.radians(2.0)  # legs planned at NO_GO + 2 degrees made no tacks of their own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutopilotLimits:
     """The autopilot's parameters that decide where the boat goes; ArduRover's sailboat defaults."""
+
+    PARAMETERS: ClassVar[tuple[str, ...]] = (
+        "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE", "FENCE_ACTION")
 
     sail_no_go_angle_rad: float = math.radians(45.0)
     sail_xtrack_max_m: float = 10.0  # 0: no corridor, long boards to the layline
@@ -143,10 +151,47 @@ def required_margin(
         # The three ways off the line exclude one another in time: the boat corners, follows or beats.
         MarginPart(name=widest[1], value_m=widest[0], why=why[widest[1]]),
     ]
-    fence = fence_penetration(limits, speed_mps=speed_mps)
-    if fence is not None:
-        parts.append(fence)
     return Margin(parts=tuple(parts), is_bounded=not legs_can_enter_no_go or limits.sail_xtrack_max_m > 0.0)
+
+
+def narrowest_corridor_m(speed_mps: float) -> float:
+    """Return the least SAIL_XTRACK_MAX that makes sense at a speed [m]: a whole number."""
+    return float(math.ceil(NARROWEST_S * speed_mps))
+
+
+def widest_corridor_m(
+    limits: AutopilotLimits, margin_m: float, *, speed_mps: float, hull: Hull | None = None,
+) -> float | None:
+    """Return the greatest whole SAIL_XTRACK_MAX that a margin holds [m]; None when it holds none that makes sense."""
+    rest_m = required_margin(replace(limits, sail_xtrack_max_m=0.0), speed_mps=speed_mps, hull=hull)
+    room_m = margin_m - sum(part.value_m for part in rest_m.parts[:2])
+    corridor_m = math.floor(room_m - CORRIDOR_OVERSHOOT_S * speed_mps + 1e-6)
+    fits = rest_m.total_m <= margin_m + 1e-6 and corridor_m >= narrowest_corridor_m(speed_mps)
+    return float(corridor_m) if fits else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProposedMargin:
+    """What to write into a mission [m]: whole numbers, and what they are made of.
+
+    ``floor_m`` is what is needed where no shift puts a leg into the autopilot's no-go zone.
+    """
+
+    margin_m: float
+    floor_m: float
+    margin: Margin
+
+
+def proposed_margin(limits: AutopilotLimits, *, speed_mps: float, hull: Hull | None = None) -> ProposedMargin:
+    """Return the margin for a mission from the autopilot's parameters: what the doctor finds enough.
+
+    Without a corridor (SAIL_XTRACK_MAX 0), or with one that is too narrow, the narrowest that makes sense is assumed.
+    """
+    corridor_m = max(limits.sail_xtrack_max_m, narrowest_corridor_m(speed_mps))
+    margin = required_margin(replace(limits, sail_xtrack_max_m=corridor_m), speed_mps=speed_mps, hull=hull)
+    floor = required_margin(limits, speed_mps=speed_mps, hull=hull, legs_can_enter_no_go=False)
+    return ProposedMargin(margin_m=float(math.ceil(margin.total_m)), floor_m=float(math.ceil(floor.total_m)),
+                          margin=margin)
 
 
 def fence_penetration(limits: AutopilotLimits, *, speed_mps: float) -> MarginPart | None:

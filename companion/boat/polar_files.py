@@ -160,7 +160,12 @@ def _parse_grid(lines: list[tuple[int, str]], source: str) -> PolarFile:
             warnings.append(f"line {number}: {len(values)} speeds for {len(tws_kn)} winds")
         values = (values + [""] * len(tws_kn))[: len(tws_kn)]
         twa_deg.append(angle)
-        rows.append([_speed(cell, source, number, i, warnings) for i, cell in enumerate(values, start=2)])
+        # Before the first speed, or under no wind, a boat that does not sail; elsewhere a gap in the file.
+        is_head = all(value == 0.0 for known in rows for value in known) and all(cell == "0" for cell in values)
+        rows.append([
+            0.0 if cell == "0" and (is_head or wind_kn == 0.0) else _speed(cell, source, number, i, warnings)
+            for i, (cell, wind_kn) in enumerate(zip(values, tws_kn, strict=True), start=2)
+        ])
     if not rows:
         raise InputError(source, f"line {header_number}", "no rows of boat speeds", "add rows like 45;2.1;3.0;3.6")
     return _finish(np.array(twa_deg), np.array(tws_kn), np.array(rows, dtype=np.float64), source, warnings)

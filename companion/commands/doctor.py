@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.program import system_id
+from companion.arguments import number, system_id
+from companion.words import counted
 
 if TYPE_CHECKING:
+    from companion.boat import AutopilotLimits
     from companion.geofence import Mission
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.signing import SigningStore
@@ -68,7 +70,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (mode 0600)")
     parser.add_argument("--apply", action="store_true", help="set what the warnings and errors name, and read it back")
     parser.add_argument("--json", action="store_true", help="print findings and changes as JSON")
-    parser.add_argument("--wait", type=float, default=30.0, metavar="S", help="for the first heartbeat (default: 30)")
+    parser.add_argument("--wait", type=number("s", above=0.0), default=30.0, metavar="S",
+                        help="for the first heartbeat (default: 30)")
     parser.set_defaults(run=run)
 
 
@@ -78,9 +81,10 @@ def run(args: argparse.Namespace) -> int:
     from companion.geofence import load_mission
     from companion.mavlink.signing import SigningStore
     from companion.mavlink.transport import open_link
+    from companion.sailable import require_sailable
     from companion.skipper.findings import Level
 
-    mission = load_mission(args.mission) if args.mission is not None else None
+    mission = require_sailable(load_mission(args.mission)) if args.mission is not None else None
     transport = open_link(args.link)
     signing = SigningStore(args.signing_key, time.time()) if args.signing_key is not None else None
     system = args.system or (mission.autopilot.system if mission is not None else None)
@@ -111,6 +115,25 @@ def needs_of(mission: Mission | None) -> Needs:
         reach_m=max(math.hypot(*place) for place in places), has_fence=mission.operator.upload_fence,
         can_tack=boat.can_tack, has_refuge=bool(mission.refuges), sails=mission.autopilot.frame == "sailboat",
     )
+
+
+def limits_at(link: str, *, wait_s: float = 10.0) -> AutopilotLimits:
+    """Return what the autopilot on a link does with a plan. Raises InputError and LinkError."""
+    from companion.boat import AutopilotLimits
+    from companion.clock import run as run_loop
+    from companion.mavlink.autopilot import Autopilot
+    from companion.mavlink.link import Link
+    from companion.mavlink.transport import open_link
+
+    async def ask() -> AutopilotLimits:
+        async with Link(open_link(link)) as connected:
+            await connected.wait_autopilot(wait_s)
+            async with Autopilot(connected) as autopilot:
+                answers = {name: await autopilot.get_parameter(name) for name in AutopilotLimits.PARAMETERS}
+        return AutopilotLimits.from_params(
+            {name: answer.value for name, answer in answers.items() if answer.value is not None})
+
+    return run_loop(ask())
 
 
 async def diagnose(
@@ -230,5 +253,6 @@ def as_text(findings: Sequence[Finding], changes: Sequence[Change], *, applied: 
         lines.append(f"apply   {c.name} {before} -> {c.wanted:g}: {state} {after}")
     errors = sum(f.level is Level.ERROR for f in findings)
     warnings = sum(f.level is Level.WARNING for f in findings)
-    lines.append(f"{errors} errors, {warnings} warnings" + ("" if applied else "; nothing was changed"))
+    rest = "" if applied else "; nothing was changed"
+    lines.append(f"{counted(errors, 'error')}, {counted(warnings, 'warning')}{rest}")
     return "\n".join(lines) + "\n"

@@ -8,13 +8,22 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from companion.arguments import number, picture, place, system_id
+from companion.commands.output import (
+    force_option,
+    patience,
+    print_findings,
+    print_losses,
+    refuse_existing,
+    summary,
+    write_out,
+)
 from companion.errors import InputError, JobError
-from companion.program import system_id
+from companion.words import counted
 
 if TYPE_CHECKING:
-    from companion.geofence import Area, Document, Finding
+    from companion.geofence import Area, Document
     from companion.geofence.autopilot_fence import AutopilotFence
-    from companion.geofence.losses import Written
     from companion.messages import GeoPoint
 
 _EPILOG = """\
@@ -43,9 +52,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     check.add_argument("file", metavar="FILE")
     reading_options(check)
     place_options(check)
-    check.add_argument("--wind-from", type=float, metavar="DEG", help="wind for which gaps must be wide enough")
-    check.add_argument("--no-go", type=float, default=47.0, metavar="DEG", help="half angle of the no-go zone (47)")
-    check.add_argument("--plot", metavar="P.png", help="draw the area")
+    check.add_argument("--wind-from", type=number("deg", at_least=-360.0, at_most=360.0), metavar="DEG",
+                       help="wind for which gaps must be wide enough")
+    check.add_argument("--no-go", type=number("deg", at_least=0.0, at_most=89.0), default=47.0, metavar="DEG",
+                       help="half angle of the no-go zone (47)")
+    check.add_argument("--plot", type=picture, metavar="P.png", help="draw the area")
     check.set_defaults(run=_check)
 
     convert = verbs.add_parser("convert", help="write a file in another format and say what it does not carry")
@@ -56,6 +67,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     convert.add_argument("--repair", action="store_true",
                          help="write broken rings repaired: no repair makes the sea larger")
     convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
+    force_option(convert)
     convert.add_argument("--simplify", action="store_true",
                          help="write the 84 items for the autopilot (needs --margin and --start, or a mission)")
     convert.set_defaults(run=_convert)
@@ -73,6 +85,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     download.add_argument("out", metavar="OUT", help="its extension is the format")
     link_options(download)
     download.add_argument("--lossy", action="store_true", help="write even if zones are left out")
+    force_option(download)
     download.set_defaults(run=_download)
 
 
@@ -82,7 +95,8 @@ def link_options(parser: argparse.ArgumentParser) -> None:
                         help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
     parser.add_argument("--system", type=system_id, metavar="N",
                         help="the autopilot's MAVLink system id (default: the only one heard)")
-    parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="wait this long for a heartbeat (10)")
+    parser.add_argument("--timeout", type=number("s", above=0.0), default=10.0, metavar="S",
+                        help="wait this long for a heartbeat (10)")
 
 
 def reading_options(parser: argparse.ArgumentParser) -> None:
@@ -91,42 +105,43 @@ def reading_options(parser: argparse.ArgumentParser) -> None:
                         help="what zones are where the file does not say (exclusion)")
     parser.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto",
                         help="order of WKT coordinates (longitude first, checked against the place)")
-    parser.add_argument("--near", metavar="LAT,LON", help="where the file should lie: farther than 50 km is an error")
-    parser.add_argument("--point-radius", type=float, default=10.0, metavar="M",
-                        help="radius of an obstacle that is a point or line (10)")
+    parser.add_argument("--near", type=place, metavar="LAT,LON",
+                        help="where the file should lie: farther than 50 km is an error")
+    parser.add_argument("--point-radius", type=number("m", above=0.0, at_most=5000.0), metavar="M",
+                        help="radius of an obstacle that is a point or line (10); a file is converted with it drawn")
 
 
 def place_options(parser: argparse.ArgumentParser) -> None:
     """Add start, goals and margin."""
-    parser.add_argument("--start", metavar="LAT,LON")
-    parser.add_argument("--goal", metavar="LAT,LON", action="append", default=[])
-    parser.add_argument("--margin", type=float, metavar="M", help="what the planner keeps clear [m]")
+    parser.add_argument("--start", type=place, metavar="LAT,LON")
+    parser.add_argument("--goal", type=place, metavar="LAT,LON", action="append", default=[])
+    parser.add_argument("--margin", type=number("m", at_least=0.0, at_most=1000.0), metavar="M",
+                        help="what the planner keeps clear [m]")
 
 
 def read_input(args: argparse.Namespace) -> Document:
     """Return the document that the arguments name."""
-    from companion.commands.shore import place_argument
     from companion.geofence import ZoneKind, read
     from companion.geofence.mission import load_mission
     from companion.geofence.mission_files import document_of
 
-    near = args.near or args.start
-    place = place_argument(near, "--near") if near else None
     if Path(args.file).suffix.lower() == ".toml":
         return document_of(load_mission(args.file))
-    return read(args.file, kind=ZoneKind(args.kind), axis=args.axis, areas=True, near=place)
+    return read(args.file, kind=ZoneKind(args.kind), axis=args.axis, areas=True, near=args.near or args.start)
+
+
+def point_radius_m(args: argparse.Namespace) -> float:
+    """Return the radius of an obstacle without area [m]: the argument, or what a mission file takes by default."""
+    from companion.geofence.options import AreaOptions
+
+    return AreaOptions().point_radius_m if args.point_radius is None else float(args.point_radius)
 
 
 def places(args: argparse.Namespace) -> tuple[GeoPoint | None, tuple[GeoPoint, ...], float | None]:
     """Return start, goals and margin of the arguments, or of a mission TOML."""
-    from companion.commands.shore import place_argument
     from companion.geofence.mission import load_mission
 
-    start = place_argument(args.start, "--start") if args.start else None
-    goals = tuple(place_argument(g, "--goal") for g in args.goal)
-    margin_m = args.margin
-    if margin_m is not None and not (math.isfinite(margin_m) and 0.0 <= margin_m <= 1000.0):
-        raise InputError("--margin", "", f"{margin_m:g} is outside 0..1000 m")
+    start, goals, margin_m = args.start, tuple(args.goal), args.margin
     if Path(args.file).suffix.lower() == ".toml":
         mission = load_mission(args.file)
         start = start or mission.origin
@@ -145,34 +160,15 @@ def area_of(document: Document, point_radius_m: float) -> Area:
     )
 
 
-def print_findings(findings: tuple[Finding, ...], source: str) -> bool:
-    """Print findings and return whether one of them is an error."""
-    from companion.geofence import Severity
+def grown_marks(document: Document, point_radius_m: float) -> Document:
+    """Return the document with its points and lines to keep out of as zones of that radius."""
+    from dataclasses import replace
 
-    for finding in findings:
-        print(finding.line(source))
-    return any(f.severity is Severity.ERROR for f in findings)
+    from companion.geofence import ZoneKind
+    from companion.geofence.mission_files import zones_only
 
-
-def print_losses(losses: tuple[Finding, ...], out: str) -> None:
-    """Print what a file does not carry."""
-    for loss in losses:
-        print(loss.line(out))
-
-
-def summary(document: Document) -> str:
-    """Return what a document holds in a few words."""
-    from companion.geofence import Circle, ZoneKind
-
-    counts = [
-        (sum(z.kind is ZoneKind.INCLUSION for z in document.zones), "keep-in zone"),
-        (sum(z.kind is ZoneKind.EXCLUSION for z in document.zones), "keep-out zone"),
-        (len(document.marks), "point or line"), (len(document.items), "mission item"),
-        (len(document.rally), "rally point"), (len(document.tracks), "track"),
-    ]
-    vertices = sum(1 if isinstance(z.shape, Circle) else len(z.shape.exterior.coords) - 1 for z in document.zones)
-    words = ", ".join(f"{n} {word}{'s' if n != 1 else ''}" for n, word in counts if n)
-    return (words or "nothing") + (f" ({vertices} fence items)" if document.zones else "")
+    return replace(document, zones=zones_only(document, point_radius_m),
+                   marks=tuple(m for m in document.marks if m.kind is not ZoneKind.EXCLUSION))
 
 
 def _check(args: argparse.Namespace) -> int:
@@ -181,13 +177,15 @@ def _check(args: argparse.Namespace) -> int:
     document = read_input(args)
     start, goals, margin_m = places(args)
     wind_deg = args.wind_from
+    names: list[str] = []
     if Path(args.file).suffix.lower() == ".toml":
         from companion.geofence.mission import load_mission
 
         mission = load_mission(args.file)
         wind_deg = mission.wind.preview_from_deg if wind_deg is None else wind_deg
         args.no_go = mission.boat.no_go_half_deg
-    area = area_of(document, args.point_radius)
+        names = [goal.name for goal in mission.goals] if not args.goal else []
+    area = area_of(document, point_radius_m(args))
     bad = print_findings(document.findings, args.file)
     bad |= print_findings(check_area(area, Conditions(
         start=start, goals=goals, margin_m=margin_m, no_go_half_rad=math.radians(args.no_go),
@@ -196,24 +194,12 @@ def _check(args: argparse.Namespace) -> int:
     if args.plot:
         from companion.plots.mission import save_area
 
-        save_area(area, args.plot, start=start, goals=goals, margin_m=margin_m or 0.0,
-                  twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
-                  no_go_half_rad=math.radians(args.no_go), title=Path(args.file).name)
+        with patience("drawing"):
+            save_area(area, args.plot, start=start, goals=goals, margin_m=margin_m or 0.0,
+                      twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
+                      no_go_half_rad=math.radians(args.no_go), title=Path(args.file).name, names=names)
     print(f"{args.file}: {document.format}: {summary(document)}: {'NOT in order' if bad else 'in order'}")
     return int(bad)
-
-
-def write_out(written: Written, out: str, *, lossy: bool) -> None:
-    """Write a file, or refuse when it would protect less than its source and nobody said ``--lossy``."""
-    from companion.geofence import Severity
-
-    print_losses(written.losses, out)
-    if any(f.severity is Severity.ERROR for f in written.losses) and not lossy:
-        raise JobError(f"{out}: not written: zones would be missing; choose another format or say --lossy")
-    try:
-        Path(out).write_bytes(written.data)
-    except OSError as error:
-        raise InputError(out, "", f"cannot be written ({error.strerror})") from None
 
 
 def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
@@ -224,7 +210,7 @@ def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
     if start is None or margin_m is None:
         raise InputError(args.file, "", "simplifying needs a margin and a start",
                          "give --margin M and --start LAT,LON, or a mission TOML")
-    result = fence_for_autopilot(area_of(document, args.point_radius), margin_m, inside=[start, *goals])
+    result = fence_for_autopilot(area_of(document, point_radius_m(args)), margin_m, inside=[start, *goals])
     if result.status is not FenceStatus.OK:
         raise JobError(f"{args.file}: no fence for the autopilot: {result.reason}")
     for note in result.notes:
@@ -234,17 +220,19 @@ def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
 
 
 def _convert(args: argparse.Namespace) -> int:
-    from companion.geofence import Document
+    from companion.geofence import Document, read
     from companion.geofence.formats import write
 
     document = read_input(args)
     if not args.repair:
         document.require_clean()
     print_findings(document.findings, args.file)
+    if args.point_radius is not None:
+        document = grown_marks(document, args.point_radius)
     if args.simplify:
         document = Document(source=document.source, format="simplified", zones=simplified(args, document).zones)
-    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy)
-    print(f"{args.out}: written: {summary(document)}")
+    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy, force=args.force)
+    print(f"{args.out}: written: {summary(read(args.out, areas=True))}")   # what is in it, not what was meant to be
     return 0
 
 
@@ -255,7 +243,7 @@ def _upload(args: argparse.Namespace) -> int:
     from companion.messages import MissionType
 
     document = read_input(args).require_clean()
-    items, losses = zones_to_items(zones_only(document, args.point_radius), return_point=document.return_point)
+    items, losses = zones_to_items(zones_only(document, point_radius_m(args)), return_point=document.return_point)
     if not items:
         raise JobError(f"{args.file}: there is no zone to upload")
     start, _, margin_m = places(args)
@@ -271,7 +259,7 @@ def _upload(args: argparse.Namespace) -> int:
         print_losses(tuple(losses), args.file)
     with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
         name = upload_and_compare(shore, MissionType.FENCE, items)
-        print(f"fence of {len(items)} items uploaded and read back the same, hash {name}")
+        print(f"fence of {counted(len(items), 'item')} uploaded and read back the same, hash {name}")
         if args.enable:
             shore.set_param("FENCE_TYPE", 4.0)  # polygons alone: the default's 300 m circle round home would breach
             shore.set_param("FENCE_ENABLE", 1.0)
@@ -292,6 +280,7 @@ def _download(args: argparse.Namespace) -> int:
     from companion.messages import MissionType
 
     format_of(args.out)
+    refuse_existing([args.out], force=args.force)
     with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
         items = download_list(shore, MissionType.FENCE)
     findings = Findings()
@@ -301,7 +290,7 @@ def _download(args: argparse.Namespace) -> int:
     if not items:
         print("the autopilot holds no fence; nothing is written", file=sys.stderr)
         return 1
-    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy)
+    write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy, force=args.force)
     print(f"{args.out}: written: {summary(document)}, hash {mission_hash(items)}")
     return int(bad)
 

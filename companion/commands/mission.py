@@ -8,19 +8,31 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from companion.arguments import picture, wind
+from companion.commands import mission_new
+from companion.commands.output import (
+    force_option,
+    patience,
+    print_findings,
+    print_losses,
+    refuse_existing,
+    summary,
+    write_out,
+)
 from companion.errors import InputError, JobError
+from companion.words import counted
 
 if TYPE_CHECKING:
-    from companion.boat import Boat
     from companion.geofence import Document, Mission
-    from companion.planner import Plan
+    from companion.planner import Plan, Problem
 
 _EPILOG = """\
 examples:
   companion mission check missions/archipelago.toml --plot archipelago.png
   companion mission new bay.toml --start 50.817,-1.31 --goal 50.8203,-1.31 --land islands.wkt --margin 12 --plot bay.png
   companion mission new bay.toml --from drawn-in-qgroundcontrol.plan
-  companion mission convert bay.toml bay.plan          (also .waypoints, .gpx, .kml, .geojson)
+  companion mission convert bay.toml bay.plan          (also .gpx, .kml, .geojson)
+  companion mission convert bay.toml bay.waypoints --part mission
   companion mission convert route.gpx route.waypoints
   companion mission upload route.waypoints --link udpin:0.0.0.0:14550
   companion mission download boat.plan --link /dev/ttyUSB0:57600
@@ -45,28 +57,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     preview_options(check)
     check.set_defaults(run=_check)
 
-    new = verbs.add_parser("new", help="make a mission TOML with its area files")
-    new.add_argument("out", metavar="OUT.toml")
-    new.add_argument("--from", dest="source", metavar="FILE", help="a drawing: .plan, .waypoints, GPX, KML, GeoJSON")
-    new.add_argument("--start", metavar="LAT,LON", help="where the boat will start (else the drawing's home)")
-    new.add_argument("--goal", metavar="LAT,LON", action="append", default=[], help="in order; repeat it")
-    new.add_argument("--land", metavar="FILE", action="append", default=[], help="obstacles, any format; repeat it")
-    new.add_argument("--fence", metavar="FILE", help="water to stay inside of, any format")
-    new.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto", help="order of WKT coordinates")
-    new.add_argument("--name", help="of the mission (else of the file)")
-    new.add_argument("--margin", type=float, metavar="M", help="what plans keep clear of everything (12)")
-    new.add_argument("--radius", type=float, metavar="M", help="of the goals (10)")
-    new.add_argument("--force", action="store_true", help="overwrite files")
-    preview_options(new)
-    new.set_defaults(run=_new)
+    mission_new.add_parser(verbs)
 
     convert = verbs.add_parser("convert", help="write a mission in another format and say what it does not carry")
     convert.add_argument("file", metavar="FILE")
     convert.add_argument("out", metavar="OUT", help="its extension is the format")
-    convert.add_argument("--part", choices=("mission", "fence", "rally"), default="mission",
-                         help="what goes into a .waypoints file, which holds one list (mission)")
+    convert.add_argument("--part", choices=("mission", "fence", "rally"),
+                         help="write this alone (a .waypoints file holds no more than one of them)")
     convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
-    convert.add_argument("--force", action="store_true", help="overwrite the files of a mission TOML")
+    mission_new.point_radius_option(convert)
+    force_option(convert)
     convert.set_defaults(run=_convert)
 
     upload = verbs.add_parser("upload", help="write a waypoint file to the autopilot, read back, compare")
@@ -78,65 +78,61 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     download = verbs.add_parser("download", help="read the autopilot's mission into a file")
     download.add_argument("out", metavar="OUT", help="its extension is the format")
     download.add_argument("--part", choices=("mission", "rally"), default="mission")
+    force_option(download)
     link_options(download)
     download.set_defaults(run=_download)
 
 
 def preview_options(parser: argparse.ArgumentParser) -> None:
     """Add --plot and what it assumes."""
-    parser.add_argument("--plot", metavar="P.png", help="draw obstacles, fence, margins, laylines and a plan")
-    parser.add_argument("--wind", metavar="SPEED@FROM", help="for the picture [m/s, degrees] (else the mission's, 5@0)")
+    parser.add_argument("--plot", type=picture, metavar="P.png",
+                        help="draw obstacles, fence, margins, laylines and a plan")
+    parser.add_argument("--wind", type=wind, metavar="SPEED@FROM",
+                        help="for the picture [m/s, degrees] (else the mission's, 5@0)")
     parser.add_argument("--no-plan", action="store_true", help="draw no plan")
 
 
-def _preview(mission: Mission, args: argparse.Namespace) -> None:
+def preview(mission: Mission, args: argparse.Namespace) -> None:
     """Draw the mission in the wind that the arguments or the mission give."""
     from companion.compose import boat_of
     from companion.plots.mission import save_mission
 
     tws_mps, from_deg = mission.wind.preview_speed_mps, mission.wind.preview_from_deg
     if args.wind:
-        tws_mps, from_deg = wind_argument(args.wind)
+        tws_mps, from_deg = args.wind
     twd_from_rad, boat = math.radians(from_deg), boat_of(mission)
-    lines = save_mission(
-        mission, args.plot, tws_mps=tws_mps, twd_from_rad=twd_from_rad,
-        beat_rad=boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad,
-        plans=[] if args.no_plan else _plans(mission, boat, tws_mps, twd_from_rad),
-    )
+    with patience("planning and drawing"):
+        lines = save_mission(
+            mission, args.plot, tws_mps=tws_mps, twd_from_rad=twd_from_rad,
+            beat_rad=boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad,
+            plans=[] if args.no_plan else _plans(mission, tws_mps, twd_from_rad),
+        )
     for line in lines:
         print(line)
     print(f"{args.plot}: written")
 
 
-def _plans(mission: Mission, boat: Boat, tws_mps: float, twd_from_rad: float) -> list[Plan]:
+def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
     """Return the planner's way from goal to goal, first lap, in a steady wind; and home, where the mission ends there.
 
     Home is taken to be the start: the autopilot's is where it was armed.
     """
-    from companion.planner import Problem, plan
+    from companion.planner import plan
     from companion.skipper.errands import HOME_RADIUS_M
 
     if mission.start is None:
         return []
     frame = mission.frame()
-    local = mission.area.local(frame)
     here = frame.en_from_geo(mission.start)
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
-    limits = boat.problem_boat(tws_mps)
     plans = []
     targets = [(goal.point, goal.radius_m) for goal in mission.goals]
     if mission.skipper.end == "home":
         targets.append((mission.start, HOME_RADIUS_M))
     for point, radius_m in targets:
         east_m, north_m = frame.en_from_geo(point)
-        problem = Problem.from_json({
-            "id": mission.name, "title": mission.name,
-            "start": {"x": here[0], "y": here[1], "heading_deg": heading_deg % 360.0},
-            "goal": {"x": east_m, "y": north_m, "radius": radius_m},
-            "obstacles": local.obstacles_wkt(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here),
-            "wind": {"from_deg": math.degrees(twd_from_rad), "speed_mps": tws_mps, "sigma": {"model": "none"}},
-            "boat": limits, "delta_s": mission.risk.delta_s,
-        })
+        problem = leg_problem(mission, here, heading_deg, (east_m, north_m), radius_m, tws_mps=tws_mps,
+                              from_deg=math.degrees(twd_from_rad))
         answer = plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0)
         plans.append(answer)
         if not answer.has_path:
@@ -146,18 +142,27 @@ def _plans(mission: Mission, boat: Boat, tws_mps: float, twd_from_rad: float) ->
     return plans
 
 
-def wind_argument(text: str) -> tuple[float, float]:
-    """Return (speed [m/s], from [deg]) of ``SPEED@FROM``. Raises InputError."""
-    try:
-        speed, direction = (float(part) for part in text.split("@"))
-    except ValueError:
-        raise InputError("--wind", "", f"{text[:30]!r} is not a wind", "write SPEED@FROM, as 5@350") from None
-    if not (0.0 < speed <= 50.0 and -360.0 <= direction <= 360.0):
-        raise InputError("--wind", "", f"{text[:30]!r} is out of range", "speed 0..50 m/s, direction in degrees")
-    return speed, direction % 360.0
+def leg_problem(
+    mission: Mission, here_en: tuple[float, float], heading_deg: float, goal_en: tuple[float, float], radius_m: float,
+    *, tws_mps: float, from_deg: float, title: str = "",
+) -> Problem:
+    """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady."""
+    from companion.compose import boat_of
+    from companion.planner import Problem
+
+    local = mission.area.local(mission.frame())
+    return Problem.from_json({
+        "id": mission.name, "title": title,
+        "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
+        "goal": {"x": goal_en[0], "y": goal_en[1], "radius": radius_m},
+        "obstacles": local.obstacles_wkt(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here_en),
+        "wind": {"from_deg": from_deg, "speed_mps": tws_mps, "sigma": {"model": "none"}},
+        "boat": boat_of(mission).problem_boat(tws_mps), "delta_s": mission.risk.delta_s,
+    })
 
 
-def _read(path: str) -> Document:
+def read_mission_file(path: str) -> Document:
+    """Return what a mission TOML or a drawing holds, with its only line as the route. Raises InputError."""
     from companion.geofence import read
     from companion.geofence.mission import load_mission
     from companion.geofence.mission_files import document_of
@@ -169,93 +174,61 @@ def _read(path: str) -> Document:
 
 
 def _check(args: argparse.Namespace) -> int:
-    from companion.commands.fence import print_findings, summary
     from companion.geofence.check import Conditions, check_area
     from companion.geofence.mission import load_mission
 
     if Path(args.file).suffix.lower() != ".toml":
-        document = _read(args.file)
+        document = read_mission_file(args.file)
         print_findings(document.findings, args.file)
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
-    mission = load_mission(args.file)
-    from companion.compose import polar_of
+    from companion.sailable import require_sailable
 
-    polar_of(mission)
+    mission = require_sailable(load_mission(args.file))
     bad = print_findings(mission.findings, args.file)
-    wind_deg = wind_argument(args.wind)[1] if args.wind else mission.wind.preview_from_deg
+    wind_deg = args.wind[1] if args.wind else mission.wind.preview_from_deg
     bad |= print_findings(check_area(mission.area, Conditions(
         start=mission.start, goals=tuple(g.point for g in mission.goals), margin_m=mission.margin_m,
         twd_from_rad=math.radians(wind_deg), no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
     )), args.file)
     if args.plot:
-        _preview(mission, args)
-    goals = f"{len(mission.goals)} goal{'s' if len(mission.goals) != 1 else ''}"
-    print(f"{args.file}: {mission.name}: {goals}, {len(mission.area.solids)} obstacles: "
+        preview(mission, args)
+    print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
+          f"{counted(len(mission.area.solids), 'obstacle')}: "
           f"{'NOT in order' if bad else 'in order'}")
     return int(bad)
 
 
-def _new(args: argparse.Namespace) -> int:
+def _only(document: Document, part: str) -> Document:
+    """Return one part of a document, and say what else it holds."""
     from dataclasses import replace
 
-    from companion.commands.fence import print_findings, print_losses
-    from companion.commands.shore import place_argument
-    from companion.geofence import Document, ZoneKind, read
-    from companion.geofence.mission import load_mission
-    from companion.geofence.mission_files import mission_files
-
-    out = Path(args.out)
-    if out.suffix.lower() != ".toml":
-        raise InputError(args.out, "", "a mission file ends in .toml")
-    drawing = _read(args.source) if args.source else Document(source="--goal")
-    start = place_argument(args.start, "--start") if args.start else None
-    goals = tuple(place_argument(g, "--goal") for g in args.goal)
-    near = start or drawing.home or (goals[0] if goals else None)
-    land = Document()
-    sources = [(f, ZoneKind.EXCLUSION) for f in args.land] + [(f, ZoneKind.INCLUSION) for f in [args.fence] if f]
-    for name, kind in sources:
-        more = read(name, kind=kind, axis=args.axis, near=near, areas=True).require_clean()
-        print_findings(more.findings, name)
-        land = replace(land, zones=(*land.zones, *more.zones), marks=(*land.marks, *more.marks))
-    if args.margin is not None and not (math.isfinite(args.margin) and 0.0 <= args.margin <= 1000.0):
-        raise InputError("--margin", "", f"{args.margin:g} is outside 0..1000 m")
-    if args.radius is not None and not (math.isfinite(args.radius) and 0.0 < args.radius <= 5000.0):
-        raise InputError("--radius", "", f"{args.radius:g} is outside 0..5000 m")
-    try:
-        made = mission_files(drawing, args.name or out.stem, start=start, goals=goals, margin_m=args.margin,
-                             radius_m=args.radius, land=land)
-    except ValueError as error:
-        raise InputError(args.source or "companion mission new", "", str(error)) from None
-    print_losses(made.losses, args.out)
-    _write_all({args.out: made.toml, **{str(out.parent / n): d for n, d in made.files.items()}}, force=args.force)
-    mission = load_mission(out)
-    if args.plot:
-        _preview(mission, args)
-    return 0
-
-
-def _write_all(files: dict[str, bytes], *, force: bool) -> None:
-    """Write all files or none: an existing one is not overwritten without ``force``."""
-    there = [name for name in files if Path(name).exists()]
-    if there and not force:
-        raise InputError(there[0], "", "exists", "say --force to overwrite it")
-    for name, data in files.items():
-        try:
-            Path(name).write_bytes(data)
-        except OSError as error:
-            raise InputError(name, "", f"cannot be written ({error.strerror})") from None
-        print(f"{name}: written")
+    parts: dict[str, Document] = {
+        "mission": replace(document, zones=(), marks=(), rally=(), return_point=None, tracks=()),
+        "fence": replace(document, items=(), item_names=(), rally=(), home=None, tracks=()),
+        "rally": replace(document, items=(), item_names=(), zones=(), marks=(), return_point=None, home=None,
+                         tracks=()),
+    }
+    if summary(parts[part]) == "nothing":
+        raise JobError(f"{document.source}: there is no {part} in it; it holds {summary(document)}")
+    others = [summary(parts[p]) for p in parts if p != part]
+    rest = ", ".join(words for words in others if words != "nothing")
+    if rest:
+        print(f"{document.source}: note: also holds {rest}: left out with --part {part}")
+    return parts[part]
 
 
 def _convert(args: argparse.Namespace) -> int:
-    from companion.commands.fence import print_findings, print_losses, summary, write_out
+    from companion.commands.fence import grown_marks
+    from companion.geofence import read
     from companion.geofence.formats import write
     from companion.geofence.mission import load_mission
     from companion.geofence.mission_files import goal_losses, mission_files
 
-    document = _read(args.file)
+    document = read_mission_file(args.file)
     print_findings(document.findings, args.file)
+    if args.point_radius is not None:
+        document = grown_marks(document, args.point_radius)
     if Path(args.file).suffix.lower() == ".toml":
         print_losses(tuple(goal_losses(load_mission(args.file))), args.out)
     out = Path(args.out)
@@ -264,14 +237,13 @@ def _convert(args: argparse.Namespace) -> int:
             made = mission_files(document, out.stem)
         except ValueError as error:
             raise InputError(args.file, "", str(error)) from None
-        print_losses(made.losses, args.out)
-        _write_all({args.out: made.toml, **{str(out.parent / n): d for n, d in made.files.items()}}, force=args.force)
-        load_mission(out)
+        mission_new.write_mission(made, out, force=args.force)
         return 0
-    only_mission = out.suffix.lower() in {".waypoints", ".txt"} and args.part == "mission"
-    # A .waypoints file is one list by design: that the others are not in it is said, and is no reason to refuse.
-    write_out(write(document, args.out, part=args.part), args.out, lossy=args.lossy or only_mission)
-    print(f"{args.out}: written from {summary(document)}")
+    if args.part is not None:
+        document = _only(document, args.part)
+    write_out(write(document, args.out), args.out, lossy=args.lossy, force=args.force,
+              remedy="choose another format, or what to write with --part,")
+    print(f"{args.out}: written: {summary(read(args.out))}")   # what is in it, not what was meant to be
     return 0
 
 
@@ -282,19 +254,18 @@ def _upload(args: argparse.Namespace) -> int:
     if Path(args.file).suffix.lower() == ".toml":
         raise InputError(args.file, "", "holds goals, not the way to them",
                          "sail it with 'companion run', or convert it to .waypoints to sail straight lines")
-    document = _read(args.file)
+    document = _only(read_mission_file(args.file), args.part)
     kind = MissionType.RALLY if args.part == "rally" else MissionType.MISSION
     items = document.rally if kind is MissionType.RALLY else document.items
     if not items:
         raise JobError(f"{args.file}: there is no {args.part} to upload")
     with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
         name = upload_and_compare(shore, kind, items, home=document.home)
-    print(f"{args.part} of {len(items)} items uploaded and read back the same, hash {name}")
+    print(f"{args.part} of {counted(len(items), 'item')} uploaded and read back the same, hash {name}")
     return 0
 
 
 def _download(args: argparse.Namespace) -> int:
-    from companion.commands.fence import summary, write_out
     from companion.commands.shore import Shore, download_list
     from companion.geofence import Document
     from companion.geofence.formats import format_of, write
@@ -302,6 +273,7 @@ def _download(args: argparse.Namespace) -> int:
     from companion.messages import MissionType
 
     format_of(args.out)
+    refuse_existing([args.out], force=args.force)
     kind = MissionType.RALLY if args.part == "rally" else MissionType.MISSION
     with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
         items = download_list(shore, kind)
@@ -311,6 +283,6 @@ def _download(args: argparse.Namespace) -> int:
         return 1
     document = Document(source="autopilot", format="autopilot", items=items if args.part == "mission" else (),
                         rally=items if args.part == "rally" else (), home=home)
-    write_out(write(document, args.out, part=args.part), args.out, lossy=False)
+    write_out(write(document, args.out, part=args.part), args.out, lossy=False, force=args.force)
     print(f"{args.out}: written: {summary(document)}, hash {mission_hash(items)}")
     return 0

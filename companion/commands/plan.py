@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from companion.arguments import number, out_file, picture, whole, wind
+from companion.commands.output import patience
 from companion.errors import InputError
+from companion.planner.courses import courses
+from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.planner import Plan, Problem
@@ -20,8 +25,10 @@ examples:
   companion plan lake.json --budget 10 --out path.json --plot path.png
   companion plan lake.json --algorithm rrtstar --expansions 20000 --seed 7   (the same path on every machine)
   companion plan lake.json --explain
+  companion plan archipelago.toml --explain --wind 5@20
 
-The problem's format is described in docs/problem-format.md. PLAN.json holds "waypoints" as [[x, y], ...] in metres.
+The problem's format is described in docs/problem-format.md. PLAN.json holds "waypoints" as [[x, y], ...] in metres;
+of a mission with several goals it is a list of plans.
 Exit codes: 0 a path was found, 1 there is none (the reason is printed), 2 the problem cannot be read or planned.
 """
 
@@ -32,57 +39,99 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         "plan", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("problem", metavar="PROBLEM.json", help="the planning problem")
-    parser.add_argument("--budget", type=float, metavar="S", help="computing time [s]; 1 unless --expansions is given")
-    parser.add_argument("--expansions", type=int, metavar="N", help="effort in the algorithm's own steps instead")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of every random choice (default 0)")
+    parser.add_argument("problem", metavar="PROBLEM.json", help="the planning problem, or a mission TOML, planned from "
+                        "goal to goal in a wind held steady")
+    parser.add_argument("--wind", type=wind, metavar="SPEED@FROM",
+                        help="of a mission [m/s, degrees] (else what its previews assume)")
+    parser.add_argument("--budget", type=number("s", above=0.0), metavar="S",
+                        help="computing time [s]; 1 unless --expansions is given")
+    parser.add_argument("--expansions", type=whole(at_least=1), metavar="N",
+                        help="effort in the algorithm's own steps instead")
+    parser.add_argument("--seed", type=whole(), default=0, metavar="N", help="of every random choice (default 0)")
     parser.add_argument("--algorithm", default="auto", choices=("auto", "rrtstar", "astar"))
     parser.add_argument("--explain", action="store_true", help="say what bound each leg and what would change the plan")
-    parser.add_argument("--explain-budget", type=float, default=5.0, metavar="S", help="computing time for that [s]")
-    parser.add_argument("--out", metavar="PLAN.json", help="write the plan")
-    parser.add_argument("--plot", metavar="P.png", help="draw problem, search, path and bound")
+    parser.add_argument("--explain-budget", type=number("s", above=0.0), default=5.0, metavar="S",
+                        help="computing time for that [s]")
+    parser.add_argument("--out", type=out_file, metavar="PLAN.json", help="write the plan")
+    parser.add_argument("--plot", type=picture, metavar="P.png", help="draw problem, search, path and bound")
     parser.add_argument("--json", action="store_true", help="print the plan as JSON instead of text")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, print, write and draw; return the exit code."""
-    from companion.planner import PlanStatus, Problem, plan
+    from companion.planner import PlanStatus, Problem
 
-    for path, flag in ((args.out, "--out"), (args.plot, "--plot")):
-        if path is not None and not Path(path).absolute().parent.is_dir():
-            raise InputError(flag, path, "is in a folder that does not exist", "make the folder first")
-    problem = Problem.from_json(args.problem)
-    answer = plan(
-        problem, budget_s=args.budget, expansions=args.expansions, seed=args.seed, algorithm=args.algorithm)
+    if Path(args.problem).suffix.lower() == ".toml":
+        answers = _sail_through(args)
+    elif args.wind is not None:
+        raise InputError("--wind", "", "a problem has a wind of its own", "leave it out, or plan a mission TOML")
+    else:
+        answers = [_answer(Problem.from_json(args.problem), args)]
+    files = [_file(problem, answer) for problem, answer in answers]
+    text = json.dumps(files[0] if len(files) == 1 else files, indent=1) + "\n"
+    if args.out is not None:
+        args.out.write_text(text, encoding="utf-8")
+    if args.plot is not None:
+        from companion.plots.plan import save_plan
+
+        if len(answers) > 1:
+            raise InputError("--plot", str(args.plot), "one plan is drawn, and this mission wants several",
+                             "companion mission check --plot draws them all")
+        with patience("drawing"):
+            save_plan(*answers[0], args.plot)
+    if args.json:
+        sys.stdout.write(text)
+    else:
+        print("\n\n".join(describe(problem, answer) for problem, answer in answers))
+        for path in (args.out, args.plot):
+            if path is not None:
+                print(f"written: {path}")
+    if any(answer.status is PlanStatus.INVALID for _, answer in answers):
+        return 2
+    return 0 if all(answer.has_path for _, answer in answers) else 1
+
+
+def _answer(problem: Problem, args: argparse.Namespace) -> tuple[Problem, Plan]:
+    """Return a problem with its plan, explained where that is asked for."""
+    from companion.planner import plan
+
+    # what is asked for may take long by itself: the time it was given is no surprise
+    with patience("planning") if args.budget is None else contextlib.nullcontext():
+        answer = plan(
+            problem, budget_s=args.budget, expansions=args.expansions, seed=args.seed, algorithm=args.algorithm)
     if args.explain:
         from companion.planner.explain import explain
 
         answer = explain(problem, answer, budget_s=args.explain_budget)
-    answer = _completed(problem, answer)
-    if args.out is not None:
-        _write(Path(args.out), json.dumps(_file(problem, answer), indent=1) + "\n")
-    if args.plot is not None:
-        from companion.plots.plan import save_plan
-
-        save_plan(problem, answer, args.plot)
-    if args.json:
-        sys.stdout.write(json.dumps(_file(problem, answer), indent=1) + "\n")
-    else:
-        print(describe(problem, answer))
-        for path in (args.out, args.plot):
-            if path is not None:
-                print(f"written: {path}")
-    if answer.status is PlanStatus.INVALID:
-        return 2
-    return 0 if answer.has_path else 1
+    return problem, _completed(problem, answer)
 
 
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError("--out", str(path), f"cannot be written ({error.strerror})", "choose another file") from error
+def _sail_through(args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
+    """Return the problems and plans of a mission from goal to goal, to the first that has no path."""
+    from companion.commands.mission import leg_problem
+    from companion.geofence import load_mission
+    from companion.sailable import require_sailable
+
+    mission = require_sailable(load_mission(args.problem))
+    if mission.start is None:
+        raise InputError(args.problem, "[start]", "is missing", "a plan begins somewhere: add lat and lon")
+    tws_mps, from_deg = args.wind or (mission.wind.preview_speed_mps, mission.wind.preview_from_deg)
+    frame = mission.frame()
+    here = frame.en_from_geo(mission.start)
+    heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
+    answers = []
+    for goal in mission.goals:
+        problem = leg_problem(
+            mission, here, heading_deg, frame.en_from_geo(goal.point), goal.radius_m, tws_mps=tws_mps,
+            from_deg=from_deg, title=goal.name)
+        answers.append(_answer(problem, args))
+        answer = answers[-1][1]
+        if not answer.has_path:
+            break
+        here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
+        heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
+    return answers
 
 
 def _completed(problem: Problem, answer: Plan) -> Plan:
@@ -117,23 +166,49 @@ def describe(problem: Problem, answer: Plan) -> str:
         else ""
     lines += [
         f"{answer.status.value}: {answer.cost_s:.1f} s{gap}",
-        f"{length:.0f} m in {len(answer.legs)} legs, {judged.tacks} tacks, {judged.gybes} gybes",
+        ", ".join((f"{length:.0f} m in {counted(len(courses(answer.legs)), 'course')}{_of_legs(answer)}",
+                   counted(judged.tacks, "tack"), counted(judged.gybes, "gybe"))),
         _risk_text(problem, answer),
         effort,
         "",
-        "  leg  heading     TWA  tack  length    from      to   no-go  margin  clear     risk",
+        *_table(answer),
     ]
-    for i, leg in enumerate(answer.legs, start=1):
-        clear = "-" if leg.clearance_m is None else f"{leg.clearance_m:.0f} m"
-        risk = "-" if leg.risk is None else f"{100.0 * leg.risk:.2f} %"
-        tack = "stbd" if leg.twa_rad > 0.0 else "port"  # the side the wind comes over
-        lines.append(
-            f"  {i:3d}  {math.degrees(leg.heading_rad):6.1f}°  {math.degrees(abs(leg.twa_rad)):5.1f}°  {tack}"
-            f"  {leg.length_m:4.0f} m  {leg.start_s:5.0f} s  {leg.end_s:5.0f} s"
-            f"  {math.degrees(leg.no_go_half_rad):5.1f}°  {math.degrees(leg.margin_rad):5.1f}°  {clear:>5}  {risk:>7}")
     if answer.why.text:
         lines += ["", answer.why.text]
     return "\n".join(lines)
+
+
+def _of_legs(answer: Plan) -> str:
+    merged = len(courses(answer.legs))
+    return f" ({counted(len(answer.legs), 'leg')})" if len(answer.legs) > merged else ""
+
+
+def _table(answer: Plan) -> list[str]:
+    """Return the courses as lines under a head; where the legs of one differ, their range."""
+    rows = [("course", "heading", "TWA", "tack", "length", "from", "to", "no-go", "margin", "clear", "risk")]
+    for place, course in enumerate(courses(answer.legs), start=1):
+        first, last = course.legs[0], course.legs[-1]
+        clearances = [leg.clearance_m for leg in course.legs if leg.clearance_m is not None]
+        risks = [leg.risk for leg in course.legs if leg.risk is not None]
+        headings = [math.degrees(heading) for heading in course.headings_rad]
+        rows.append((
+            str(place), _range(*headings), _range(*course.span(lambda leg: math.degrees(abs(leg.twa_rad)))),
+            "stbd" if first.twa_rad > 0.0 else "port",  # the side the wind comes over
+            f"{course.length_m:.0f} m", f"{first.start_s:.0f} s", f"{last.end_s:.0f} s",
+            _range(*course.span(lambda leg: math.degrees(leg.no_go_half_rad))),
+            _range(*course.span(lambda leg: math.degrees(leg.margin_rad))),
+            f"{min(clearances):.0f} m" if clearances else "-",
+            # at most: as if the legs' chances excluded one another
+            f"{100.0 * min(1.0, sum(risks)):.2f} %" if risks else "-",
+        ))
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return ["  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
+
+
+def _range(begin: float, end: float) -> str:
+    """Return degrees, or from where to where they go."""
+    low, high = (f"{round(value, 1) + 0.0:.1f}" for value in (begin, end))   # + 0: no minus before a zero
+    return f"{low}°" if low == high else f"{low}..{high}°"
 
 
 def _risk_text(problem: Problem, answer: Plan) -> str:

@@ -1,43 +1,123 @@
-"""``companion report``: pictures and a summary of a recorded voyage."""
+"""``companion report``: a recorded voyage in words, as a picture, and its track for other programs."""
 
 from __future__ import annotations
 
 import argparse
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from companion.arguments import out_file, picture
+from companion.commands.output import force_option, patience, write_out
+from companion.words import counted
+
+if TYPE_CHECKING:
+    from companion.geofence import Document
+    from companion.telemetry.voyage_folder import VoyageRecord
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "report", help=summary, description="Draw a recorded voyage and print its summary.",
-        epilog="Example: companion report voyages/20260714T101500Z-archipelago",
+        "report", help=summary, description="Tell a recorded voyage in words, draw it, and write its track.",
+        epilog="Example: companion report voyages/20260714T101500Z-archipelago --track day.gpx",
     )
     parser.add_argument("voyage", type=Path, metavar="VOYAGE_DIR", help="the folder that `companion run` left")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="the picture (default: voyage.png in the folder)")
+    parser.add_argument("--out", type=picture, metavar="FILE", help="the picture (default: voyage.png in the folder)")
+    parser.add_argument("--track", type=out_file, action="append", default=[], metavar="FILE",
+                        help="write the track as .gpx, .kml, .kmz or .geojson; may be given more than once")
+    force_option(parser)
     parser.add_argument("--json", action="store_true", help="print summary.json and draw nothing")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.plots.voyage import plot_voyage, read_voyage
+    from companion.geofence.formats import format_of, write
+    from companion.plots.voyage import plot_voyage
     from companion.telemetry.names import PICTURE
+    from companion.telemetry.voyage_folder import read_voyage
 
+    for path in args.track:
+        format_of(path)
     record = read_voyage(args.voyage)
+    for path in args.track:
+        write_out(write(track_of(record), path), str(path), lossy=False, force=args.force,
+                  remedy="write .gpx, .kml, .kmz or .geojson")
     if args.json:
-        print(json.dumps(record.summary, indent=1))
+        print(json.dumps(record.figures, indent=1))
         return 0
     out = args.out or args.voyage / PICTURE
-    plot_voyage(record, out)
-    for key, value in record.summary.items():
-        shown = f"{value:.1f}" if isinstance(value, float) else value
-        print(f"{key:20} {shown}")
-    reasons: dict[str, int] = {}
-    for decision in record.decisions:
-        if decision.get("kind") == "plan":
-            reasons[str(decision.get("reason"))] = reasons.get(str(decision.get("reason")), 0) + 1
-    print(f"{'plans by reason':20} " + ", ".join(f"{k} {n}" for k, n in sorted(reasons.items())))
-    print(f"{'picture':20} {out}")
+    with patience("drawing"):
+        plot_voyage(record, out)
+    print("\n".join([*in_words(record), *(f"Track: {path}" for path in args.track), f"Picture: {out}"]))
     return 0
+
+
+def track_of(record: VoyageRecord) -> Document:
+    """Return the positions of a voyage as a document with one track."""
+    import numpy as np
+
+    from companion.geofence.document import Document, Track
+    from companion.messages import GeoPoint
+
+    c = record.columns
+    known = np.flatnonzero(np.isfinite(c["lat_deg"]) & np.isfinite(c["lon_deg"]))
+    track = Track(
+        points=tuple(GeoPoint(lat_deg=float(c["lat_deg"][k]), lon_deg=float(c["lon_deg"][k])) for k in known),
+        times_s=None if record.epoch_s is None else tuple(record.epoch_s + float(c["t_s"][k]) for k in known),
+        name=record.chart.name,
+    )
+    return Document(source=str(record.folder), format="voyage", tracks=(track,) if len(known) else ())
+
+
+def in_words(record: VoyageRecord) -> list[str]:
+    """Return a voyage as sentences."""
+    from companion.plots.chart import date_words, place_words
+
+    s, chart = record.summary, record.chart
+    where = place_words(chart.origin.lat_deg, chart.origin.lon_deg)
+    head = ", ".join(word for word in (chart.name, date_words(record.began_utc), where) if word)
+    if s.arrived is None:
+        return [head, "The voyage has no summary: it has not ended, or its end was not recorded.", *_plans(record)]
+    lines = [head, _end(record)]
+    lines += _plans(record)
+    if s.min_clearance_m is not None:
+        touched = "no contact" if not s.contacts else f"{counted(s.contacts, 'contact')}!"
+        lines.append(f"Nearest to an obstacle or the fence: {s.min_clearance_m:.1f} m, {touched}.")
+    if s.promised_risk is not None:
+        whole = f" and {100.0 * s.path_risk:.0f} % over a whole way" if s.path_risk is not None else ""
+        lines.append(f"Chance that plans gave the wind to force her into the no-go zone: up to "
+                     f"{100.0 * s.promised_risk:.0f} % at each instant{whole}; entered {_times(s.no_go_entries)}.")
+    if s.alerts:
+        said = ", ".join(f"{code} {_times(number)}" for code, number in sorted(s.alerts.items()))
+        lines.append(f"Announced: {said}.")
+    if s.records_dropped:
+        lines.append(f"{counted(s.records_dropped, 'record')} missing: {s.disk_trouble or 'the disk took no more'}.")
+    return lines
+
+
+def _end(record: VoyageRecord) -> str:
+    s = record.summary
+    why = ": ".join(part for part in (s.end_reason or "unknown", s.end_why) if part)
+    end = "Arrived" if s.arrived else f"Not arrived ({why})"
+    if s.time_s is not None:
+        minutes, seconds = divmod(round(s.time_s), 60)
+        clock = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
+        end += f" after {clock} and {s.distance_m or 0.0:.0f} m"
+    goals = f"; {s.goals_reached} of {counted(s.goals, 'goal')} reached" if s.goals is not None else ""
+    return f"{end}, with {counted(s.tacks, 'tack')} and {counted(s.gybes, 'gybe')}{goals}."
+
+
+def _plans(record: VoyageRecord) -> list[str]:
+    reasons: dict[str, int] = {}
+    for plan in record.plans:
+        reasons[plan.reason or "unknown"] = reasons.get(plan.reason or "unknown", 0) + 1
+    if not reasons:
+        return ["No plan was made."]
+    why = ", ".join(f"{reason} {number}" for reason, number in sorted(reasons.items(), key=lambda r: -r[1]))
+    return [f"{counted(len(record.plans), 'plan')} made, by reason: {why}."]
+
+
+def _times(number: int) -> str:
+    return {0: "never", 1: "once", 2: "twice"}.get(number, f"{number} times")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-import math
 import os
 import re
 import secrets
@@ -17,7 +16,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from companion.program import INTERRUPTED, system_id
+from companion.arguments import number, system_id, whole
+from companion.program import INTERRUPTED
 
 if TYPE_CHECKING:
     from companion.planner.worker import PlannerWorker
@@ -45,18 +45,18 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR",
                         help="the voyage folder (default: voyages/<UTC time>-<mission>)")
     parser.add_argument("--dry-run", action="store_true", help="look, plan and speak; touch nothing")
-    parser.add_argument("--seed", type=int, default=None, help="of the planner (default: the mission's)")
+    parser.add_argument("--seed", type=whole(), default=None, help="of the planner (default: the mission's)")
     parser.add_argument("--state", type=Path, metavar="FILE",
                         help="where the state for a restart is kept (default: voyages/<mission>.state.json); its "
                         "folder is one boat's, and locked")
     parser.add_argument("--again", action="store_true",
                         help="sail the mission again when its state says that it has arrived (asked at a terminal)")
-    parser.add_argument("--keep-gb", type=float, metavar="GB",
+    parser.add_argument("--keep-gb", type=number("GB", above=0.0), metavar="GB",
                         help="what all voyages in the folder may take together; the oldest finished ones give way, "
                         "telemetry logs first, decisions last (default: 5, and without end where --out is given)")
-    parser.add_argument("--wait", type=float, default=30.0, metavar="S",
+    parser.add_argument("--wait", type=number("s", above=0.0), default=30.0, metavar="S",
                         help="give up when no autopilot is heard for this long (default: 30)")
-    parser.add_argument("--limit", type=float, metavar="S", help="end after this many seconds")
+    parser.add_argument("--limit", type=number("s", above=0.0), metavar="S", help="end after this many seconds")
     parser.add_argument("--exit-on-arrival", action="store_true",
                         help="end when the voyage is over; by default the boat is watched in its loiter until SIGINT "
                         "or SIGTERM")
@@ -64,7 +64,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         help="hear other vessels here too, besides the mission's [traffic] feeds: udpin:HOST:PORT, "
                         "tcp:HOST:PORT, /dev/NAME:BAUD; may be given more than once")
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (32 bytes, mode 0600)")
-    parser.add_argument("--speedup", type=float, default=1.0, metavar="N",
+    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=1.0, metavar="N",
                         help="the autopilot is a simulator that runs N times as fast as time (default: 1)")
     parser.set_defaults(run=run)
 
@@ -101,19 +101,15 @@ def _outliving_the_terminal() -> Iterator[None]:
 
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     from companion.clock import run as run_loop
-    from companion.errors import InputError
     from companion.geofence import load_mission
     from companion.mavlink.transport import open_link
+    from companion.sailable import require_sailable
     from companion.telemetry.shelf import DEFAULT_BUDGET_BYTES, Shelf
     from companion.traffic.feeds import parse_feed
 
-    if not args.speedup > 0.0:
-        raise InputError("--speedup", str(args.speedup), "must be positive")
-    if args.keep_gb is not None and not 0.0 < args.keep_gb < math.inf:
-        raise InputError("--keep-gb", str(args.keep_gb), "must be positive")
     for name in args.feed:
         parse_feed(name)
-    mission = load_mission(args.mission).with_feeds(*args.feed).with_system(args.system)
+    mission = require_sailable(load_mission(args.mission)).with_feeds(*args.feed).with_system(args.system)
     for finding in mission.findings:
         err.write(f"companion run: note: {finding}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
@@ -230,9 +226,9 @@ async def _sail(
 
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for end in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
-            loop.add_signal_handler(number, stop.set)
+            loop.add_signal_handler(end, stop.set)
     with ServiceManager(os.environ) as manager:
         async with PlannerWorker() as planner:
             # The child loads its kernels while this process imports the rest.
@@ -284,8 +280,9 @@ def _signing(path: Path | None) -> Any:
 def _report(folder: Path, err: Console) -> None:
     """Draw the voyage; a picture that fails must not hide how the voyage ended."""
     try:
-        from companion.plots.voyage import plot_voyage, read_voyage
+        from companion.plots.voyage import plot_voyage
         from companion.telemetry.names import PICTURE
+        from companion.telemetry.voyage_folder import read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
-from companion.errors import InputError, LinkError, TransferError
+from companion.errors import LinkError, TransferError
 from companion.messages import Command, GeoPoint, MissionItem, MissionType
 
 OnProgress = Callable[[float], None]  # 0..1
@@ -376,13 +376,3 @@ def download_list(shore: Shore, kind: MissionType) -> tuple[MissionItem, ...]:
     """Read a list with a progress bar."""
     with progress_bar(f"{_NAMES[kind]} download") as on_progress:
         return shore.download(kind, on_progress=on_progress)
-
-
-def place_argument(text: str, flag: str) -> GeoPoint:
-    """Return the point of ``LAT,LON``. Raises InputError."""
-    try:
-        lat, lon = (float(part) for part in text.split(","))
-        return GeoPoint(lat_deg=lat, lon_deg=lon)
-    except ValueError as error:
-        problem = str(error) if "outside" in str(error) else f"{text[:40]!r} is not a position"
-        raise InputError(flag, "", problem, "write LAT,LON in degrees, as 50.82,-1.31") from None

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from companion.program import system_id
+from companion.arguments import number, system_id
 
 EXIT_NO_LINK, EXIT_STALE, EXIT_ALARM = 3, 4, 5
 # States of the skipper that somebody ashore should look at.
@@ -35,9 +35,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         help="the autopilot's MAVLink system id (default: the only one heard)")
     parser.add_argument("--once", action="store_true", help="print one status and end")
     parser.add_argument("--json", action="store_true", help="JSON, one object per status; unknown is null")
-    parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="for the first status (default: 10)")
-    parser.add_argument("--max-age", type=float, default=10.0, metavar="S", help="older is stale (default: 10)")
-    parser.add_argument("--every", type=float, default=2.0, metavar="S", help="without --once (default: 2)")
+    parser.add_argument("--timeout", type=number("s", above=0.0), default=10.0, metavar="S",
+                        help="for the first status (default: 10)")
+    parser.add_argument("--max-age", type=number("s", above=0.0), default=10.0, metavar="S",
+                        help="older is stale (default: 10)")
+    parser.add_argument("--every", type=number("s", above=0.0), default=2.0, metavar="S",
+                        help="without --once (default: 2)")
     parser.add_argument("--units", choices=("ms", "kn"), default="ms", help="of speeds in the text (default: ms)")
     parser.set_defaults(run=run)
 

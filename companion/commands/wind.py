@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from companion.arguments import out_file, picture
 from companion.errors import InputError
 
 if TYPE_CHECKING:
@@ -51,8 +52,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument(
         "--estimator", default="default", metavar="NAME", help="default, kalman, ou, arma, garch, mean90, mean5 or all")
     parser.add_argument(
-        "--plot", type=Path, metavar="P.png", help="draw the (first) record, its forecasts and their scores")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures")
+        "--plot", type=picture, metavar="P.png", help="draw the (first) record, its forecasts and their scores")
+    parser.add_argument("--json", type=out_file, metavar="FILE", help="write the figures")
     parser.add_argument("--cost", action="store_true", help="time update and forecast instead of scoring")
     parser.set_defaults(run=run)
 
@@ -65,9 +66,6 @@ def run(args: argparse.Namespace) -> int:
     names = list(NAMES) if args.estimator == "all" else [args.estimator]
     for name in names:
         make(name)                      # an unknown name is refused before anything is read
-    for path, flag in ((args.plot, "--plot"), (args.json, "--json")):
-        if path is not None and not path.absolute().parent.is_dir():
-            raise InputError(flag, str(path), "is in a folder that does not exist", "make the folder first")
     records = [read_record(path) for path in _files(args.record)]
     if args.cost:
         _print_cost(records[0], names)

@@ -56,9 +56,9 @@ def read(
 
     ``kind`` is what zones are when the format does not say. ``axis`` (``auto``, ``lonlat``, ``latlon``) is the
     order of coordinates in WKT; with ``auto`` it is longitude first, and with ``near`` (the place of the mission) a
-    file that lies elsewhere is an error that suggests the swap. ``areas`` reads the lines of a GPX as dangers or
-    limits in place of routes. Raises InputError where the file cannot be understood at all; everything else that
-    is wrong is in the document's findings.
+    file that lies elsewhere is an error that suggests the swap. ``areas`` reads the lines of a GPX and the pins of a
+    KML or GeoJSON as dangers or limits in place of routes. Raises InputError where the file cannot be understood at
+    all; everything else that is wrong is in the document's findings.
     """
     path = Path(path)
     document = parse(read_bytes(path), str(path), kind=kind, axis=axis, areas=areas, extension=path.suffix.lower())
@@ -71,17 +71,17 @@ def parse(
 ) -> Document:
     """Return what the bytes of a file hold; see ``read``."""
     if data.startswith(b"PK"):
-        return replace(read_kml(unzip_kmz(data, source), source, kind=kind), format="kmz")
+        return replace(read_kml(unzip_kmz(data, source), source, kind=kind, areas=areas), format="kmz")
     name = sniff(data, source, extension)
     if name == "kml":
-        return read_kml(data, source, kind=kind)
+        return read_kml(data, source, kind=kind, areas=areas)
     if name == "gpx":
         return read_gpx(data, source, kind=kind, areas=areas)
     text = decode(data, source)
     if name == "wkt":
         return read_wkt(text, source, kind=kind, latlon=axis == "latlon")
     if name == "geojson":
-        return read_geojson(text, source, kind=kind)
+        return read_geojson(text, source, kind=kind, areas=areas)
     if name == "poly":
         return read_poly(text, source, kind=kind)
     plain: dict[str, Callable[[str, str], Document]] = {

@@ -16,8 +16,9 @@ from companion.errors import InputError
 from companion.geofence.document import Document, Mark, Track
 from companion.geofence.findings import Code, Severity
 from companion.geofence.json_node import JsonNode, parse_json
-from companion.geofence.losses import Losses, Written
+from companion.geofence.losses import Losses, Written, leave_out
 from companion.geofence.rings import Findings, polygons_from_rings
+from companion.geofence.routes import RoutePoint, items_of, pins_as_dangers, pins_as_route
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.geofence.text import MAX_DEPTH, MAX_POSITIONS
 from companion.messages import Command, GeoPoint, MissionItem
@@ -29,13 +30,14 @@ _KINDS = {
 
 
 class _Reading:
-    def __init__(self, source: str, kind: ZoneKind) -> None:
-        self.source, self.kind = source, kind
+    def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
+        self.source, self.kind, self.areas = source, kind, areas
         self.findings = Findings()
         self.zones: list[Zone] = []
         self.marks: list[Mark] = []
         self.items: list[MissionItem] = []
         self.item_names: list[str] = []
+        self.pins: list[RoutePoint] = []
         self.rally: list[MissionItem] = []
         self.tracks: list[Track] = []
         self.home: GeoPoint | None = None
@@ -145,6 +147,8 @@ class _Reading:
             if radius_m <= 0.0:
                 raise radius.fail("a circle needs a positive radius")
             self.zones.append(Zone(kind=kind, shape=Circle(point, radius_m), name=name, margin_m=margin_m))
+        elif not (self.areas or properties.get("kind") or margin_m is not None):
+            self.pins.append((point, 0.0, name))
         else:
             self.marks.append(Mark(geometry=Point(position), kind=kind, name=name, margin_m=margin_m))
 
@@ -201,10 +205,15 @@ def _item(point: GeoPoint, properties: JsonNode, *, rally: bool) -> MissionItem:
     )
 
 
-def read_geojson(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION) -> Document:
-    """Return what a GeoJSON text holds; polygons without a ``kind`` property are of ``kind``."""
+def read_geojson(
+    text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, areas: bool = False,
+) -> Document:
+    """Return what a GeoJSON text holds; polygons without a ``kind`` property are of ``kind``.
+
+    Points without properties that say what they are are the places to sail to, or, with ``areas``, dangers.
+    """
     root = parse_json(text, source)
-    reading = _Reading(source, kind)
+    reading = _Reading(source, kind, areas=areas)
     root_kind = root.member("type").text()
     crs = root.get("crs")
     if crs is not None:
@@ -219,11 +228,21 @@ def read_geojson(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION)
         reading.feature(root)
     else:
         reading.geometry(root, JsonNode({}, source), "")
+    route: list[RoutePoint] = []
+    places: dict[str, GeoPoint] = {"home": reading.home} if reading.home is not None else {}
+    has_line = bool(reading.tracks) or any(isinstance(m.geometry, LineString) for m in reading.marks)
+    if reading.items or has_line:
+        reading.marks.extend(pins_as_dangers(reading.pins, kind, reading.findings))
+    else:
+        pins_as_route(reading.pins, route, places, reading.findings)
+    pins, pin_names = items_of(route)
+    items = tuple(reading.items) or pins
+    names = (tuple(reading.item_names) if any(reading.item_names) else ()) or pin_names
     document = Document(
         source=source, format="geojson", zones=tuple(reading.zones), marks=tuple(reading.marks),
-        items=tuple(reading.items), item_names=tuple(reading.item_names) if any(reading.item_names) else (),
-        home=reading.home, rally=tuple(reading.rally), return_point=reading.return_point,
-        tracks=tuple(reading.tracks), findings=tuple(reading.findings),
+        items=items, item_names=names, home=places.get("home"),
+        rally=tuple(reading.rally), return_point=reading.return_point, tracks=tuple(reading.tracks),
+        findings=tuple(reading.findings),
     )
     if document.is_empty and not reading.findings:
         reading.findings.add(Severity.ERROR, Code.EMPTY, "", "holds no feature", "an empty file is not 'no obstacles'")
@@ -233,6 +252,10 @@ def read_geojson(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION)
 
 def write_geojson(document: Document) -> Written:
     """Return the document as a FeatureCollection; nothing is lost."""
+    losses = Losses()
+    leave_out(losses, document, {
+        "zones", "marks", "items", "item names", "rally", "return", "home", "tracks", "names", "margins",
+    })
     features: list[dict[str, Any]] = []
 
     def add(geometry: dict[str, Any], **properties: object) -> None:
@@ -263,7 +286,7 @@ def write_geojson(document: Document) -> Written:
         add({"type": "LineString", "coordinates": [[p.lon_deg, p.lat_deg] for p in track.points]},
             role="track", name=track.name, times_s=list(track.times_s) if track.times_s is not None else None)
     text = json.dumps({"type": "FeatureCollection", "features": features}, ensure_ascii=False, indent=1)
-    return Written((text + "\n").encode(), tuple(Losses()))
+    return Written((text + "\n").encode(), tuple(losses))
 
 
 def _point(point: GeoPoint) -> dict[str, Any]:

@@ -1,8 +1,9 @@
 """GPX 1.1 routes, tracks and waypoints (OpenCPN and every chart plotter), by gpxpy.
 
-A route is a mission of waypoints. A closed route or track whose ``<type>`` is inclusion or exclusion is a zone
-(that is how we write them), and when a file is read for its ``areas`` every closed line is one, every open line
-and every waypoint something to stay clear of.
+A route is a mission of waypoints; in a file without a line the waypoints are one themselves. A closed route or track
+whose ``<type>`` is inclusion or exclusion is a zone (that is how we write them). When a file is read for its ``areas``
+every closed line is a zone, every open line and every waypoint something to stay clear of, but for the mission and
+the tracks that we wrote ourselves.
 """
 
 from __future__ import annotations
@@ -21,13 +22,15 @@ from companion.geofence.fence_items import ring_of
 from companion.geofence.findings import Code, Severity
 from companion.geofence.losses import Losses, Written, as_polygon, leave_out, without_holes
 from companion.geofence.rings import Findings
-from companion.geofence.routes import RoutePoint, items_of, line_as_area, route_of
+from companion.geofence.routes import RoutePoint, items_of, line_as_area, pins_as_route, route_of
 from companion.geofence.shapes import Zone, ZoneKind, wrap_lon_deg
 from companion.geofence.text import MAX_POSITIONS, printable
 from companion.geofence.xml_safe import parse_xml
 from companion.messages import Command, GeoPoint, MissionItem
 
 _KINDS = {k.value: k for k in ZoneKind}
+# The <type> that we give to routes and tracks: what says so is no danger and no limit, whoever reads it.
+_MISSION, _TRACK = "mission", "track"
 
 
 class _Reading:
@@ -40,6 +43,7 @@ class _Reading:
         self.tracks: list[Track] = []
         self.places: dict[str, GeoPoint] = {}
         self.rally: list[MissionItem] = []
+        self.pins: list[RoutePoint] = []
 
     def point(self, node: Any, place: str) -> GeoPoint:
         lat_deg, lon_deg = node.latitude, node.longitude
@@ -77,6 +81,12 @@ def read_gpx(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
         _route(route, f"rte {number}", reading)
     for number, track in enumerate(gpx.tracks, start=1):
         _track(track, f"trk {number}", reading)
+    if reading.route or reading.tracks:
+        for _, _, name in reading.pins:
+            reading.findings.add(Severity.NOTE, Code.DROPPED, "", f"the waypoint {name} is no part of a route and is "
+                                 "not used")
+    else:
+        pins_as_route(reading.pins, reading.route, reading.places, reading.findings)
     items, names = items_of(reading.route)
     document = Document(
         source=source, format="gpx", zones=tuple(reading.zones), marks=tuple(reading.marks), items=items,
@@ -103,8 +113,7 @@ def _waypoint(node: Any, place: str, reading: _Reading) -> None:
         geometry = Point(point.lon_deg, point.lat_deg)
         reading.marks.append(Mark(geometry=geometry, kind=_KINDS.get(role, reading.kind), name=node.name or ""))
     else:
-        reading.findings.add(Severity.NOTE, Code.DROPPED, place, f"the waypoint {node.name or ''} is no part of a "
-                             "route and is not used")
+        reading.pins.append((point, _altitude_m(node), node.name or ""))
 
 
 def _altitude_m(node: Any) -> float:
@@ -114,7 +123,7 @@ def _altitude_m(node: Any) -> float:
 def _route(node: Any, place: str, reading: _Reading) -> None:
     points = [reading.point(p, f"{place} point {i + 1}") for i, p in enumerate(node.points)]
     role = (node.type or "").strip().lower()
-    if role in _KINDS or reading.areas:
+    if role in _KINDS or (reading.areas and role != _MISSION):
         reading.line(points, _KINDS.get(role, reading.kind), node.name or "", place)
     elif reading.route:
         reading.findings.add(Severity.WARNING, Code.FORMAT, place,
@@ -133,7 +142,7 @@ def _track(node: Any, place: str, reading: _Reading) -> None:
         points = [reading.point(p, f"{where} point {i + 1}") for i, p in enumerate(segment.points)]
         if not points:
             continue
-        if role in _KINDS or reading.areas:
+        if role in _KINDS or (reading.areas and role != _TRACK):
             reading.line(points, _KINDS.get(role, reading.kind), node.name or "", where)
             continue
         times = [p.time for p in segment.points]
@@ -158,6 +167,7 @@ def write_gpx(document: Document) -> Written:
     points = route_of(document, losses)
     if points:
         route = gpxpy.gpx.GPXRoute(name="mission")
+        route.type = _MISSION
         route.points.extend(
             gpxpy.gpx.GPXRoutePoint(p.lat_deg, p.lon_deg, elevation=a or None, name=printable(n) or None,
                                     symbol="diamond", type="WPT")
@@ -192,6 +202,7 @@ def write_gpx(document: Document) -> Written:
 
 def _add_track(gpx: Any, track: Track) -> None:
     line = gpxpy.gpx.GPXTrack(name=printable(track.name) or None)
+    line.type = _TRACK  # type: ignore[assignment]
     segment = gpxpy.gpx.GPXTrackSegment()
     times = track.times_s or (None,) * len(track.points)
     segment.points.extend(

@@ -20,7 +20,7 @@ from companion.geofence.document import Document, Mark, Track
 from companion.geofence.findings import Code, Severity
 from companion.geofence.losses import Losses, Written, as_polygon, leave_out
 from companion.geofence.rings import Findings, polygons_from_rings
-from companion.geofence.routes import RoutePoint, items_of, route_of, track_points
+from companion.geofence.routes import RoutePoint, items_of, pins_as_dangers, pins_as_route, route_of, track_points
 from companion.geofence.shapes import Zone, ZoneKind, unwrapped, wrap_lon_deg
 from companion.geofence.text import MAX_BYTES, MAX_POSITIONS, number, printable
 from companion.geofence.wpl import decimal
@@ -49,14 +49,15 @@ def unzip_kmz(data: bytes, source: str) -> bytes:
 
 
 class _Reading:
-    def __init__(self, source: str, kind: ZoneKind) -> None:
-        self.source, self.kind = source, kind
+    def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
+        self.source, self.kind, self.areas = source, kind, areas
         self.findings = Findings()
         self.zones: list[Zone] = []
         self.marks: list[Mark] = []
         self.route: list[RoutePoint] = []
         self.tracks: list[Track] = []
         self.rally: list[MissionItem] = []
+        self.pins: list[RoutePoint] = []
         self.places: dict[str, GeoPoint] = {}
         self.positions = 0
 
@@ -88,12 +89,15 @@ class _Reading:
         return True
 
 
-def read_kml(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION) -> Document:
-    """Return what a KML file holds; polygons without a ``kind`` are of ``kind``."""
+def read_kml(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, areas: bool = False) -> Document:
+    """Return what a KML file holds; polygons without a ``kind`` are of ``kind``.
+
+    Pins that say nothing of themselves are the places to sail to, or, when it is read for its ``areas``, dangers.
+    """
     root = parse_xml(data, source)
     if local_name(root) != "kml":
         raise InputError(source, "line 1", f"the root is <{local_name(root)[:30]}>, not <kml>")
-    reading = _Reading(source, kind)
+    reading = _Reading(source, kind, areas=areas)
     placemarks = [e for e in root.iter() if local_name(e) == "Placemark"]
     for index, placemark in enumerate(placemarks):
         name = child_text(placemark, "name")
@@ -107,6 +111,11 @@ def read_kml(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION) -
     for element in root.iter():
         if local_name(element) in {"NetworkLink", "GroundOverlay"}:
             reading.findings.add(Severity.WARNING, Code.DROPPED, "", f"a {local_name(element)} is not followed")
+    has_line = bool(reading.tracks) or any(isinstance(m.geometry, LineString) for m in reading.marks)
+    if reading.route or has_line:
+        reading.marks.extend(pins_as_dangers(reading.pins, kind, reading.findings))
+    else:
+        pins_as_route(reading.pins, reading.route, reading.places, reading.findings)
     items, names = items_of(reading.route)
     document = Document(
         source=source, format="kml", zones=tuple(reading.zones), marks=tuple(reading.marks), items=items,
@@ -167,6 +176,9 @@ def _shape(element: Any, name: str, data_of: dict[str, str], place: str, *, read
         return
     lonlat = [(x, y) for x, y, _ in coordinates]
     if shape == "Point":
+        if not (role or word or margin or reading.areas):
+            reading.pins.append((track_points(lonlat)[0], coordinates[0][2], name))
+            return
         _point(lonlat[0], coordinates[0][2], Mark(geometry=Point(lonlat[0]), kind=kind, name=name, margin_m=margin_m),
                role, reading)
     elif role == "route":

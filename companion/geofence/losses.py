@@ -23,6 +23,17 @@ class Written:
     data: bytes
     losses: tuple[Finding, ...] = ()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing of the document would be in the file."""
+        return any(loss.code is Code.EMPTY for loss in self.losses)
+
+
+# What a document holds that is worth a file, and what each is called.
+_WORDS = {"zones": "zone", "marks": "point or line obstacle", "items": "mission", "rally": "rally point",
+          "tracks": "track", "home": "home", "return": "return point"}
+_FIELDS = {"return": "return_point"}
+
 
 class Losses(list[Finding]):
     """The losses of one writing."""
@@ -31,10 +42,10 @@ class Losses(list[Finding]):
         """Append one loss."""
         self.append(Finding(severity=severity, code=Code.NOT_CARRIED, place="", text=text, remedy=remedy))
 
-    def drop(self, what: str, count: int, *, severity: Severity = Severity.WARNING) -> None:
+    def drop(self, what: str, count: int, *, severity: Severity = Severity.WARNING, remedy: str = "") -> None:
         """Say that ``count`` things are not carried."""
         if count:
-            self.add(severity, f"{count} {what} not carried by this format")
+            self.add(severity, f"{count} {what} not carried by this format", remedy)
 
 
 def leave_out(losses: Losses, document: Document, carried: Iterable[str]) -> None:
@@ -43,10 +54,15 @@ def leave_out(losses: Losses, document: Document, carried: Iterable[str]) -> Non
     Words: zones, marks, items, rally, return, home, tracks, names, margins.
     """
     kept = set(carried)
+    if not any(getattr(document, _FIELDS.get(what, what)) for what in _WORDS if what in kept):
+        words = ", ".join(_WORDS[what] for what in _WORDS if what in kept)
+        losses.append(Finding(severity=Severity.ERROR, code=Code.EMPTY, place="",
+                              text=f"would hold nothing: the source has no {words}"))
     if "zones" not in kept:
         losses.drop("zones are", len(document.zones), severity=Severity.ERROR)
     if "marks" not in kept:
-        losses.drop("point and line obstacles are", len(document.marks), severity=Severity.ERROR)
+        losses.drop("point and line obstacles are", len(document.marks), severity=Severity.ERROR,
+                    remedy="say --point-radius M to draw them")
     if "items" not in kept:
         losses.drop("mission items are", len(document.items))
     if "rally" not in kept:

@@ -56,8 +56,8 @@ class MissionFiles:
 
 def mission_files(
     document: Document, name: str, *, start: GeoPoint | None = None, goals: tuple[GeoPoint, ...] = (),
-    margin_m: float | None = None, radius_m: float | None = None, point_radius_m: float | None = None,
-    land: Document | None = None,
+    margin_m: float | None = None, floor_m: float | None = None, radius_m: float | None = None,
+    point_radius_m: float | None = None, land: Document | None = None,
 ) -> MissionFiles:
     """Return the files of a mission made from a drawing.
 
@@ -95,7 +95,7 @@ def mission_files(
         refuge=tuple(RefugeOptions(lat=r.point.lat_deg, lon=r.point.lon_deg) for r in document.rally),
         area=AreaOptions(
             obstacles=obstacle_names, fence=fence_name, margin_m=margin,
-            margin_floor_m=min(defaults.margin_floor_m, margin),
+            margin_floor_m=min(defaults.margin_floor_m if floor_m is None else floor_m, margin),
             point_radius_m=point_radius_m if point_radius_m is not None else defaults.point_radius_m,
         ),
     )

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Point
 
 from companion.geofence.document import Document, Mark
-from companion.geofence.findings import Severity
+from companion.geofence.findings import Code, Severity
 from companion.geofence.losses import Losses
 from companion.geofence.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import Zone, ZoneKind, unwrapped, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
+from companion.words import counted
 
+_START_NAMES = {"start", "home"}
 RoutePoint = tuple[GeoPoint, float, str]  # place, altitude [m], name
 
 
@@ -45,6 +47,31 @@ def items_of(points: Iterable[RoutePoint]) -> tuple[tuple[MissionItem, ...], tup
         ))
         names.append(name)
     return tuple(items), tuple(names) if any(names) else ()
+
+
+def pins_as_route(
+    pins: Sequence[RoutePoint], route: list[RoutePoint], places: dict[str, GeoPoint], findings: Findings,
+) -> None:
+    """Make pins that say nothing of themselves the route of a file that has no line; one called start is its home.
+
+    ``route`` and ``places`` are filled.
+    """
+    for pin in pins:
+        if pin[2].strip().lower() in _START_NAMES and "home" not in places:
+            places["home"] = pin[0]
+        else:
+            route.append(pin)
+    if route:
+        start = ", the one called start for the start" if len(route) < len(pins) else ""
+        findings.add(Severity.NOTE, Code.FORMAT, "",
+                     f"{counted(len(route), 'pin')} taken for places to sail to, in the file's order{start}")
+
+
+def pins_as_dangers(pins: Sequence[RoutePoint], kind: ZoneKind, findings: Findings) -> list[Mark]:
+    """Return pins beside a line, which tells the way itself, as what they are on a chart of dangers."""
+    if pins:
+        findings.add(Severity.NOTE, Code.FORMAT, "", f"{counted(len(pins), 'pin')} beside the line taken for dangers")
+    return [Mark(geometry=Point(p.lon_deg, p.lat_deg), kind=kind, name=name) for p, _, name in pins]
 
 
 def line_as_area(

@@ -11,10 +11,12 @@ from typing import Any
 
 import shapely
 
+from companion.planner.courses import courses
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem import Problem
 from companion.planner.risk import path_risk, with_parts
 from companion.planner.what_if import Replanner, decisive_side, other_side, what_would_help
+from companion.words import counted
 
 TOUCH_M = 0.5                      # nearer than this a leg is said to touch
 NO_GO_TOUCH_RAD = math.radians(0.5)
@@ -37,7 +39,10 @@ def explain(problem: Problem, plan: Plan, budget_s: float = 5.0, *, expansions: 
         text, data = what_would_help(problem, again)
         return replace(plan, why=Why(text=text, data=data | {"replans": again.count}))
     legs = [leg_bounds(problem, leg) for leg in plan.legs]
-    text, data = _legs_in_words(problem, plan, legs), {"legs": legs, "turns": turns(plan)}
+    text, data = _courses_in_words(problem, plan, legs), {
+        "legs": legs, "turns": turns(plan),
+        "courses": [[course.first + 1, course.first + len(course.legs)] for course in courses(plan.legs)],
+    }
     side = decisive_side(problem, plan)
     if side is not None:
         more, other = other_side(problem, plan, side, again)
@@ -101,18 +106,23 @@ def _around(shape: shapely.Geometry) -> list[float]:
     return [round(float(v), 1) for v in shapely.get_coordinates(shape.representative_point())[0]]
 
 
-def _legs_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]]) -> str:
+def _courses_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]]) -> str:
+    """Say what binds each course; what binds any leg of it binds it."""
     if len(plan.legs) == 1 and not legs[0]["binds"]:
         return "Straight there: nothing is in the way and the heading can be sailed."
     numbers: dict[str, list[int]] = {}
-    for i, (leg, bound) in enumerate(zip(plan.legs, legs, strict=True), start=1):
-        for bind in bound["binds"]:
-            if bind["by"] != "no_go":
-                numbers.setdefault(_bind_in_words(bind), []).append(i)
-            else:
-                tack = "starboard" if leg.twa_rad > 0.0 else "port"
-                numbers.setdefault(f"close-hauled on {tack} tack", []).append(i)
-    sentences = [f"{_legs_of(which)} {text}." for text, which in numbers.items()]
+    merged = courses(plan.legs)
+    for i, course in enumerate(merged, start=1):
+        tack = "starboard" if course.legs[0].twa_rad > 0.0 else "port"
+        bound: dict[str, None] = {}   # in order, each once
+        for bind in (b for k in course.numbers for b in legs[k]["binds"]):
+            bound[f"close-hauled on {tack} tack" if bind["by"] == "no_go" else _bind_in_words(bind)] = None
+        for text in bound:
+            numbers.setdefault(text, []).append(i)
+    sentences = [f"{_named('Course', which)} {text}." for text, which in numbers.items()]
+    if len(merged) < len(plan.legs):
+        sentences.insert(0, f"{counted(len(plan.legs), 'leg')} make {counted(len(merged), 'course')}: within a course "
+                         "they bend by a few degrees, as the no-go zone grows or a shore does.")
     zones = [bind for bound in legs for bind in bound["binds"] if bind["by"] == "no_go"]
     if zones:
         sentences.append(_zone_in_words(zones))
@@ -145,11 +155,12 @@ def turns(plan: Plan) -> list[dict[str, Any]]:
 def turns_in_words(problem: Problem, plan: Plan) -> list[str]:
     """Return sentences on the tacks and gybes, and why one is sailed in place of the other."""
     every = turns(plan)
+    course_of = {k + 1: i for i, course in enumerate(courses(plan.legs), start=1) for k in course.numbers}
     out = []
     for name in ("tack", "gybe"):
         plain = [t["leg"] for t in every if t["manoeuvre"] == name and not t["instead_of"]]
         if plain:
-            out.append(f"A {name} leads into {_legs_of(plain)[0].lower()}{_legs_of(plain)[1:]}.")
+            out.append(f"A {name} leads into {_named('course', sorted({course_of[k] for k in plain}))}.")
         round_ = sorted({k for t in every if t["manoeuvre"] == name and t["instead_of"] for k in t["legs"]})
         if round_:
             other = "tack" if name == "gybe" else "gybe"
@@ -157,14 +168,22 @@ def turns_in_words(problem: Problem, plan: Plan) -> list[str]:
             why = "the boat cannot tack" if other == "tack" and not problem.boat.can_tack else \
                 f"a {other} would lose {lost:.0f} s"
             out.append(f"It {name}s round instead of {_ING[other]}, by way of "
-                       f"{_legs_of(round_)[0].lower()}{_legs_of(round_)[1:]}: {why}.")
+                       f"{_named('course', sorted({course_of[k] for k in round_}))}: {why}.")
     return out
 
 
-def _legs_of(which: list[int]) -> str:
-    if len(which) == 1:
-        return f"Leg {which[0]}"
-    return f"Legs {', '.join(map(str, which[:-1]))} and {which[-1]}"
+def _named(word: str, which: list[int]) -> str:
+    """Return ``Course 1``, ``Courses 1 and 3``, ``Courses 1 to 4 and 7``."""
+    runs: list[list[int]] = []
+    for number in which:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    parts = [part for run in runs for part in (
+        [f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(number) for number in run])]
+    text = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return f"{word}{'s' if len(which) > 1 else ''} {text}"
 
 
 def _zone_in_words(zones: list[dict[str, Any]]) -> str:

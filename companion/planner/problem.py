@@ -226,7 +226,7 @@ class Problem:
             raw = json.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
             raise InputError(str(path), "", f"cannot be read ({error.strerror})", "name a problem file") from error
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise InputError(str(path), "", f"is not JSON ({error})", "see docs/problem-format.md") from error
         if not isinstance(raw, Mapping):
             raise InputError(str(path), "", "is not a JSON object", "see docs/problem-format.md")

@@ -15,7 +15,6 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import shapely
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle as Disc
 from matplotlib.patches import Patch, PathPatch
@@ -31,6 +30,9 @@ from companion.geofence import Area, LocalArea, Mission, ZoneKind
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint
+from companion.planner.courses import courses
+from companion.plots.chart import place_words, save, scale_bar
+from companion.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,24 +74,27 @@ def save_mission(
         axes.plot(leg[1:-1, 0], leg[1:-1, 1], "o", color=PATH, ms=3.0, zorder=6)
     if legs:
         handles.append(Line2D([], [], color=PATH, lw=1.8, label="plan in this wind, held steady"))
-    _draw_marks(axes, mission, start, goals)
+    handles += _draw_marks(axes, mission, start, goals)
     for place, name in refuges:
         axes.plot(*place, "P", color=GOAL, ms=8, mec="black", mew=0.6, zorder=8)
         axes.annotate(name, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
+    if refuges:
+        handles.append(Line2D([], [], ls="", marker="P", color=GOAL, ms=8, mec="black", mew=0.6, label="refuge"))
     _finish(axes, extent, twd_from_rad, tws_mps, handles)
     words = _words(mission, plans)
     subtitle = words[0] if words else mission.options.description
-    figure.suptitle(f"{mission.name}\n{subtitle}", fontsize=10, x=0.1, ha="left")
-    _save(figure, path)
+    where = place_words(mission.origin.lat_deg, mission.origin.lon_deg)
+    figure.suptitle(f"{mission.name}   ·   {where}\n{subtitle}", fontsize=10, x=0.1, ha="left")
+    save(figure, path)
     return words
 
 
 def save_area(
     area: Area, path: str | Path, *, start: GeoPoint | None = None, goals: tuple[GeoPoint, ...] = (),
     margin_m: float = 0.0, twd_from_rad: float | None = None, no_go_half_rad: float = math.radians(47.0),
-    title: str = "",
+    title: str = "", names: Sequence[str] = (),
 ) -> None:
-    """Draw an area alone and save it. Raises InputError when the file cannot be written."""
+    """Draw an area alone and save it; ``names`` are the goals'. Raises InputError when the file cannot be written."""
     shapes = [z.shape for z in area.fence.inclusions] + [o.shape for o in area.solids]
     if not shapes and start is None:
         raise InputError(str(path), "", "there is nothing to draw")
@@ -104,18 +109,16 @@ def save_area(
     for index, place in enumerate(places):
         is_start = start is not None and index == 0
         axes.plot(*place, "o", color=START if is_start else GOAL, ms=8, mec="black", mew=0.6, zorder=8)
+        number = index + (start is None)   # of a goal, from 1
+        name = "start" if is_start else (names[number - 1] if number <= len(names) else "") or f"goal {number}"
+        axes.annotate(name, place, xytext=(7, -10) if is_start else (8, 6), textcoords="offset points", fontsize=8,
+                      zorder=9)
+    handles += [_dot(START, "start")] if start is not None else []
+    handles += [_dot(GOAL, "goal")] if goals else []
     _finish(axes, extent, twd_from_rad, None, handles)
-    figure.suptitle(title, fontsize=10, x=0.1, ha="left")
-    _save(figure, path)
-
-
-def _save(figure: Figure, path: str | Path) -> None:
-    try:
-        figure.savefig(path, dpi=110)
-    except (OSError, ValueError) as error:
-        raise InputError("--plot", str(path), f"cannot be written ({error})", "name a .png in a folder") from None
-    finally:
-        plt.close(figure)
+    where = place_words(frame.origin.lat_deg, frame.origin.lon_deg)
+    figure.suptitle(f"{title}   ·   {where}", fontsize=10, x=0.1, ha="left")
+    save(figure, path)
 
 
 def draw_area(axes: Axes, local: LocalArea, margin_m: float) -> list[Handle]:
@@ -185,10 +188,13 @@ def _draw_laylines(
     ]
 
 
-def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En]) -> None:
+def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En]) -> list[Handle]:
+    """Draw start and goals by their names; return the legend's handles."""
+    handles: list[Handle] = []
     if start is not None:
         axes.plot(*start, "o", color=START, ms=8, mec="black", mew=0.6, zorder=8)
         axes.annotate("start", start, xytext=(7, -10), textcoords="offset points", fontsize=8, zorder=9)
+        handles.append(_dot(START, "start"))
     for index, (place, goal) in enumerate(zip(goals, mission.goals, strict=True)):
         colour = {"port": PORT, "starboard": STARBOARD}.get(goal.rounding or "", GOAL)
         axes.add_patch(Disc(place, goal.radius_m, fc="none", ec=colour, lw=1.3, zorder=7))
@@ -196,6 +202,14 @@ def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En])
         name = goal.name or (f"goal {index + 1}" if len(goals) > 1 else "goal")
         text = f"{name}\nleave to {goal.rounding}" if goal.rounding else name
         axes.annotate(text, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
+    for side, colour in (("", GOAL), ("port", PORT), ("starboard", STARBOARD)):
+        if any((goal.rounding or "") == side for goal in mission.goals):
+            handles.append(_dot(colour, f"mark to leave to {side}" if side else "goal and its radius"))
+    return handles
+
+
+def _dot(colour: str, label: str) -> Line2D:
+    return Line2D([], [], color=colour, marker="o", ls="", ms=7, mec="black", mew=0.6, label=label)
 
 
 def _finish(
@@ -207,6 +221,7 @@ def _finish(
     axes.set_xlabel("east of the start [m]", fontsize=8)
     axes.set_ylabel("north of the start [m]", fontsize=8)
     axes.grid(visible=True, color="white", lw=0.6, zorder=0)
+    scale_bar(axes)
     if twd_from_rad is not None:
         east, north = unit_en(twd_from_rad)
         cx, cy, size = 0.91, 0.91, 0.05
@@ -255,7 +270,7 @@ def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
     names = [*(goal.name or "goal" for goal in mission.goals), "home"]
     for name, answer in zip(names, plans, strict=False):
         if answer.has_path:
-            out.append(f"{name}: {answer.cost_s:.0f} s in {len(answer.legs)} legs")
+            out.append(f"{name}: {answer.cost_s:.0f} s in {counted(len(courses(answer.legs)), 'course')}")
         else:
             out.append(f"{name}: no path ({answer.status.value}): {answer.reason}")
     if len(out) > 1 and all(p.has_path for p in plans):

@@ -17,6 +17,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, PathPatch, Wedge
 from matplotlib.path import Path as DrawnPath
 
+from companion.planner.courses import courses
+from companion.plots.chart import legend_below, save, scale_bar
+from companion.words import counted
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -34,16 +38,11 @@ def save_plan(problem: Problem, plan: Plan, path: str | Path) -> None:
     Raises:
         InputError: the file cannot be written or its kind is unknown.
     """
-    from companion.errors import InputError
-
-    figure, axes = plt.subplots(figsize=(8.0, 8.0), layout="constrained")
-    try:
-        draw_plan(axes, problem, plan)
-        figure.savefig(path, dpi=110)
-    except (OSError, ValueError) as error:
-        raise InputError("--plot", str(path), f"cannot be written ({error})", "name a .png in a folder") from error
-    finally:
-        plt.close(figure)
+    figure, axes = plt.subplots(figsize=(8.0, 8.6), layout="constrained")
+    draw_plan(axes, problem, plan)
+    scale_bar(axes)
+    legend_below(axes, columns=3)
+    save(figure, path)
 
 
 def draw_plan(axes: Axes, problem: Problem, plan: Plan, *, title: str | None = None, fans: bool = True) -> None:
@@ -55,22 +54,27 @@ def draw_plan(axes: Axes, problem: Problem, plan: Plan, *, title: str | None = N
     if tree is not None and len(tree):
         segments = np.asarray(tree, dtype=np.float64).reshape(-1, 2, 2)
         axes.add_collection(LineCollection(list(segments), colors=TREE, linewidths=0.35, alpha=0.8, zorder=1))
-    for other in plan.trace.get("paths", ()) if plan.trace else ():  # the candidates that auto weighed
+        axes.plot([], [], color=TREE, lw=0.6, label="search tree")
+    for k, other in enumerate(plan.trace.get("paths", ()) if plan.trace else ()):  # the candidates that auto weighed
         way = np.asarray(other)
-        axes.plot(way[:, 0], way[:, 1], "-", color=TREE, lw=1.0, zorder=2)
+        axes.plot(way[:, 0], way[:, 1], "-", color=TREE, lw=1.0, zorder=2,
+                  label=None if k else "ways that were weighed")
     axes.plot([problem.start_en[0], problem.goal_en[0]], [problem.start_en[1], problem.goal_en[1]], ls=":", lw=0.8,
-              color="#777777", zorder=2)
+              color="#777777", zorder=2, label="straight line")
     if plan.has_path:
         way = np.asarray(plan.waypoints_en)
         if fans:
             _fans(axes, problem, plan, 0.055 * max(x1 - x0, y1 - y0))
-        axes.plot(way[:, 0], way[:, 1], "-", color=PATH, lw=1.9, zorder=5, solid_joinstyle="round")
+        axes.plot(way[:, 0], way[:, 1], "-", color=PATH, lw=1.9, zorder=5, solid_joinstyle="round",
+                  label="plan")
         axes.plot(way[1:-1, 0], way[1:-1, 1], "o", color=PATH, ms=3.2, zorder=6)
-    axes.plot(*problem.start_en, "o", color=START, ms=8, mec="black", mew=0.6, zorder=7)
+    axes.plot(*problem.start_en, "o", color=START, ms=8, mec="black", mew=0.6, zorder=7, ls="", label="start")
     axes.add_patch(Circle(problem.goal_en, max(problem.goal_radius_m, 1e-6), fc="none", ec=GOAL, lw=1.2, zorder=7))
-    axes.plot(*problem.goal_en, "o", color=GOAL, ms=8, mec="black", mew=0.6, zorder=7)
+    axes.plot(*problem.goal_en, "o", color=GOAL, ms=8, mec="black", mew=0.6, zorder=7, ls="",
+              label="goal and its radius")
     draw_wind(axes, problem)
-    for target in problem.resolved.targets:
+    for k, target in enumerate(problem.resolved.targets):
+        axes.plot([], [], color="#7a3fa0", ls="--", label=None if k else "vessel, and where it is in a minute")
         axes.add_patch(Circle((target.x_m, target.y_m), target.radius_m, fc="none", ec="#7a3fa0", ls="--", zorder=4))
         axes.annotate("", (target.x_m + 60.0 * target.vx_mps, target.y_m + 60.0 * target.vy_mps),
                       (target.x_m, target.y_m), arrowprops={"arrowstyle": "->", "color": "#7a3fa0"}, zorder=4)
@@ -85,9 +89,12 @@ def draw_solids(axes: Axes, problem: Problem) -> None:
     """Draw obstacles and, with a fence, the forbidden water outside it."""
     for shape in shapely.get_parts(problem.obstacle_union):
         axes.add_patch(PathPatch(_outline(shape), fc=LAND, ec=LAND_EDGE, lw=0.8, zorder=3))
+    if problem.obstacles:
+        axes.plot([], [], "s", color=LAND, mec=LAND_EDGE, label="obstacle")
     if problem.fence_polygon is not None:
         for shape in shapely.get_parts(problem.fence_polygon):
             axes.add_patch(PathPatch(_outline(shape), fc="none", ec="#555555", ls=(0, (6, 3)), lw=1.1, zorder=3))
+        axes.plot([], [], color="#555555", ls=(0, (6, 3)), lw=1.1, label="fence")
 
 
 def draw_wind(axes: Axes, problem: Problem) -> None:
@@ -118,6 +125,8 @@ def _fans(axes: Axes, problem: Problem, plan: Plan, radius_m: float) -> None:
         return
     windward_deg = 90.0 - math.degrees(problem.wind.twd_from_rad)
     own = math.degrees(problem.boat.no_go_half_rad)
+    for colour, label in ((WIDER, "no-go zone as widened by then"), (FAN, "no-go zone of the boat")):
+        axes.plot([], [], "s", color=colour, alpha=0.55, label=label)
     for t in np.linspace(0.0, total, FANS_MOST):
         leg = next((item for item in plan.legs if t <= item.end_s), plan.legs[-1])
         span = leg.end_s - leg.start_s
@@ -152,7 +161,7 @@ def _title(problem: Problem, plan: Plan) -> str:
     name = problem.title or problem.id or "plan"
     if not plan.has_path:
         return f"{name}\nno path ({plan.status.value}): {plan.reason[:90]}"
-    text = f"{name}\n{plan.algorithm}: {plan.cost_s:.0f} s in {len(plan.legs)} legs"
+    text = f"{name}\n{plan.algorithm}: {plan.cost_s:.0f} s in {counted(len(courses(plan.legs)), 'course')}"
     if math.isfinite(plan.gap) and plan.lower_bound_s > 0.0:
         text += f", {100.0 * plan.gap:.1f} % above the bound of {plan.lower_bound_s:.0f} s"
     if plan.risk is not None and problem.wind.sigma.model != "none":

@@ -6,10 +6,7 @@ a sailor expects; the true wind is blue.
 
 from __future__ import annotations
 
-import csv
-import json
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,67 +14,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.errors import InputError
-from companion.telemetry.names import AREA, DECISIONS, SUMMARY, TRACK
-from companion.telemetry.recorder import read_jsonl
+from companion.plots.chart import date_words, legend_above, legend_below, place_words, save, scale_bar
+from companion.telemetry.voyage_folder import Chart, RecordedPlan, VoyageRecord
+from companion.words import counted
 
 PORT_RED, STARBOARD_GREEN, WIND_BLUE, PLAN_GREY = "#b3261e", "#1b7f3b", "#1f5fa8", "#5b6472"
-LAND, LAND_EDGE, WATER = "#e7dcc3", "#8a7a55", "#f4f8fb"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VoyageRecord:
-    """What a voyage folder holds; columns are float arrays with NaN for what is unknown."""
-
-    folder: Path
-    columns: dict[str, NDArray[np.float64]]
-    texts: dict[str, list[str]]
-    decisions: list[dict[str, Any]]
-    area: dict[str, Any]
-    summary: dict[str, Any]
-
-
-def read_voyage(folder: Path) -> VoyageRecord:
-    """Read a voyage folder.
-
-    Raises:
-        InputError: it is not a voyage folder, naming the missing file.
-    """
-    for name in (TRACK, DECISIONS, AREA):
-        if not (folder / name).is_file():
-            raise InputError(str(folder), name, "is missing", "name a folder that `companion run` left")
-    with (folder / TRACK).open(newline="", encoding="utf-8") as file:
-        rows = [r for r in csv.DictReader(file) if r.get("t_s") and None not in r.values()]
-    texts: dict[str, list[str]] = {k: [r[k] for r in rows] for k in ("mode", "phase")}
-    names = [k for k in (rows[0] if rows else {}) if k not in texts]
-    columns = {k: np.array([_number(r[k]) for r in rows], dtype=np.float64) for k in names}
-    summary_path = folder / SUMMARY
-    return VoyageRecord(
-        folder=folder,
-        columns=columns,
-        texts=texts,
-        decisions=_joined(read_jsonl(folder / DECISIONS)),
-        area=json.loads((folder / AREA).read_text(encoding="utf-8")),
-        summary=json.loads(summary_path.read_text(encoding="utf-8")) if summary_path.is_file() else {},
-    )
-
-
-def _joined(decisions: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Give each plan the facts of its request: reason, wind, widening of the no-go zone."""
-    requests = {d["request_id"]: d for d in decisions if d.get("action") == "RequestPlan"}
-    for decision in decisions:
-        if decision.get("kind") == "plan":
-            request = requests.get(decision.get("request_id"), {})
-            for key in ("reason", "rung", "twd_deg", "widening"):
-                decision.setdefault(key, request.get(key))
-    return decisions
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+LAND, LAND_EDGE, WATER, GOAL = "#e7dcc3", "#8a7a55", "#f4f8fb", "#f6c945"
+SAILING_MODES = frozenset({"AUTO", "GUIDED"})
 
 
 def plot_voyage(record: VoyageRecord, path: Path) -> None:
@@ -87,39 +30,34 @@ def plot_voyage(record: VoyageRecord, path: Path) -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure = plt.figure(figsize=(15.0, 9.2), layout="constrained")
+    figure = plt.figure(figsize=(15.0, 9.6), layout="constrained")
     grid = figure.add_gridspec(4, 2, width_ratios=(1.15, 1.0))
-    plans = [d for d in record.decisions if d.get("kind") == "plan" and (d.get("plan") or {}).get("waypoints")]
+    plans = [p for p in record.plans if p.plan is not None and p.plan.waypoints]
     _chart(figure.add_subplot(grid[:, 0]), record, plans)
     direction = figure.add_subplot(grid[0, 1])
     _direction(direction, record)
     _speed(figure.add_subplot(grid[1, 1], sharex=direction), record)
     _no_go(figure.add_subplot(grid[2, 1], sharex=direction), record, plans)
     _cross_track(figure.add_subplot(grid[3, 1], sharex=direction), record)
-    figure.suptitle(_title(record), fontsize=13, ha="left", x=0.01)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    figure.suptitle(_title(record), fontsize=12, ha="left", x=0.01)
+    save(figure, path)
 
 
 def _title(record: VoyageRecord) -> str:
-    s = record.summary
-    if not s:
-        return f"{record.area.get('name', record.folder.name)}: unfinished voyage"
-    end = "arrived" if s.get("arrived") else f"not arrived ({s.get('end_reason', 'unknown')})"
-    parts = [f"{record.area.get('name', record.folder.name)}: {end}"]
-    if s.get("time_s") is not None:
-        parts.append(f"{s['time_s']:.0f} s, {s.get('distance_m') or 0.0:.0f} m")
-    parts.append(f"{s.get('tacks')} tacks, {s.get('replans')} replans")
-    if s.get("min_clearance_m") is not None:
-        parts.append(f"smallest clearance {s['min_clearance_m']:.1f} m")
-    if s.get("promised_risk") is not None:
-        parts.append(f"promised risk {100.0 * s['promised_risk']:.0f} %")
-    return "   ·   ".join(parts)
-
-
-def _start_s(record: VoyageRecord) -> float:
-    t = record.columns.get("t_s")
-    return float(t[0]) if t is not None and len(t) else 0.0
+    s, chart = record.summary, record.chart
+    where = [date_words(record.began_utc), place_words(chart.origin.lat_deg, chart.origin.lon_deg)]
+    if s.arrived is None:
+        parts = ["unfinished voyage"]
+    else:
+        parts = ["arrived" if s.arrived else f"not arrived ({s.end_reason or 'unknown'})"]
+        if s.time_s is not None:
+            parts.append(f"{s.time_s:.0f} s, {s.distance_m or 0.0:.0f} m")
+        parts.append(f"{counted(s.tacks, 'tack')}, {counted(s.replans, 'replan')}")
+        if s.min_clearance_m is not None:
+            parts.append(f"smallest clearance {s.min_clearance_m:.1f} m")
+        if s.promised_risk is not None:
+            parts.append(f"promised risk {100.0 * s.promised_risk:.0f} %")
+    return "   ·   ".join([chart.name or record.folder.name, *(w for w in where if w)]) + "\n" + "   ·   ".join(parts)
 
 
 def _polygon(axes: Any, wkt: str, **style: Any) -> None:
@@ -134,91 +72,110 @@ def _polygon(axes: Any, wkt: str, **style: Any) -> None:
         axes.add_patch(PathPatch(Outline(np.concatenate(rings), codes), **style))
 
 
-def _chart(axes: Any, record: VoyageRecord, plans: list[dict[str, Any]]) -> None:
-    from matplotlib.patches import Circle
-
-    area, c = record.area, record.columns
+def _chart(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
+    chart, c = record.chart, record.columns
     axes.set_facecolor(WATER)
-    for wkt in area.get("grown", []):
+    for wkt in chart.grown:
         _polygon(axes, wkt, facecolor="none", edgecolor=LAND_EDGE, linewidth=0.7, linestyle=(0, (4, 3)), zorder=1)
-    for wkt in area.get("obstacles", []):
+    for wkt in chart.obstacles:
         _polygon(axes, wkt, facecolor=LAND, edgecolor=LAND_EDGE, linewidth=1.0, zorder=2)
-    if area.get("fence"):
-        _polygon(axes, area["fence"], facecolor="none", edgecolor="#444444", linewidth=1.4, zorder=2)
+    if chart.fence:
+        _polygon(axes, chart.fence, facecolor="none", edgecolor="#444444", linewidth=1.4, zorder=2)
+        axes.plot([], [], color="#444444", linewidth=1.4, label="fence")
+    if chart.obstacles:
+        axes.plot([], [], "s", color=LAND, markeredgecolor=LAND_EDGE, label="obstacle")
+        axes.plot([], [], color=LAND_EDGE, linewidth=0.7, linestyle=(0, (4, 3)), label="its margin")
     for i, decision in enumerate(plans):
-        way = np.asarray(decision["plan"]["waypoints"], dtype=np.float64)
+        way = np.asarray(decision.plan.waypoints if decision.plan else (), dtype=np.float64)
         first = i == 0
         axes.plot(
             way[:, 0], way[:, 1], color=PLAN_GREY, linewidth=1.6 if first else 0.8, alpha=0.95 if first else 0.4,
             linestyle="--" if first else "-", marker="o" if first else None, markersize=3.5, zorder=3,
-            label="first plan" if first else ("replanned" if i == 1 else None),
+            label="first plan" if first else ("later plan" if i == 1 else None),
         )
-    _fans(axes, area, plans)
-    east, north = c.get("east_m", np.empty(0)), c.get("north_m", np.empty(0))
-    twa = _wrap_deg(c["heading_deg"] - c["twd_deg"]) if "twd_deg" in c else np.empty(0)
-    _tack_coloured(axes, east, north, twa)
+    _fans(axes, chart, plans)
+    east, north = c["east_m"], c["north_m"]
+    known = np.flatnonzero(np.isfinite(east) & np.isfinite(north))
+    _sailed(axes, record)
+    label: str | None = "planned again here"
     for decision in plans[1:]:
-        if decision["plan"]["waypoints"]:
-            t = decision.get("t_s", 0.0)
-            k = int(np.searchsorted(c["t_s"], t)) if len(c.get("t_s", [])) else 0
-            if k < len(east):
-                axes.plot(east[k], north[k], marker="|", color="black", markersize=7, zorder=6)
-    for goal in area.get("goals", []):
-        axes.add_patch(Circle((goal["x"], goal["y"]), goal["radius_m"], facecolor="#f6c945", edgecolor="black",
-                              alpha=0.8, zorder=4))
-        axes.annotate(goal.get("name") or "goal", (goal["x"], goal["y"]), xytext=(9, 7), textcoords="offset points")
-    if len(east):
-        axes.plot(east[0], north[0], marker="o", color="white", markeredgecolor="black", markersize=8, zorder=7)
-        axes.annotate("start", (east[0], north[0]), xytext=(9, -12), textcoords="offset points")
-        axes.plot(east[-1], north[-1], marker="s", color="black", markersize=5, zorder=7)
+        k = int(np.searchsorted(c["t_s"], decision.t_s))
+        if k < len(east) and np.isfinite(east[k]):
+            axes.plot(east[k], north[k], "|", color="black", markersize=8, zorder=6, label=label)
+            label = None
+    _goals(axes, chart)
+    if len(known):
+        axes.plot(east[known[0]], north[known[0]], "o", color="white", markeredgecolor="black", markersize=8, zorder=7,
+                  label="first position")
+        axes.plot(east[known[-1]], north[known[-1]], "s", color="black", markersize=5, zorder=7, label="last position")
     _wind_arrow(axes, c)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06)
-    axes.set_xlabel("east, m")
-    axes.set_ylabel("north, m")
+    axes.autoscale_view()
+    axes.apply_aspect()
+    scale_bar(axes)
+    axes.set_xlabel("east of the origin, m")
+    axes.set_ylabel("north of the origin, m")
     axes.grid(visible=True, color="white", linewidth=0.8, zorder=0)
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        axes.legend(handles, labels, loc="lower right", fontsize=8, framealpha=0.9)
+    legend_below(axes)
 
 
-def _fans(axes: Any, area: dict[str, Any], plans: list[dict[str, Any]]) -> None:
+def _goals(axes: Any, chart: Chart) -> None:
+    """Draw the goals, each by its name or its place in the order."""
+    from matplotlib.patches import Circle
+
+    for number, goal in enumerate(chart.goals, start=1):
+        axes.add_patch(Circle((goal.x, goal.y), goal.radius_m, facecolor=GOAL, edgecolor="black", alpha=0.8, zorder=4))
+        name = goal.name or (f"goal {number}" if len(chart.goals) > 1 else "goal")
+        side = f", leave to {goal.side}" if goal.side != "none" else ""
+        axes.annotate(name + side, (goal.x, goal.y), xytext=(9, 7), textcoords="offset points", zorder=8)
+    if chart.goals:
+        axes.plot([], [], "o", color=GOAL, markeredgecolor="black", markersize=8, label="goal and its radius")
+
+
+def _fans(axes: Any, chart: Chart, plans: list[RecordedPlan]) -> None:
     """Draw the no-go zone at each waypoint of the first plan: the boat's own, and as the forecast widened it."""
     from matplotlib.patches import Wedge
 
-    if not plans:
+    if not plans or plans[0].plan is None or plans[0].twd_deg is None:
         return
-    legs = plans[0]["plan"].get("legs", [])
-    wind_deg = plans[0].get("twd_deg")
-    if wind_deg is None:
-        return
-    scale = 0.055 * max((math.dist(leg["from"], legs[-1]["to"]) for leg in legs), default=100.0)
-    bare = float(area.get("no_go_half_deg", 45.0))
+    legs = plans[0].plan.legs
+    scale = 0.055 * max((math.dist(leg.start_en, legs[-1].end_en) for leg in legs), default=100.0)
+    middle = 90.0 - plans[0].twd_deg
     for k, leg in enumerate(legs):
-        half = float(leg["no_go_half_deg"])
-        middle = 90.0 - float(wind_deg)
-        for angle, shade, layer in ((half, "#f3c1bd", 2.4), (bare, "#d9867f", 2.5)):
-            axes.add_patch(Wedge(leg["from"], scale, middle - angle, middle + angle, facecolor=shade, alpha=0.55,
-                                 edgecolor="none", zorder=layer,
-                                 label=None if k else ("no-go zone, widened" if angle == half else "no-go zone")))
+        for angle, shade, layer, name in ((leg.no_go_half_deg, "#f3c1bd", 2.4, "no-go zone as widened"),
+                                          (chart.no_go_half_deg, "#d9867f", 2.5, "no-go zone")):
+            axes.add_patch(Wedge(leg.start_en, scale, middle - angle, middle + angle, facecolor=shade, alpha=0.55,
+                                 edgecolor="none", zorder=layer, label=None if k else name))
 
 
-def _tack_coloured(axes: Any, east: NDArray[np.float64], north: NDArray[np.float64], twa: NDArray[np.float64]) -> None:
+def _sailed(axes: Any, record: VoyageRecord) -> None:
+    """Draw the track: by tack where the autopilot sailed, dotted where the boat drifted or somebody else had her."""
     from matplotlib.collections import LineCollection
 
-    if len(east) < 2:
+    c = record.columns
+    track = np.column_stack([c["east_m"], c["north_m"]])
+    known: NDArray[np.bool_] = np.isfinite(track[:, 0]) & np.isfinite(track[:, 1])
+    pairs = known[:-1] & known[1:]
+    if not pairs.any():
         return
-    segments = np.stack([np.column_stack([east[:-1], north[:-1]]), np.column_stack([east[1:], north[1:]])], axis=1)
+    segments = np.stack([track[:-1], track[1:]], axis=1)
+    sails = np.array([mode in SAILING_MODES for mode in record.texts["mode"]])[:-1]
     # Heading minus wind: positive means the wind is over the port side, which is port tack.
-    colours = [PORT_RED if a > 0.0 else STARBOARD_GREEN for a in twa[:-1]]
-    axes.add_collection(LineCollection(list(segments), colors=colours, linewidths=2.2, zorder=5))
-    axes.update_datalim(np.column_stack([east, north]))
-    axes.plot([], [], color=PORT_RED, linewidth=2.2, label="sailed, port tack")
-    axes.plot([], [], color=STARBOARD_GREEN, linewidth=2.2, label="sailed, starboard tack")
+    twa = _wrap_deg(c["heading_deg"] - c["twd_deg"])[:-1]
+    for chosen, style, name in (
+        (pairs & sails & (twa > 0.0), {"color": PORT_RED, "linewidth": 2.2}, "sailed on port tack"),
+        (pairs & sails & ~(twa > 0.0), {"color": STARBOARD_GREEN, "linewidth": 2.2}, "sailed on starboard tack"),
+        (pairs & ~sails, {"color": "black", "linewidth": 1.2, "linestyle": ":"}, "adrift, or in other hands"),
+    ):
+        if chosen.any():
+            axes.add_collection(LineCollection(list(segments[chosen]), zorder=5, **style))
+            axes.plot([], [], label=name, **style)
+    axes.update_datalim(track[known])
 
 
 def _wind_arrow(axes: Any, c: dict[str, NDArray[np.float64]]) -> None:
-    twd = c.get("twd_deg", np.empty(0))
+    twd = c["twd_deg"]
     twd = twd[np.isfinite(twd)]
     if not len(twd):
         return
@@ -240,9 +197,7 @@ def _wrap_deg(angle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _direction(axes: Any, record: VoyageRecord) -> None:
     c = record.columns
-    if "twd_deg" not in c:
-        return
-    t = c["t_s"] - _start_s(record)
+    t = c["t_s"] - record.start_s
     unwrapped = c["twd_deg"].copy()
     known = np.isfinite(unwrapped)
     unwrapped[known] = np.degrees(np.unwrap(np.radians(unwrapped[known])))
@@ -253,65 +208,64 @@ def _direction(axes: Any, record: VoyageRecord) -> None:
                       label="95 % a minute ahead")
     axes.plot(t, unwrapped, color=WIND_BLUE, linewidth=1.2, label="wind from (5 s mean)")
     axes.set_ylabel("TWD, °")
-    axes.legend(loc="upper right", fontsize=8, ncols=2)
+    legend_above(axes)
     axes.grid(visible=True, alpha=0.3)
 
 
 def _speed(axes: Any, record: VoyageRecord) -> None:
     c = record.columns
-    t = c.get("t_s", np.empty(0)) - _start_s(record)
-    axes.plot(t, c.get("tws_mps", t * math.nan), color=WIND_BLUE, linewidth=1.0, label="true wind")
-    axes.plot(t, c.get("sog_mps", t * math.nan), color="black", linewidth=1.0, label="boat over ground")
+    t = c["t_s"] - record.start_s
+    axes.plot(t, c["tws_mps"], color=WIND_BLUE, linewidth=1.0, label="true wind")
+    axes.plot(t, c["sog_mps"], color="black", linewidth=1.0, label="boat over ground")
     axes.set_ylabel("speed, m/s")
     axes.set_ylim(bottom=0.0)
-    axes.legend(loc="upper right", fontsize=8, ncols=2)
+    legend_above(axes)
     axes.grid(visible=True, alpha=0.3)
 
 
-def _no_go(axes: Any, record: VoyageRecord, plans: list[dict[str, Any]]) -> None:
+def _no_go(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
     """Draw |TWA| as sailed over the half angle that each plan kept clear, from when it was made to the next."""
     c = record.columns
-    t0 = _start_s(record)
-    bare = float(record.area.get("no_go_half_deg", 45.0))
+    t0 = record.start_s
+    bare = record.chart.no_go_half_deg
     axes.axhspan(0.0, bare, color="#d9867f", alpha=0.35, linewidth=0, label="no-go zone")
-    times = [float(p.get("t_s", 0.0)) - t0 for p in plans] + [float(c["t_s"][-1]) - t0 if len(c["t_s"]) else 0.0]
+    times = [p.t_s - t0 for p in plans] + [float(c["t_s"][-1]) - t0 if len(c["t_s"]) else 0.0]
     for k, plan in enumerate(plans):
         start_s = times[k]
         xs: list[float] = []
         ys: list[float] = []
-        for horizon_s, half_deg in plan.get("widening") or []:
-            at_s = start_s + float(horizon_s)
+        for horizon_s, half_deg in plan.widening or ():
+            at_s = start_s + horizon_s
             if at_s > times[k + 1] + 1e-9 and xs:
                 break
             xs.append(at_s)
-            ys.append(float(half_deg))
+            ys.append(half_deg)
         if xs and xs[-1] < times[k + 1]:
             xs.append(times[k + 1])
             ys.append(ys[-1])
         if xs:
             axes.fill_between(xs, bare, ys, color="#f3c1bd", alpha=0.6, linewidth=0,
                               label="as the plan widened it" if k == 0 else None)
-    if "twd_deg" in c:
-        twa = np.abs(_wrap_deg(c["heading_deg"] - c["twd_deg"]))
-        axes.plot(c["t_s"] - t0, twa, color="black", linewidth=0.9, label="|TWA| as sailed")
+    twa = np.abs(_wrap_deg(c["heading_deg"] - c["twd_deg"]))
+    axes.plot(c["t_s"] - t0, twa, color="black", linewidth=0.9, label="|TWA| as sailed")
     axes.set_ylim(0.0, 180.0)
     axes.set_yticks(range(0, 181, 45))
     axes.set_ylabel("angle to the wind, °")
-    axes.legend(loc="upper right", fontsize=8, ncols=3)
+    legend_above(axes)
     axes.grid(visible=True, alpha=0.3)
 
 
 def _cross_track(axes: Any, record: VoyageRecord) -> None:
     c = record.columns
-    t = c.get("t_s", np.empty(0)) - _start_s(record)
-    axes.plot(t, c.get("cross_track_m", t * math.nan), color=PLAN_GREY, linewidth=1.0, label="cross-track (+ right)")
-    axes.plot(t, c.get("clearance_m", t * math.nan), color="#8a5a00", linewidth=1.2, label="clearance")
+    t = c["t_s"] - record.start_s
+    axes.plot(t, c["cross_track_m"], color=PLAN_GREY, linewidth=1.0, label="cross-track (+ right)")
+    axes.plot(t, c["clearance_m"], color="#8a5a00", linewidth=1.2, label="clearance")
     axes.axhline(0.0, color="black", linewidth=0.6)
-    margin = record.area.get("margin_m")
-    if margin is not None:
-        axes.axhline(float(margin), color="#8a5a00", linewidth=0.8, linestyle=":", label="planned margin")
+    margin_m = record.chart.margin_m
+    if margin_m is not None:
+        axes.axhline(margin_m, color="#8a5a00", linewidth=0.8, linestyle=":", label="planned margin")
     axes.set_ylim(-40.0, 60.0)
     axes.set_ylabel("metres")
     axes.set_xlabel("time since the start, s")
-    axes.legend(loc="upper right", fontsize=8, ncols=3)
+    legend_above(axes)
     axes.grid(visible=True, alpha=0.3)

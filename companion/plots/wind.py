@@ -21,8 +21,8 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
-from companion.errors import InputError
 from companion.geo.angles import mean_direction_rad
+from companion.plots.chart import save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,24 +60,19 @@ def save_wind(record: Record, scores: Sequence[Score], path: str | Path) -> None
     speed = figure.add_subplot(upper[1], sharex=direction)
     below = [figure.add_subplot(lower[i]) for i in range(4)]
     centre = _centre(record)
-    try:
-        draw_strips(strip, strip_speed, record, centre)
-        draw_direction(direction, record, scores[0], centre)
-        draw_speed(speed, record, scores[0])
-        draw_reliability(below[0], scores)
-        draw_crps(below[1], scores)
-        draw_histogram(below[2], record, centre)
-        draw_autocorrelation(below[3], record, centre)
-        figure.suptitle(
-            f"{record.name}: true wind, mean {np.mean(record.tws_mps):.1f} m/s from "
-            f"{math.degrees(centre) % 360.0:.0f}°, {record.duration_s / 60.0:.0f} min; forecasts by "
-            f"“{scores[0].estimator}”", fontsize=12,
-        )
-        figure.savefig(path, dpi=110)
-    except (OSError, ValueError) as error:
-        raise InputError("--plot", str(path), f"cannot be written ({error})", "name a .png in a folder") from error
-    finally:
-        plt.close(figure)
+    draw_strips(strip, strip_speed, record, centre)
+    draw_direction(direction, record, scores[0], centre)
+    draw_speed(speed, record, scores[0])
+    draw_reliability(below[0], scores)
+    draw_crps(below[1], scores)
+    draw_histogram(below[2], record, centre)
+    draw_autocorrelation(below[3], record, centre)
+    figure.suptitle(
+        f"{record.name}: true wind, mean {np.mean(record.tws_mps):.1f} m/s from "
+        f"{math.degrees(centre) % 360.0:.0f}°, {record.duration_s / 60.0:.0f} min; forecasts by "
+        f"“{scores[0].estimator}”", fontsize=12,
+    )
+    save(figure, path)
 
 
 def _centre(record: Record) -> float:
@@ -114,7 +109,7 @@ def draw_direction(axes: Axes, record: Record, score: Score, centre_rad: float) 
     _compass(axes.yaxis)
     axes.set_ylabel("wind from")
     axes.grid(alpha=0.3)
-    axes.legend(loc="upper left", fontsize=8, ncols=3, markerscale=6.0, framealpha=0.85)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8, ncols=4, markerscale=6.0, frameon=False)
     axes.tick_params(labelbottom=False)
 
 
@@ -171,7 +166,7 @@ def draw_strips(direction: Axes, speed: Axes, record: Record, centre_rad: float)
     if record.awa_rad is not None:
         direction.plot([], [], color=PORT, lw=2, label="P  port tack")
         direction.plot([], [], color=STARBOARD, lw=2, label="S  starboard tack")
-        direction.legend(loc="lower left", fontsize=7, framealpha=0.85)
+        direction.legend(loc="upper left", bbox_to_anchor=(-0.1, -0.09), ncols=2, fontsize=7, frameon=False)
     gust, lull = np.full(ago.size, np.nan), np.full(ago.size, np.nan)
     order = np.argsort(cell, kind="stable")
     parts = np.split(v[order], np.cumsum(np.bincount(cell))[:-1])
@@ -209,7 +204,7 @@ def draw_reliability(axes: Axes, scores: Sequence[Score]) -> None:
 
 def _legend_or_reason(axes: Axes) -> None:
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=7, loc="upper left")
+        axes.legend(fontsize=7, loc="best")
     else:
         axes.text(0.5, 0.5, "too short\nto score", transform=axes.transAxes, ha="center", va="center", color="#777777")
 
@@ -243,6 +238,7 @@ def draw_histogram(axes: Axes, record: Record, centre_rad: float) -> None:
     x = np.linspace(-reach, reach, 200)
     axes.plot(x, np.exp(-0.5 * (x / spread) ** 2) / (spread * math.sqrt(2.0 * math.pi)), color=MEDIAN, lw=1.4,
               label=f"normal, sd {spread:.1f}°")
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])   # room for the legend over the curve
     axes.set_xlabel("direction about its mean [°]")
     axes.set_yticks([])
     axes.set_title("distribution of direction", fontsize=9)

@@ -10,7 +10,12 @@ from __future__ import annotations
 
 import math
 
-from companion.boat import AutopilotLimits, required_margin
+from companion.boat import (
+    AutopilotLimits,
+    narrowest_corridor_m,
+    proposed_margin,
+    widest_corridor_m,
+)
 from companion.mavlink.parameter_ranges import believable
 from companion.skipper.checks_safety import failsafes, fence, identity, mission, signing, streams, version
 from companion.skipper.findings import Examined, Finding, Level, Needs, Report
@@ -56,32 +61,44 @@ def _boat(report: Report, needs: Needs) -> None:
                    "in a header the autopilot points higher than the boat sails", name="SAIL_NO_GO_ANGLE",
                    wanted=planned)
     limits = AutopilotLimits.from_params(believable({
-        name: value for name in ("SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE",
-                                 "FENCE_ACTION") if (value := report.get(name)) is not None})[0])
-    margin = required_margin(limits, speed_mps=needs.speed_mps, hull=needs.hull)
+        name: value for name in AutopilotLimits.PARAMETERS if (value := report.get(name)) is not None})[0])
     if not needs.can_tack:
         if limits.sail_xtrack_max_m > 0.0:
             report.add(Level.WARNING, "corridor", f"SAIL_XTRACK_MAX is {limits.sail_xtrack_max_m:g}, and this boat "
                        "cannot tack", "when a shift closes a leg the autopilot tries to tack at that corridor's edge; "
                        "at 0 it sails on, and the companion gybes round", name="SAIL_XTRACK_MAX", wanted=0.0)
-    elif limits.sail_xtrack_max_m <= 0.0:
-        report.add(Level.WARNING, "corridor", "SAIL_XTRACK_MAX is 0: no corridor when a shift closes a leg",
-                   "the autopilot then sails long boards to the layline, wherever that is; the companion reacts, but "
-                   "if it dies nothing bounds the boat", name="SAIL_XTRACK_MAX",
-                   wanted=float(max(2, math.floor(needs.margin_m - needs.margin_floor_m))))
-    elif margin.total_m > needs.margin_m + 1e-6:
-        rest = margin.total_m - limits.sail_xtrack_max_m
-        wanted = max(2.0, math.floor(needs.margin_m - rest))
-        report.add(
-            Level.WARNING, "margin", f"the margin of {needs.margin_m:g} m is less than {margin.describe()}",
-            "when a shift closes a leg the autopilot beats in its corridor: narrow it or plan with a wider margin",
-            name="SAIL_XTRACK_MAX", wanted=wanted if wanted < limits.sail_xtrack_max_m else None)
+    else:
+        _corridor(report, needs, limits)
     loiter = report.get("SAIL_LOIT_RADIUS")
     if loiter is not None and 2.5 * loiter > needs.loiter_radius_m:
         report.add(Level.WARNING, "loiter", f"SAIL_LOIT_RADIUS {loiter:g} m needs about {2.5 * loiter:.0f} m of room",
                    f"the mission's end is chosen with {needs.loiter_radius_m:g} m", name="SAIL_LOIT_RADIUS",
                    wanted=math.floor(needs.loiter_radius_m / 2.5))
     report.expect(Level.INFO, "LOIT_TYPE", 1.0, "a sailboat keeps moving in a loiter; 1 turns it bow to the point")
+
+
+def _corridor(report: Report, needs: Needs, limits: AutopilotLimits) -> None:
+    """Hold corridor and margin against each other, once for both: what is wanted of one must not spoil the other."""
+    corridor_m, speed_mps = limits.sail_xtrack_max_m, needs.speed_mps
+    narrowest_m = narrowest_corridor_m(speed_mps)
+    fitting_m = widest_corridor_m(limits, needs.margin_m, speed_mps=speed_mps, hull=needs.hull)
+    proposed = proposed_margin(limits, speed_mps=speed_mps, hull=needs.hull)
+    if corridor_m < narrowest_m:
+        wanted = narrowest_m if fitting_m is None else fitting_m
+        if corridor_m <= 0.0:
+            what = "SAIL_XTRACK_MAX is 0: no corridor when a shift closes a leg"
+            why = ("the autopilot then sails long boards to the layline, wherever that is; the companion reacts, but "
+                   "if it dies nothing bounds the boat")
+        else:
+            what = f"SAIL_XTRACK_MAX {corridor_m:g} m is soon crossed at {speed_mps:.1f} m/s"
+            why = "when a shift closes a leg the autopilot does little but tack"
+        report.add(Level.WARNING, "corridor", what, why, name="SAIL_XTRACK_MAX", wanted=wanted)
+    if proposed.margin.total_m > needs.margin_m + 1e-6:
+        narrows = fitting_m is not None and fitting_m < corridor_m
+        report.add(Level.WARNING, "margin", f"the margin of {needs.margin_m:g} m is less than "
+                   f"{proposed.margin.describe()}", "when a shift closes a leg the autopilot beats in its corridor: "
+                   f"{'narrow it, or ' if narrows else ''}plan with [area] margin_m = {proposed.margin_m:g}",
+                   name="SAIL_XTRACK_MAX", wanted=fitting_m if narrows else None)
 
 
 def _wind(report: Report) -> None:

@@ -291,7 +291,7 @@ def read_jsonl(path: Path) -> list[dict[str, Any]]:
             continue
         try:
             records.append(json.loads(line))
-        except ValueError:
+        except (ValueError, RecursionError):
             if number < len(lines) - 2:
                 raise JobError(f"{path}: line {number + 1} is not JSON; only the last line may be torn") from None
     return records

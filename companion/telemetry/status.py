@@ -6,17 +6,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from companion.boat import AutopilotLimits
 from companion.fold import Step
-from companion.geo.angles import wrap_two_pi
-from companion.messages import CompanionStatus, TrafficStatus
+from companion.geo.angles import difference_rad, heading_of, wrap_two_pi
+from companion.messages import Command, CompanionStatus, TrafficStatus
 from companion.skipper.actions import Announce, Severity
+from companion.skipper.geometry import cross_track_m, moved
 from companion.skipper.state import Phase, Route
-from companion.skipper.voyage import Voyage
+from companion.skipper.voyage import PointEn, Voyage
 from companion.telemetry.records import sigma_ahead_rad
 from companion.telemetry.summary import VoyageFigures
 from companion.traffic import TrafficCounts
 from companion.traffic.feeds import AisFeed
 
+# A tack takes this long: who should have tacked a moment ago is tacking [s].
+TACKING_S = 4.0
 # Below this speed the time to a waypoint says nothing [m/s].
 MIN_SPEED_MPS = 0.2
 
@@ -94,23 +98,63 @@ def risk_of(route: Route) -> float:
 
 
 def next_tack_s(step: Step) -> float | None:
-    """Return the time until the next planned change of tack [s]; None when there is none or no way on."""
+    """Return the time until the next tack [s], planned or the autopilot's own; None: there is none, or no way on.
+
+    On a leg inside its no-go zone the autopilot beats: it tacks at the edge of its corridor, or where the other tack
+    fetches the waypoint. The end of a mission, a loiter, is no course.
+    """
     route, snapshot = step.state.route, step.snapshot
-    wind_rad, vehicle, autopilot = snapshot.wind.mean_twd_from_rad, snapshot.vehicle, snapshot.autopilot
-    if route is None or wind_rad is None or vehicle is None or vehicle.speed_mps < MIN_SPEED_MPS:
+    vehicle, here = snapshot.vehicle, snapshot.position_en_m
+    wind_rad = snapshot.wind.present_twd_from_rad
+    wind_rad = snapshot.wind.mean_twd_from_rad if wind_rad is None else wind_rad
+    if route is None or wind_rad is None or vehicle is None or here is None or vehicle.speed_mps < MIN_SPEED_MPS:
         return None
-    distance_m = 0.0 if autopilot is None or autopilot.waypoint_distance_m is None else autopilot.waypoint_distance_m
-    sides: list[float] = []
-    for start, end in zip(route.leg_from_en_m[step.state.index:], route.points_en_m[step.state.index:], strict=True):
-        course_rad = math.atan2(end[0] - start[0], end[1] - start[1])
-        off_rad = (course_rad - wind_rad + math.pi) % (2.0 * math.pi) - math.pi
-        side = math.copysign(1.0, off_rad)
-        if sides and side != sides[-1] and abs(off_rad) < math.pi / 2.0:
+    limits = snapshot.limits or AutopilotLimits()
+    begin = step.state.index
+    legs = [
+        (start, end) for item, start, end in zip(
+            route.items[begin:], route.leg_from_en_m[begin:], route.points_en_m[begin:], strict=True)
+        if item.command == Command.NAV_WAYPOINT
+    ]
+    if not legs:
+        return None
+    side = difference_rad(wind_rad, vehicle.heading_rad) > 0.0
+    to_sail = [(here, legs[0][1]), *legs[1:]]
+    distance_m = 0.0
+    for number, (start, end) in enumerate(to_sail):
+        off_rad = difference_rad(wind_rad, heading_of(end[0] - start[0], end[1] - start[1]))
+        if abs(off_rad) < limits.sail_no_go_angle_rad:
+            if number == 0:
+                return _own_tack_s(here, vehicle.velocity_en_mps, legs[0], wind_rad, side=side, limits=limits)
+            board_m = limits.sail_xtrack_max_m / math.sin(limits.sail_no_go_angle_rad)
+            return (distance_m + min(board_m, math.dist(start, end))) / vehicle.speed_mps
+        if number and (off_rad > 0.0) != side and abs(off_rad) < math.pi / 2.0:
             return distance_m / vehicle.speed_mps
-        if sides:
-            distance_m += math.dist(start, end)
-        sides.append(side)
+        side = off_rad > 0.0
+        distance_m += math.dist(start, end)
     return None
+
+
+def _own_tack_s(
+    here: PointEn, velocity_en: PointEn, leg: tuple[PointEn, PointEn], wind_rad: float, *, side: bool,
+    limits: AutopilotLimits,
+) -> float | None:
+    """Return when a boat that beats along a leg meets its corridor's edge or the layline [s]; ``side``: as off_rad."""
+    times = []
+    in_a_second = (here[0] + velocity_en[0], here[1] + velocity_en[1])
+    off_m = cross_track_m(here, *leg)
+    out_mps = cross_track_m(in_a_second, *leg) - off_m
+    if limits.sail_xtrack_max_m > 0.0 and abs(out_mps) > MIN_SPEED_MPS / 2.0:
+        times.append((math.copysign(limits.sail_xtrack_max_m, out_mps) - off_m) / out_mps)
+    # The course of the other tack that leads to the waypoint, and how soon the boat is on it.
+    other_rad = wind_rad + (limits.sail_no_go_angle_rad if side else -limits.sail_no_go_angle_rad)
+    layline = (moved(leg[1], other_rad, -1.0), leg[1])
+    gap_m = cross_track_m(here, *layline)
+    closing_mps = gap_m - cross_track_m(in_a_second, *layline)
+    if abs(closing_mps) > MIN_SPEED_MPS / 2.0:
+        times.append(gap_m / closing_mps)
+    ahead = [max(0.0, t) for t in times if t > -TACKING_S]
+    return min(ahead, default=None)
 
 
 def _alert(step: Step) -> tuple[str, str]:

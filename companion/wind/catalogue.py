@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -34,5 +35,7 @@ def make(name: str, **options: Any) -> Estimator:
     """Return a new estimator; ``options`` are its constructor's keywords. Raises InputError for a name unknown."""
     maker = _MAKERS.get(name)
     if maker is None:
-        raise InputError("estimator", name, "there is none of that name", "choose " + ", ".join(NAMES))
+        near = difflib.get_close_matches(name, NAMES, n=1)
+        remedy = f"did you mean {near[0]!r}? " if near else ""
+        raise InputError("estimator", name, "is no wind estimator", f"{remedy}choose {', '.join(NAMES)}")
     return maker(**options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import struct
 from collections.abc import Mapping
@@ -95,11 +96,17 @@ class Parameters:
 
 
 def check_parameters(overrides: Mapping[str, float]) -> None:
-    """Refuse parameter values that a float of the wire cannot carry.
+    """Refuse parameters that the simulated boat does not have, and values that a float of the wire cannot carry.
 
     Raises:
         InputError: naming the parameter.
     """
+    known = {line.split()[0] for line in TABLE.splitlines() if line and not line.startswith("#")}
+    known |= set(NEW_NAMES.values())
     for name, value in overrides.items():
+        if name not in known:
+            near = difflib.get_close_matches(name.upper(), known, n=1)
+            raise InputError("--param", name, "is no parameter of this boat", f"did you mean {near[0]}?" if near else
+                             "docs/simulated-autopilot.md says which it has")
         if not math.isfinite(value) or len(name) > 16 or struct.unpack("f", struct.pack("f", value))[0] != value:
             raise InputError("--param", name, f"{value} cannot be a parameter", "write NAME=NUMBER")

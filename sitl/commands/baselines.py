@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from companion.arguments import number, out_file, whole
+
 SAILORS = ("companion", "companion-ardurover", "alone-embedded", "alone", "dijkstra")
 
 
@@ -22,10 +24,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
     )
     parser.add_argument("--who", nargs="+", choices=SAILORS, default=list(SAILORS), help="sailors (default: all)")
     parser.add_argument("--scenarios", type=Path, nargs="+", metavar="FILE", help="scenario files (default: the six)")
-    parser.add_argument("--seeds", type=int, default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
-    parser.add_argument("--workers", type=int, default=1, metavar="W", help="voyages at a time (default: 1)")
-    parser.add_argument("--speedup", type=float, default=20.0, metavar="X", help="of the real ArduRover (default: 20)")
-    parser.add_argument("--out", type=Path, default=Path("baselines.jsonl"), metavar="FILE", help="voyages, appended")
+    parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
+    parser.add_argument("--workers", type=whole(at_least=1), default=1, metavar="W",
+                        help="voyages at a time (default: 1)")
+    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=20.0, metavar="X",
+                        help="of the real ArduRover (default: 20)")
+    parser.add_argument("--out", type=out_file, default="baselines.jsonl", metavar="FILE", help="voyages, appended")
     parser.set_defaults(run=run)
 
 

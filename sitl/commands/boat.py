@@ -7,6 +7,7 @@ import math
 import sys
 from pathlib import Path
 
+from companion.arguments import number, place, whole
 from companion.errors import InputError
 
 _EXAMPLE = """examples:
@@ -27,20 +28,24 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument("--udp", type=_port, default=14555, help="UDP port to listen on, 0 for none (default 14555)")
     parser.add_argument("--udp-out", metavar="HOST:PORT", action="append", default=[], help="also send there first")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
-    parser.add_argument("--speedup", type=float, default=1.0, metavar="N", help="simulated seconds per second")
+    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=1.0, metavar="N",
+                        help="simulated seconds per second")
     parser.add_argument(
         "--wind", default="5@0", metavar="WIND",
         help="SPEED@FROM in m/s and degrees, ar1:SPEED@FROM[,sd=DEG][,rho=HZ][,gust=MPS], or FILE.csv (default 5@0)",
     )
-    parser.add_argument("--home", default="51.1,-1.3", metavar="LAT,LON", help="place of the boat (default 51.1,-1.3)")
-    parser.add_argument("--heading", type=float, default=0.0, metavar="DEG", help="of the bow at power-up")
-    parser.add_argument("--seed", type=int, default=0, help="of the wind and of faults (default 0)")
+    parser.add_argument("--home", type=place, default="51.1,-1.3", metavar="LAT,LON",
+                        help="place of the boat (default 51.1,-1.3)")
+    parser.add_argument("--heading", type=number("deg", at_least=-360.0, at_most=360.0), default=0.0, metavar="DEG",
+                        help="of the bow at power-up")
+    parser.add_argument("--seed", type=whole(), default=0, help="of the wind and of faults (default 0)")
     parser.add_argument("--warm", action="store_true", help="powered up long ago: no EKF wait of 42 s")
     parser.add_argument("--moored", action="store_true", help="lies still until it is armed")
-    parser.add_argument("--sysid", type=int, default=1, help="MAVLink system id (default 1)")
+    parser.add_argument("--sysid", type=whole(at_least=1, at_most=255), default=1, help="MAVLink system id (default 1)")
     parser.add_argument("--param", metavar="NAME=VALUE", action="append", default=[], help="set a parameter")
     parser.add_argument("--polar", type=Path, metavar="FILE", help="a boat that sails by this polar")
-    parser.add_argument("--for", dest="for_s", type=float, metavar="S", help="end after S simulated seconds")
+    parser.add_argument("--for", dest="for_s", type=number("s", above=0.0), metavar="S",
+                        help="end after S simulated seconds")
     parser.set_defaults(run=run)
 
 
@@ -48,16 +53,6 @@ def _port(text: str) -> int:
     if not text.isdigit() or int(text) > 65535:
         raise argparse.ArgumentTypeError(f"{text!r} is not a port")
     return int(text)
-
-
-def _home(text: str) -> tuple[float, float]:
-    try:
-        lat, lon = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError("--home", text, "is not a position", "write LAT,LON in degrees") from None
-    if not (abs(lat) <= 90.0 and abs(lon) <= 180.0):
-        raise InputError("--home", text, "is not on the globe", "write LAT,LON in degrees")
-    return lat, lon
 
 
 def run(args: argparse.Namespace) -> int:
@@ -68,16 +63,10 @@ def run(args: argparse.Namespace) -> int:
     from companion.boat import read_polar
     from companion.errors import LinkError
     from companion.mavlink.transport import parse_link
-    from companion.messages import GeoPoint
     from sitl.autopilot import Autopilot, AutopilotConfig, serve
     from sitl.autopilot.parameters import check_parameters
     from sitl.wind import parse_wind
 
-    if not (math.isfinite(args.speedup) and args.speedup > 0.0):
-        raise InputError("--speedup", str(args.speedup), "is not a speed-up", "write a number above 0")
-    if not 1 <= args.sysid <= 255:
-        raise InputError("--sysid", str(args.sysid), "is not a system id", "write 1 to 255")
-    lat, lon = _home(args.home)
     parameters: dict[str, float] = {}
     for text in args.param:
         name, sign, value = text.partition("=")
@@ -89,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
             raise InputError("--param", text, "is not a parameter", "write NAME=VALUE")
     check_parameters(parameters)
     config = AutopilotConfig(
-        home=GeoPoint(lat_deg=lat, lon_deg=lon), heading_rad=math.radians(args.heading), is_warm=args.warm,
+        home=args.home, heading_rad=math.radians(args.heading), is_warm=args.warm,
         is_moored=args.moored, sysid=args.sysid, parameters=parameters,
         polar=None if args.polar is None else read_polar(args.polar).polar,
     )

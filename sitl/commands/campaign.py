@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from companion.arguments import out_file, out_folder, whole
+
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
@@ -16,11 +18,13 @@ def add_parser(subparsers: Any, summary: str) -> None:
         epilog="Example: sitl campaign sitl/scenarios/demo.toml --runs 50",
     )
     parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.toml")
-    parser.add_argument("--runs", type=int, default=50, metavar="N", help="seeds 0..N-1 (default: 50)")
-    parser.add_argument("--first-seed", type=int, default=0, metavar="S")
-    parser.add_argument("--workers", type=int, default=None, metavar="W", help="processes (default: one per core)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the table's figures")
-    parser.add_argument("--keep", type=Path, metavar="DIR", help="keep the voyage folders (default: failed ones only, "
+    parser.add_argument("--runs", type=whole(at_least=1), default=50, metavar="N", help="seeds 0..N-1 (default: 50)")
+    parser.add_argument("--first-seed", type=whole(), default=0, metavar="S")
+    parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
+                        help="processes (default: one per core)")
+    parser.add_argument("--json", type=out_file, metavar="FILE", help="write the table's figures")
+    parser.add_argument("--keep", type=out_folder, metavar="DIR",
+                        help="keep the voyage folders (default: failed ones only, "
                         "in campaign-failures/)")
     parser.set_defaults(run=run)
 

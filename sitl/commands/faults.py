@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
+
+from companion.arguments import out_file, out_folder, whole
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -18,11 +19,14 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "unhandled error. A failing seed is printed and repeats exactly.",
         epilog="Example: sitl faults --runs 1000, then sitl faults --first-seed 17 --keep v",
     )
-    parser.add_argument("--runs", type=int, default=1000, metavar="N", help="seeds to sail (default: 1000)")
-    parser.add_argument("--first-seed", type=int, default=0, metavar="S", help="the first of them (default: 0)")
-    parser.add_argument("--workers", type=int, default=None, metavar="W", help="processes (default: one per core)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write figures and voyages")
-    parser.add_argument("--keep", type=Path, metavar="DIR", help="sail only the first seed and keep its voyage folder")
+    parser.add_argument("--runs", type=whole(at_least=1), default=1000, metavar="N",
+                        help="seeds to sail (default: 1000)")
+    parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
+    parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
+                        help="processes (default: one per core)")
+    parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
+    parser.add_argument("--keep", type=out_folder, metavar="DIR",
+                        help="sail only the first seed and keep its voyage folder")
     parser.set_defaults(run=run)
 
 

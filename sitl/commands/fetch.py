@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from companion.arguments import number
 from companion.errors import JobError
 
 
@@ -19,7 +20,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     )
     parser.add_argument("--to", type=Path, metavar="FILE", help=f"where to put it (default {fetched_path()})")
     parser.add_argument("--url", default=URL, help="another place to get it from")
-    parser.add_argument("--timeout", type=float, default=120.0, metavar="S", help="for the download (default 120)")
+    parser.add_argument("--timeout", type=number("s", above=0.0), default=120.0, metavar="S",
+                        help="for the download (default 120)")
     parser.set_defaults(run=run)
 
 

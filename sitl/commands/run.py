@@ -8,6 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from companion.arguments import number, out_folder, whole
+from companion.words import counted
+
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
@@ -23,9 +26,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--ardurover", type=Path, metavar="PATH", help="the ArduRover program (default: $ARDUROVER, "
                         "the PATH, what `sitl fetch` brought)")
     parser.add_argument("--live", action="store_true", help="separate processes over UDP, in (sped-up) real time")
-    parser.add_argument("--speedup", type=float, metavar="N", help="with --live or ardurover (default: the scenario's)")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="the voyage folder")
+    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), metavar="N",
+                        help="with --live or ardurover (default: the scenario's)")
+    parser.add_argument("--seed", type=whole(), default=0)
+    parser.add_argument("--out", type=out_folder, metavar="DIR", help="the voyage folder")
     parser.set_defaults(run=run)
 
 
@@ -69,8 +73,9 @@ def run(args: argparse.Namespace) -> int:
 def draw(folder: Path) -> None:
     """Draw the voyage; a picture that fails must not hide the verdict."""
     try:
-        from companion.plots.voyage import plot_voyage, read_voyage
+        from companion.plots.voyage import plot_voyage
         from companion.telemetry.names import PICTURE
+        from companion.telemetry.voyage_folder import read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:
@@ -84,5 +89,6 @@ def print_verdict(verdict: Any) -> None:
         print(f"{'pass' if check.passed else 'FAIL'}  {check.name}: {figure} ({check.required})")
     f = verdict.figures
     print(f"{'PASSED' if verdict.passed else 'FAILED'}  {verdict.scenario} seed {verdict.seed}: "
-          f"{f['time_s']:.0f} s, {f['distance_m']:.0f} m, {f['tacks']} tacks, {f['replans']} replans, "
-          f"clearance {f['min_clearance_m'] if f['min_clearance_m'] is None else round(f['min_clearance_m'], 1)} m")
+          f"{f['time_s']:.0f} s, {f['distance_m']:.0f} m, {counted(f['tacks'], 'tack')}, "
+          f"{counted(f['replans'], 'replan')}, " + (
+              "nothing to be clear of" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"))

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from companion.clock import run_virtual
-from companion.plots.voyage import plot_voyage, read_voyage
+from companion.plots.voyage import plot_voyage
 from companion.replay import replay
+from companion.telemetry.voyage_folder import read_voyage
 from sitl.runner import run_embedded
 from sitl.scenario import EventSpec, ExpectSpec, Scenario, WindSpec, load_scenario
 

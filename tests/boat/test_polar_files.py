@@ -62,8 +62,8 @@ def test_a_bare_zero_is_unknown_and_warned_but_zero_point_zero_cannot_sail():
     assert knots(read.polar, 30, 4) == 0.0
     assert knots(read.polar, 30, 8) == 0.0  # OpenCPN saves "cannot sail" as 0.01
     assert knots(read.polar, 45, 4) == pytest.approx(0.5)
-    assert sum("bare 0" in w for w in read.warnings) == 3
-    assert "line 2, column 2" in read.warnings[0]
+    assert sum("bare 0" in w for w in read.warnings) == 1   # head to wind a boat does not sail: no gap
+    assert "line 4, column 2" in read.warnings[0]
 
 
 def test_missing_and_surplus_cells_are_warned_of():
@@ -135,3 +135,19 @@ def test_any_text_is_a_sound_polar_or_an_input_error(text):
         return
     assert np.all(polar.speed_mps_table >= 0.0)
     assert polar.speed_mps(1.0, 5.0) <= polar.speed_mps_table.max()
+
+
+@pytest.mark.parametrize("head", ["0;0;0;0", "0;0;0;0\n30;0;0;0"])
+def test_bare_zeros_before_the_first_speed_are_no_gap(head):
+    """As most programs write them: head to wind a boat makes no way."""
+    file = parse_polar(f"TWA\\TWS;0;6;10\n{head}\n45;0;3.0;4.0\n90;0;4.0;5.0\n150;0;3.5;4.5\n")
+    assert file.warnings == ()
+    assert file.polar.speed_mps(0.0, 6.0 * MPS_PER_KNOT) == 0.0
+    assert file.polar.speed_mps(math.radians(90.0), 6.0 * MPS_PER_KNOT) == pytest.approx(4.0 * MPS_PER_KNOT)
+    assert file.polar.speed_mps(math.radians(90.0), 0.0) == 0.0
+
+
+def test_a_bare_zero_between_speeds_is_still_a_gap():
+    file = parse_polar("TWA\\TWS;6;10\n0;0;0\n45;3.0;4.0\n90;0;5.0\n150;3.5;4.5\n")
+    assert len(file.warnings) == 1
+    assert "line 4, column 2" in file.warnings[0]

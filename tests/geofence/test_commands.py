@@ -189,7 +189,7 @@ def test_bad_use_is_one_line_and_exit_code_2(capsys, argv):
     code, _, err = run(capsys, *argv)
     assert code == 2
     assert err.count("\n") == 1
-    assert err.startswith(f"companion {argv[0]}: ")
+    assert err.startswith(f"companion {argv[0]}")
 
 
 def test_help_has_examples(capsys):

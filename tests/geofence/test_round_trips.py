@@ -55,7 +55,7 @@ def test_geojson_carries_everything(document):
 @given(documents(holes=False, tracks=False, marks=False, names=False, margins=False))
 def test_plan_carries_mission_fence_and_rally(document):
     back, losses = there_and_back(document, "plan")
-    assert all(f.severity is Severity.NOTE for f in losses), losses
+    assert all(f.severity is Severity.NOTE for f in losses) or document.is_empty, losses
     assert sorted(map(repr, map(zone_key, back.zones))) == sorted(map(repr, map(zone_key, document.zones)))
     assert (back.items, back.rally, back.return_point) == (document.items, document.rally, document.return_point)
     if document.home is not None:

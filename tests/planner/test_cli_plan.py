@@ -74,7 +74,7 @@ def test_it_draws_a_picture(capsys, file, tmp_path):
 def test_explain_adds_reasons(capsys, file):
     code, out, _ = run(capsys, file(), "--budget", "0.3", "--explain", "--explain-budget", "1")
     assert code == 0
-    assert "Leg" in out
+    assert "Course" in out
 
 
 def test_no_plan_is_exit_1_with_the_reason(capsys, file, tmp_path):

@@ -15,10 +15,10 @@ from tests.sitl.boats import boat_process, free_port
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    (["--wind", "storm"], "--wind: storm: is not a wind"), (["--home", "143,5"], "--home: 143,5: is not on the globe"),
-    (["--home", "51.1"], "write LAT,LON"), (["--speedup", "0"], "is not a speed-up"),
-    (["--param", "WP_SPEED"], "write NAME=VALUE"), (["--param", "A_NAME_THAT_IS_TOO_LONG=1"], "cannot be a parameter"),
-    (["--param", "WP_SPEED=nan"], "cannot be a parameter"), (["--sysid", "300"], "is not a system id"),
+    (["--wind", "storm"], "--wind: storm: is not a wind"), (["--home", "143,5"], "--home: latitude 143.0 is outside"),
+    (["--home", "51.1"], "write LAT,LON"), (["--speedup", "0"], "--speedup: 0 is out of range"),
+    (["--param", "WP_SPEED"], "write NAME=VALUE"), (["--param", "WP_SPED=1"], "did you mean WP_SPEED?"),
+    (["--param", "WP_SPEED=nan"], "cannot be a parameter"), (["--sysid", "300"], "--sysid: 300 is out of range"),
     (["--port", "0", "--udp", "0"], "nobody could reach the boat"),
     (["--wind", "none.csv"], "none.csv: cannot be read"),
     (["--udp-out", "nowhere"], "host or port is missing"),

@@ -1,13 +1,18 @@
 """The doctor: each setting that would spoil a voyage is found, nothing is changed unasked, what is set reads back."""
 
 import math
+import re
+from dataclasses import replace
 from functools import partial
 
 import pytest
 
+from companion.boat import AutopilotLimits
+from companion.cli import main
 from companion.clock import run_virtual
-from companion.commands.doctor import as_json, as_text, diagnose
+from companion.commands.doctor import as_json, as_text, diagnose, limits_at, needs_of
 from companion.errors import LinkError
+from companion.geofence import load_mission
 from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, SigningStore
 from companion.messages import GeoPoint, MissionItem
 from companion.skipper.checks import examine
@@ -16,6 +21,7 @@ from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.memory import frames
 from sitl.signer import Signer
 from sitl.wind import parse_wind
+from tests.sitl.boats import boat_process
 
 # ArduRover's sailboat as `sim_vehicle.py -f sailboat` starts it.
 DEFAULTS = {
@@ -61,7 +67,10 @@ def test_a_boat_that_is_set_up_has_nothing_in_its_way():
     ({"WNDVN_SPEED_TYPE": 0.0}, {}, "wind speed", Level.WARNING, "WNDVN_SPEED_TYPE", None),
     ({"WNDVN_TRUE_FILT": 0.01}, {}, "wind filter", Level.WARNING, "WNDVN_TRUE_FILT", 0.05),
     ({"SAIL_XTRACK_MAX": 30.0}, {}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
-    ({"SAIL_XTRACK_MAX": 0.0}, {}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 7.0),
+    ({"SAIL_XTRACK_MAX": 0.0}, {}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
+    ({"SAIL_XTRACK_MAX": 2.0}, {}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
+    ({}, {"margin_m": 12.0}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", 7.0),
+    ({}, {"margin_m": 10.0}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", None),
     ({}, {"can_tack": False}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 0.0),
     ({"SAIL_NO_GO_ANGLE": 35.0}, {}, "no-go", Level.WARNING, "SAIL_NO_GO_ANGLE", 45.0),
     ({"SAIL_LOIT_RADIUS": 20.0}, {}, "loiter", Level.WARNING, "SAIL_LOIT_RADIUS", 6.0),
@@ -135,6 +144,48 @@ def test_what_is_wanted_cures():
                 parameters[finding.parameter] = finding.wanted
     left = examine(seen(parameters=parameters, fence=(MissionItem(command=5001),)), needs)
     assert [f for f in left if f.level > Level.INFO and f.wanted is not None] == []
+
+
+def advice(needs, **changes):
+    return [f for f in examine(seen(**changes), needs) if f.code in {"corridor", "margin"}]
+
+
+@pytest.mark.parametrize("fence", [{}, {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 1.0, "FENCE_TYPE": 4.0}])
+@pytest.mark.parametrize("corridor_m", [0.0, 1.0, 2.0, 5.0, 8.0, 10.0, 15.0, 30.0])
+@pytest.mark.parametrize("speed_mps", [0.8, 1.5, 2.5, 2.93, 4.0])
+@pytest.mark.parametrize("margin_m", [4.0, 8.0, 12.0, 15.0, 20.0, 40.0])
+def test_corridor_and_margin_do_not_fight(fence, corridor_m, speed_mps, margin_m):
+    """One setting cures; where no corridor does, the margin that is named; a fence changes neither."""
+    needs = Needs(speed_mps=speed_mps, margin_m=margin_m)
+    first = advice(needs, SAIL_XTRACK_MAX=corridor_m, **fence)
+    assert [(f.code, f.wanted) for f in first] == [
+        (f.code, f.wanted) for f in advice(needs, SAIL_XTRACK_MAX=corridor_m)]
+    wanted = {f.wanted for f in first if f.wanted is not None}
+    assert len(wanted) <= 1
+    set_to = next(iter(wanted), corridor_m)
+    assert set_to * 2.0 * math.sqrt(2.0) / speed_mps >= 5.0 or not first   # a board outlasts the time between tacks
+    again = advice(needs, SAIL_XTRACK_MAX=set_to, **fence)
+    assert not [f for f in again if f.wanted is not None]
+    if again:
+        named_m = float(re.search(r"margin_m = (\d+)", again[0].why)[1])
+        assert named_m > margin_m
+        assert advice(replace(needs, margin_m=named_m), SAIL_XTRACK_MAX=set_to, **fence) == []
+
+
+def test_a_new_mission_has_the_margin_that_the_doctor_finds_enough(tmp_path, capsys):
+    with boat_process("--warm", "--moored", "--param", "SAIL_XTRACK_MAX=14") as (host, tcp, _):
+        link = f"tcp:{host}:{tcp}"
+        for name, options in (("default", []), ("asked", ["--link", link])):
+            path = tmp_path / f"{name}.toml"
+            assert main(["mission", "new", str(path), "--start", "51.1,-1.3", "--goal", "51.101,-1.3", *options]) == 0
+            mission = load_mission(path)
+            limits = limits_at(link) if options else AutopilotLimits()
+            assert limits.sail_xtrack_max_m == (14.0 if options else 10.0)
+            assert f"margin_m = {mission.margin_m:g}: " in capsys.readouterr().out
+            findings = examine(seen(SAIL_XTRACK_MAX=limits.sail_xtrack_max_m), needs_of(mission))
+            assert not [f for f in findings if f.code in {"corridor", "margin"}]
+            assert 0.0 < mission.margin_floor_m < mission.margin_m
+    assert load_mission(tmp_path / "asked.toml").margin_m > load_mission(tmp_path / "default.toml").margin_m
 
 
 def doctor(parameters, *, apply=False, prepare=None, signing=None):

@@ -66,8 +66,8 @@ def test_cost_is_a_ratio_to_the_kalman_filter(csv_record, capsys):
 @pytest.mark.parametrize(("arguments", "words"), [
     (["nowhere.csv"], "no such file"),
     (["RECORD", "--estimator", "oracle"], "choose default"),
-    (["RECORD", "--plot", "/no/such/folder/p.png"], "folder that does not exist"),
-    (["RECORD", "--plot", "p.nonsense"], "cannot be written"),
+    (["RECORD", "--plot", "/no/such/folder/p.png"], "/no/such/folder/p.png: /no/such/folder does not exist"),
+    (["RECORD", "--plot", "p.nonsense"], "end it in one of .png"),
 ])
 def test_bad_usage_exits_2_with_one_line(arguments, words, csv_record, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)

@@ -1,0 +1,127 @@
+"""Values of a command line: numbers in their ranges, places, winds and files to write, each refused in one line.
+
+Each function here, or what it returns, is an argparse ``type``: it takes the text and raises ArgumentTypeError, so that
+everything a command is given is believed before it begins to work.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from argparse import ArgumentTypeError
+from collections.abc import Callable
+from pathlib import Path
+
+from companion.messages import GeoPoint
+
+# What matplotlib writes without a further program.
+PICTURES = (".png", ".svg", ".pdf", ".jpg")
+
+
+def number(
+    unit: str = "", *, above: float | None = None, at_least: float | None = None, at_most: float | None = None,
+) -> Callable[[str], float]:
+    """Return the reader of a finite number in a range; ``unit`` is what the refusal calls it."""
+    allowed = _range(above, at_least, at_most, unit)
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            raise ArgumentTypeError(f"{text[:40]!r} is not a number; {allowed}") from None
+        if not (math.isfinite(value) and _is_within(value, above, at_least, at_most)):
+            raise ArgumentTypeError(f"{text[:40]} is out of range; {allowed}")
+        return value
+
+    return read
+
+
+def whole(*, at_least: int = 0, at_most: int | None = None) -> Callable[[str], int]:
+    """Return the reader of a whole number in a range."""
+    allowed = _range(None, at_least, at_most)
+
+    def read(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise ArgumentTypeError(f"{text[:40]!r} is not a whole number; {allowed}") from None
+        if not _is_within(value, None, at_least, at_most):
+            raise ArgumentTypeError(f"{text[:40]} is out of range; {allowed}")
+        return value
+
+    return read
+
+
+def system_id(text: str) -> int:
+    """Take the argument of ``--system``: a MAVLink system id."""
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 255):
+        raise ArgumentTypeError(f"{text!r} is not a system id from 1 to 255")
+    return int(text)
+
+
+def _is_within(value: float, above: float | None, at_least: float | None, at_most: float | None) -> bool:
+    return (above is None or value > above) and (at_least is None or value >= at_least) and (
+        at_most is None or value <= at_most)
+
+
+def _range(above: float | None, at_least: float | None, at_most: float | None, unit: str = "") -> str:
+    low = f"above {above:g}" if above is not None else f"of at least {at_least:g}" if at_least is not None else ""
+    high = f"at most {at_most:g}" if at_most is not None else ""
+    bounds = " and ".join(part for part in (low, high) if part)
+    return f"write a number {bounds}".rstrip() + (f" [{unit}]" if unit else "")
+
+
+def place(text: str) -> GeoPoint:
+    """Return the point of ``LAT,LON``."""
+    try:
+        lat, lon = (float(part) for part in text.split(","))
+        return GeoPoint(lat_deg=lat, lon_deg=lon)
+    except ValueError as error:
+        problem = str(error) if "outside" in str(error) else f"{text[:40]!r} is not a position"
+        raise ArgumentTypeError(f"{problem}; write LAT,LON in degrees, as 50.82,-1.31") from None
+
+
+def wind(text: str) -> tuple[float, float]:
+    """Return (speed [m/s], from [deg]) of ``SPEED@FROM``."""
+    try:
+        speed, direction = (float(part) for part in text.split("@"))
+    except ValueError:
+        raise ArgumentTypeError(f"{text[:30]!r} is not a wind; write SPEED@FROM, as 5@350") from None
+    if not (0.0 < speed <= 50.0 and -360.0 <= direction <= 360.0):
+        raise ArgumentTypeError(f"{text[:30]!r} is out of range; speed 0..50 m/s, direction in degrees")
+    return speed, direction % 360.0
+
+
+def out_file(text: str) -> Path:
+    """Return a file that can be written as far as can be told beforehand: work is not lost for a slip of the name."""
+    path = Path(text)
+    folder = path.absolute().parent
+    if not text or path.is_dir():
+        raise ArgumentTypeError(f"{text or 'an empty name'} is a folder; name a file")
+    if not folder.is_dir():
+        what = "is not a folder" if folder.exists() else "does not exist"
+        raise ArgumentTypeError(f"{text}: {folder} {what}; make the folder first")
+    if not os.access(path if path.exists() else folder, os.W_OK):
+        raise ArgumentTypeError(f"{text}: must not be written; name another place or change the permissions")
+    return path
+
+
+def picture(text: str) -> Path:
+    """Return a file for a picture, its format told by its name."""
+    path = out_file(text)
+    if path.suffix.lower() not in PICTURES:
+        raise ArgumentTypeError(f"{text}: the name does not tell a picture; end it in one of {', '.join(PICTURES)}")
+    return path
+
+
+def out_folder(text: str) -> Path:
+    """Return a folder that is there, or can be made."""
+    path = Path(text)
+    above = path.absolute()
+    while not above.exists():
+        above = above.parent
+    if not above.is_dir():
+        raise ArgumentTypeError(f"{text}: {above.name} is a file; name another folder")
+    if not os.access(above, os.W_OK):
+        raise ArgumentTypeError(f"{text}: must not be written; name another place or change the permissions")
+    return path

@@ -1,0 +1,109 @@
+"""What the shore's commands print of a file, and how they write one: never over another without a word."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from companion.disk import NEW, reason
+from companion.errors import InputError, JobError
+from companion.words import counted
+
+# Beyond this it is told why nothing happens [s]: cached, planning and drawing each take less.
+PATIENCE_S = 3.0
+
+if TYPE_CHECKING:
+    from companion.geofence import Document, Finding
+    from companion.geofence.losses import Written
+
+
+def print_findings(findings: tuple[Finding, ...], source: str) -> bool:
+    """Print findings and return whether one of them is an error."""
+    from companion.geofence import Severity
+
+    for finding in findings:
+        print(finding.line(source))
+    return any(f.severity is Severity.ERROR for f in findings)
+
+
+def print_losses(losses: tuple[Finding, ...], out: str) -> None:
+    """Print what a file does not carry."""
+    for loss in losses:
+        print(loss.line(out))
+
+
+def summary(document: Document) -> str:
+    """Return what a document holds in a few words."""
+    from companion.geofence import Circle, ZoneKind
+
+    counts = [
+        (sum(z.kind is ZoneKind.INCLUSION for z in document.zones), "keep-in zone"),
+        (sum(z.kind is ZoneKind.EXCLUSION for z in document.zones), "keep-out zone"),
+        (len(document.marks), "point or line"), (len(document.items), "mission item"),
+        (len(document.rally), "rally point"), (len(document.tracks), "track"),
+    ]
+    vertices = sum(1 if isinstance(z.shape, Circle) else len(z.shape.exterior.coords) - 1 for z in document.zones)
+    words = ", ".join(counted(n, word) for n, word in counts if n)
+    return (words or "nothing") + (f" ({vertices} fence items)" if document.zones else "")
+
+
+def write_out(
+    written: Written, out: str, *, lossy: bool, force: bool, remedy: str = "choose another format",
+) -> None:
+    """Write a file, or refuse: when it would hold nothing, or protect less than its source without ``--lossy``."""
+    from companion.geofence import Severity
+
+    print_losses(written.losses, out)
+    if written.is_empty:
+        raise JobError(f"{out}: not written: it would be empty; {remedy}")
+    if any(f.severity is Severity.ERROR for f in written.losses) and not lossy:
+        raise JobError(f"{out}: not written: zones would be missing; {remedy} or say --lossy")
+    write_files({out: written.data}, force=force)
+
+
+def write_files(files: dict[str, bytes], *, force: bool) -> None:
+    """Write all files or none: what exists is not overwritten without ``force``. Raises InputError."""
+    refuse_existing(list(files), force=force)
+    beside: list[tuple[Path, Path]] = []
+    try:
+        for name, data in files.items():
+            path = Path(name)
+            beside.append((path.with_name(path.name + NEW), path))
+            beside[-1][0].write_bytes(data)
+        for new, path in beside:
+            new.replace(path)
+    except OSError as error:
+        for new, _ in beside:
+            with contextlib.suppress(OSError):
+                new.unlink(missing_ok=True)
+        raise InputError(str(beside[-1][1]), "", f"cannot be written ({reason(error)})", "name another place") from None
+
+
+def refuse_existing(names: Sequence[str], *, force: bool) -> None:
+    """Raise InputError when one of the files exists and nobody said ``force``."""
+    there = [name for name in names if Path(name).exists()]
+    if there and not force:
+        raise InputError(there[0], "", "exists", "say --force to overwrite it")
+
+
+@contextlib.contextmanager
+def patience(doing: str) -> Iterator[None]:
+    """Say on stderr why nothing happens when the work within takes long: the first time on a machine it does."""
+    waiting = threading.Timer(PATIENCE_S, sys.stderr.write, (
+        f"note: {doing}; the first time on a machine kernels are compiled and fonts are listed, which takes long\n",))
+    waiting.daemon = True
+    waiting.start()
+    try:
+        yield
+    finally:
+        waiting.cancel()
+
+
+def force_option(parser: argparse.ArgumentParser) -> None:
+    """Add --force."""
+    parser.add_argument("--force", action="store_true", help="overwrite a file that exists")

@@ -1,0 +1,82 @@
+"""What all pictures share: places and dates in words, a scale, legends beside the curves, one way to save."""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from companion.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DPI = 110
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a figure and close it. Raises InputError when the file cannot be written or its kind is unknown."""
+    import matplotlib.pyplot as plt
+
+    try:
+        figure.savefig(path, dpi=DPI)
+    except (OSError, ValueError) as error:
+        raise InputError("--plot", str(path), f"cannot be written ({error})", "name a .png in a folder") from None
+    finally:
+        plt.close(figure)
+
+
+def place_words(lat_deg: float, lon_deg: float) -> str:
+    """Return a position as a sailor writes it, in degrees and decimal minutes.
+
+    >>> place_words(-33.85, 151.26)
+    "33°51.00' S 151°15.60' E"
+    """
+    words = []
+    for value, (positive, negative) in ((lat_deg, "NS"), (lon_deg, "EW")):
+        minutes = round(abs(value) * 60.0, 2)
+        words.append(f"{int(minutes // 60)}°{minutes % 60.0:05.2f}' {positive if value >= 0.0 else negative}")
+    return " ".join(words)
+
+
+def date_words(utc: str) -> str:
+    """Return an ISO time as a date with its minute, "" for what is none.
+
+    >>> date_words("2026-06-09T10:13:20+00:00")
+    '9 June 2026, 10:13 UTC'
+    """
+    try:
+        when = dt.datetime.fromisoformat(utc).astimezone(dt.UTC)
+    except ValueError:
+        return ""
+    return f"{when.day} {when:%B %Y, %H:%M} UTC"
+
+
+def scale_bar(axes: Axes) -> None:
+    """Draw a bar of a round length at the lower left of axes in metres whose limits are set."""
+    x0, x1 = axes.get_xlim()
+    y0, y1 = axes.get_ylim()
+    wanted_m = 0.2 * (x1 - x0)
+    power = 10.0 ** math.floor(math.log10(wanted_m))
+    length_m = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted_m)
+    left, low, tick = x0 + 0.03 * (x1 - x0), y0 + 0.03 * (y1 - y0), 0.008 * (y1 - y0)
+    axes.plot([left, left, left + length_m, left + length_m], [low + tick, low, low, low + tick], color="black", lw=1.4,
+              zorder=10, scalex=False, scaley=False)
+    text = f"{length_m:g} m" if length_m < 1000.0 else f"{length_m / 1000.0:g} km"
+    axes.annotate(text, (left + length_m / 2.0, low), xytext=(0, 3), textcoords="offset points", ha="center",
+                  fontsize=8, zorder=10)
+
+
+def legend_above(axes: Any, *, columns: int = 4) -> None:
+    """Put the legend over the axes, where no curve runs."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize=8, frameon=False,
+                    borderaxespad=0.1)
+
+
+def legend_below(axes: Any, *, columns: int = 4) -> None:
+    """Put the legend of a chart under it."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.07), ncols=columns, fontsize=8, frameon=False)

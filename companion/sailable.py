@@ -1,0 +1,47 @@
+"""Whether a mission can be sailed as it stands: one validation for who checks it, who sails it and who simulates it."""
+
+from __future__ import annotations
+
+from companion.compose import config_of, estimator_of, feeds_of, target_limits_of, voyage_of
+from companion.errors import InputError
+from companion.geofence import Mission
+from companion.geofence.options import AreaOptions
+
+
+def require_sailable(mission: Mission) -> Mission:
+    """Return the mission; raise InputError for what would fail, or be passed over in silence, under way.
+
+    ``load_mission`` has seen to each key by itself and to the places; here everything that a voyage is made of is made
+    once, and keys that contradict each other are refused.
+    """
+    source = str(mission.path)
+    _require_consistent(mission, source)
+    try:
+        estimator_of(mission)
+        feeds_of(mission)
+        target_limits_of(mission)
+        config_of(mission)
+        voyage_of(mission)
+    except ValueError as error:
+        raise InputError(source, "", str(error)) from error
+    return mission
+
+
+def _require_consistent(mission: Mission, source: str) -> None:
+    area, operator, skipper = mission.options.area, mission.operator, mission.skipper
+    if area.margin_floor_m > max(area.margin_m, AreaOptions().margin_floor_m):
+        raise InputError(source, "[area] margin_floor_m",
+                         f"{area.margin_floor_m:g} m is more than margin_m, {area.margin_m:g} m",
+                         "the margin is reduced down to the floor: write a smaller floor or a larger margin")
+    missing = [key for key in ("guided", "set_auto") if not getattr(operator, key)]
+    if skipper.guidance != "plan" and missing:
+        raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" steers in GUIDED, which nobody allows',
+                         f"write {' and '.join(f'{key} = true' for key in missing)} in [operator], "
+                         'or guidance = "plan"')
+    if skipper.max_replan_s is not None and skipper.max_replan_s < skipper.min_replan_s:
+        raise InputError(source, "[skipper] max_replan_s",
+                         f"{skipper.max_replan_s:g} s is less than min_replan_s, {skipper.min_replan_s:g} s",
+                         "write a larger one, or a smaller min_replan_s")
+    if operator.upload_fence and not (mission.area.solids or mission.area.fence.zones):
+        raise InputError(source, "[operator] upload_fence", "there is no area to make a fence of",
+                         "name its files in [area], or write upload_fence = false")
