@@ -117,16 +117,18 @@ def needs_of(mission: Mission | None) -> Needs:
     )
 
 
-def limits_at(link: str, *, wait_s: float = 10.0) -> AutopilotLimits:
+def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> AutopilotLimits:
     """Return what the autopilot on a link does with a plan. Raises InputError and LinkError."""
     from companion.boat import AutopilotLimits
     from companion.clock import run as run_loop
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
+    from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
     from companion.mavlink.transport import open_link
 
     async def ask() -> AutopilotLimits:
-        async with Link(open_link(link)) as connected:
+        own = LinkIdentity(component=TOOL_COMPONENT)
+        async with Link(open_link(link), identity=own, target_system=system) as connected:
             await connected.wait_autopilot(wait_s)
             async with Autopilot(connected) as autopilot:
                 answers = {name: await autopilot.get_parameter(name) for name in AutopilotLimits.PARAMETERS}

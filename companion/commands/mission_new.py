@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from companion.arguments import number, place
+from companion.arguments import number, place, system_id
 from companion.commands.output import force_option, print_findings, print_losses, refuse_existing, write_files
 from companion.errors import InputError
 
@@ -35,6 +35,8 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
                      help="what plans keep clear of everything (what the autopilot's habits ask for)")
     new.add_argument("--link", metavar="LINK",
                      help="ask the autopilot there for its habits (else ArduRover's defaults)")
+    new.add_argument("--system", type=system_id, metavar="N",
+                     help="the autopilot's MAVLink system id (default: the only one heard)")
     new.add_argument("--radius", type=number("m", above=0.0, at_most=5000.0), metavar="M", help="of the goals (10)")
     point_radius_option(new)
     force_option(new)
@@ -52,7 +54,7 @@ def _proposed_margin(args: argparse.Namespace) -> ProposedMargin | None:
     if args.link is not None:
         from companion.commands.doctor import limits_at
 
-        limits, source = limits_at(args.link), f"the parameters at {args.link}"
+        limits, source = limits_at(args.link, system=args.system), f"the parameters at {args.link}"
     else:
         limits, source = AutopilotLimits(), "ArduRover's default parameters; --link asks the autopilot"
     boat = Boat(polar=ardurover_sitl())
@@ -98,6 +100,7 @@ def run(args: argparse.Namespace) -> int:
     except ValueError as error:
         raise InputError(args.source or "companion mission new", "", str(error)) from None
     mission = write_mission(made, out, force=args.force)
+    print(f"{args.out}: note: [operator] permits nothing yet: with set_auto = true the companion uploads and sets AUTO")
     if args.plot:
         preview(mission, args)
     return 0

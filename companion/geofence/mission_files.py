@@ -45,6 +45,16 @@ def replace_defaults(options: MissionOptions) -> list[str]:
             if getattr(options, t) != getattr(default, t)]
 
 
+# Nothing is permitted by default; a new file names what could be.
+PERMITS = """
+[operator]            # what the companion may do uninvited
+set_auto = false      # upload missions, set AUTO and the modes of the watchdogs
+arm = false           # arm
+guided = false        # steer under GUIDED: out of irons, round a vessel
+upload_fence = false  # put the fence on the autopilot and switch it on
+"""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionFiles:
     """A mission TOML and the area files beside it, ready to be written: name -> content."""
@@ -99,7 +109,7 @@ def mission_files(
             point_radius_m=point_radius_m if point_radius_m is not None else defaults.point_radius_m,
         ),
     )
-    return MissionFiles(toml=dump_options(options).encode(), files=files, losses=tuple(losses))
+    return MissionFiles(toml=(dump_options(options) + PERMITS).encode(), files=files, losses=tuple(losses))
 
 
 def _goals(document: Document, losses: Losses) -> list[GoalOptions]:
