@@ -8,6 +8,7 @@ import pytest
 from companion.cli import main
 from companion.geofence import load_mission, read
 from companion.geofence.mission_files import document_of
+from companion.geofence.options import OperatorOptions
 
 MISSIONS = pathlib.Path(__file__).parents[2] / "missions"
 DEMO = str(MISSIONS / "archipelago.toml")
@@ -125,6 +126,9 @@ def test_mission_new_from_a_start_goals_and_land(capsys, tmp_path):
     assert len(mission.area.fence.inclusions) == 1
     assert mission.margin_m == 10.0
     assert mission.operator.arm is False
+    assert "set_auto = false" in out_file.read_text()       # what could be permitted is there to be changed
+    assert "[operator] permits nothing yet" in out
+    assert load_mission(out_file).operator == OperatorOptions()
     assert run(capsys, "mission", "new", out_file, "--start", "50.8170,-1.3100", "--goal", "50.8203,-1.3101")[0] == 2
     assert run(capsys, "mission", "new", tmp_path / "b.toml", "--goal", "50.8203,-1.3101", "--start", "x")[0] == 2
     code, _, err = run(capsys, "mission", "new", tmp_path / "b.toml", "--start", "50.8170,-1.3100")
