@@ -208,7 +208,7 @@ def _pass_gates(turn: Turn) -> None:
             return
         closest = turn.state.closest_m
         reached = (*turn.state.reached, gate.goal) if gate.ends_goal else turn.state.reached
-        turn.update(gate=number + 1, reached=reached, missed_s=None, closest_m=math.inf)
+        turn.update(gate=number + 1, reached=reached, closest_m=math.inf)
         if gate.ends_goal:
             turn.update(bearing_rad=0.0)
             turn.say(Severity.NOTICE, "goal", f"{gate.name} reached, {min(left, closest):.1f} m from it", every_s=0.0)

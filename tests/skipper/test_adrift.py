@@ -153,7 +153,7 @@ def test_the_first_means_that_will_do_is_used(tws_mps, has_motor, may, wanted):
     w.run(CALM_S)
     w.wind = lambda t: (-1.5, tws_mps)
     w.permissions = replace(w.permissions, may_set_mode=may)
-    turn = Turn(w.skipper.voyage, w.skipper.config, w.skipper.gates, w.state, w.snapshot())
+    turn = Turn(w.skipper.voyage, w.skipper.config, w.state, w.snapshot())
     ahead = drift_ahead(w.skipper.voyage.area, w.position, (0.5, 0.0), floor_m=8.0)
     assert next(m.name for m in MEANS if m.will_do(turn, ahead)) == wanted
 
