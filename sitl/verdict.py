@@ -139,18 +139,26 @@ def count_roundings(positions_m: NDArray[np.float64], marks: Sequence[tuple[tupl
     rounded, at = 0, 0
     for mark, side in marks:
         offset = positions_m[at:] - np.asarray(mark)
-        near = np.hypot(offset[:, 0], offset[:, 1]) < ROUNDING_M
-        if not near.any():
+        # A board that only comes near, and a miss that is sailed again, are followed by the rounding itself.
+        near = _stretches(np.hypot(offset[:, 0], offset[:, 1]) < ROUNDING_M)
+        if not near:
             break
-        first = int(np.argmax(near))
-        left = np.flatnonzero(~near[first:])
-        end = first + (int(left[0]) if len(left) else len(near) - first)
-        bearing = np.unwrap(np.arctan2(offset[first:end, 0], offset[first:end, 1]))
-        turned = float(bearing[-1] - bearing[0]) * (-1.0 if side == "port" else 1.0)
-        if turned >= ROUNDING_RAD:
-            rounded += 1
-        at += end
+        ends = [end for first, end in near if _turned_rad(offset[first:end], side) >= ROUNDING_RAD]
+        rounded += bool(ends)
+        at += ends[0] if ends else near[0][1]
     return rounded
+
+
+def _turned_rad(offset_m: NDArray[np.float64], side: str) -> float:
+    """Return how far the bearing from a mark turns the way it should for its side [rad]."""
+    bearing = np.unwrap(np.arctan2(offset_m[:, 0], offset_m[:, 1]))
+    return float(bearing[-1] - bearing[0]) * (-1.0 if side == "port" else 1.0)
+
+
+def _stretches(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return where ``holds`` is true without a break, as (first, behind the last)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], holds, [False])).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def longest_silence_s(status_times_s: Sequence[float], start_s: float, end_s: float) -> float:

@@ -150,6 +150,19 @@ def test_roundings_count_only_on_the_right_side_and_in_order():
     assert count_roundings(second, marks) == 0
 
 
+def test_a_board_near_a_mark_and_a_miss_sailed_again_are_not_the_rounding():
+    """Buoy course, seed 1: a board clipped the first mark's circle, and its rounding half a minute later was not seen."""
+    marks = [((0.0, 0.0), "port"), ((200.0, 0.0), "port")]
+    right = np.array([(20 * math.sin(a), 20 * math.cos(a)) for a in np.linspace(2.5, -2.5, 40)])
+    second = right + np.array([200.0, 0.0])
+    board, away = np.array([(-55.0, 10.0), (-55.0, 5.0)]), np.array([(-90.0, 0.0)])
+    assert count_roundings(np.vstack([board, away, right, second]), marks) == 2
+    assert count_roundings(np.vstack([right[::-1], away, right, second]), marks) == 2
+    assert count_roundings(np.vstack([board, away, second]), marks) == 1
+    # in its order: a mark that is only rounded in the next lap costs those between
+    assert count_roundings(np.vstack([board, away, second, right, second]), [*marks, *marks]) < 4
+
+
 def verdict_of(truth, hull=DOT, **how):
     return judge(scenario="x", seed=0, expect=how.pop("expect", ExpectSpec(arrived=None, contacts=9)), truth=truth,
                  solid=ISLAND, hull=hull, goal_en_m=(0.0, 99.0), summary={}, status_times_s=None, alerts=(), **how)
