@@ -151,7 +151,7 @@ def test_roundings_count_only_on_the_right_side_and_in_order():
 
 
 def test_a_board_near_a_mark_and_a_miss_sailed_again_are_not_the_rounding():
-    """Buoy course, seed 1: a board clipped the first mark's circle, and the rounding half a minute later was not seen."""
+    """Buoy course, seed 1: a board clipped the first mark's circle, and the rounding after it was not seen."""
     marks = [((0.0, 0.0), "port"), ((200.0, 0.0), "port")]
     right = np.array([(20 * math.sin(a), 20 * math.cos(a)) for a in np.linspace(2.5, -2.5, 40)])
     second = right + np.array([200.0, 0.0])
