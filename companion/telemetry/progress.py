@@ -22,6 +22,7 @@ from companion.telemetry.records import sigma_ahead_rad
 
 # Without a terminal a line is written this often [s of the voyage], and whenever the phase changes.
 PLAIN_EVERY_S = 15.0
+SILENT_S = 5.0           # without a heartbeat
 LOUD = Severity.NOTICE   # what is said more quietly than this is in the records only
 COLUMNS_MOST = 120       # longer lines are hard to read
 DISK = "disk"   # the alert of trouble with the disk, which no state of the voyage tells
@@ -107,6 +108,8 @@ def progress_text(step: Step, next_tack_s: float | None = None) -> str:
     snapshot, state = step.snapshot, step.state
     autopilot, wind, route = snapshot.autopilot, snapshot.wind, state.route
     parts = [state.phase.value.upper()]
+    if snapshot.heartbeat_age_s is not None and snapshot.heartbeat_age_s > SILENT_S:
+        parts.append(f"autopilot silent for {snapshot.heartbeat_age_s:.0f} s: what follows is old")
     under_way = route is not None and state.sailing and state.phase is not Phase.DONE
     if under_way and route is not None and autopilot is not None:
         distance = autopilot.waypoint_distance_m
@@ -125,7 +128,7 @@ def progress_text(step: Step, next_tack_s: float | None = None) -> str:
             parts.append(f"xt {autopilot.cross_track_m:+.1f} m")
     if route is not None:
         parts.append(f"risk {100.0 * (1.0 - route.delta_s):.0f} %")
-        parts.append(f"replans {state.replans}")
+        parts.append(f"plans {state.replans}")
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)
     return " | ".join(parts)
