@@ -121,12 +121,9 @@ def marks_of(mission: Mission) -> list[tuple[tuple[float, float], str]]:
 
 
 def ends_of(mission: Mission) -> dict[str, Any]:
-    """Return where a voyage may end beside its last goal: home, which is where she is armed, and the refuges."""
+    """Return where a voyage may end beside its last goal and home: the refuges."""
     frame = mission.frame()
-    return {
-        "home_en_m": frame.en_from_geo(mission.start or mission.origin),
-        "refuges_en_m": [frame.en_from_geo(r.point) for r in mission.refuges],
-    }
+    return {"refuges_en_m": [frame.en_from_geo(r.point) for r in mission.refuges]}
 
 
 def permitted(mission: Mission) -> Mission:

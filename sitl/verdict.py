@@ -181,7 +181,6 @@ def judge(
     alerts: Iterable[str],
     errors: Sequence[str] = (),
     marks: Sequence[tuple[tuple[float, float], str]] = (),
-    home_en_m: tuple[float, float] = (0.0, 0.0),
     refuges_en_m: Sequence[tuple[float, float]] = (),
     floor_m: float | None = None,
     called_at_s: Sequence[float] | None = None,
@@ -191,7 +190,7 @@ def judge(
     ``hull`` is what touches. ``floor_m`` is the mission's, which the hull must keep in ordinary weather; None: not
     asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
     """
-    ends = {"goal": [goal_en_m], "home": [home_en_m], "refuge": refuges_en_m}[expect.ends_at]
+    ends = {"goal": [goal_en_m], "home": truth.en_m[:1], "refuge": refuges_en_m}[expect.ends_at]
     positions = truth.positions_m()
     hulls = truth.hull(hull)
     touches, clearance = hulls.entries(solid), hulls.least_m(solid)[0]
