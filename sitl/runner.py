@@ -36,15 +36,13 @@ from sitl.befalls import Observer, World, channel, happen
 from sitl.fragile import FragilePlanner
 from sitl.hull import own_polar
 from sitl.others import Others
-from sitl.scenario import Scenario, is_all_ordinary
+from sitl.scenario import EPOCH_S, Scenario, is_all_ordinary
 from sitl.ships import free_port
 from sitl.verdict import Verdict, judge
 from sitl.weather import scenario_wind
 
 TRUTH_EVERY_S = 0.25
 MAX_TRUTH_SAMPLES = 20_000
-# Unix time of every simulated voyage's start: stamps must not depend on when it was run.
-EPOCH_S = 1_781_000_000.0
 # Effort of one plan under the virtual clock, where time cannot stop it.
 EXPANSIONS = 15_000
 
@@ -224,7 +222,7 @@ async def _sail_and_restart(
             return
         if kill.saved != "kept":
             world.disk.spoil(folder / STATE, kill.saved, kill.aged_s)
-        options = replace(options, epoch_s=options.epoch_s + kill.clock_step_s)
+        options = replace(options, epoch_s=max(0.0, options.epoch_s + kill.clock_step_s))
         await asyncio.sleep(kill.restart_after_s)
 
 

@@ -15,6 +15,9 @@ import msgspec
 
 from companion.errors import InputError
 
+# Unix time of every simulated voyage's start: stamps must not depend on when it was run.
+EPOCH_S = 1_781_000_000.0
+
 EventKind = Literal[
     "wind_shift",        # veer_deg, over_s
     "wind_speed",        # tws_mps, over_s

@@ -305,6 +305,11 @@ class Vehicle:
         """End of the present leg [m]."""
         return float(self.state[k.S_DE]), float(self.state[k.S_DN])
 
+    @property
+    def current_en_mps(self) -> tuple[float, float]:
+        """Of the water, towards east and north [m/s]."""
+        return float(self.state[k.S_CURRENT_E]), float(self.state[k.S_CURRENT_N])
+
     def stopping_point(self) -> tuple[float, float]:
         """Return where the boat could come to rest: v² / 2a ahead, as the autopilot reckons."""
         s = self.state

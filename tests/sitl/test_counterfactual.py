@@ -51,7 +51,7 @@ def test_the_hand_takes_the_companions_place_for_good():
                              ("mode", 102.0, "LOITER")]
     assert sailed.limit_s == 141.0
     assert kinds(by_hand(scenario(JUMP), 102.0, None, 140.0))[-1] == ("kill_companion", 102.0, None)
-    assert kinds(without(scenario(GUST, JUMP), CAUSES["false position"])) == [("wind_speed", 50.0, None)]
+    assert kinds(without(scenario(GUST, JUMP), "false position")) == [("wind_speed", 50.0, None)]
 
 
 def test_what_touches_without_the_fault_is_not_excused_by_it():
