@@ -4,8 +4,8 @@ An excuse names a fault; whether it excuses is found out and not supposed. The s
 where the boat touches all the same, the fault is no excuse. Then it is sailed up to each moment at which something
 could first be known of the fault, and from there an ideal skipper takes the place of the companion, who does one thing
 at once and nothing else: he lets be what is on board, loiters, or holds. Where one of them touches nothing the contact
-was avoidable. He orders no more than the companion may: without the permission to set modes, or after
-a crash, he can only let be.
+was avoidable. He orders no more than the companion may: without the permission to set modes, after a
+crash, and while a stranger's mission is on board, he can only let be.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ CAUSES: dict[str, frozenset[str]] = {
     "foreign": frozenset({"foreign_mission"}),
     "drift": frozenset({"current", "wind_speed"}),
 }
+# While these last nothing may be ordered, by the table of causes and by what a stranger's mission is.
+HANDS_OFF = frozenset({"crash", "foreign"})
 # Those whose causes are the autopilot's parameters, too: without them it does nothing by itself.
 BY_PARAMETERS = frozenset({"failsafe", "crash", "autopilot refuses"})
 # From the first sign to an order that the autopilot has: a step to see it, a step for the command.
@@ -104,7 +106,7 @@ def avoidable(
         return "the boat touches without that fault as well"
     for t_s in moments(scenario.events, kinds, contact_s, reach):
         until_s = contact_s + GAINED_S
-        for name, mode in HANDS if scenario.set_auto and excuse != "crash" else HANDS[:1]:
+        for name, mode in HANDS if scenario.set_auto and excuse not in HANDS_OFF else HANDS[:1]:
             touched_s = touches(by_hand(scenario, t_s, mode, until_s))
             if touched_s is None or touched_s > until_s:
                 return f"a skipper who {name} at {t_s:.0f} s touches nothing"
