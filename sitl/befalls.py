@@ -23,7 +23,7 @@ from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryLink, Van
 from sitl.autopilot.memory import MemoryEnd
 from sitl.failsafes import FAILURES, PERSONS, play
 from sitl.forgeries import Forger, forgery_named
-from sitl.fragile import FragilePlanner
+from sitl.fragile import FragilePlanner, MortalPlanner
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, befall
 from sitl.scenario import EventSpec
@@ -65,7 +65,7 @@ class World:
     errors: list[str] = field(default_factory=list)
     summary: dict[str, Any] = field(default_factory=dict)
     set_sail_s: float | None = None
-    planner: FragilePlanner = field(default_factory=FragilePlanner)
+    planner: FragilePlanner | MortalPlanner = field(default_factory=FragilePlanner)
     disk: SickDisk = field(default_factory=SickDisk)
     observer: Observer | None = None
     stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
@@ -229,6 +229,7 @@ _BY_KIND: dict[str, _Befall] = {
     "kill_planner": _at(lambda world, _: world.planner.die()),
     "planner_hang": _at(
         lambda world, e: world.planner.hang(math.inf if e.for_s is None else now_s() + e.for_s)),
+    "planner_starved": _at(lambda world, _: world.planner.starve()),
     "vane": _vane,
     "crew": _crew,
     "foreign_mission": _foreign,

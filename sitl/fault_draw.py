@@ -7,7 +7,7 @@ import random
 import msgspec
 
 from sitl.failsafe_lots import FAILSAFES, unattended
-from sitl.fault_lots import LOTS, SINGLE, Lot, Maker
+from sitl.fault_lots import LOTS, PLANNER, SINGLE, Lot, Maker
 from sitl.scenario import EventSpec, ExpectSpec, Scenario, WindSpec
 
 _MAKERS, _WEIGHTS = zip(*LOTS, *SINGLE, *FAILSAFES, strict=True)
@@ -43,3 +43,15 @@ def draw(seed: int, base: Scenario) -> Scenario:
         has_ftp=rng.random() < 0.5, limit_s=round(limit_s, 1),
         expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None), **changes,
     )
+
+
+def draw_planner(seed: int, base: Scenario) -> Scenario:
+    """Return ``base`` with the weather of ``seed`` and two to four faults of the planner's process."""
+    rng = random.Random(f"planner {seed}")
+    wind = WindSpec(model="ou", from_deg=round(rng.uniform(0.0, 360.0), 1), tws_mps=round(rng.uniform(3.5, 7.0), 2))
+    makers, weights = zip(*PLANNER, strict=True)
+    events = [e for _ in range(rng.randint(2, 4))
+              for e in rng.choices(makers, weights=weights)[0](rng, round(rng.uniform(3.0, 120.0), 1)).events]
+    return msgspec.structs.replace(
+        base, wind=wind, events=tuple(sorted(events, key=lambda e: e.at_s)), is_service=True,
+        expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None))

@@ -153,6 +153,10 @@ def _planner_hangs(rng: random.Random, at_s: float) -> Lot:
     return one(at_s=at_s, kind="planner_hang", for_s=length(rng, 5.0, 60.0))
 
 
+def _planner_starves(rng: random.Random, at_s: float) -> Lot:  # noqa: ARG001
+    return one(at_s=at_s, kind="planner_starved")
+
+
 def _kill(rng: random.Random, at_s: float) -> Lot:
     for_s = None if rng.random() < 0.1 else length(rng, 1.0, 40.0)
     return one(at_s=at_s, kind="kill_companion", restart_after_s=for_s)
@@ -216,3 +220,5 @@ LOTS: tuple[tuple[Maker, float], ...] = (
 )
 # The same, each at most once a voyage.
 SINGLE: tuple[tuple[Maker, float], ...] = ((_calm_in_a_current, 0.5), (_neighbour, 1.5))
+# What befalls the planner where it is the real process.
+PLANNER: tuple[tuple[Maker, float], ...] = ((_planner_dies, 1), (_planner_hangs, 1), (_planner_starves, 1))

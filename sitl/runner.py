@@ -10,7 +10,7 @@ import contextlib
 import json
 import math
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from companion.skipper.adrift import CALL
 from companion.telemetry.names import STATE, VERDICT
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.befalls import Observer, World, channel, happen
-from sitl.fragile import FragilePlanner
+from sitl.fragile import FragilePlanner, MortalPlanner
 from sitl.hull import own_polar
 from sitl.others import Others
 from sitl.scenario import EPOCH_S, Scenario, is_all_ordinary
@@ -112,9 +112,13 @@ def with_radio(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
 
 async def run_embedded(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, on_step: OnStep | None = None,
-    expansions: int | None = EXPANSIONS, observer: Observer | None = None,
+    expansions: int | None = EXPANSIONS, observer: Observer | None = None, worker_pace: float | None = None,
 ) -> Verdict:
-    """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json."""
+    """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json.
+
+    With ``worker_pace`` (loop seconds per second, on a loop in real time that begins at 0) the planner is the real
+    worker process, and plans by its budget of time.
+    """
     mission, radio_port = with_radio(permitted(load_mission(scenario.mission_path(source)), scenario), scenario)
     wind = scenario_wind(scenario, source, seed)
     start = mission.start or mission.origin
@@ -141,7 +145,7 @@ async def run_embedded(
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
             *(asyncio.create_task(happen(world, e), name=f"event {e.kind}") for e in scenario.events),
         ]
-        await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions)
+        await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions, worker_pace)
         for task in side_tasks:
             task.cancel()
         for task in side_tasks:
@@ -162,13 +166,14 @@ async def run_embedded(
 
 async def _sail_and_restart(
     world: World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_step: OnStep | None,
-    expansions: int | None,
+    expansions: int | None, worker_pace: float | None,
 ) -> None:
     """Run the companion; kill it where the scenario says, and start it again."""
     kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
     deadline_s = now_s() + scenario.limit_s
     options = SailOptions(
-        seed=seed, epoch_s=EPOCH_S, expansions=expansions, offload=at_once, is_durable=False,
+        seed=seed, epoch_s=EPOCH_S, expansions=expansions if worker_pace is None else None,
+        budget_scale=1.0 / (worker_pace or 1.0), offload=at_once, is_durable=False,
         state_path=folder / STATE, disk=world.disk, command=f"sitl run {scenario.name}",
         exit_on_arrival=scenario.exit_on_arrival, dry_run=scenario.dry_run,
     )
@@ -187,10 +192,10 @@ async def _sail_and_restart(
             return
         born_s = now_s()
         # the planner's process lives and dies with the companion's
-        world.planner = FragilePlanner()
+        planner = world.planner = FragilePlanner() if worker_pace is None else MortalPlanner()
         task = asyncio.create_task(
-            sail(mission, world.heard_by(), world.planner, folder, replace(options, limit_s=left_s),
-                 on_status=on_status),
+            _one_life(planner, sail(mission, world.heard_by(), planner, folder, replace(options, limit_s=left_s),
+                                    on_status=on_status)),
             name="companion",
         )
         kill = kills.pop(0) if kills else None
@@ -224,6 +229,11 @@ async def _sail_and_restart(
             world.disk.spoil(folder / STATE, kill.saved, kill.aged_s)
         options = replace(options, epoch_s=max(0.0, options.epoch_s + kill.clock_step_s))
         await asyncio.sleep(kill.restart_after_s)
+
+
+async def _one_life(planner: FragilePlanner | MortalPlanner, voyage: Coroutine[Any, Any, dict[str, Any]]) -> Any:
+    async with planner:
+        return await voyage
 
 
 def _collect_alerts(world: World, folder: Path) -> None:

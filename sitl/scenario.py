@@ -37,6 +37,7 @@ EventKind = Literal[
     "kill_companion",    # restart_after_s: SIGKILL in the middle of whatever it does; saved, aged_s, clock_step_s
     "kill_planner",      # its process dies; the next request starts another
     "planner_hang",      # for_s: requests are not answered in time
+    "planner_starved",   # its process gets no more memory; a replaced one does
     "disk",              # state: full | sick | read_only | ok; for_s: the companion's
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
