@@ -29,8 +29,8 @@ CAUSES: dict[str, frozenset[str]] = {
     "foreign": frozenset({"foreign_mission"}),
     "drift": frozenset({"current", "wind_speed"}),
 }
-# While these last nothing may be ordered, by the table of causes and by what a stranger's mission is.
-HANDS_OFF = frozenset({"crash", "foreign"})
+# While it lasts nothing may be ordered, by the table of causes.
+HANDS_OFF = frozenset({"crash"})
 # Those whose causes are the autopilot's parameters, too: without them it does nothing by itself.
 BY_PARAMETERS = frozenset({"failsafe", "crash", "autopilot refuses"})
 # From the first sign to an order that the autopilot has: a step to see it, a step for the command.
@@ -94,6 +94,11 @@ def by_hand(scenario: Scenario, t_s: float, mode: Mode | None, until_s: float) -
         scenario, events=tuple(sorted(kept, key=lambda e: e.at_s)), limit_s=min(scenario.limit_s, until_s + 1.0))
 
 
+def _may_order(scenario: Scenario, excuse: str, t_s: float) -> bool:
+    strange = any(e.kind == "foreign_mission" and e.at_s <= t_s for e in scenario.events)
+    return scenario.set_auto and excuse not in HANDS_OFF and not strange
+
+
 def avoidable(
     scenario: Scenario, excuse: str, contact_s: float, reach: Reach, touches: Callable[[Scenario], float | None],
 ) -> str:
@@ -106,7 +111,7 @@ def avoidable(
         return "the boat touches without that fault as well"
     for t_s in moments(scenario.events, kinds, contact_s, reach):
         until_s = contact_s + GAINED_S
-        for name, mode in HANDS if scenario.set_auto and excuse not in HANDS_OFF else HANDS[:1]:
+        for name, mode in HANDS if _may_order(scenario, excuse, t_s) else HANDS[:1]:
             touched_s = touches(by_hand(scenario, t_s, mode, until_s))
             if touched_s is None or touched_s > until_s:
                 return f"a skipper who {name} at {t_s:.0f} s touches nothing"

@@ -70,6 +70,23 @@ def test_what_another_hand_avoids_is_not_excused():
         "a skipper who loiters at 102 s touches nothing")
 
 
+@pytest.mark.parametrize(("changes", "more", "is_helped"), [
+    ({}, (), True),
+    ({"set_auto": False}, (), False),
+    ({}, (EventSpec(at_s=90.0, kind="foreign_mission"),), False),   # nothing is ordered while it is on board
+    ({}, (EventSpec(at_s=110.0, kind="foreign_mission"),), True),
+])
+def test_the_skipper_orders_no_more_than_the_companion_may(changes, more, is_helped):
+    import msgspec
+
+    def touches(other):
+        is_steered = any(e.kind == "mode" for e in other.events)
+        return None if is_steered or not any(e.kind == "gps_jump" for e in other.events) else 115.0
+
+    sailed = msgspec.structs.replace(scenario(JUMP, *more), **changes)
+    assert bool(avoidable(sailed, "false position", 115.0, ALWAYS, touches)) == is_helped
+
+
 def test_what_nothing_avoids_is_excused():
     def touches(other):
         return 118.0 if any(e.kind == "gps_jump" for e in other.events) else None
