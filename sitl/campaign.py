@@ -67,7 +67,7 @@ def run_campaign(
 
     loaded = [load_scenario(path) for path in scenarios]
     for scenario, path in zip(loaded, scenarios, strict=True):
-        require_sailable(permitted(load_mission(scenario.mission_path(path))))
+        require_sailable(permitted(load_mission(scenario.mission_path(path)), scenario))
     names = [scenario.name for scenario in loaded]
     jobs = [Job(scenario=p, seed=first_seed + k, keep=keep) for p in scenarios for k in range(runs)]
     records: list[dict[str, Any]] = []

@@ -4,7 +4,8 @@ An excuse names a fault; whether it excuses is found out and not supposed. The s
 where the boat touches all the same, the fault is no excuse. Then it is sailed up to each moment at which something
 could first be known of the fault, and from there an ideal skipper takes the place of the companion, who does one thing
 at once and nothing else: he lets be what is on board, loiters, or holds. Where one of them touches nothing the contact
-was avoidable.
+was avoidable. He orders no more than the companion may: without the permission to set modes, after a
+crash, and while a stranger's mission is on board, he can only let be.
 """
 
 from __future__ import annotations
@@ -21,10 +22,17 @@ from sitl.scenario import EventSpec, Scenario
 CAUSES: dict[str, frozenset[str]] = {
     "false position": frozenset({"gps_jump", "gps_lost"}),
     "operator": frozenset({"mode"}),
-    "autopilot refuses": frozenset({"gps_lost", "gps_jump", "reboot"}),
-    "cut off": frozenset({"link_cut", "link_quality", "kill_companion"}),
+    "autopilot refuses": frozenset({"gps_lost", "gps_jump", "reboot", "radio_lost", "station"}),
+    "failsafe": frozenset({"battery", "radio_lost", "station", "gps_lost", "gps_jump"}),
+    "crash": frozenset({"knockdown"}),
+    "cut off": frozenset({"link_cut", "link_half", "link_quality", "kill_companion"}),
     "foreign": frozenset({"foreign_mission"}),
+    "drift": frozenset({"current", "wind_speed"}),
 }
+# While it lasts nothing may be ordered, by the table of causes.
+HANDS_OFF = frozenset({"crash"})
+# Those whose causes are the autopilot's parameters, too: without them it does nothing by itself.
+BY_PARAMETERS = frozenset({"failsafe", "crash", "autopilot refuses"})
 # From the first sign to an order that the autopilot has: a step to see it, a step for the command.
 ALERT_S = 2.0
 # An ideal skipper has done enough when he has gained this much time: he can plan and upload in half of it.
@@ -41,6 +49,7 @@ class Reach:
     lives: Sequence[tuple[float, float]]
     link_up: Sequence[tuple[float, bool]]
     operator_s: Sequence[tuple[float, float]]
+    stopped_s: Sequence[float] = ()          # when a failsafe stopped her: a sign as well
 
     def first_s(self, t_s: float, before_s: float) -> float | None:
         """Return the first moment from ``t_s`` on at which he could, None before ``before_s``."""
@@ -63,13 +72,16 @@ def moments(events: Sequence[EventSpec], kinds: frozenset[str], contact_s: float
                 signs.append(event.at_s + event.for_s)
             if event.restart_after_s is not None:
                 signs.append(event.at_s + event.restart_after_s)
+    signs += reach.stopped_s
     found = {reach.first_s(t + ALERT_S, contact_s) for t in signs if t < contact_s}
     return sorted(t for t in found if t is not None)[-MOMENTS:]
 
 
-def without(scenario: Scenario, kinds: frozenset[str]) -> Scenario:
-    """Return the scenario without the events of these kinds."""
-    return msgspec.structs.replace(scenario, events=tuple(e for e in scenario.events if e.kind not in kinds))
+def without(scenario: Scenario, excuse: str) -> Scenario:
+    """Return the scenario without what stands behind an excuse."""
+    events = tuple(e for e in scenario.events if e.kind not in CAUSES[excuse])
+    parameters = {} if excuse in BY_PARAMETERS else scenario.parameters
+    return msgspec.structs.replace(scenario, events=events, parameters=parameters)
 
 
 def by_hand(scenario: Scenario, t_s: float, mode: Mode | None, until_s: float) -> Scenario:
@@ -82,6 +94,11 @@ def by_hand(scenario: Scenario, t_s: float, mode: Mode | None, until_s: float) -
         scenario, events=tuple(sorted(kept, key=lambda e: e.at_s)), limit_s=min(scenario.limit_s, until_s + 1.0))
 
 
+def _may_order(scenario: Scenario, excuse: str, t_s: float) -> bool:
+    strange = any(e.kind == "foreign_mission" and e.at_s <= t_s for e in scenario.events)
+    return scenario.set_auto and excuse not in HANDS_OFF and not strange
+
+
 def avoidable(
     scenario: Scenario, excuse: str, contact_s: float, reach: Reach, touches: Callable[[Scenario], float | None],
 ) -> str:
@@ -90,11 +107,11 @@ def avoidable(
     ``touches`` sails a scenario with the same seed and returns when its boat first touches [s], None for never.
     """
     kinds = CAUSES[excuse]
-    if touches(without(scenario, kinds)) is not None:
+    if touches(without(scenario, excuse)) is not None:
         return "the boat touches without that fault as well"
     for t_s in moments(scenario.events, kinds, contact_s, reach):
         until_s = contact_s + GAINED_S
-        for name, mode in HANDS:
+        for name, mode in HANDS if _may_order(scenario, excuse, t_s) else HANDS[:1]:
             touched_s = touches(by_hand(scenario, t_s, mode, until_s))
             if touched_s is None or touched_s > until_s:
                 return f"a skipper who {name} at {t_s:.0f} s touches nothing"

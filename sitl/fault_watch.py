@@ -10,6 +10,12 @@ like having prevented everybody on board from helping it, and is only where that
   ``REACTION_S`` ago;
 - ``autopilot refuses``: a failsafe of the autopilot had stopped it, or it was booting and could not be armed; or that
   ended less than ``RESUME_S`` ago;
+- ``failsafe``: it was in a mode, or disarmed, by a failsafe of the autopilot that no one has ended since (or that ended
+  less than ``REACTION_S`` ago);
+- ``crash``: the same by the crash check, which only a person may end;
+- ``drift``: what wind there was over the water left it without steerage, or too slow to stem the current, and it was
+  carried. Nobody on board can help that but the crew with its anchor, who must be called in time: ``CALLED_S`` before
+  it touches, or where it began later than that, within ``NOTICED_S`` of its beginning;
 - ``cut off``: it lay stopped or disarmed by the autopilot's own doing while the link was cut or the companion dead;
 - ``foreign``: the boat followed a mission that somebody else put on board and that the companion may not replace.
 
@@ -30,6 +36,7 @@ from __future__ import annotations
 import bisect
 import enum
 import itertools
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -42,11 +49,13 @@ from companion.boat import Hull
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.messages import Command, Mode
-from companion.skipper.actions import UploadMission
+from companion.skipper.actions import Announce, UploadMission
+from companion.skipper.adrift import CALL
 from sitl.autopilot import Autopilot, MemoryLink
 from sitl.clearance import HullTrack
 from sitl.counterfactual import Reach
 from sitl.scenario import EventSpec
+from sitl.verdict import CALL_HOLDS_S
 
 MAX_SILENCE_S = 10.0
 # From knowing to being on another course [s]: a step of 1 s to see it, 1 s to plan, 1.5 s to upload and read back, and
@@ -58,12 +67,23 @@ RESUME_S = 10.0
 # A ground station's upload of one item on a link that loses nothing [s]: the count cuts the old mission short at once,
 # the item is written when it has been asked for.
 STRANGER_S = 1.0
+# A crew that is called to the anchor needs this long to let it go [s].
+CALLED_S = 120.0
+# From the water's carrying a boat without steerage to a call [s]: a wind that has died is one by its mean over a
+# minute, and a velocity that is not by sails by its mean over ten seconds.
+NOTICED_S = 60.0
+# With less wind over the water than this there is no steerage [m/s]; and with less than this many times the current she
+# does not stem it: half of the wind is what the boat makes in light air.
+STEERAGE_MPS, STEMS = 0.8, 2.0
 UNEXCUSED = "unexcused"
 # What may excuse a contact, in the words of the campaign's table.
 EXCUSES = {
     "false position": f"with the reported position wrong and clear, or right again for less than {REACTION_S:g} s",
     "operator": f"in a person's hands, or given back less than {REACTION_S:g} s before",
     "autopilot refuses": f"stopped by a failsafe or booting, or that over for less than {RESUME_S:g} s",
+    "failsafe": f"in the mode that a failsafe had put it into, or out of it for less than {REACTION_S:g} s",
+    "crash": "stopped by the crash check, until a person has looked",
+    "drift": f"carried without wind to sail by, the crew called to the anchor {CALLED_S:g} s before, or at once",
     "cut off": "stopped by the autopilot, with the link cut or the companion dead",
     "foreign": "following a stranger's mission, which may not be replaced",
 }
@@ -89,6 +109,7 @@ class Watch:
     frame: LocalFrame
     hull: Hull
     operator_s: list[tuple[float, float]] = field(default_factory=list)
+    called_s: list[float] = field(default_factory=list)
     t_s: list[float] = field(default_factory=list)
     en_m: list[tuple[float, float]] = field(default_factory=list)
     heading_rad: list[float] = field(default_factory=list)
@@ -97,6 +118,8 @@ class Watch:
     armed: list[bool] = field(default_factory=list)
     missions: list[MissionKey] = field(default_factory=list)
     link_up: list[bool] = field(default_factory=list)
+    stopped: list[str] = field(default_factory=list)
+    carried: list[bool] = field(default_factory=list)
     lives: list[tuple[float, float]] = field(default_factory=list)
     ours: set[MissionKey] = field(default_factory=set)
     foreign: set[MissionKey] = field(default_factory=set)
@@ -104,8 +127,10 @@ class Watch:
     _last: tuple[Any, MissionKey] = ((), ())
 
     def step(self, step: Step) -> None:
-        """Note what the companion uploads."""
+        """Note what the companion uploads, and when it calls its crew."""
         for action in step.actions:
+            if isinstance(action, Announce) and action.code == CALL:
+                self.called_s.append(step.snapshot.t_s)
             if isinstance(action, UploadMission):
                 self.ours.add(mission_key((i.command, i.lat_e7, i.lon_e7) for i in action.items))
 
@@ -128,7 +153,13 @@ class Watch:
         if items != self._last[0]:
             self._last = (items, mission_key((i.command, i.x, i.y) for i in items))
         self.missions.append(self._last[1])
-        self.link_up.append(not link.is_cut)
+        self.link_up.append(link.is_up)
+        self.stopped.append("" if helm is Helm.SAILED else autopilot.failsafe.stopped_by)
+        current = autopilot.vehicle.current_en_mps
+        air = (truth.tws_mps * math.sin(truth.twd_from_rad) + current[0],
+               truth.tws_mps * math.cos(truth.twd_from_rad) + current[1])
+        drift_mps = math.hypot(*current)
+        self.carried.append(drift_mps > 0.0 and math.hypot(*air) < max(STEERAGE_MPS, STEMS * drift_mps))
 
     def life(self, start_s: float, end_s: float) -> None:
         """Note one life of the companion."""
@@ -150,17 +181,32 @@ class Watch:
             return "operator"
         if Helm.REFUSED in self.helm[self._since(i, RESUME_S):i + 1]:
             return "autopilot refuses"
+        stops = self.stopped[self._since(i, REACTION_S):i + 1]
+        if any(stops):
+            return "crash" if "crash" in stops else "failsafe"
+        if self.carried[i] and self._was_called(i):
+            return "drift"
         if self.helm[i] is Helm.ADRIFT and not (self.link_up[i] and any(a <= t_s <= b for a, b in self.lives)):
             return "cut off"
         if self.missions[i] in self.foreign:
             return "foreign"
         return UNEXCUSED
 
+    def _was_called(self, i: int) -> bool:
+        """Whether the crew was called in time for a contact at sample ``i``."""
+        t_s, began = self.t_s[i], i
+        while began > 0 and self.carried[began - 1]:
+            began -= 1
+        latest_s = max(t_s - CALLED_S, min(self.t_s[began] + NOTICED_S, t_s))
+        return any(t_s - CALL_HOLDS_S <= called_s <= latest_s for called_s in self.called_s)
+
     def reach(self) -> Reach:
         """Return when a skipper could see and order."""
         changes = [(t_s, up) for n, (t_s, up) in enumerate(zip(self.t_s, self.link_up, strict=True))
                    if n == 0 or up != self.link_up[n - 1]]
-        return Reach(lives=tuple(self.lives), link_up=tuple(changes), operator_s=tuple(self.operator_s))
+        return Reach(lives=tuple(self.lives), link_up=tuple(changes), operator_s=tuple(self.operator_s),
+                     stopped_s=tuple(t_s for n, t_s in enumerate(self.t_s) if self.stopped[n]
+                                     and not (n and self.stopped[n - 1])))
 
     def _since(self, i: int, span_s: float) -> int:
         """Return the index of the first sample not more than ``span_s`` before sample ``i``."""

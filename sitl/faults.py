@@ -20,30 +20,44 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from companion.errors import InputError
 from companion.fold import Step
 from sitl.counterfactual import avoidable
-from sitl.fault_draw import draw
+from sitl.fault_draw import draw, draw_planner
 from sitl.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
 from sitl.pool import in_processes
-from sitl.scenario import Scenario, is_all_ordinary, load_scenario
+from sitl.scenario import EventSpec, Scenario, is_all_ordinary, load_scenario
 
 BASE = Path(__file__).parent / "scenarios" / "faults" / "rocks.toml"
 # Effort of one plan: the voyage is short and its water simple.
 EXPANSIONS = 4_000
+WORKER_PACE = 2.0    # faster, two seconds of a busy machine would count as silence
 
 
 def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[str, Any]:
-    """Sail one seed and return how it went; a voyage folder is left in ``keep``."""
+    """Draw the faults of one seed, sail them and return how it went; a voyage folder is left in ``keep``."""
+    return sail_faults(draw(seed, load_scenario(base)), seed, base, keep)
+
+
+def sail_worker_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[str, Any]:
+    """Sail one seed with faults of the planner's real process, in real time ``WORKER_PACE`` times as fast."""
+    return sail_faults(draw_planner(seed, load_scenario(base)), seed, base, keep, worker_pace=WORKER_PACE)
+
+
+def sail_faults(
+    scenario: Scenario, seed: int, base: Path, keep: Path | None = None, *, worker_pace: float | None = None,
+) -> dict[str, Any]:
+    """Sail a scenario, read from ``base``, with what else a ``seed`` decides, and return how it went."""
     if keep is not None and keep.is_dir() and any(keep.iterdir()):
         raise InputError("--keep", str(keep), "is not empty", "a voyage's folder is taken up where it was left")
     began_s = time.process_time()
-    scenario = draw(seed, load_scenario(base))
-    voyage = _sail(scenario, seed, base, keep)
+    voyage = _sail(scenario, seed, base, keep, worker_pace)
     watch, figures, errors = voyage.watch, voyage.figures, voyage.errors
 
     def touches(other: Scenario) -> float | None:
-        return next((t_s for t_s, _ in _sail(other, seed, base, None).watch.contacts()), None)
+        return next((t_s for t_s, _ in _sail(other, seed, base, None, worker_pace).watch.contacts()), None)
 
     contacts = []
     for t_s, excuse in watch.contacts():
@@ -63,11 +77,15 @@ def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[st
         faults.append(f"a mixture for {mixture_s:.1f} s")
     if silence_s > MAX_SILENCE_S:
         faults.append(f"silent for {silence_s:.0f} s")
+    if voyage.ordered:
+        faults.append(f"neighbour {voyage.ordered[0]} was given orders")
     if errors:
         faults.append(f"unhandled: {errors[0].strip().splitlines()[-1]}")
     return {
         "seed": seed, "passed": not faults, "faults": faults,
-        "events": [f"{e.kind} at {e.at_s:.0f} s" for e in scenario.events],
+        "events": [told(e) for e in scenario.events], "parameters": dict(scenario.parameters),
+        "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}", "limit_s": scenario.limit_s,
+        "set_auto": scenario.set_auto, "system": scenario.system,
         "kinds": sorted({e.kind for e in scenario.events}),
         "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
         "contacts": contacts, "clearance_m": least and least[0], "clearance_t_s": least and least[1],
@@ -87,14 +105,18 @@ class _Voyage:
     errors: list[str]
     status_s: list[float]
     floor_m: float
+    ordered: list[int]     # neighbours
 
 
-def _sail(scenario: Scenario, seed: int, base: Path, keep: Path | None) -> _Voyage:
+def _sail(
+    scenario: Scenario, seed: int, base: Path, keep: Path | None, worker_pace: float | None = None,
+) -> _Voyage:
     """Sail a scenario on the embedded autopilot under the eyes of a watch."""
     from companion.clock import run_virtual
     from companion.compose import boat_of
     from companion.geofence import load_mission
     from companion.messages import waypoint
+    from sitl.from_zero import run_from_zero
     from sitl.runner import run_embedded, solid_of
 
     mission = load_mission(scenario.mission_path(base))
@@ -114,25 +136,39 @@ def _sail(scenario: Scenario, seed: int, base: Path, keep: Path | None) -> _Voya
 
     figures: dict[str, Any] = {}
     errors: list[str] = []
+    ordered: list[int] = []
     with tempfile.TemporaryDirectory(prefix="faults-") as scratch:
         folder = keep if keep is not None else Path(scratch) / "voyage"
         try:
-            verdict = run_virtual(run_embedded(
-                scenario, base, seed, folder, on_step=on_step, expansions=EXPANSIONS, observer=watch))
+            voyage = run_embedded(scenario, base, seed, folder, on_step=on_step, expansions=EXPANSIONS, observer=watch,
+                                  worker_pace=worker_pace)
+            verdict = run_virtual(voyage) if worker_pace is None else run_from_zero(voyage, worker_pace)
             figures = verdict.figures
-            errors = [str(e) for c in verdict.checks if c.name == "no unhandled error" for e in c.figure]
+            seen = {check.name: check.figure for check in verdict.checks}
+            errors, ordered = [str(e) for e in seen["no unhandled error"]], seen.get("neighbours given orders", [])
         except Exception as error:
             errors = [repr(error)]
-    return _Voyage(watch=watch, figures=figures, errors=errors, status_s=status_s, floor_m=mission.margin_floor_m)
+    return _Voyage(watch=watch, figures=figures, errors=errors, status_s=status_s, floor_m=mission.margin_floor_m,
+                   ordered=ordered)
+
+
+def told(event: EventSpec) -> str:
+    """Return an event in short, with what was drawn for it."""
+    plain = msgspec.to_builtins(EventSpec(at_s=0.0, kind=event.kind))
+    drawn = [f"{key} {value}" for key, value in msgspec.to_builtins(event).items()
+             if key not in {"at_s", "kind"} and value != plain[key]]
+    return f"{event.kind} at {event.at_s:.0f} s" + (f" ({', '.join(drawn)})" if drawn else "")
 
 
 def run_faults(
     *, runs: int, first_seed: int = 0, workers: int | None = None, json_path: Path | None = None,
+    worker: bool = False,
 ) -> int:
     """Sail ``runs`` seeds, print those that failed and what was counted; return the exit code."""
     began_s = time.perf_counter()
     records: list[dict[str, Any]] = []
-    for record in in_processes(sail_seed, range(first_seed, first_seed + runs), workers):
+    sail_one = sail_worker_seed if worker else sail_seed
+    for record in in_processes(sail_one, range(first_seed, first_seed + runs), workers):
         records.append(record)
         if not record["passed"]:
             print(f"\rFAILED seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(record['events'])})",

@@ -51,6 +51,11 @@ class Forgery:
     component: int = AUTOPILOT
     in_a_read: bool = False
 
+    @property
+    def name(self) -> str:
+        """What it is called in a scenario."""
+        return f"{self.message}: {self.says}"
+
 
 def _beat(mode: int = 4, *, armed: bool = True) -> Any:
     return wire.MAVLink_heartbeat_message(11, 3, 0x80 if armed else 0, mode, 4, 3)
@@ -145,6 +150,18 @@ FORGERIES: tuple[Forgery, ...] = (
     Forgery(message="FILE_TRANSFER_PROTOCOL", says="a refusal", in_a_read=True,
             build=lambda _: wire.MAVLink_file_transfer_protocol_message(0, 1, COMPANION, _NAK.ljust(251, b"\x00"))),
 )
+
+
+def forgery_named(name: str) -> Forgery:
+    """Return the forgery called "MESSAGE: what it says".
+
+    Raises:
+        ValueError: there is none.
+    """
+    found = next((f for f in FORGERIES if f.name == name), None)
+    if found is None:
+        raise ValueError(f"no forgery is called {name!r}; the names are MESSAGE: SAYS of docs/mavlink.md")
+    return found
 
 
 class Forger:

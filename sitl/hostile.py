@@ -31,7 +31,7 @@ from sitl.air import Air
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.forgeries import FORGERIES, Forger, Forgery
 from sitl.fragile import FragilePlanner
-from sitl.runner import EPOCH_S
+from sitl.scenario import EPOCH_S
 from sitl.signer import SignedEnd, Signer
 from sitl.wind import AR1
 

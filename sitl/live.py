@@ -22,10 +22,11 @@ from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
 from companion.telemetry.names import DECISIONS, VERDICT
+from sitl.befalls import break_vane
 from sitl.boats import Boat, RealBoat, SimulatedBoat
 from sitl.others import TRAFFIC, Others
 from sitl.relay import LINK_EVENTS, Relay, befall
-from sitl.runner import TRUTH_EVERY_S, break_vane, ends_of, marks_of, solid_of
+from sitl.runner import TRUTH_EVERY_S, ends_of, marks_of, solid_of
 from sitl.scenario import EventSpec, Scenario, is_all_ordinary
 from sitl.ships import Motion, free_port
 from sitl.verdict import Truth, Verdict, judge

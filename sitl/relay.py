@@ -17,21 +17,26 @@ from sitl.false_vane import FalseVane
 from sitl.scenario import EventSpec
 from sitl.ships import free_port
 
-LINK_EVENTS = frozenset({"link_cut", "link_quality"})
+LINK_EVENTS = frozenset({"link_cut", "link_half", "link_quality"})
 
 
 async def befall(line: MemoryLink, event: EventSpec) -> None:
     """Cut or impair ``line`` as ``event`` says, and mend it after ``for_s``."""
+    end = line.near if event.state == "unheard" else line.far    # whose words are lost
     if event.kind == "link_cut":
         line.cut()
+    elif event.kind == "link_half":
+        end.is_mute = True
     else:
         line.impairment = Impairment(loss=event.loss, duplicate=event.duplicate, reorder=event.reorder,
-                                     corrupt=event.corrupt, delay_s=event.delay_s)
+                                     corrupt=event.corrupt, noise=event.noise, delay_s=event.delay_s)
     if event.for_s is None:
         return
     await asyncio.sleep(event.for_s)
     if event.kind == "link_cut":
         line.mend()
+    elif event.kind == "link_half":
+        end.is_mute = False
     else:
         line.impairment = Impairment()
 

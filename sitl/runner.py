@@ -10,10 +10,10 @@ import contextlib
 import json
 import math
 import traceback
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -26,41 +26,24 @@ from companion.errors import LinkError
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission, load_mission
-from companion.mavlink.autopilot import Autopilot as Pilot
-from companion.mavlink.link import Link
-from companion.mavlink.reception import LinkIdentity
-from companion.messages import MissionItem, Mode, waypoint
+from companion.messages import Mode
 from companion.options import SailOptions, at_once
 from companion.sailable import require_sailable
 from companion.skipper.actions import Announce
 from companion.skipper.adrift import CALL
 from companion.telemetry.names import STATE, VERDICT
-from sitl.autopilot import (
-    Autopilot,
-    AutopilotConfig,
-    GpsFault,
-    MemoryLink,
-    VaneFault,
-    VaneState,
-    serve,
-)
-from sitl.autopilot.memory import MemoryEnd
-from sitl.failsafes import FAILURES, PERSONS, play
-from sitl.fragile import FragilePlanner
+from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.befalls import Observer, World, channel, happen
+from sitl.fragile import FragilePlanner, MortalPlanner
 from sitl.hull import own_polar
-from sitl.others import TRAFFIC, Others
-from sitl.relay import LINK_EVENTS, befall
-from sitl.scenario import EventSpec, Scenario, is_all_ordinary
-from sitl.ships import Motion, free_port
-from sitl.sick_disk import SickDisk
-from sitl.verdict import Truth, Verdict, judge
+from sitl.others import Others
+from sitl.scenario import EPOCH_S, Scenario, is_all_ordinary
+from sitl.ships import free_port
+from sitl.verdict import Verdict, judge
 from sitl.weather import scenario_wind
 
 TRUTH_EVERY_S = 0.25
 MAX_TRUTH_SAMPLES = 20_000
-# Unix time of every simulated voyage's start: stamps must not depend on when it was run.
-EPOCH_S = 1_781_000_000.0
-# The simulated boat lies still until it sails, so that every voyage starts where its mission says.
 # Effort of one plan under the virtual clock, where time cannot stop it.
 EXPANSIONS = 15_000
 
@@ -68,39 +51,6 @@ EXPANSIONS = 15_000
 SERVICE_RESTART_S = 5.0
 
 OnStep = Callable[[Step], None]
-
-
-class Observer(Protocol):
-    """Whoever looks at a run from the outside, beside its judge."""
-
-    def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:
-        """Look at the autopilot; called every ``TRUTH_EVERY_S`` of a run, from its first moment."""
-
-    def life(self, start_s: float, end_s: float) -> None:
-        """Take one life of the companion's process."""
-
-
-@dataclass(slots=True)
-class _World:
-    """What a running scenario shares between its tasks."""
-
-    autopilot: Autopilot
-    link: MemoryLink
-    shore: MemoryLink
-    station: MemoryLink      # a ground station that beats, where a scenario has one
-    others: Others
-    truth: Truth = field(default_factory=Truth)
-    status_s: list[float] = field(default_factory=list)
-    alerts: dict[str, int] = field(default_factory=dict)
-    errors: list[str] = field(default_factory=list)
-    summary: dict[str, Any] = field(default_factory=dict)
-    set_sail_s: float | None = None
-    planner: FragilePlanner = field(default_factory=FragilePlanner)
-    disk: SickDisk = field(default_factory=SickDisk)
-    observer: Observer | None = None
-    stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
-    called: asyncio.Event = field(default_factory=asyncio.Event)   # the companion calls its crew to the anchor
-    called_at_s: list[float] = field(default_factory=list)
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -126,10 +76,15 @@ def ends_of(mission: Mission) -> dict[str, Any]:
     return {"refuges_en_m": [frame.en_from_geo(r.point) for r in mission.refuges]}
 
 
-def permitted(mission: Mission) -> Mission:
-    """Return the mission with what a harness allows: the simulated boat may be armed, set to AUTO and steered."""
-    operator = replace_struct(mission.options.operator, arm=True, set_auto=True)
-    return replace(mission, options=replace_struct(mission.options, operator=operator))
+def permitted(mission: Mission, scenario: Scenario) -> Mission:
+    """Return the mission with what a harness allows, and the autopilot's system where the scenario names it.
+
+    The simulated boat may be armed, and set to AUTO and steered where the scenario does not forbid it.
+    """
+    options = mission.options
+    operator = replace_struct(options.operator, arm=True, set_auto=scenario.set_auto)
+    named = options.autopilot if scenario.system is None else replace_struct(options.autopilot, system=scenario.system)
+    return replace(mission, options=replace_struct(options, operator=operator, autopilot=named))
 
 
 def replace_struct(struct: Any, **changes: Any) -> Any:
@@ -155,11 +110,15 @@ def with_radio(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
 
 async def run_embedded(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, on_step: OnStep | None = None,
-    expansions: int | None = EXPANSIONS, observer: Observer | None = None,
+    expansions: int | None = EXPANSIONS, observer: Observer | None = None, worker_pace: float | None = None,
 ) -> Verdict:
-    """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json."""
-    mission = require_sailable(permitted(load_mission(scenario.mission_path(source))))
-    mission, radio_port = with_radio(mission, scenario)
+    """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json.
+
+    With ``worker_pace`` (loop seconds per second, on a loop in real time that begins at 0) the planner is the real
+    worker process, and plans by its budget of time.
+    """
+    mission, radio_port = with_radio(
+        require_sailable(permitted(load_mission(scenario.mission_path(source)), scenario)), scenario)
     wind = scenario_wind(scenario, source, seed)
     start = mission.start or mission.origin
     heading_deg = scenario.start_heading_deg
@@ -173,18 +132,19 @@ async def run_embedded(
     )
     link = MemoryLink("companion", seed=seed)
     frame = mission.frame()
-    world = _World(
-        autopilot=autopilot, link=link, shore=MemoryLink("shore", seed=seed + 1),
+    world = World(
+        autopilot=autopilot, link=link, frame=frame, wind=wind, seed=seed, shore=MemoryLink("shore", seed=seed + 1),
         station=MemoryLink("station", seed=seed + 2), observer=observer,
         others=Others(frame, wind, seed, port=radio_port, hear=autopilot.hear_vessel))
+    channel(world, scenario.events)
     folder.mkdir(parents=True, exist_ok=True)
     station = [world.station.far] if any(e.kind == "station" for e in scenario.events) else []
     async with serve(autopilot, [link.far, world.shore.far, *station]):
         side_tasks = [
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
-            *(asyncio.create_task(_event(world, e, mission), name=f"event {e.kind}") for e in scenario.events),
+            *(asyncio.create_task(happen(world, e), name=f"event {e.kind}") for e in scenario.events),
         ]
-        await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions)
+        await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions, worker_pace)
         for task in side_tasks:
             task.cancel()
         for task in side_tasks:
@@ -194,7 +154,7 @@ async def run_embedded(
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
         hull=boat_of(mission).hull, floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
-        called_at_s=world.called_at_s,
+        called_at_s=world.called_at_s, ordered=world.ordered if world.neighbours else None,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
         status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
         **ends_of(mission),
@@ -204,14 +164,15 @@ async def run_embedded(
 
 
 async def _sail_and_restart(
-    world: _World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_step: OnStep | None,
-    expansions: int | None,
+    world: World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_step: OnStep | None,
+    expansions: int | None, worker_pace: float | None,
 ) -> None:
     """Run the companion; kill it where the scenario says, and start it again."""
     kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
     deadline_s = now_s() + scenario.limit_s
     options = SailOptions(
-        seed=seed, epoch_s=EPOCH_S, expansions=expansions, offload=at_once, is_durable=False,
+        seed=seed, epoch_s=EPOCH_S, expansions=expansions if worker_pace is None else None,
+        budget_scale=1.0 / (worker_pace or 1.0), offload=at_once, is_durable=False,
         state_path=folder / STATE, disk=world.disk, command=f"sitl run {scenario.name}",
         exit_on_arrival=scenario.exit_on_arrival, dry_run=scenario.dry_run,
     )
@@ -230,10 +191,10 @@ async def _sail_and_restart(
             return
         born_s = now_s()
         # the planner's process lives and dies with the companion's
-        world.planner = FragilePlanner()
+        planner = world.planner = FragilePlanner() if worker_pace is None else MortalPlanner()
         task = asyncio.create_task(
-            sail(mission, world.link.near, world.planner, folder, replace(options, limit_s=left_s),
-                 on_status=on_status),
+            _one_life(planner, sail(mission, world.heard_by(), planner, folder, replace(options, limit_s=left_s),
+                                    on_status=on_status)),
             name="companion",
         )
         kill = kills.pop(0) if kills else None
@@ -263,10 +224,18 @@ async def _sail_and_restart(
         if kill is None or kill.restart_after_s is None:
             await asyncio.sleep(max(0.0, deadline_s - now_s()))
             return
+        if kill.saved != "kept":
+            world.disk.spoil(folder / STATE, kill.saved, kill.aged_s)
+        options = replace(options, epoch_s=max(0.0, options.epoch_s + kill.clock_step_s))
         await asyncio.sleep(kill.restart_after_s)
 
 
-def _collect_alerts(world: _World, folder: Path) -> None:
+async def _one_life(planner: FragilePlanner | MortalPlanner, voyage: Coroutine[Any, Any, dict[str, Any]]) -> Any:
+    async with planner:
+        return await voyage
+
+
+def _collect_alerts(world: World, folder: Path) -> None:
     try:
         summary = json.loads((folder / "summary.json").read_bytes())
     except (OSError, ValueError):
@@ -275,7 +244,7 @@ def _collect_alerts(world: _World, folder: Path) -> None:
         world.alerts[code] = world.alerts.get(code, 0) + count
 
 
-async def _watch_truth(world: _World, frame: LocalFrame, limit_s: float) -> None:
+async def _watch_truth(world: World, frame: LocalFrame, limit_s: float) -> None:
     # A day is watched once in four seconds: the judge looks between samples too, and its memory is bounded.
     every_s = max(TRUTH_EVERY_S, limit_s / MAX_TRUTH_SAMPLES)
     while True:
@@ -289,74 +258,3 @@ async def _watch_truth(world: _World, frame: LocalFrame, limit_s: float) -> None
         if world.observer is not None:
             world.observer.truth(now_s(), world.autopilot, world.link)
         await asyncio.sleep(every_s)
-
-
-async def _event(world: _World, event: EventSpec, mission: Mission) -> None:
-    """Make one event happen; wind events are in the wind already, kills in the companion's loop."""
-    await asyncio.sleep(max(0.0, event.at_s - now_s()))
-    autopilot, link = world.autopilot, world.link
-    if event.kind in PERSONS | FAILURES:
-        await play(event, autopilot, world.station.near)
-    elif event.kind == "reboot":
-        autopilot.reboot()
-    elif event.kind in LINK_EVENTS:
-        await befall(link, event)
-    elif event.kind == "gps_jump":
-        autopilot.set_gps(GpsFault(east_m=event.east_m, north_m=event.north_m, is_resisted=event.is_resisted))
-        if event.for_s is not None:
-            await asyncio.sleep(event.for_s)
-            autopilot.set_gps(GpsFault())
-    elif event.kind == "gps_lost":
-        autopilot.set_gps(GpsFault(is_lost=True))
-        if event.for_s is not None:
-            await asyncio.sleep(event.for_s)
-            autopilot.set_gps(GpsFault())
-    elif event.kind == "kill_planner":
-        world.planner.die()
-    elif event.kind == "planner_hang":
-        world.planner.hang(math.inf if event.for_s is None else now_s() + event.for_s)
-    elif event.kind == "disk":
-        world.disk.become(event.state or "full")
-        if event.for_s is not None:
-            await asyncio.sleep(event.for_s)
-            world.disk.become("ok")
-    elif event.kind == "vane":
-        await break_vane(autopilot.set_vane, event)
-    elif event.kind == "current":
-        autopilot.set_current(math.radians(event.set_deg), event.drift_mps)
-    elif event.kind == "crew":
-        await world.called.wait()
-        await asyncio.sleep(event.react_s)
-        autopilot.vehicle.anchor(down=True)
-        if event.for_s is not None:
-            await asyncio.sleep(event.for_s)
-            autopilot.vehicle.anchor(down=False)
-    elif event.kind in TRAFFIC:
-        await world.others.play(event, 0.0, lambda: _ours(autopilot, mission.frame()))
-    elif event.kind == "foreign_mission":
-        away = mission.frame().geo_from_en(event.east_m, event.north_m)
-        async with world.stranger:
-            await _upload_foreign(world.shore.near, [waypoint(away)])
-
-
-def _ours(autopilot: Autopilot, frame: LocalFrame) -> tuple[Motion, float]:
-    """Return how our boat truly moves, and its heading [rad]."""
-    now = autopilot.truth
-    return (frame.en_from_geo(now.position), now.velocity_en_mps), now.heading_rad
-
-
-async def break_vane(set_vane: Callable[[VaneFault], None], event: EventSpec) -> None:
-    """Break the vane as ``event`` says, and mend it after ``for_s``."""
-    set_vane(VaneFault(state=VaneState(event.state or "ok"), value_rad=math.radians(event.value_deg)))
-    if event.for_s is not None:
-        await asyncio.sleep(event.for_s)
-        set_vane(VaneFault())
-
-
-async def _upload_foreign(end: MemoryEnd, items: list[MissionItem]) -> None:
-    """Upload ``items`` as a ground station does: over a link of its own, as 255/190."""
-    async with (
-        Link(end, identity=LinkIdentity(system=255, component=190), streams=()) as link,
-        Pilot(link) as pilot,
-    ):
-        await pilot.upload_mission(items, method="items")

@@ -15,6 +15,9 @@ import msgspec
 
 from companion.errors import InputError
 
+# Unix time of every simulated voyage's start: stamps must not depend on when it was run.
+EPOCH_S = 1_781_000_000.0
+
 EventKind = Literal[
     "wind_shift",        # veer_deg, over_s
     "wind_speed",        # tws_mps, over_s
@@ -23,20 +26,25 @@ EventKind = Literal[
     "set_current",       # seq, for_s: the ground station makes an item of the mission current, and insists
     "reboot",            # the autopilot restarts
     "link_cut",          # for_s (none: for good)
-    "link_quality",      # loss, duplicate, reorder, delay_s, corrupt
+    "link_half",         # state: unheard (the companion hears and is not heard) | deaf; for_s
+    "link_quality",      # loss, duplicate, reorder, delay_s, corrupt, noise
+    "neighbour",         # another boat's autopilot, system, is on the link; for_s; vehicle_type
+    "spoof",             # forgery ("MESSAGE: what it says", of sitl.forgeries), rate_hz, listens, for_s
     "gps_jump",          # east_m, north_m, for_s, is_resisted (noticed by the EKF, as on the real one)
     "gps_lost",          # for_s
+    "compass",           # value_deg to starboard, for_s: what the autopilot believes
     "vane",              # state: frozen | offset | spikes | ok; value_deg
-    "kill_companion",    # restart_after_s: SIGKILL in the middle of whatever it does
+    "kill_companion",    # restart_after_s: SIGKILL in the middle of whatever it does; saved, aged_s, clock_step_s
     "kill_planner",      # its process dies; the next request starts another
     "planner_hang",      # for_s: requests are not answered in time
+    "planner_starved",   # its process gets no more memory; a replaced one does
     "disk",              # state: full | sick | read_only | ok; for_s: the companion's
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
     "radio_lost",        # for_s: the transmitter is out of range
     "station",           # for_s: a ground station is heard, from then on no more
     "knockdown",         # roll_deg, for_s
-    "current",           # set_deg, drift_mps
+    "current",           # set_deg, drift_mps, for_s
     "crew",              # anchors react_s after the companion first calls for it, weighs after for_s
     "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
     "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
@@ -71,6 +79,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     duplicate: float = 0.0
     reorder: float = 0.0
     corrupt: float = 0.0
+    noise: float = 0.0           # of the bytes: lost, changed or inserted
     delay_s: float = 0.0
     east_m: float = 0.0
     north_m: float = 0.0
@@ -78,9 +87,17 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     state: str | None = None
     value_deg: float = 0.0
     restart_after_s: float | None = None
+    saved: Literal["kept", "lost", "torn", "old"] = "kept"   # what becomes of the companion's saved state
+    aged_s: float = 0.0          # of an old one: as it was so long before
+    clock_step_s: float = 0.0    # of the companion's wall clock, when it lives again
     volts: float | None = None
     roll_deg: float = 0.0
     seq: int = 1
+    system: int = 7              # of a neighbour
+    vehicle_type: int = 11
+    forgery: str = ""
+    rate_hz: float = 5.0
+    listens: bool = False        # the forger hears the boat
     set_deg: float = 0.0
     drift_mps: float = 0.0
     react_s: float = 0.0         # a crew's, from being called to the anchor on the ground
@@ -96,20 +113,23 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 # What a boat must bear without coming nearer to anything than its mission allows.
-ORDINARY = frozenset({"wind_speed", "wind_shift", "link_cut", "link_quality", "kill_planner", "battery", "vessel"})
+ORDINARY = frozenset({
+    "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "vessel",
+    "neighbour", "disk"})
 ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
 ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
 ORDINARY_LOSS = 0.3          # a link that loses more is none
+ORDINARY_NOISE = 0.005       # of bytes: one frame in five
 
 
 def is_ordinary(event: EventSpec) -> bool:
     """Return whether an event belongs to ordinary weather, links and traffic."""
     if event.kind == "wind_shift":
         return abs(event.veer_deg) <= ORDINARY_VEER_DEG
-    if event.kind == "link_cut":
+    if event.kind in {"link_cut", "link_half"}:
         return event.for_s is not None and event.for_s <= ORDINARY_CUT_S
     if event.kind == "link_quality":
-        return event.loss <= ORDINARY_LOSS
+        return event.loss <= ORDINARY_LOSS and event.noise <= ORDINARY_NOISE
     return event.kind in ORDINARY
 
 
@@ -153,6 +173,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     is_service: bool = False                  # a companion that heard no autopilot is started again
     exit_on_arrival: bool = True              # else the boat is watched in its loiter until the limit
     dry_run: bool = False                     # the companion may only look
+    set_auto: bool = True                     # it may set modes
+    system: int | None = None                 # of our autopilot, named in place of what the mission says
     wind: WindSpec = msgspec.field(default_factory=WindSpec)
     parameters: dict[str, float] = {}
     events: tuple[EventSpec, ...] = ()

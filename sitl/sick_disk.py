@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import errno
 import os
+from collections import deque
 from pathlib import Path
 from typing import Final
 
+from companion.clock import now_s
 from companion.disk import Disk, Room
+from companion.telemetry.names import STATE
 
 STATES: Final = {"full": errno.ENOSPC, "sick": errno.EIO, "read_only": errno.EROFS, "ok": 0}
+KEPT = 600   # earlier contents of the saved state, which changes once a second at most
 
 
 class SickDisk(Disk):
@@ -17,6 +21,7 @@ class SickDisk(Disk):
 
     def __init__(self) -> None:
         self._errno = 0
+        self._states: deque[tuple[float, bytes]] = deque(maxlen=KEPT)
 
     def become(self, state: str) -> None:
         """Be "full", "sick", "read_only" or "ok" from now on."""
@@ -60,6 +65,19 @@ class SickDisk(Disk):
         if self._errno in {errno.EIO, errno.EROFS}:
             self._fail()
         super().rename(source, target)
+        if target.name == STATE:
+            self._states.append((now_s(), target.read_bytes()))
+
+    def spoil(self, path: Path, how: str, aged_s: float) -> None:
+        """Lose or tear a saved state, or put back what it was ``aged_s`` ago; one that there is not stays so."""
+        if how == "lost":
+            path.unlink(missing_ok=True)
+        elif how == "torn" and path.is_file():
+            content = path.read_bytes()
+            path.write_bytes(content[: len(content) // 2])
+        elif how == "old" and self._states:
+            before = [content for t_s, content in self._states if t_s <= now_s() - aged_s]
+            path.write_bytes(before[-1] if before else self._states[0][1])
 
     def room(self, folder: Path) -> Room:
         """Return what is left: nothing on a full disk."""

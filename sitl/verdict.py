@@ -184,11 +184,13 @@ def judge(
     refuges_en_m: Sequence[tuple[float, float]] = (),
     floor_m: float | None = None,
     called_at_s: Sequence[float] | None = None,
+    ordered: Sequence[int] | None = None,
 ) -> Verdict:
     """Hold a run against what its scenario expects.
 
     ``hull`` is what touches. ``floor_m`` is the mission's, which the hull must keep in ordinary weather; None: not
     asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
+    ``ordered`` are the systems of other autopilots that were given orders, None where there was no other.
     """
     ends = {"goal": [goal_en_m], "home": truth.en_m[:1], "refuge": refuges_en_m}[expect.ends_at]
     positions = truth.positions_m()
@@ -259,6 +261,8 @@ def judge(
                    for i in touches]
         check("called before a contact, s", all(s >= expect.called_s for s in ahead_s), ahead_s,
               f"at least {expect.called_s}")
+    if ordered is not None:
+        check("neighbours given orders", not ordered, list(ordered), [])
     for code in expect.alerts:
         check(f"announced {code}", code in seen, sorted(seen), code)
     return Verdict(

@@ -71,6 +71,8 @@ def follow_stops(turn: Turn) -> None:
     stop = turn.state.stop
     if status.is_armed and status.mode not in STOPPING:
         turn.update(stop=None)
+    elif stop is not None and _is_ours(turn):
+        turn.update(stop=replace(stop, mode=status.mode, is_armed=True))   # a loiter that we asked for in it
     elif (stop is not None and (stop.mode, stop.is_armed) != helm) or (stop is None and _was_sailed(turn, before)):
         turn.update(stop=Stop(
             t_s=turn.t_s, before_s=before.helm_s, mode=status.mode, is_armed=status.is_armed, cause=PERSON))
@@ -135,7 +137,8 @@ def take_over(turn: Turn) -> bool:
 def is_answered(turn: Turn) -> bool:
     """Return whether she lies in a stop that is ours to end."""
     status = turn.autopilot
-    held = status is not None and turn.state.stop is not None and status.mode is turn.state.own_mode
+    held = status is not None and turn.state.stop is not None and (
+        status.mode is turn.state.own_mode or turn.is_leaving)
     return bool(turn.state.answering) and held
 
 

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from companion.messages import MissionState, Mode
 from companion.skipper.actions import Arm, RunMotor, SetCurrent, SetMode, Severity, Tack
-from companion.skipper.turn import Turn
+from companion.skipper.turn import SHOWS_S, Turn
 from companion.skipper.uploads import upload
 
 ARMING, CURRENT = "arming", "set current"
 TACK = "tack"
 MOTOR_ON, MOTOR_OFF = "motor on", "motor off"
 CHECK_S = 3.0   # MISSION_CURRENT comes once a second: by then it shows what was asked for
-
-
-SHOWS_S = 2.5   # a command that was accepted shows in the next heartbeats: it is not repeated before that
 
 
 def is_busy(turn: Turn, what: str) -> bool:

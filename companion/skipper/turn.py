@@ -36,6 +36,7 @@ from companion.skipper.voyage import PointEn, Voyage
 
 FRESH_S = 3.0          # a part older than this is not acted upon
 JUMP_M = LEAP_M        # a fix this much farther than the boat can sail is a jump
+SHOWS_S = 2.5          # a command that was accepted shows in the next heartbeats: it is not repeated before that
 DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
 
 
@@ -235,7 +236,20 @@ class Turn:
         status = self.autopilot
         if status is None or not self.state.sailing:
             return False
+        if status.is_armed and self.is_leaving:
+            return False
         return not status.is_armed or status.mode not in {None, Mode.AUTO, Mode.INITIALISING, self.state.own_mode}
+
+    @property
+    def is_leaving(self) -> bool:
+        """Whether she shows a stop still that an order of ours, on its way or just accepted, ends."""
+        status, state, own = self.autopilot, self.state, self.state.own_mode
+        if status is None or own is None or state.stop is None or status.mode is not state.stop.mode:
+            return False
+        if state.pending_command is not None:
+            return state.pending_command[2] == own.name and state.stop.t_s < state.pending_command[1]
+        name, accepted_s = state.accepted or ("", 0.0)
+        return name == own.name and state.stop.t_s < accepted_s and self.t_s < accepted_s + SHOWS_S
 
     @property
     def steers(self) -> bool:

@@ -403,6 +403,10 @@ class Autopilot:
         """Break or mend the wind vane."""
         self.vehicle.set_vane_fault(fault.code, wrap_pi(fault.value_rad) if fault.value_rad else 0.0)
 
+    def set_compass(self, error_rad: float) -> None:
+        """Let the compass err by so much to starboard, or mend it with 0."""
+        self.vehicle.set_compass_error(error_rad)
+
     def set_gps(self, fault: GpsFault) -> None:
         """Break or mend the position."""
         self.failsafe.set_gps(fault)

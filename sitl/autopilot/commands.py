@@ -151,7 +151,7 @@ def setpoint(a: Autopilot, m: Any) -> None:
         if rate_known and math.isfinite(m.yaw_rate):
             a.helm.turn(m.yaw_rate, speed)
             return
-        heading = math.atan2(m.vy, m.vx) + (float(a.vehicle.heading) if in_body else 0.0)
+        heading = math.atan2(m.vy, m.vx) + (a.vehicle.heading if in_body else 0.0)
         a.helm.steer(m.yaw if yaw_known and math.isfinite(m.yaw) and speed == 0.0 else heading, speed)
     elif yaw_known and math.isfinite(m.yaw):
         a.helm.steer(m.yaw, 0.0)

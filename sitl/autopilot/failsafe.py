@@ -6,7 +6,9 @@ station ten times a second, both act through one place, and whoever looks next a
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
@@ -45,6 +47,8 @@ class Failsafe:
         self._battery_action: int | None = None
         self._due_s = 0.0
         self._recovery_until_s = -math.inf
+        self._acting = ""
+        self.stopped_by = ""    # "crash" or "action": that changed the mode or disarmed, and nobody has since
 
     @property
     def is_active(self) -> bool:
@@ -144,11 +148,25 @@ class Failsafe:
             return
         if abs(a.roll_rad) > math.radians(angle_deg):
             a.announce(mav.MAV_SEVERITY_EMERGENCY, "Crash: Going to HOLD")
-            a.helm.set_mode(Mode.HOLD)
-            if check == 2:
-                self._disarm()
+            with self._own_doing("crash"):
+                a.helm.set_mode(Mode.HOLD)
+                if check == 2:
+                    self._disarm()
+
+    @contextlib.contextmanager
+    def _own_doing(self, what: str) -> Iterator[None]:
+        """What the mode changes to in here is a failsafe's doing."""
+        self._acting = what
+        try:
+            yield
+        finally:
+            self._acting = ""
 
     def _act(self, action: int) -> None:
+        with self._own_doing("action"):
+            self._take(action)
+
+    def _take(self, action: int) -> None:
         helm = self._a.helm
         if action in {_RTL, _SMART, 4} and helm.set_mode(Mode.SMART_RTL if action == 4 else Mode.RTL):
             return
@@ -160,6 +178,7 @@ class Failsafe:
             self._disarm()
 
     def _disarm(self) -> None:
+        self.stopped_by = self._acting
         self._a.disarm()
         self._a.ports.after_ack()
 
@@ -192,6 +211,7 @@ class Failsafe:
 
     def mode_changed(self) -> None:
         """Leave ten seconds to whoever steers now, if the mode was changed outside the fence, by anybody."""
+        self.stopped_by = self._acting
         if self._a.fence.is_breached:
             self._recovery_until_s = self._a.t_s + RECOVERY_S
             self._a.announce(mav.MAV_SEVERITY_INFO, "Manual recovery started")

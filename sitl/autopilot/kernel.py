@@ -47,6 +47,7 @@ S_MOORED, S_MOTOR, S_THROTTLE = 63, 64, 65
 S_INDIRECT = 66
 S_WANT_SPEED = 69                                             # desired speed, accelerated at P_ACCEL
 S_GPS_E, S_GPS_N = 67, 68                                       # error of the position that the autopilot believes
+S_COMPASS = 70                                                  # error of the heading that it believes [rad]
 S_SIZE = 72
 
 # --- settings --------------------------------------------------------------------------------------------------
@@ -192,6 +193,7 @@ def _vane(s: Vector, p: Vector, noise: float) -> None:
         # now and then (one reading in fifty) the vane points anywhere within the stated angle
         raw_awa = _wrap(raw_awa + (s[S_VANE_VALUE] * (noise * 100.0 - 1.0) if noise < 0.02 else 0.0))
     s[S_AWA_RAW] = raw_awa
+    believed = s[S_YAW] + s[S_COMPASS]
     a_dir, a_spd = _alpha(VANE_DT_S, p[P_DIR_FILT]), _alpha(VANE_DT_S, p[P_SPD_FILT])
     a_true = _alpha(VANE_DT_S, p[P_TRUE_FILT])
     if s[S_VANE_SET] == 0.0:
@@ -203,14 +205,14 @@ def _vane(s: Vector, p: Vector, noise: float) -> None:
         # no speed sensor: the "true" direction is the apparent one turned by the heading, the speed 0
         awa = math.atan2(s[S_AWA_SIN], s[S_AWA_COS])
         s[S_AWS] = s[S_TWS] = 0.0
-        s[S_TWD_SIN], s[S_TWD_COS] = math.sin(awa + s[S_YAW]), math.cos(awa + s[S_YAW])
+        s[S_TWD_SIN], s[S_TWD_COS] = math.sin(awa + believed), math.cos(awa + believed)
         return
     s[S_AWS] += a_spd * (raw_speed - s[S_AWS])
     if raw_speed < p[P_SPEED_MIN]:
         return
     # true speed and direction from the filtered apparent speed and the raw apparent direction
-    from_e = s[S_AWS] * math.sin(raw_awa + s[S_YAW]) - s[S_VE]
-    from_n = s[S_AWS] * math.cos(raw_awa + s[S_YAW]) - s[S_VN]
+    from_e = s[S_AWS] * math.sin(raw_awa + believed) - s[S_VE]
+    from_n = s[S_AWS] * math.cos(raw_awa + believed) - s[S_VN]
     speed = math.hypot(from_e, from_n)
     if speed > 1e-9:
         s[S_TWD_SIN] += a_true * (from_e / speed - s[S_TWD_SIN])
@@ -257,7 +259,7 @@ def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
         tacking = True
         events |= TACKED
     if tacking:
-        if abs(_wrap(s[S_TACK_YAW] - s[S_YAW])) <= TACK_DONE_RAD:
+        if abs(_wrap(s[S_TACK_YAW] - s[S_YAW] - s[S_COMPASS])) <= TACK_DONE_RAD:
             s[S_TACKING] = 0.0
             s[S_TACK_END] = t
         elif t - s[S_TACK_START] > TACK_TIMEOUT_S:
@@ -373,7 +375,7 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     v = math.hypot(ve, vn)
     if v > p[P_WP_SPEED]:
         ve, vn, v = ve * p[P_WP_SPEED] / v, vn * p[P_WP_SPEED] / v, p[P_WP_SPEED]
-    sin, cos = math.sin(s[S_YAW]), math.cos(s[S_YAW])
+    sin, cos = math.sin(s[S_YAW] + s[S_COMPASS]), math.cos(s[S_YAW] + s[S_COMPASS])
     forward = ve * sin + vn * cos
     lateral = p[P_VEL_P] * ((ve - s[S_VE]) * cos - (vn - s[S_VN]) * sin) + a_e * cos - a_n * sin
     limit = p[P_TURN_MAX_G] * 9.80665
@@ -455,7 +457,7 @@ def _control(s: Vector, p: Vector) -> int:
     else:
         rate, by_heading, thrust = s[S_WANT_TURN], False, s[S_THRUST]
     if by_heading:
-        rate = p[P_ANG_P] * _wrap(heading - s[S_YAW])
+        rate = p[P_ANG_P] * _wrap(heading - s[S_YAW] - s[S_COMPASS])
         if s[S_TACKING] and p[P_PIVOT_RATE] > 0.0:
             rate = _clip(rate, -p[P_PIVOT_RATE], p[P_PIVOT_RATE])
         s[S_NAV_YAW] = heading

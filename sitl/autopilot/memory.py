@@ -28,6 +28,7 @@ class Impairment:
         duplicate: share that arrive twice.
         reorder: share held back so that later frames overtake them, by up to ``reorder_s``.
         corrupt: share with one byte changed.
+        noise: share of the stream's bytes that are lost, changed, or preceded by one that nobody sent.
         delay_s: for every frame, one way.
         jitter_s: a further delay, uniform on 0..jitter_s; order is kept.
     """
@@ -37,11 +38,12 @@ class Impairment:
     reorder: float = 0.0
     reorder_s: float = 0.2
     corrupt: float = 0.0
+    noise: float = 0.0
     delay_s: float = 0.0
     jitter_s: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("loss", "duplicate", "reorder", "corrupt"):
+        for name in ("loss", "duplicate", "reorder", "corrupt", "noise"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name} is a probability, not {getattr(self, name)}")
 
@@ -52,7 +54,8 @@ PERFECT = Impairment()
 class MemoryLink:
     """A pair of ends, ``near`` (for a companion) and ``far`` (for the autopilot).
 
-    ``impairment`` may be replaced at any time; ``cut()`` silences both directions until ``mend()``.
+    ``impairment`` may be replaced at any time; ``cut()`` silences both directions until ``mend()``, ``near.is_mute``
+    and ``far.is_mute`` one of them, as a half-open TCP connection does.
     """
 
     def __init__(self, name: str = "memory", *, impairment: Impairment = PERFECT, seed: int = 0) -> None:
@@ -61,6 +64,11 @@ class MemoryLink:
         self.near = MemoryEnd(f"{name}:near", self, random.Random(f"{seed} near"))
         self.far = MemoryEnd(f"{name}:far", self, random.Random(f"{seed} far"))
         self.near.other, self.far.other = self.far, self.near
+
+    @property
+    def is_up(self) -> bool:
+        """Whether both sides hear each other."""
+        return not (self.is_cut or self.near.is_mute or self.far.is_mute)
 
     def cut(self) -> None:
         """Let nothing through from now on; what is under way still arrives."""
@@ -76,6 +84,7 @@ class MemoryEnd:
 
     def __init__(self, name: str, link: MemoryLink, rng: random.Random) -> None:
         self.other: MemoryEnd = self
+        self.is_mute = False             # what it says is heard by nobody
         self._name = name
         self._link = link
         self._rng = rng
@@ -112,7 +121,7 @@ class MemoryEnd:
 
     def write(self, data: bytes) -> None:
         """Send every frame in ``data`` on its own way through the link."""
-        if self._on_bytes is None or self._link.is_cut:
+        if self._on_bytes is None or self._link.is_cut or self.is_mute:
             self._stats.writes_dropped += 1
             self._stats.bytes_dropped += len(data)
             return
@@ -121,6 +130,8 @@ class MemoryEnd:
         if faults == PERFECT:
             asyncio.get_running_loop().call_soon(self.other.deliver, data)
             return
+        if faults.noise:
+            data = _noisy(data, faults.noise, self._rng)
         for frame in frames(data):
             self._send(frame, faults)
 
@@ -153,6 +164,20 @@ class MemoryEnd:
         if self._on_bytes is not None:
             self._stats.bytes_in += len(data)
             self._on_bytes(data)
+
+
+def _noisy(data: bytes, share: float, rng: random.Random) -> bytes:
+    """Return bytes of which a ``share`` was lost, changed or preceded by a strange one, a third each."""
+    out = bytearray()
+    for byte in data:
+        fate = rng.random() / share
+        if fate >= 1.0:
+            out.append(byte)
+        elif fate >= 2.0 / 3.0:
+            out.append(byte ^ rng.randrange(1, 256))
+        elif fate >= 1.0 / 3.0:
+            out += bytes([rng.randrange(256), byte])
+    return bytes(out)
 
 
 def frames(data: bytes) -> Iterator[bytes]:

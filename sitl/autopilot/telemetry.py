@@ -63,12 +63,12 @@ def _sys_status(a: Autopilot) -> Any:
 
 def _attitude(a: Autopilot) -> Any:
     s = a.vehicle.state
-    return mav.MAVLink_attitude_message(a.boot_ms, a.roll_rad, 0.0, float(s[k.S_YAW]), 0.0, 0.0, float(s[k.S_RATE]))
+    return mav.MAVLink_attitude_message(a.boot_ms, a.roll_rad, 0.0, a.vehicle.heading, 0.0, 0.0, float(s[k.S_RATE]))
 
 
 def _global_position(a: Autopilot) -> Any:
     s = a.vehicle.state
-    heading = round(math.degrees(wrap_two_pi(float(s[k.S_YAW]))) * 100) % 36000
+    heading = round(math.degrees(wrap_two_pi(a.vehicle.heading)) * 100) % 36000
     lat, lon = a.latlon_e7 if a.has_origin else (0, 0)
     return mav.MAVLink_global_position_int_message(
         a.boot_ms, lat, lon, 0, 0, round(float(s[k.S_VN]) * 100), round(float(s[k.S_VE]) * 100), 0, heading
@@ -88,7 +88,7 @@ def _local_position(a: Autopilot) -> Any:
 def _vfr_hud(a: Autopilot) -> Any:
     s = a.vehicle.state
     speed = math.hypot(float(s[k.S_VE]), float(s[k.S_VN]))
-    heading = int(math.degrees(wrap_two_pi(float(s[k.S_YAW]))))
+    heading = int(math.degrees(wrap_two_pi(a.vehicle.heading)))
     return mav.MAVLink_vfr_hud_message(speed, speed, heading, 0, 0.0, 0.0)
 
 
@@ -199,7 +199,7 @@ def _high_latency2(a: Autopilot) -> Any:
     s = a.vehicle.state
     twd, tws = a.vehicle.true_wind
     lat, lon = a.latlon_e7
-    heading = round(math.degrees(wrap_two_pi(float(s[k.S_YAW]))) / 2) % 180
+    heading = round(math.degrees(wrap_two_pi(a.vehicle.heading)) / 2) % 180
     speed = round(math.hypot(float(s[k.S_VE]), float(s[k.S_VN])) * 5)
     return mav.MAVLink_high_latency2_message(
         a.boot_ms, 11, 3, int(a.helm.mode), lat, lon, 0, 0, heading, 0, min(65535, int(s[k.S_DIST] / 10)), 0, 0,
@@ -210,7 +210,7 @@ def _high_latency2(a: Autopilot) -> Any:
 
 def _quaternion(a: Autopilot) -> Any:
     s = a.vehicle.state
-    half = float(s[k.S_YAW]) / 2.0
+    half = a.vehicle.heading / 2.0
     return mav.MAVLink_attitude_quaternion_message(
         a.boot_ms, math.cos(half), 0.0, 0.0, math.sin(half), 0.0, 0.0, float(s[k.S_RATE])
     )
@@ -260,7 +260,7 @@ _FIXED: dict[int, Callable[[Autopilot], Any]] = {
     mav.MAVLINK_MSG_ID_VIBRATION: lambda a: mav.MAVLink_vibration_message(a.boot_us, 0.003, 0.003, 0.003, 0, 0, 0),
     mav.MAVLINK_MSG_ID_RPM: lambda a: mav.MAVLink_rpm_message(a.vehicle.apparent[1], -1.0),
     mav.MAVLINK_MSG_ID_AHRS2: lambda a: mav.MAVLink_ahrs2_message(
-        0.0, 0.0, float(a.vehicle.state[k.S_YAW]), 0.0, *(a.latlon_e7 if a.has_origin else (0, 0))
+        0.0, 0.0, a.vehicle.heading, 0.0, *(a.latlon_e7 if a.has_origin else (0, 0))
     ) if a.boot_s > 4.2 else None,
     mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda _: _EXTENDED_STATE,
 }

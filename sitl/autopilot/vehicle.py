@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.boat import Polar
-from companion.geo.angles import wrap_two_pi
+from companion.geo.angles import wrap_pi, wrap_two_pi
 from sitl.autopilot import kernel as k
 from sitl.autopilot.parameters import Parameters
 from sitl.wind import Wind
@@ -208,14 +208,15 @@ class Vehicle:
 
     @property
     def heading(self) -> float:
-        """Heading [rad, -π..π)."""
-        return float(self.state[k.S_YAW])
+        """Heading [rad, -π..π), as the autopilot believes."""
+        yaw = float(self.state[k.S_YAW] + self.state[k.S_COMPASS])
+        return yaw if -math.pi <= yaw < math.pi else wrap_pi(yaw)
 
     def loiter(self, centre: tuple[float, float] | None = None) -> None:
         """Stay near ``centre``, or near where the boat could stop."""
         s = self.state
         s[k.S_LE], s[k.S_LN] = centre if centre is not None else self.stopping_point()
-        s[k.S_LOITER_YAW] = s[k.S_YAW]
+        s[k.S_LOITER_YAW] = self.heading
         self._steer(k.STEER_LOITER)
         self._measure((s[k.S_LE], s[k.S_LN]))
 
@@ -244,6 +245,10 @@ class Vehicle:
     def set_vane_fault(self, fault: int, value_rad: float) -> None:
         """Break or mend the wind vane."""
         self.state[k.S_VANE_FAULT], self.state[k.S_VANE_VALUE] = fault, value_rad
+
+    def set_compass_error(self, error_rad: float) -> None:
+        """Let the autopilot believe that it heads so much to starboard of where it does."""
+        self.state[k.S_COMPASS] = error_rad
 
     def anchor(self, *, down: bool) -> None:
         """Let go the anchor, which holds at once, or weigh it."""
@@ -299,6 +304,11 @@ class Vehicle:
     def destination(self) -> tuple[float, float]:
         """End of the present leg [m]."""
         return float(self.state[k.S_DE]), float(self.state[k.S_DN])
+
+    @property
+    def current_en_mps(self) -> tuple[float, float]:
+        """Of the water, towards east and north [m/s]."""
+        return float(self.state[k.S_CURRENT_E]), float(self.state[k.S_CURRENT_N])
 
     def stopping_point(self) -> tuple[float, float]:
         """Return where the boat could come to rest: v² / 2a ahead, as the autopilot reckons."""

@@ -13,8 +13,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser = subparsers.add_parser(
         "faults", help=summary,
         description="Sail a short voyage many times, each with faults drawn from its seed: bad and cut links, broken "
-        "vanes, false positions, wind shifts and calms, a planner that dies or hangs, a companion that is killed, an "
-        "autopilot that reboots, an operator, a stranger's mission. None may end in a contact of the hull that was to "
+        "vanes and compasses, false positions, wind shifts, calms, currents, a planner that dies or hangs, a companion "
+        "that is killed with its state and clock spoilt, full disks, an autopilot that reboots and its failsafes, an "
+        "operator, neighbours, forgers, a stranger's mission. None may end in a contact of the hull that was to "
         "be helped, below the margin's floor in ordinary weather, in a mission that is a mixture, in silence or in an "
         "unhandled error. A failing seed is printed and repeats exactly.",
         epilog="Example: sitl faults --runs 1000, then sitl faults --first-seed 17 --keep v",
@@ -27,18 +28,21 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="sail only the first seed and keep its voyage folder")
+    parser.add_argument("--worker", action="store_true",
+                        help="the planner's real process, killed, stopped, out of memory: in real time (a minute each)")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from sitl.compiled import compile_ahead
-    from sitl.faults import run_faults, sail_seed
+    from sitl.faults import run_faults, sail_seed, sail_worker_seed
 
     compile_ahead()
     if args.keep is not None:
-        record = sail_seed(args.first_seed, keep=args.keep)
+        record = (sail_worker_seed if args.worker else sail_seed)(args.first_seed, keep=args.keep)
         for key, value in record.items():
             print(f"{key}: {value}")
         return 0 if record["passed"] else 1
-    return run_faults(runs=args.runs, first_seed=args.first_seed, workers=args.workers, json_path=args.json)
+    return run_faults(runs=args.runs, first_seed=args.first_seed, workers=args.workers, json_path=args.json,
+                      worker=args.worker)

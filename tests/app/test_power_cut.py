@@ -143,7 +143,7 @@ def test_after_a_power_cut_at_any_write_the_mission_on_board_is_known(durable, m
     """Renames were not synced: a state one upload older ended as "foreign", without control (issue 12, point 14)."""
     disk = ForgetfulDisk()
     witness = Witness(disk)
-    monkeypatch.setattr(runner, "_World", functools.partial(runner._World, disk=disk))
+    monkeypatch.setattr(runner, "World", functools.partial(runner.World, disk=disk))
     (tmp_path / "mission.toml").write_text(SHORT_MISSION + "[skipper]\nautopilot_beats = false\n")
     (tmp_path / "rock.wkt").write_text(ROCK)
     source = tmp_path / "scenario.toml"

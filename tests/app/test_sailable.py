@@ -74,9 +74,10 @@ def test_a_fence_of_nothing_is_not_uploaded(tmp_path):
 
 @pytest.mark.parametrize("path", sorted(MISSIONS.glob("*.toml")), ids=lambda p: p.stem)
 def test_every_example_can_be_sailed(path):
-    require_sailable(permitted(load_mission(path)))
+    require_sailable(permitted(load_mission(path), load_scenario(path)))
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
 def test_every_scenario_can_be_sailed(path):
-    require_sailable(permitted(load_mission(load_scenario(path).mission_path(path))))
+    scenario = load_scenario(path)
+    require_sailable(permitted(load_mission(scenario.mission_path(path)), scenario))

@@ -51,7 +51,7 @@ def test_the_hand_takes_the_companions_place_for_good():
                              ("mode", 102.0, "LOITER")]
     assert sailed.limit_s == 141.0
     assert kinds(by_hand(scenario(JUMP), 102.0, None, 140.0))[-1] == ("kill_companion", 102.0, None)
-    assert kinds(without(scenario(GUST, JUMP), CAUSES["false position"])) == [("wind_speed", 50.0, None)]
+    assert kinds(without(scenario(GUST, JUMP), "false position")) == [("wind_speed", 50.0, None)]
 
 
 def test_what_touches_without_the_fault_is_not_excused_by_it():
@@ -68,6 +68,23 @@ def test_what_another_hand_avoids_is_not_excused():
 
     assert avoidable(scenario(JUMP), "false position", 115.0, ALWAYS, touches) == (
         "a skipper who loiters at 102 s touches nothing")
+
+
+@pytest.mark.parametrize(("changes", "more", "is_helped"), [
+    ({}, (), True),
+    ({"set_auto": False}, (), False),
+    ({}, (EventSpec(at_s=90.0, kind="foreign_mission"),), False),   # nothing is ordered while it is on board
+    ({}, (EventSpec(at_s=110.0, kind="foreign_mission"),), True),
+])
+def test_the_skipper_orders_no_more_than_the_companion_may(changes, more, is_helped):
+    import msgspec
+
+    def touches(other):
+        is_steered = any(e.kind == "mode" for e in other.events)
+        return None if is_steered or not any(e.kind == "gps_jump" for e in other.events) else 115.0
+
+    sailed = msgspec.structs.replace(scenario(JUMP, *more), **changes)
+    assert bool(avoidable(sailed, "false position", 115.0, ALWAYS, touches)) == is_helped
 
 
 def test_what_nothing_avoids_is_excused():

@@ -6,7 +6,7 @@ import pytest
 import shapely
 import shapely.ops
 
-from companion.messages import Mode
+from companion.messages import Mode, StatusText
 from companion.skipper import actions as act
 from companion.skipper.geometry import bearing_rad, distance_m, moved
 from companion.skipper.state import Phase
@@ -35,6 +35,24 @@ def lie(world):
 def is_near_an_island(world):
     sails = world.state.phase in {Phase.STANDARD, Phase.DESTINATION_APPROACH}
     return sails and world.skipper.voyage.area.clearance_m([world.position])[0] < 30.0
+
+
+def test_a_loiter_that_we_asked_for_in_a_failsafes_hold_is_no_persons():
+    """Seed 1 of the fault campaign: put into HOLD by the jump, it stood off, and took its own LOITER for a person's."""
+    world = make()
+    assert world.run(600, lambda w: is_near_an_island(w) and w.skipper.voyage.area.clearance_m([w.position])[0] < 20.0)
+    lie(world)
+    world.set_mode(Mode.HOLD)
+    world.events.append(StatusText(t_s=world.t, severity=2, text="EKF failsafe"))
+    world.system_status, world.ekf_ok = 5, False
+    world.run(8)
+    world.system_status, world.ekf_ok = 4, True
+    assert world.run(10, lambda w: w.mode is Mode.LOITER)
+    world.run(3)
+    assert not said(world, "operator")
+    assert world.state.phase is Phase.HOLDING
+    world.position_offset = (0.0, 0.0)
+    assert world.run(60, lambda w: w.mode is Mode.AUTO)
 
 
 @pytest.mark.parametrize("stays_s", [4, 15])
