@@ -45,9 +45,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="sign the forgeries: the forger has the key")
     parser.add_argument("--sign-boat", type=Path, metavar="FILE",
                         help="sign what the boat says, which has no key of its own, for a companion with --signing-key")
-    parser.add_argument("--rate", type=number("Hz", above=0.0, at_most=1000.0), default=5.0, metavar="HZ",
+    parser.add_argument("--rate", type=number("Hz", above=0.0, at_most=500.0), default=5.0, metavar="HZ",
                         help="frames a second (5)")
-    parser.add_argument("--count", type=whole(at_least=1), default=100, metavar="N", help="forge so many frames (100)")
+    parser.add_argument("--count", type=whole(at_least=1, at_most=100_000), default=100, metavar="N",
+                        help="forge so many frames (100)")
     parser.add_argument("--for", dest="for_s", type=number("s", above=0.0), default=600.0, metavar="S",
                         help="end after S seconds (600)")
     parser.set_defaults(run=run)
