@@ -54,7 +54,7 @@ def test_check_agrees_with_sampling(x: float, y: float, vx: float, vy: float, ra
     depth = radius + growth * t - np.hypot(tx * t / end - x - vx * t, ty * t / end - y - vy * t)
     if depth.max() > 0.01:
         assert found
-        assert found[0].time_s <= float(t[np.argmax(depth > 0.0)]) + 1e-3   # a quadratic whose leading term nearly vanishes
+        assert found[0].time_s <= float(t[np.argmax(depth > 0.0)]) + 1e-3   # its quadratic may be ill-conditioned
         assert found[0].depth_m >= float(depth.max()) - 0.01
     if depth.max() < -0.5:
         assert found == ()
