@@ -50,6 +50,7 @@ class Reach:
     link_up: Sequence[tuple[float, bool]]
     operator_s: Sequence[tuple[float, float]]
     stopped_s: Sequence[float] = ()          # when a failsafe stopped her: a sign as well
+    false_s: Sequence[float] = ()            # when the autopilot came to believe a place where she is not
 
     def first_s(self, t_s: float, before_s: float) -> float | None:
         """Return the first moment from ``t_s`` on at which he could, None before ``before_s``."""
@@ -67,7 +68,9 @@ def moments(events: Sequence[EventSpec], kinds: frozenset[str], contact_s: float
     signs: list[float] = []
     for event in events:
         if event.kind in kinds:
-            signs.append(event.at_s)
+            # of a jump that the filter resists nothing shows before it is taken
+            taken_s = [t for t in reach.false_s if t >= event.at_s][:1] if event.is_resisted else [event.at_s]
+            signs += taken_s
             if event.for_s is not None:
                 signs.append(event.at_s + event.for_s)
             if event.restart_after_s is not None:

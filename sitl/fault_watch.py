@@ -58,6 +58,7 @@ from sitl.scenario import EventSpec
 from sitl.verdict import CALL_HOLDS_S
 
 MAX_SILENCE_S = 10.0
+FALSE_M = 1.0
 # From knowing to being on another course [s]: a step of 1 s to see it, 1 s to plan, 1.5 s to upload and read back, and
 # 2.5 s for a turn of 180 degrees at speed.
 REACTION_S = 6.0
@@ -171,7 +172,7 @@ class Watch:
         return [(self.t_s[i], self._excuse(i)) for i in self._track().entries(self.solid)]
 
     def _excuse(self, i: int) -> str:
-        wrong = np.hypot(*(np.asarray(self.en_m) - np.asarray(self.believed_en_m)).T) > 1.0
+        wrong = np.asarray(self._is_false())
         if wrong[i] and not shapely.intersects(self.solid, shapely.points(self.believed_en_m[i])):
             return "false position"
         if not wrong[i] and wrong[self._since(i, REACTION_S):i].any():
@@ -205,8 +206,16 @@ class Watch:
         changes = [(t_s, up) for n, (t_s, up) in enumerate(zip(self.t_s, self.link_up, strict=True))
                    if n == 0 or up != self.link_up[n - 1]]
         return Reach(lives=tuple(self.lives), link_up=tuple(changes), operator_s=tuple(self.operator_s),
-                     stopped_s=tuple(t_s for n, t_s in enumerate(self.t_s) if self.stopped[n]
-                                     and not (n and self.stopped[n - 1])))
+                     stopped_s=self._begins([bool(by) for by in self.stopped]), false_s=self._begins(self._is_false()))
+
+    def _begins(self, holds: Sequence[bool]) -> tuple[float, ...]:
+        """Return when something began to hold [s]."""
+        return tuple(t_s for n, t_s in enumerate(self.t_s) if holds[n] and not (n and holds[n - 1]))
+
+    def _is_false(self) -> list[bool]:
+        """Return, of each sample, whether the autopilot believed the boat to be where she was not."""
+        off_m = np.asarray(self.en_m).reshape(-1, 2) - np.asarray(self.believed_en_m).reshape(-1, 2)
+        return [bool(far) for far in np.hypot(*off_m.T) > FALSE_M]
 
     def _since(self, i: int, span_s: float) -> int:
         """Return the index of the first sample not more than ``span_s`` before sample ``i``."""

@@ -1,5 +1,8 @@
 """Excuses are sailed again: without the fault, and by other hands."""
 
+import dataclasses
+
+import msgspec
 import pytest
 
 from sitl.counterfactual import CAUSES, GAINED_S, Reach, avoidable, by_hand, moments, without
@@ -31,6 +34,13 @@ def test_a_skipper_acts_soon_after_each_sign_and_before_the_contact():
     assert moments((GUST, JUMP), CAUSES["false position"], 130.0, ALWAYS) == [102.0, 122.0]
     assert moments((GUST, JUMP), CAUSES["false position"], 115.0, ALWAYS) == [102.0]
     assert moments((GUST,), CAUSES["false position"], 115.0, ALWAYS) == []
+
+
+def test_of_a_jump_that_is_resisted_nothing_can_be_known_before_it_is_taken():
+    resisted = msgspec.structs.replace(JUMP, is_resisted=True)
+    seen = dataclasses.replace(ALWAYS, false_s=(20.0, 104.0))
+    assert moments((resisted,), CAUSES["false position"], 130.0, seen) == [106.0, 122.0]
+    assert moments((resisted,), CAUSES["false position"], 130.0, ALWAYS) == [122.0]
 
 
 @pytest.mark.parametrize(("reach", "first"), [
