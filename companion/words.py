@@ -1,6 +1,11 @@
-"""Words for numbers: what is counted, singular or plural."""
+"""Words: what is counted, singular or plural; the words that an option may be."""
 
 from __future__ import annotations
+
+import re
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import msgspec
 
 
 def counted(number: int, word: str, plural: str = "") -> str:
@@ -10,3 +15,13 @@ def counted(number: int, word: str, plural: str = "") -> str:
     ('1 leg', '2 gybes', '0 ways', '2 losses')
     """
     return f"{number} {word if number == 1 else plural or word + 's'}"
+
+
+def choices(kind: Any, path: str) -> tuple[str, ...]:
+    """Return the words that an option may be: of the struct ``kind``, at msgspec's path (``$.skipper.end``)."""
+    for key in re.findall(r"\.(\w+)", path):
+        hints = get_type_hints(kind)
+        kind = next((part for part in (hints[key], *get_args(hints[key])) if isinstance(part, type)
+                     and issubclass(part, msgspec.Struct)), hints[key])
+    words = [word for part in (kind, *get_args(kind)) if get_origin(part) is Literal for word in get_args(part)]
+    return tuple(words)

@@ -14,6 +14,7 @@ from typing import Any, Literal
 import msgspec
 
 from companion.errors import InputError
+from companion.words import choices
 
 # Unix time of every simulated voyage's start: stamps must not depend on when it was run.
 EPOCH_S = 1_781_000_000.0
@@ -220,6 +221,8 @@ def _sentence(error: msgspec.ValidationError) -> str:
 
 
 def _suggestion(error: msgspec.ValidationError) -> str:
+    if "Invalid enum value" in str(error):
+        return "write one of " + ", ".join(choices(Scenario, str(error).partition(" - at `")[2].rstrip("`")))
     if "unknown field" not in str(error):
         return ""
     word = str(error).partition("`")[2].partition("`")[0]

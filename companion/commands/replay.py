@@ -26,12 +26,14 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.replay import replay
+    from companion.words import counted
 
     report = replay(args.voyage, args.mission)
-    print(f"{report.steps} steps, {report.messages} messages, {report.actions} actions, {report.restarts} restarts: "
-          f"{len(report.differences)} steps differ")
+    print(f"{counted(report.steps, 'step')}, {counted(report.messages, 'message')}, "
+          f"{counted(report.actions, 'action')}, {counted(report.restarts, 'restart')}: "
+          f"{counted(len(report.differences), 'difference')}")
     if report.unrecorded:
-        print(f"{report.unrecorded} more steps came after a gap in the records, and were not compared")
+        print(f"{counted(report.unrecorded, 'more step')} came after a gap in the records, and were not compared")
     for difference in report.differences[:SHOWN]:
         print(f"  t = {difference.t_s:.1f} s")
         print(f"    recorded {json.dumps(difference.recorded)[:400]}")

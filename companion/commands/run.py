@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from companion.arguments import number, system_id, whole
 from companion.program import INTERRUPTED
+from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.planner.worker import PlannerWorker
@@ -153,7 +154,8 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
         # an order that gets no better by trying again
         return 2, f"not sailed: {name} had arrived before this start; --again sails it again"
     end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
-    text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {summary['tacks']} tacks, {summary['replans']} replans"
+    text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {counted(summary['tacks'], 'tack')}, "
+    text += counted(summary["replans"], "replan")
     if not summary["arrived"] and summary["left_behind"]:
         text += f"\n{summary['left_behind']}"
     if summary["records_dropped"]:

@@ -8,7 +8,7 @@ import re
 import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -39,6 +39,7 @@ from companion.geofence.options import (
 from companion.geofence.shapes import Obstacle, Zone, ZoneKind
 from companion.geofence.text import decode, read_bytes
 from companion.messages import GeoPoint
+from companion.words import choices
 
 MAX_TOML_BYTES = 1024 * 1024
 RANGE_M = 50_000.0  # the frame is below 1 m wrong to here; what lies farther off is a mistake
@@ -291,24 +292,13 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
         return InputError(source, f"{place} {key}".strip(), "is missing", remedy)
     if problem.startswith("Invalid enum value"):
         return InputError(source, place, f"{_short(_value_at(raw, path))} is none of the choices",
-                          "write " + " or ".join(f'"{choice}"' for choice in _choices(path)))
+                          "write " + " or ".join(f'"{choice}"' for choice in choices(MissionOptions, path)))
     value = _value_at(raw, path)
     shown = f"{_short(value)} is wrong: " if value is not None and not isinstance(value, dict | list) else ""
     swap = ""
     if place.endswith(" lat") and isinstance(value, int | float) and abs(value) > 90.0:
         swap = "are lat and lon swapped? write degrees within ±90"
     return InputError(source, place, shown + problem[:1].lower() + problem[1:], swap)
-
-
-def _choices(path: str) -> tuple[str, ...]:
-    """Return the words that the option at msgspec's path may be."""
-    kind: Any = MissionOptions
-    for key in re.findall(r"\.(\w+)", path):
-        hints = get_type_hints(kind)
-        kind = next((part for part in (hints[key], *get_args(hints[key])) if isinstance(part, type)
-                     and issubclass(part, msgspec.Struct)), hints[key])
-    words = [word for part in (kind, *get_args(kind)) if get_origin(part) is Literal for word in get_args(part)]
-    return tuple(words)
 
 
 def _short(value: object) -> str:

@@ -173,3 +173,12 @@ def test_the_shore_hears_the_companion_through_the_autopilot(tmp_path):
         companion.wait(30)
         boat.terminate()
         boat.wait(30)
+
+
+@pytest.mark.parametrize(("wrong", "choices"), [
+    ('[wind]\nmodel = "gusty"\n', "write one of constant, ou, recorded"),
+    ('[[events]]\nat_s = 1.0\nkind = "gale"\n', "wind_shift")])
+def test_a_wrong_word_in_a_scenario_is_told_its_choices(wrong, choices, tmp_path, capsys):
+    (tmp_path / "s.toml").write_text(f'name = "x"\nmission = "m.toml"\n{wrong}')
+    assert sitl_cli.main(["run", str(tmp_path / "s.toml")]) == 2
+    assert choices in capsys.readouterr().err
