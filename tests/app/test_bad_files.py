@@ -10,6 +10,7 @@ from companion import cli
 from companion.clock import run_virtual
 from companion.commands.run import NOT_THERE
 from sitl import cli as sitl_cli
+from sitl import compiled
 from sitl.runner import run_embedded
 from sitl.scenario import ExpectSpec, Scenario, WindSpec
 
@@ -189,3 +190,13 @@ def test_what_is_written(short, voyage, tmp_path, monkeypatch, capsys, program, 
         Path("a-file").write_text("")
         target = Path("a-file") / name
     assert ends_in_one_line(capsys, program, (*argv, target), target.parent if "a-file" in str(target) else name) != 0
+
+
+@pytest.mark.parametrize("name", ["mission.toml", "boat.pol", "wind.csv", "rock.wkt"])
+def test_what_cannot_be_sailed_is_told_before_anything_is_compiled(short, tmp_path, monkeypatch, capsys, name):
+    """On a machine that has no kernels yet the refusal came a minute later, behind the compiling's progress."""
+    shutil.copytree(short, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(compiled, "compile_ahead", lambda: pytest.fail("compiled first"))
+    broken(tmp_path, name, "empty")
+    assert ends_in_one_line(capsys, sitl_cli, ("run", "scenario.toml", "--out", "v"), name) == 2
