@@ -60,14 +60,14 @@ def run_campaign(
     json_path: Path | None = None, keep: Path | None = None,
 ) -> int:
     """Run and print; return the exit code."""
-    from companion.geofence import load_mission
-    from companion.sailable import require_sailable
-    from sitl.runner import permitted
+    from sitl.compiled import compile_ahead
+    from sitl.runner import mission_of
     from sitl.scenario import load_scenario
 
     loaded = [load_scenario(path) for path in scenarios]
     for scenario, path in zip(loaded, scenarios, strict=True):
-        require_sailable(permitted(load_mission(scenario.mission_path(path)), scenario))
+        mission_of(scenario, path)
+    compile_ahead()
     names = [scenario.name for scenario in loaded]
     jobs = [Job(scenario=p, seed=first_seed + k, keep=keep) for p in scenarios for k in range(runs)]
     records: list[dict[str, Any]] = []

@@ -87,6 +87,11 @@ def permitted(mission: Mission, scenario: Scenario) -> Mission:
     return replace(mission, options=replace_struct(options, operator=operator, autopilot=named))
 
 
+def mission_of(scenario: Scenario, source: Path) -> Mission:
+    """Return the mission that a scenario sails, with what a harness allows. Raises InputError: it cannot be sailed."""
+    return require_sailable(permitted(load_mission(scenario.mission_path(source)), scenario))
+
+
 def replace_struct(struct: Any, **changes: Any) -> Any:
     """Return a copy of a msgspec struct with ``changes``."""
     import msgspec
@@ -117,8 +122,7 @@ async def run_embedded(
     With ``worker_pace`` (loop seconds per second, on a loop in real time that begins at 0) the planner is the real
     worker process, and plans by its budget of time.
     """
-    mission, radio_port = with_radio(
-        require_sailable(permitted(load_mission(scenario.mission_path(source)), scenario)), scenario)
+    mission, radio_port = with_radio(mission_of(scenario, source), scenario)
     wind = scenario_wind(scenario, source, seed)
     start = mission.start or mission.origin
     heading_deg = scenario.start_heading_deg

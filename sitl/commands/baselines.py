@@ -37,7 +37,10 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from sitl.compiled import compile_ahead
     from sitl.figures import SCENARIOS, run_baselines
+    from sitl.scenario import load_scenario
 
+    for path in args.scenarios or ():
+        load_scenario(path)
     compile_ahead()
     return run_baselines(
         who=args.who, scenarios=args.scenarios or SCENARIOS, seeds=args.seeds, workers=args.workers,

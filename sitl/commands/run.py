@@ -37,13 +37,11 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run_virtual
     from companion.errors import InputError
-    from companion.geofence import load_mission
-    from companion.sailable import require_sailable
     from companion.telemetry.names import DECISIONS
     from companion.telemetry.progress import ProgressLine
     from sitl.compiled import compile_ahead
     from sitl.hull import own_polar
-    from sitl.runner import permitted, run_embedded
+    from sitl.runner import mission_of, run_embedded
     from sitl.scenario import load_scenario
     from sitl.weather import scenario_wind
 
@@ -53,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--out", str(folder), "holds a voyage already, which this one would resume",
                          "name another folder, or remove that one")
     # What cannot be sailed is told before anything is compiled for a minute.
-    mission = require_sailable(permitted(load_mission(scenario.mission_path(args.scenario)), scenario))
+    mission = mission_of(scenario, args.scenario)
     scenario_wind(scenario, args.scenario, args.seed)
     if own_polar(mission) is not None and args.autopilot == "ardurover":
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
