@@ -27,9 +27,9 @@ from PIL import Image
 
 from companion.boat import MPS_PER_KNOT, Boat, avalon
 from companion.planner import Problem, plan
-from companion.planner.astar import AstarSettings, search_with
 from companion.planner.plan import Plan, PlanStatus
-from companion.planner.risk import simulate_entries
+from companion.planner.reference.astar import AstarSettings, search_with
+from companion.planner.risk.wind import simulate_entries
 from companion.planner.solve import Effort
 from companion.plots.plan import draw_plan
 
@@ -182,7 +182,7 @@ def busser_5_4():
 # ------------------------------------------------------------------------------------------- risk
 def risk():
     base = Problem.from_json(Path(__file__).resolve().parent / "problems" / "trap-beat.json")
-    from companion.planner.problem import RiskLimit
+    from companion.planner.problem.value import RiskLimit
 
     limits = [0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01]
     promised, share, cost = [], [], []

@@ -17,9 +17,9 @@ import sys
 import numpy as np
 
 from companion.planner import Problem
-from companion.planner import reference_kernels as kernels
-from companion.planner.rrtstar import simple_bound_s
-from companion.planner.rrtstar_world import bounds_of, world_of
+from companion.planner.reference import kernels
+from companion.planner.reference.rrtstar import simple_bound_s
+from companion.planner.reference.world import bounds_of, world_of
 
 PLANNERS = ("rrtstar-se2", "informed", "bitstar")
 

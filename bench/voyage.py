@@ -19,7 +19,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sitl.ships import free_port
+from sitl.scene.ships import free_port
 
 SCENARIO = Path("sitl/scenarios/demo.toml")
 MISSION = Path("missions/archipelago.toml")
@@ -54,7 +54,7 @@ def live(seconds: float) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "voyage"
         boat = subprocess.Popen([
-            sys.executable, "-m", "sitl.live_boat", str(SCENARIO), "--endpoint", f"udpout:127.0.0.1:{port}"])
+            sys.executable, "-m", "sitl.run.live_boat", str(SCENARIO), "--endpoint", f"udpout:127.0.0.1:{port}"])
         began = time.monotonic()
         companion = subprocess.Popen(
             [sys.executable, "-m", "companion.cli", "run", str(MISSION), "--link", f"udpin:127.0.0.1:{port}",
@@ -89,8 +89,8 @@ def live(seconds: float) -> dict[str, float]:
 
 def virtual() -> dict[str, float]:
     from companion.clock import run_virtual
-    from sitl.runner import run_embedded
-    from sitl.scenario import load_scenario
+    from sitl.run.embedded import run_embedded
+    from sitl.scene.scenario import load_scenario
 
     scenario = load_scenario(SCENARIO)
     ratios = []

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 from companion.boat import AutopilotLimits
 from companion.geo.angles import wrap_pi
-from companion.mavlink.assembler import VehicleAssembler
-from companion.mavlink.codec import AUTOPILOT_COMPONENT, autopilot_version, is_autopilot_heartbeat
-from companion.mavlink.frames import Drop, Message
-from companion.mavlink.identity import GAP_S, UID_EVERY_S, Identity
-from companion.mavlink.parameter_ranges import RANGES, believable
-from companion.mavlink.witness import Witness
+from companion.mavlink.trust.identity import GAP_S, UID_EVERY_S, Identity
+from companion.mavlink.trust.witness import Witness
+from companion.mavlink.wire.assembler import VehicleAssembler
+from companion.mavlink.wire.codec import AUTOPILOT_COMPONENT, autopilot_version, is_autopilot_heartbeat
+from companion.mavlink.wire.frames import Drop, Message
+from companion.mavlink.wire.parameter_ranges import RANGES, believable
 from companion.messages import (
     AisReport,
     ApparentWind,
@@ -28,10 +28,10 @@ from companion.messages import (
     WindSample,
 )
 from companion.skipper import Skipper
-from companion.skipper.actions import Action
-from companion.skipper.config import Permissions
-from companion.skipper.saved import Persisted
-from companion.skipper.snapshot import (
+from companion.skipper.step.actions import Action
+from companion.skipper.step.config import Permissions
+from companion.skipper.step.saved import Persisted
+from companion.skipper.step.snapshot import (
     AutopilotRebooted,
     Disbelieved,
     Event,
@@ -44,7 +44,7 @@ from companion.skipper.snapshot import (
     WindHealth,
     WindView,
 )
-from companion.skipper.state import SkipperState
+from companion.skipper.step.state import SkipperState
 from companion.traffic import TargetLimits, Targets
 from companion.wind import Estimator, Verdict, WindRoom, make
 

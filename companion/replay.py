@@ -17,15 +17,15 @@ from typing import Any
 from companion.compose import config_of, estimator_of, target_limits_of, voyage_of
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
-from companion.mavlink.frames import Codec, Message
-from companion.mavlink.reception import OWN_COMPONENT
 from companion.mavlink.tlog import read_tlog
+from companion.mavlink.trust.reception import OWN_COMPONENT
+from companion.mavlink.wire.frames import Codec, Message
 from companion.messages import MissionItem
 from companion.planner import Plan
 from companion.skipper import Skipper
-from companion.skipper.config import Permissions
-from companion.skipper.saved import Persisted
-from companion.skipper.snapshot import (
+from companion.skipper.step.config import Permissions
+from companion.skipper.step.saved import Persisted
+from companion.skipper.step.snapshot import (
     CommandOutcome,
     CommandResult,
     Outcome,
@@ -34,10 +34,10 @@ from companion.skipper.snapshot import (
     UploadOutcome,
     UploadResult,
 )
-from companion.telemetry.names import DECISIONS, TLOG, TRACK, VOYAGE
-from companion.telemetry.recorder import jsonable
-from companion.telemetry.records import action_record, ais_of
-from companion.telemetry.voyage_folder import believed, read_decisions, read_description, read_rows, require_files
+from companion.telemetry.folder.names import DECISIONS, TLOG, TRACK, VOYAGE
+from companion.telemetry.folder.reading import believed, read_decisions, read_description, read_rows, require_files
+from companion.telemetry.folder.recorder import jsonable
+from companion.telemetry.folder.records import action_record, ais_of
 from companion.wind import WindRoom
 
 TOLERANCE = 1e-6

@@ -118,7 +118,7 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
     Home is taken to be the start: the autopilot's is where it was armed.
     """
     from companion.planner import plan
-    from companion.skipper.errands import HOME_RADIUS_M
+    from companion.skipper.planning.errands import HOME_RADIUS_M
 
     if mission.start is None:
         return []
@@ -164,9 +164,9 @@ def leg_problem(
 def read_mission_file(path: str) -> Document:
     """Return what a mission TOML or a drawing holds, with its only line as the route. Raises InputError."""
     from companion.geofence import read
-    from companion.geofence.mission import load_mission
-    from companion.geofence.mission_files import document_of
-    from companion.geofence.routes import lines_as_route
+    from companion.geofence.formats.routes import lines_as_route
+    from companion.geofence.mission.files import document_of
+    from companion.geofence.mission.mission import load_mission
 
     if Path(path).suffix.lower() == ".toml":
         return document_of(load_mission(path))
@@ -175,7 +175,7 @@ def read_mission_file(path: str) -> Document:
 
 def _check(args: argparse.Namespace) -> int:
     from companion.geofence.check import Conditions, check_area
-    from companion.geofence.mission import load_mission
+    from companion.geofence.mission.mission import load_mission
 
     if Path(args.file).suffix.lower() != ".toml":
         document = read_mission_file(args.file)
@@ -221,9 +221,9 @@ def _only(document: Document, part: str) -> Document:
 def _convert(args: argparse.Namespace) -> int:
     from companion.commands.fence import grown_marks
     from companion.geofence import read
-    from companion.geofence.formats import write
-    from companion.geofence.mission import load_mission
-    from companion.geofence.mission_files import goal_losses, mission_files
+    from companion.geofence.formats.registry import write
+    from companion.geofence.mission.files import goal_losses, mission_files
+    from companion.geofence.mission.mission import load_mission
 
     document = read_mission_file(args.file)
     print_findings(document.findings, args.file)
@@ -268,8 +268,8 @@ def _upload(args: argparse.Namespace) -> int:
 def _download(args: argparse.Namespace) -> int:
     from companion.commands.shore import Shore, download_list
     from companion.geofence import Document
-    from companion.geofence.formats import format_of, write
-    from companion.mavlink.items import mission_hash
+    from companion.geofence.formats.registry import format_of, write
+    from companion.mavlink.wire.items import mission_hash
     from companion.messages import MissionType
 
     format_of(args.out)

@@ -137,7 +137,7 @@ def _sail_through(args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
 def _completed(problem: Problem, answer: Plan) -> Plan:
     """Return the plan with risk and clearance, computed here if the planner left them open."""
     from companion.planner.explain import with_clearance
-    from companion.planner.risk import with_risk
+    from companion.planner.risk.wind import with_risk
 
     if answer.has_path and answer.risk is None:
         answer = with_risk(problem, answer)
@@ -214,7 +214,7 @@ def _range(begin: float, end: float) -> str:
 def _risk_text(problem: Problem, answer: Plan) -> str:
     if problem.wind.sigma.model == "none" and not problem.is_shared:
         return "risk: none, the wind is taken as certain"
-    from companion.planner.risk import path_risk
+    from companion.planner.risk.wind import path_risk
 
     risk = path_risk(problem, answer)
     if problem.is_shared:

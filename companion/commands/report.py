@@ -13,7 +13,7 @@ from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.geofence import Document
-    from companion.telemetry.voyage_folder import VoyageRecord
+    from companion.telemetry.folder.reading import VoyageRecord
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -33,10 +33,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.geofence.formats import format_of, write
+    from companion.geofence.formats.registry import format_of, write
     from companion.plots.voyage import plot_voyage
-    from companion.telemetry.names import PICTURE
-    from companion.telemetry.voyage_folder import read_voyage
+    from companion.telemetry.folder.names import PICTURE
+    from companion.telemetry.folder.reading import read_voyage
 
     for path in args.track:
         format_of(path)

@@ -103,9 +103,9 @@ def _outliving_the_terminal() -> Iterator[None]:
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     from companion.clock import run as run_loop
     from companion.geofence import load_mission
-    from companion.mavlink.transport import open_link
+    from companion.mavlink.transports.transport import open_link
     from companion.sailable import require_sailable
-    from companion.telemetry.shelf import DEFAULT_BUDGET_BYTES, Shelf
+    from companion.telemetry.folder.shelf import DEFAULT_BUDGET_BYTES, Shelf
     from companion.traffic.feeds import parse_feed
 
     for name in args.feed:
@@ -128,7 +128,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
             return 0
 
         def options() -> Any:
-            from companion.options import SailOptions
+            from companion.app.options import SailOptions
 
             return SailOptions(
                 seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
@@ -234,7 +234,7 @@ async def _sail(
     with ServiceManager(os.environ) as manager:
         async with PlannerWorker() as planner:
             # The child loads its kernels while this process imports the rest.
-            from companion.app import sail
+            from companion.app.sail import sail
             from companion.telemetry.progress import ProgressLine
 
             if not await _is_ready(planner, stop, out, manager):
@@ -274,7 +274,7 @@ async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, m
 def _signing(path: Path | None) -> Any:
     if path is None:
         return None
-    from companion.mavlink.signing import SigningStore
+    from companion.mavlink.transports.signing import SigningStore
 
     return SigningStore(path, time.time())
 
@@ -283,8 +283,8 @@ def _report(folder: Path, err: Console) -> None:
     """Draw the voyage; a picture that fails must not hide how the voyage ended."""
     try:
         from companion.plots.voyage import plot_voyage
-        from companion.telemetry.names import PICTURE
-        from companion.telemetry.voyage_folder import read_voyage
+        from companion.telemetry.folder.names import PICTURE
+        from companion.telemetry.folder.reading import read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:

@@ -48,7 +48,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
-    from companion.mavlink.transport import open_link
+    from companion.mavlink.transports.transport import open_link
 
     return run_loop(_watch(args, open_link(args.link)))
 
@@ -56,10 +56,10 @@ def run(args: argparse.Namespace) -> int:
 async def _watch(args: argparse.Namespace, transport: Any) -> int:
     from companion.clock import now_s
     from companion.errors import LinkError
-    from companion.mavlink.assembler import VehicleAssembler
     from companion.mavlink.link import Link
-    from companion.mavlink.reception import LinkIdentity
-    from companion.mavlink.status_wire import StatusReader
+    from companion.mavlink.trust.reception import LinkIdentity
+    from companion.mavlink.wire.assembler import VehicleAssembler
+    from companion.mavlink.wire.status import StatusReader
 
     reader, vehicle = StatusReader(), VehicleAssembler()
     heard = asyncio.Event()

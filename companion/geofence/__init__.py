@@ -7,8 +7,8 @@ metres for the planner. ``read(path)`` reads any single file into a ``Document``
 from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Document
 from companion.geofence.findings import Code, Finding, Severity
-from companion.geofence.formats import read
-from companion.geofence.mission import Goal, Mission, load_mission
+from companion.geofence.formats.registry import read
+from companion.geofence.mission.mission import Goal, Mission, load_mission
 from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
 
 __all__ = [

@@ -14,10 +14,10 @@ from shapely.geometry.base import BaseGeometry
 from companion.geo.angles import difference_rad, heading_of
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, LocalArea, buffer_in, parts
-from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
-from companion.geofence.fence_items import MAX_FENCE_ITEMS, zones_to_items
+from companion.geofence.fence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.geofence.findings import Code, Finding, Severity
-from companion.geofence.rings import Findings
+from companion.geofence.formats.fence_items import MAX_FENCE_ITEMS, zones_to_items
+from companion.geofence.formats.rings import Findings
 from companion.geofence.shapes import Circle, Zone, ZoneKind, center_of, polygon_en
 from companion.messages import GeoPoint
 
@@ -103,7 +103,7 @@ def _holes(area: Area, findings: Findings) -> None:
 
 
 def _places(local: LocalArea, conditions: Conditions, findings: Findings) -> None:
-    from companion.geofence.mission import trouble_at
+    from companion.geofence.mission.mission import trouble_at
 
     places = [(Code.START_OUTSIDE, "start", conditions.start)] if conditions.start is not None else []
     places += [(Code.GOAL_OUTSIDE, f"goal {i + 1}", g) for i, g in enumerate(conditions.goals)]

@@ -1,6 +1,7 @@
 """The types of a kernel's arguments as text, and back: what the list of kernels is written in.
 
-float64, int64[::1], float64[:, ::1], tuple(float64, int64), named("companion.planner.kernels:Grid", float64[::1])
+float64, int64[::1], float64[:, ::1], tuple(float64, int64), named("companion.planner.search.kernels:Grid",
+float64[::1])
 """
 
 from __future__ import annotations

@@ -15,15 +15,15 @@ from typing import Self
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s
-from companion.mavlink import codec
-from companion.mavlink.assembler import Value, VehicleAssembler
-from companion.mavlink.commands import CommandAnswer
-from companion.mavlink.frames import Message
 from companion.mavlink.link import Link
-from companion.mavlink.machines import Outcome
 from companion.mavlink.mission_lists import Lists, Method, ReadResult, TransferResult
-from companion.mavlink.params import ParamAnswer, ParamList, ParamRead, ParamSet, ParamTable, names_of
-from companion.mavlink.status_wire import status_messages
+from companion.mavlink.transfers.commands import CommandAnswer
+from companion.mavlink.transfers.machines import Outcome
+from companion.mavlink.transfers.params import ParamAnswer, ParamList, ParamRead, ParamSet, ParamTable, names_of
+from companion.mavlink.wire import codec
+from companion.mavlink.wire.assembler import Value, VehicleAssembler
+from companion.mavlink.wire.frames import Message
+from companion.mavlink.wire.status import status_messages
 from companion.messages import (
     AutopilotStatus,
     CompanionStatus,

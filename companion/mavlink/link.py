@@ -22,18 +22,18 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s
 from companion.errors import LinkError
-from companion.mavlink import codec
-from companion.mavlink.census import LISTEN_S, OtherCompanion, Speaker, listed
-from companion.mavlink.commands import CommandAnswer, CommandSend
-from companion.mavlink.frames import Codec, Drop, Message
-from companion.mavlink.identity import GAP_S
-from companion.mavlink.link_stats import LinkStats, Throughput
-from companion.mavlink.machines import Machine, Outcome, Party, ResultT_co
-from companion.mavlink.rates import RateKeeper
-from companion.mavlink.reception import Heard, LinkIdentity, Objection, Reception
-from companion.mavlink.signing import TICKS_PER_S, SigningStore
-from companion.mavlink.streams import DEFAULT_STREAMS, Stream, StreamMonitor
-from companion.mavlink.transport import Transport, TransportState
+from companion.mavlink.transfers.commands import CommandAnswer, CommandSend
+from companion.mavlink.transfers.machines import Machine, Outcome, Party, ResultT_co
+from companion.mavlink.transfers.rates import RateKeeper
+from companion.mavlink.transports.signing import TICKS_PER_S, SigningStore
+from companion.mavlink.transports.transport import Transport, TransportState
+from companion.mavlink.trust.census import LISTEN_S, OtherCompanion, Speaker, listed
+from companion.mavlink.trust.identity import GAP_S
+from companion.mavlink.trust.link_stats import LinkStats, Throughput
+from companion.mavlink.trust.reception import Heard, LinkIdentity, Objection, Reception
+from companion.mavlink.wire import codec
+from companion.mavlink.wire.frames import Codec, Drop, Message
+from companion.mavlink.wire.streams import DEFAULT_STREAMS, Stream, StreamMonitor
 
 OnMessage = Callable[[float, Message], None]
 OnFrame = Callable[[float, bytes], None]

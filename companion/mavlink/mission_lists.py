@@ -14,12 +14,12 @@ from typing import Literal
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s
-from companion.mavlink import codec
-from companion.mavlink.ftp import FENCE_FILE, MISSION_FILE, RALLY_FILE, FtpRead, FtpWrite
-from companion.mavlink.items import ENDING, first_difference, pack_mission_dat, padded, sailed, unpack_mission_dat
 from companion.mavlink.link import Link
-from companion.mavlink.lists import ListClear, ListDownload, ListUpload
-from companion.mavlink.machines import Outcome
+from companion.mavlink.transfers.ftp import FENCE_FILE, MISSION_FILE, RALLY_FILE, FtpRead, FtpWrite
+from companion.mavlink.transfers.lists import ListClear, ListDownload, ListUpload
+from companion.mavlink.transfers.machines import Outcome
+from companion.mavlink.wire import codec
+from companion.mavlink.wire.items import ENDING, first_difference, pack_mission_dat, padded, sailed, unpack_mission_dat
 from companion.messages import AutopilotStatus, GeoPoint, MissionItem, MissionState, MissionType
 
 Method = Literal["auto", "ftp", "items", "partial", "guarded"]

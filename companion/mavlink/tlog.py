@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import BinaryIO, Self
 
 from companion.errors import InputError
-from companion.mavlink.frames import STX, Codec, Message
+from companion.mavlink.wire.frames import STX, Codec, Message
 
 _STAMP = struct.Struct(">Q")
 # Stamps outside 2000..2100 are damage, not time [µs].

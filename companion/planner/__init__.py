@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
-from companion.planner.problem import Problem
+from companion.planner.problem.value import Problem
 from companion.planner.solve import ALGORITHMS, plan
 
 __all__ = ["ALGORITHMS", "Leg", "Plan", "PlanStatus", "Problem", "Why", "plan"]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from companion.planner.beat import beaten
-from companion.planner.bound import cut_off, lower_bound_s
 from companion.planner.plan import PlanStatus
-from companion.planner.problem import Beat, Problem
+from companion.planner.problem.beat import beaten
+from companion.planner.problem.value import Beat, Problem
+from companion.planner.search.bound import cut_off, lower_bound_s
+from companion.planner.search.world import make_world
 from companion.planner.solve import Effort, Outcome, Search
-from companion.planner.world import make_world
 
 BOUND_TESTS = 40_000   # of visibility, for the bound of both kinds of path, when there is effort left
 BEAT_SHARE = 0.3       # of the effort, for the path with beats: an easier search, and often the end of it

@@ -13,8 +13,8 @@ import shapely
 
 from companion.planner.courses import courses
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
-from companion.planner.problem import Problem
-from companion.planner.risk import path_risk, with_parts
+from companion.planner.problem.value import Problem
+from companion.planner.risk.wind import path_risk, with_parts
 from companion.planner.what_if import Replanner, decisive_side, other_side, what_would_help
 from companion.words import counted
 

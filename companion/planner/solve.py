@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 
 from companion.clock import effort_s
 from companion.errors import InputError
-from companion.planner.evaluate import clearances
 from companion.planner.plan import Plan, PlanStatus, Why
-from companion.planner.problem import Problem
+from companion.planner.problem.evaluate import clearances
+from companion.planner.problem.value import Problem
 
 DEFAULT_BUDGET_S = 1.0
 OPTIMAL_GAP = 1e-3
 
 ALGORITHMS: Mapping[str, tuple[str, str]] = {
-    "auto": ("companion.planner.auto", "search"),
-    "rrtstar": ("companion.planner.rrtstar", "search"),
-    "astar": ("companion.planner.astar", "search"),
+    "auto": ("companion.planner.search.auto", "search"),
+    "rrtstar": ("companion.planner.reference.rrtstar", "search"),
+    "astar": ("companion.planner.reference.astar", "search"),
 }
 """Name -> module and function; modules are imported when asked for."""
 
@@ -181,7 +181,7 @@ def _load(algorithm: str) -> None:
 def _solved(problem: Problem, effort: Effort, empty: Plan) -> Plan:
     module, name = ALGORITHMS[empty.algorithm]
     search: Search = getattr(importlib.import_module(module), name)
-    from companion.planner.risk import keep_limit, search_within, with_risk
+    from companion.planner.risk.wind import keep_limit, search_within, with_risk
 
     def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
         return search(problem.resolved, effort, seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from companion.planner.problem import Problem
+from companion.planner.problem.value import Problem
 from companion.planner.solve import plan
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from companion.clock import effort_s
 from companion.planner.plan import Plan
-from companion.planner.problem import Problem
+from companion.planner.problem.value import Problem
 
 MAX_SHIFT_RAD = math.radians(60.0)  # larger shifts are another day's wind
 SHIFT_RESOLUTION_RAD = math.radians(1.0)

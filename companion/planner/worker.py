@@ -26,7 +26,7 @@ import numpy as np
 from companion.clock import effort_s
 from companion.kernels.build import prepare
 from companion.planner.plan import Plan, PlanStatus, Why
-from companion.planner.problem import Problem
+from companion.planner.problem.value import Problem
 from companion.planner.solve import DEFAULT_BUDGET_S, plan
 
 _LOG = logging.getLogger(__name__)

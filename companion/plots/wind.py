@@ -27,8 +27,8 @@ from companion.plots.chart import save
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from companion.wind.records import Record
-    from companion.wind.score import Score
+    from companion.wind.study.records import Record
+    from companion.wind.study.score import Score
 
 Array = NDArray[np.float64]
 

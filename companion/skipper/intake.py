@@ -6,14 +6,13 @@ import math
 from dataclasses import replace
 
 from companion.messages import Mode, StatusText
-from companion.skipper.actions import CancelPlan, Severity
-from companion.skipper.answers import take_plan
-from companion.skipper.config import Guidance
-from companion.skipper.failsafe import note
-from companion.skipper.gates import Gate, again, bearing_on, is_on_wrong_side
-from companion.skipper.geometry import distance_m, leg_distance_m, waypoint_done
-from companion.skipper.helm import MOTOR_OFF, MOTOR_ON
-from companion.skipper.snapshot import (
+from companion.skipper.board.uploads import take_upload
+from companion.skipper.deeds.failsafe import note
+from companion.skipper.deeds.helm import MOTOR_OFF, MOTOR_ON
+from companion.skipper.planning.answers import take_plan
+from companion.skipper.step.actions import CancelPlan, Severity
+from companion.skipper.step.config import Guidance
+from companion.skipper.step.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
     CommandResult,
@@ -24,9 +23,10 @@ from companion.skipper.snapshot import (
     UploadOutcome,
     UploadResult,
 )
-from companion.skipper.state import PATIENT, Fix, Phase
-from companion.skipper.turn import FRESH_S, Turn
-from companion.skipper.uploads import take_upload
+from companion.skipper.step.state import PATIENT, Fix, Phase
+from companion.skipper.step.turn import FRESH_S, Turn
+from companion.skipper.way.gates import Gate, again, bearing_on, is_on_wrong_side
+from companion.skipper.way.geometry import distance_m, leg_distance_m, waypoint_done
 
 HISTORY_STEP_S = 10.0
 HISTORY_KEPT = 19            # 180 s and the present

@@ -9,15 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from companion.messages import Mode
-from companion.skipper.actions import Action, CancelPlan, Severity
-from companion.skipper.adrift import follow_ground
-from companion.skipper.causes import PERSON
-from companion.skipper.config import SkipperConfig
-from companion.skipper.custody import judge, stand_by
-from companion.skipper.doubt import follow
-from companion.skipper.failsafe import follow_answer, follow_stops, take_over
-from companion.skipper.gates import gates_of
-from companion.skipper.helm import is_busy
+from companion.skipper.board.custody import judge, stand_by
+from companion.skipper.board.on_board import mission_is_known
+from companion.skipper.deeds.adrift import follow_ground
+from companion.skipper.deeds.doubt import follow
+from companion.skipper.deeds.failsafe import follow_answer, follow_stops, take_over
+from companion.skipper.deeds.helm import is_busy
+from companion.skipper.deeds.launch import finished, launch, start
+from companion.skipper.deeds.sailing import sail
 from companion.skipper.intake import (
     count_time,
     locate,
@@ -26,18 +25,19 @@ from companion.skipper.intake import (
     take_events,
     take_outcomes,
 )
-from companion.skipper.ladder import rungs
-from companion.skipper.launch import finished, launch, start
-from companion.skipper.lookout import look_out
-from companion.skipper.on_board import mission_is_known
-from companion.skipper.sailing import sail
-from companion.skipper.saved import Persisted, saved_of
-from companion.skipper.snapshot import OperatorWish, Snapshot
-from companion.skipper.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState
-from companion.skipper.stopped import speak_of_stop
-from companion.skipper.turn import Turn
-from companion.skipper.voyage import Voyage
-from companion.skipper.watch import watch
+from companion.skipper.planning.ladder import rungs
+from companion.skipper.step.actions import Action, CancelPlan, Severity
+from companion.skipper.step.causes import PERSON
+from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.saved import Persisted, saved_of
+from companion.skipper.step.snapshot import OperatorWish, Snapshot
+from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState
+from companion.skipper.step.turn import Turn
+from companion.skipper.watch.lookout import look_out
+from companion.skipper.watch.stopped import speak_of_stop
+from companion.skipper.watch.watch import watch
+from companion.skipper.way.gates import gates_of
+from companion.skipper.way.voyage import Voyage
 
 REBOOT_RACE_S = 15.0     # a mode change this long before a reboot shows was the reboot, not the operator
 

@@ -16,9 +16,9 @@ from typing import Any, Protocol, Self
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.messages import Mode
-from companion.skipper.actions import Announce, Severity
-from companion.skipper.state import Phase
-from companion.telemetry.records import sigma_ahead_rad
+from companion.skipper.step.actions import Announce, Severity
+from companion.skipper.step.state import Phase
+from companion.telemetry.folder.records import sigma_ahead_rad
 
 # Without a terminal a line is written this often [s of the voyage], and whenever the phase changes.
 PLAIN_EVERY_S = 15.0

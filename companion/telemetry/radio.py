@@ -9,11 +9,11 @@ from collections.abc import Callable
 from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.messages import CompanionStatus
-from companion.skipper.actions import Severity
-from companion.telemetry.logbook import Logbook
+from companion.skipper.step.actions import Severity
+from companion.telemetry.folder.logbook import Logbook
 from companion.traffic.listening import Feeds
 
-# Status to the radio: a frame of it every so often [s]; see companion.mavlink.status_wire for its bytes.
+# Status to the radio: a frame of it every so often [s]; see companion.mavlink.wire.status for its bytes.
 STATUS_EVERY_S = 2.0
 TROUBLE_EVERY_S = 600.0   # trouble with the disk that lasts is said again
 

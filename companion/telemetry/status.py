@@ -10,12 +10,12 @@ from companion.boat import AutopilotLimits
 from companion.fold import Step
 from companion.geo.angles import difference_rad, heading_of, wrap_two_pi
 from companion.messages import Command, CompanionStatus, TrafficStatus
-from companion.skipper.actions import Announce, Severity
-from companion.skipper.geometry import cross_track_m, moved
-from companion.skipper.state import Phase, Route
-from companion.skipper.voyage import PointEn, Voyage
-from companion.telemetry.records import sigma_ahead_rad
-from companion.telemetry.summary import VoyageFigures
+from companion.skipper.step.actions import Announce, Severity
+from companion.skipper.step.state import Phase, Route
+from companion.skipper.way.geometry import cross_track_m, moved
+from companion.skipper.way.voyage import PointEn, Voyage
+from companion.telemetry.folder.records import sigma_ahead_rad
+from companion.telemetry.folder.summary import VoyageFigures
 from companion.traffic import TrafficCounts
 from companion.traffic.feeds import AisFeed
 

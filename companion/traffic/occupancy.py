@@ -1,6 +1,6 @@
 """Where not to be, and when: predicted vessels as moving discs for a planner that plans in time.
 
-A ``Disc`` has the fields of ``companion.planner.problem.Target`` (the planner sits above this room and makes one
+A ``Disc`` has the fields of ``companion.planner.problem.value.Target`` (the planner sits above this room and makes one
 from the other). Its radius grows linearly; the radius that is needed, hull and clearance and k sigma(t), is convex
 in time and its centre straight, so the chord over a window covers it all through the window. A turning vessel's
 arc adds its own sagitta.

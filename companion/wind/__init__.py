@@ -6,8 +6,8 @@
 ``WindRoom`` is what the application feeds: messages in, status and the planner's forecast table out.
 """
 
-from companion.wind.catalogue import NAMES, Forecaster, make
-from companion.wind.estimator import HORIZONS_S, LEVELS, Estimator
+from companion.wind.estimators.catalogue import NAMES, Forecaster, make
+from companion.wind.estimators.estimator import HORIZONS_S, LEVELS, Estimator
 from companion.wind.parameters import VaneParameters
 from companion.wind.room import WindRoom
 from companion.wind.true_wind import apparent_wind, true_wind

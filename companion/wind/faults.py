@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from companion.geo.angles import wrap_pi
-from companion.wind.estimator import gain
+from companion.wind.estimators.estimator import gain
 
 _STILL_RAD = math.radians(0.4)        # a vane within this has not moved (instruments report whole degrees)
 _SWEPT_RAD = math.radians(20.0)       # boat turned this much under a vane that has not moved: frozen

@@ -13,8 +13,8 @@ import numpy as np
 
 from companion.geo.angles import wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindForecast, WindQuality, WindSample, WindSource
-from companion.wind.catalogue import Forecaster
-from companion.wind.estimator import SIGMA_MAX_RAD, Estimator, gain
+from companion.wind.estimators.catalogue import Forecaster
+from companion.wind.estimators.estimator import SIGMA_MAX_RAD, Estimator, gain
 from companion.wind.parameters import VaneParameters
 from companion.wind.true_wind import LIGHT_MPS, true_wind
 from companion.wind.watch import Verdict, WindStatus, WindWatch

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
-from companion.wind.estimator import gain
+from companion.wind.estimators.estimator import gain
 from companion.wind.faults import FrozenVane, Spikes, TackOffset
 from companion.wind.parameters import VaneParameters
 from companion.wind.true_wind import LIGHT_MPS, apparent_wind, true_wind

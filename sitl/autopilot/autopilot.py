@@ -32,7 +32,7 @@ from sitl.autopilot.telemetry import BUILDERS, POSITION_MODES
 from sitl.autopilot.traffic import Traffic, Vessel
 from sitl.autopilot.transfer import TransferServer
 from sitl.autopilot.vehicle import Vehicle
-from sitl.wind import Constant, Wind
+from sitl.world.wind import Constant, Wind
 
 WARM_BOOT_S = 60.0
 ORIGIN_S = 19.8

@@ -1,7 +1,7 @@
 """A link without a network: two transports in one process, with a radio's faults between them.
 
-Both ends have the shape of ``companion.mavlink.transport.Transport``. Nothing is lost by default. Faults are drawn
-from a seed, frame by frame, so that under the virtual clock a bad link repeats exactly.
+Both ends have the shape of ``companion.mavlink.transports.transport.Transport``. Nothing is lost by default. Faults are
+drawn from a seed, frame by frame, so that under the virtual clock a bad link repeats exactly.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from companion.clock import now_s
 from companion.errors import LinkError
-from companion.mavlink.transport import OnBytes, TransportState, TransportStats
+from companion.mavlink.transports.transport import OnBytes, TransportState, TransportStats
 
 _STX = 0xFD
 

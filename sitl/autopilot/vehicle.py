@@ -11,7 +11,7 @@ from companion.boat import Polar
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from sitl.autopilot import kernel as k
 from sitl.autopilot.parameters import Parameters
-from sitl.wind import Wind
+from sitl.world.wind import Wind
 
 LOOP_S = k.LOOP_S
 _WIND_LOOPS = 5

@@ -35,9 +35,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.compiled import compile_ahead
-    from sitl.figures import SCENARIOS, run_baselines
-    from sitl.scenario import load_scenario
+    from sitl.campaigns.figures import SCENARIOS, run_baselines
+    from sitl.run.compiled import compile_ahead
+    from sitl.scene.scenario import load_scenario
 
     for path in args.scenarios or ():
         load_scenario(path)

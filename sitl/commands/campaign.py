@@ -31,7 +31,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaign import run_campaign
+    from sitl.campaigns.campaign import run_campaign
 
     return run_campaign(
         args.scenarios, runs=args.runs, first_seed=args.first_seed, workers=args.workers, json_path=args.json,

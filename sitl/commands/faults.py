@@ -35,8 +35,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.compiled import compile_ahead
-    from sitl.faults import run_faults, sail_seed, sail_worker_seed
+    from sitl.campaigns.faults import run_faults, sail_seed, sail_worker_seed
+    from sitl.run.compiled import compile_ahead
 
     compile_ahead()
     if args.keep is not None:

@@ -37,13 +37,13 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run_virtual
     from companion.errors import InputError
-    from companion.telemetry.names import DECISIONS
+    from companion.telemetry.folder.names import DECISIONS
     from companion.telemetry.progress import ProgressLine
-    from sitl.compiled import compile_ahead
-    from sitl.hull import own_polar
-    from sitl.runner import mission_of, run_embedded
-    from sitl.scenario import load_scenario
-    from sitl.weather import scenario_wind
+    from sitl.run.compiled import compile_ahead
+    from sitl.run.embedded import mission_of, run_embedded
+    from sitl.scene.hull import own_polar
+    from sitl.scene.scenario import load_scenario
+    from sitl.scene.weather import scenario_wind
 
     scenario = load_scenario(args.scenario)
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{scenario.name}"
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
     compile_ahead()
     if args.autopilot == "ardurover" or args.live:
-        from sitl.live import run_live
+        from sitl.run.live import run_live
 
         verdict = run_live(
             scenario, args.scenario, args.seed, folder, autopilot=args.autopilot, program=args.ardurover,
@@ -77,8 +77,8 @@ def draw(folder: Path) -> None:
     """Draw the voyage; a picture that fails must not hide the verdict."""
     try:
         from companion.plots.voyage import plot_voyage
-        from companion.telemetry.names import PICTURE
-        from companion.telemetry.voyage_folder import read_voyage
+        from companion.telemetry.folder.names import PICTURE
+        from companion.telemetry.folder.reading import read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:

@@ -27,10 +27,10 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea
 from companion.mavlink.autopilot import Autopilot as Facade
 from sitl.autopilot import Truth
-from sitl.motorboat import MotorBoat
 from sitl.tasks.guided import sail_guided, with_boat
 from sitl.tasks.wrsc2013 import ORIGIN
-from sitl.wind import AR1
+from sitl.world.motorboat import MotorBoat
+from sitl.world.wind import AR1
 
 MARKS = ((0.0, 80.0), (110.0, 80.0), (110.0, 0.0), (0.0, 0.0))
 REACHED_M = 5.0

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from companion.geo.frame import LocalFrame
 from companion.messages import AisReport, GeoPoint
 from companion.planner import Plan, Problem, plan
-from companion.planner.problem import BoatLimits, Sigma, Wind
-from companion.planner.vessels import VESSELS_SHARE
-from companion.skipper.traffic import (
+from companion.planner.problem.value import BoatLimits, Sigma, Wind
+from companion.planner.risk.vessels import VESSELS_SHARE
+from companion.skipper.planning.vessels import (
     ALIKE_S,
     GIVE_UP_RISK,
     HORIZON_S,
@@ -47,9 +47,9 @@ from companion.traffic import (
 from companion.traffic.occupancy import Disc, Keep
 from companion.traffic.plans import MIN_INTERVAL_S, pressing
 from companion.traffic.predict import tail_factor
-from sitl.tasks.afloat import polar_at
 from sitl.tasks.wrsc2013 import least_distance_m
 from sitl.tasks.wrsc2013_planner import target_of
+from sitl.world.afloat import polar_at
 
 ORIGIN = GeoPoint(lat_deg=48.0, lon_deg=-6.0)
 STEP_S = 5.0

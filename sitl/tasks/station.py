@@ -1,6 +1,6 @@
 """Station keeping on VAIMOS's model: by field, and by a plan, a short loop.
 
-The scores are in ``sitl.tasks.scores``. Published: 9.4 m with a boat of 2.6 m, 3.61 lengths, is the best of WRSC 2018;
+The scores are in ``sitl.scene.scores``. Published: 9.4 m with a boat of 2.6 m, 3.61 lengths, is the best of WRSC 2018;
 mean radii of 2.1 to 8.4 m are those of 2019.
 
     python -m sitl.tasks.station --runs 20
@@ -21,8 +21,8 @@ from companion.field.controllers import line_following
 from companion.field.guidance import go_to, helm, step
 from companion.field.station import Station, StationState, keep
 from companion.field.values import GuidanceState, Habits, Situation
-from sitl.tasks.afloat import LENGTH_M, Afloat, habits_for, wind_for
-from sitl.tasks.scores import TASK_S, StationScore, station_score
+from sitl.scene.scores import TASK_S, StationScore, station_score
+from sitl.world.afloat import LENGTH_M, Afloat, habits_for, wind_for
 
 PLAN_HALF_M = 2.0     # the plan: to and fro between two waypoints this far from the station, across the wind
 PLAN_REACHED_M = 3.0

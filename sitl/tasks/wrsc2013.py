@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
-from sitl.tasks.afloat import LENGTH_M, Afloat, habits_for, summary, wind_for
+from sitl.world.afloat import LENGTH_M, Afloat, habits_for, summary, wind_for
 
 HALF_M = 100.0
 APPROACH_M = 5.0

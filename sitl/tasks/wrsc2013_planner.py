@@ -14,7 +14,7 @@ from companion.field.guidance import LastResort, helm
 from companion.field.values import GuidanceState, Habits, Situation
 from companion.geo.frame import LocalFrame
 from companion.planner import Problem, plan
-from companion.planner.problem import BoatLimits, Sigma, Target, Wind
+from companion.planner.problem.value import BoatLimits, Sigma, Target, Wind
 from companion.traffic import Vessel, check_legs, decide, planning_discs
 from companion.traffic.occupancy import Disc
 from companion.traffic.plans import Conflict, Decision

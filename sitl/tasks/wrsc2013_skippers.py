@@ -21,7 +21,7 @@ from companion.geo.frame import LocalFrame
 from companion.traffic import TargetLimits, Targets, Vessel, decode_json, predict
 from companion.traffic.occupancy import Keep
 from companion.traffic.predict import STEADY, risk_factor
-from sitl.tasks.afloat import LENGTH_M
+from sitl.world.afloat import LENGTH_M
 
 HALF_M = 100.0
 SHUTTLE_M = 30.0      # while waiting: to and fro across the wind, this far each side of the centre

@@ -6,18 +6,18 @@ taken for somebody else's mission.
 
 import asyncio
 
+from companion.app.executor import Executor
 from companion.clock import now_s, run_virtual
-from companion.executor import Executor
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.messages import GeoPoint, Mode, waypoint
 from companion.planner.worker import InlinePlanner
-from companion.skipper.actions import ReadMission, SetMode, UploadMission
-from companion.skipper.config import SkipperConfig
-from companion.skipper.snapshot import CommandResult, UploadResult
+from companion.skipper.step.actions import ReadMission, SetMode, UploadMission
+from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.snapshot import CommandResult, UploadResult
 from sitl.autopilot import HOME, AutopilotConfig, Impairment, MemoryLink, serve
 from sitl.autopilot import Autopilot as SimulatedAutopilot
-from sitl.wind import Constant
+from sitl.world.wind import Constant
 
 ITEMS = tuple(waypoint(GeoPoint(lat_deg=HOME.lat_deg + 0.001 * n, lon_deg=HOME.lon_deg)) for n in range(1, 31))
 CONFIG = SkipperConfig()

@@ -17,18 +17,18 @@ from companion.compose import config_of, estimator_of, voyage_of
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.frames import Codec
 from companion.mavlink.link import Link
-from companion.mavlink.parameter_ranges import RANGES, believable, refusal
-from companion.mavlink.transport import open_link
+from companion.mavlink.transports.transport import open_link
+from companion.mavlink.wire.frames import Codec
+from companion.mavlink.wire.parameter_ranges import RANGES, believable, refusal
 from companion.skipper import Skipper
-from companion.skipper.config import Permissions
-from companion.skipper.snapshot import Disbelieved
+from companion.skipper.step.config import Permissions
+from companion.skipper.step.snapshot import Disbelieved
 from companion.wind import WindRoom
 from companion.wind.parameters import VaneParameters
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, serve
-from sitl.wind import Constant
+from sitl.world.wind import Constant
 
 DEMO = "missions/archipelago.toml"
 

@@ -14,8 +14,8 @@ from companion.field.guidance import LastResort, follow_line, go_to, helm, hold_
 from companion.field.look_ahead import foresee, margins
 from companion.field.values import GuidanceState, Habits, Intent, Manoeuvre, Obstacle, Situation
 from companion.geo.angles import wrap_pi
-from sitl.tasks.afloat import Afloat, habits_for, wind_for
-from sitl.wind import AR1
+from sitl.world.afloat import Afloat, habits_for, wind_for
+from sitl.world.wind import AR1
 
 angle = st.floats(-math.pi, math.pi)
 HABITS = Habits()

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from companion.field.controllers import motor_commands
 from companion.geo.angles import wrap_pi
-from sitl.ardurover_program import find
-from sitl.motorboat import MotorBoat
+from sitl.ardurover.program import find
 from sitl.tasks.motor import HABITS, run, run_ardurover
+from sitl.world.motorboat import MotorBoat
 
 
 def test_both_motors_at_one_half_go_straight_at_two_metres_a_second() -> None:

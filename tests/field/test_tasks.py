@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
+from sitl.scene.scores import sailbot_points, station_score
 from sitl.tasks.guided import run_station, run_wrsc
-from sitl.tasks.scores import sailbot_points, station_score
 from sitl.tasks.station import run as keep_station
 from sitl.tasks.wrsc2013 import HALF_M, campaign, draw, run, score, table
 

@@ -7,8 +7,8 @@ import pytest
 
 from companion.cli import main
 from companion.geofence import load_mission, read
-from companion.geofence.mission_files import document_of
-from companion.geofence.options import OperatorOptions
+from companion.geofence.mission.files import document_of
+from companion.geofence.mission.options import OperatorOptions
 
 MISSIONS = pathlib.Path(__file__).parents[2] / "missions"
 DEMO = str(MISSIONS / "archipelago.toml")

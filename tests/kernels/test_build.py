@@ -15,7 +15,7 @@ from companion.kernels import places
 from companion.kernels.build import Progress, is_ready, prepare
 from companion.kernels.listed import read_list
 from companion.kernels.signatures import as_text
-from sitl.ships import free_port
+from sitl.scene.ships import free_port
 
 ALL = ("companion", "sitl")
 # What is compiled while a program does all that a voyage asks for.
@@ -33,7 +33,7 @@ class Listener(event.Listener):
 
 event.register("numba:compile", Listener())
 from companion.planner.warm import warm
-from companion.wind.forecaster import compile_kernels
+from companion.wind.estimators.forecaster import compile_kernels
 from sitl.autopilot import kernel
 warm()
 compile_kernels()

@@ -7,19 +7,19 @@ import pytest
 from companion import clock
 from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.items import first_difference, mission_hash, sailed
 from companion.mavlink.link import Link
-from companion.mavlink.machines import Outcome
-from companion.mavlink.reception import LinkIdentity
-from companion.mavlink.status_wire import StatusReader
-from companion.mavlink.transport import open_link
+from companion.mavlink.transfers.machines import Outcome
+from companion.mavlink.transports.transport import open_link
+from companion.mavlink.trust.reception import LinkIdentity
+from companion.mavlink.wire.items import first_difference, mission_hash, sailed
+from companion.mavlink.wire.status import StatusReader
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, Mode, StatusText, waypoint
-from sitl.ardurover import ArduRover
-from sitl.ardurover_program import find
+from sitl.ardurover.program import find
+from sitl.ardurover.simulation import ArduRover
 from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot.memory import frames
-from sitl.wind import Constant
+from sitl.world.wind import Constant
 
 PROGRAM = find()
 SPEEDUP = 10.0

@@ -9,17 +9,17 @@ import pytest
 from companion.clock import now_s, run_virtual
 from companion.errors import LinkError
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.frames import Drop
-from companion.mavlink.items import canonical, mission_hash, sailed
 from companion.mavlink.link import Link
-from companion.mavlink.machines import Outcome
-from companion.mavlink.reception import LinkIdentity
-from companion.mavlink.status_wire import StatusReader
+from companion.mavlink.transfers.machines import Outcome
+from companion.mavlink.trust.reception import LinkIdentity
+from companion.mavlink.wire.frames import Drop
+from companion.mavlink.wire.items import canonical, mission_hash, sailed
+from companion.mavlink.wire.status import StatusReader
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.memory import Impairment
-from sitl.wind import Constant
+from sitl.world.wind import Constant
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
 

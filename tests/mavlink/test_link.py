@@ -10,19 +10,19 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s, run, run_virtual
 from companion.errors import LinkError
-from companion.mavlink import codec
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.frames import Codec, Drop, SigningState
-from companion.mavlink.items import mission_hash
 from companion.mavlink.link import Link
-from companion.mavlink.machines import Outcome
-from companion.mavlink.reception import LinkIdentity
-from companion.mavlink.signing import EPOCH_S, SigningStore
-from companion.mavlink.transport import open_link
+from companion.mavlink.transfers.machines import Outcome
+from companion.mavlink.transports.signing import EPOCH_S, SigningStore
+from companion.mavlink.transports.transport import open_link
+from companion.mavlink.trust.reception import LinkIdentity
+from companion.mavlink.wire import codec
+from companion.mavlink.wire.frames import Codec, Drop, SigningState
+from companion.mavlink.wire.items import mission_hash
 from companion.messages import Command, GeoPoint, Mode, waypoint
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
-from sitl.wind import Constant
+from sitl.world.wind import Constant
 
 BEAT = wire.MAVLink_heartbeat_message(11, 3, 0, 4, 3, 3)
 

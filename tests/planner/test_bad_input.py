@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
-from companion.planner import shore as shores
-from companion.planner.kernels import is_free
-from companion.planner.world import make_world
+from companion.planner.problem import shore as shores
+from companion.planner.search.kernels import is_free
+from companion.planner.search.world import make_world
 from tests.planner.problems import POLAR, box, random_problems, simple
 
 BOAT = simple()["boat"]

@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.clock import now_s, run_virtual
 from companion.geo.frame import LocalFrame
 from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.wind import Constant, Wind
+from sitl.world.wind import Constant, Wind
 
 FRAME = LocalFrame(HOME)
 

@@ -13,11 +13,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion import clock
 from companion.errors import InputError, JobError
 from companion.geo.angles import difference_rad
-from companion.mavlink.transport import open_link
-from sitl.ardurover import ArduRover, free_instance
-from sitl.ardurover_program import check, fetch, find
+from companion.mavlink.transports.transport import open_link
+from sitl.ardurover.program import check, fetch, find
+from sitl.ardurover.simulation import ArduRover, free_instance
 from sitl.autopilot import HOME
-from sitl.wind import Constant, Event, Scripted
+from sitl.world.wind import Constant, Event, Scripted
 from tests.sitl.boats import Client, sail
 
 PROGRAM = find()

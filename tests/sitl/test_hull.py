@@ -10,8 +10,8 @@ from companion.boat.polar import MPS_PER_KNOT
 from sitl.autopilot import kernel as k
 from sitl.autopilot.parameters import Parameters
 from sitl.autopilot.vehicle import Vehicle
-from sitl.hull import own_polar
-from sitl.wind import Constant
+from sitl.scene.hull import own_polar
+from sitl.world.wind import Constant
 
 # A keelboat, slower than the simulator's own hull on every course; knots.
 SLOW = Polar(

@@ -12,20 +12,20 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.clock import now_s, run_virtual
 from companion.geo.angles import difference_rad
 from companion.geo.frame import LocalFrame
-from companion.mavlink.transport import open_link
+from companion.mavlink.transports.transport import open_link
 from companion.messages import GeoPoint
 from companion.traffic.feeds import open_feed
 from companion.traffic.nmea import NmeaDecoder
-from sitl.ardurover_program import find
+from sitl.ardurover.program import find
 from sitl.autopilot import VaneFault, VaneState, Vessel
-from sitl.false_vane import FalseVane
-from sitl.live import run_live
-from sitl.others import Others, sentences
-from sitl.relay import Relay, befall
-from sitl.scenario import EventSpec, load_scenario
-from sitl.ships import distance_m, free_port, ship_of
-from sitl.verdict import Truth
-from sitl.wind import Constant
+from sitl.run.live import run_live
+from sitl.scene.others import Others, sentences
+from sitl.scene.scenario import EventSpec, load_scenario
+from sitl.scene.ships import distance_m, free_port, ship_of
+from sitl.scene.verdict import Truth
+from sitl.trouble.false_vane import FalseVane
+from sitl.trouble.relay import Relay, befall
+from sitl.world.wind import Constant
 
 ORIGIN = GeoPoint(lat_deg=50.817, lon_deg=-1.31)
 FRAME = LocalFrame(ORIGIN)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from companion.errors import InputError
 from companion.geo.angles import difference_rad, wrap_pi
-from sitl.wind import AR1, NOISE_RAD, RHO_HZ, SPREAD_RAD, Constant, Event, Recorded, Scripted, parse_wind
+from sitl.world.wind import AR1, NOISE_RAD, RHO_HZ, SPREAD_RAD, Constant, Event, Recorded, Scripted, parse_wind
 
 
 def directions(wind: AR1, step_s: float, count: int) -> np.ndarray:

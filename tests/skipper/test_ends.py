@@ -6,13 +6,13 @@ import pytest
 from shapely.geometry import box
 
 from companion.messages import GeoPoint, Mode
-from companion.skipper import actions as act
-from companion.skipper.config import SafeEnd
-from companion.skipper.geometry import distance_m
-from companion.skipper.saved import Persisted
-from companion.skipper.state import Phase
-from companion.skipper.voyage import Goal
-from tests.skipper.test_failsafe import text
+from companion.skipper.step import actions as act
+from companion.skipper.step.config import SafeEnd
+from companion.skipper.step.saved import Persisted
+from companion.skipper.step.state import Phase
+from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.voyage import Goal
+from tests.skipper.deeds.test_failsafe import text
 from tests.skipper.test_voyage import is_done, make, said
 from tests.skipper.world import FRAME, restarted
 

@@ -6,10 +6,10 @@ import random
 import pytest
 
 from companion.messages import Mode, StatusText
-from companion.skipper.geometry import moved
-from companion.skipper.route import ends_safely, is_same_mission
-from companion.skipper.snapshot import OperatorWish, UploadResult, WindHealth
-from companion.skipper.state import Phase
+from companion.skipper.step.route import ends_safely, is_same_mission
+from companion.skipper.step.snapshot import OperatorWish, UploadResult, WindHealth
+from companion.skipper.step.state import Phase
+from companion.skipper.way.geometry import moved
 from tests.skipper.test_voyage import ar1, is_done, make
 from tests.skipper.world import restarted
 

@@ -13,14 +13,14 @@ from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, Mode, StatusText
 from companion.planner import PlanStatus
 from companion.planner.worker import failed
-from companion.skipper import actions as act
-from companion.skipper.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
-from companion.skipper.geometry import bearing_rad, distance_m, moved
-from companion.skipper.manoeuvre import is_tack
-from companion.skipper.route import effective, ends_safely, is_same_mission
-from companion.skipper.snapshot import AutopilotRebooted, OperatorWish, UploadResult, WindHealth
-from companion.skipper.state import Phase
-from companion.skipper.voyage import Goal, Side
+from companion.skipper.step import actions as act
+from companion.skipper.step.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
+from companion.skipper.step.route import effective, ends_safely, is_same_mission
+from companion.skipper.step.snapshot import AutopilotRebooted, OperatorWish, UploadResult, WindHealth
+from companion.skipper.step.state import Phase
+from companion.skipper.way.geometry import bearing_rad, distance_m, moved
+from companion.skipper.way.manoeuvre import is_tack
+from companion.skipper.way.voyage import Goal, Side
 from tests.skipper.world import World, restarted, skipper, voyage
 
 ISLANDS = (box(-40, 120, 30, 160), box(60, 220, 120, 260), box(-120, 230, -20, 270))

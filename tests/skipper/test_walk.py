@@ -9,14 +9,12 @@ from functools import cache
 import pytest
 import shapely
 
-from companion.mavlink.identity import Identity
+from companion.mavlink.trust.identity import Identity
 from companion.messages import Mode, StatusText
 from companion.planner import plan
-from companion.skipper import actions as act
-from companion.skipper.config import ALL_PERMITTED, DRY_RUN, Permissions
-from companion.skipper.document import markdown
-from companion.skipper.geometry import bearing_rad, moved
-from companion.skipper.snapshot import (
+from companion.skipper.step import actions as act
+from companion.skipper.step.config import ALL_PERMITTED, DRY_RUN, Permissions
+from companion.skipper.step.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
     CommandResult,
@@ -31,9 +29,11 @@ from companion.skipper.snapshot import (
     WindHealth,
     WindView,
 )
-from companion.skipper.state import Phase
-from companion.skipper.voyage import Goal, Side
-from companion.skipper.watchdogs import TABLE
+from companion.skipper.step.state import Phase
+from companion.skipper.watch.document import markdown
+from companion.skipper.watch.watchdogs import TABLE
+from companion.skipper.way.geometry import bearing_rad, moved
+from companion.skipper.way.voyage import Goal, Side
 from companion.traffic import TrafficPicture
 from tests.skipper.test_voyage import ISLANDS, make
 from tests.skipper.world import check_invariants
@@ -410,4 +410,4 @@ def test_the_document_is_current():
 
     path = Path(__file__).parents[2] / "docs" / "watchdogs.md"
     text = path.read_text(encoding="utf-8")
-    assert text == markdown(), "run: python -m companion.skipper.document > docs/watchdogs.md"
+    assert text == markdown(), "run: python -m companion.skipper.watch.document > docs/watchdogs.md"

@@ -16,7 +16,7 @@ from companion.boat import AutopilotLimits, Boat, ardurover_sitl
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import LocalArea
-from companion.mavlink.identity import Identity
+from companion.mavlink.trust.identity import Identity
 from companion.messages import (
     AutopilotStatus,
     Command,
@@ -28,12 +28,11 @@ from companion.messages import (
     WindForecast,
 )
 from companion.planner import plan
-from companion.skipper import actions as act
-from companion.skipper.config import ALL_PERMITTED, Permissions, SkipperConfig
-from companion.skipper.geometry import bearing_rad, cross_track_m, distance_m, is_past, moved
 from companion.skipper.rules import Skipper
-from companion.skipper.saved import Persisted
-from companion.skipper.snapshot import (
+from companion.skipper.step import actions as act
+from companion.skipper.step.config import ALL_PERMITTED, Permissions, SkipperConfig
+from companion.skipper.step.saved import Persisted
+from companion.skipper.step.snapshot import (
     CommandOutcome,
     CommandResult,
     MissionOnBoard,
@@ -46,8 +45,9 @@ from companion.skipper.snapshot import (
     WindHealth,
     WindView,
 )
-from companion.skipper.state import SkipperState
-from companion.skipper.voyage import Goal, Refuge, Voyage
+from companion.skipper.step.state import SkipperState
+from companion.skipper.way.geometry import bearing_rad, cross_track_m, distance_m, is_past, moved
+from companion.skipper.way.voyage import Goal, Refuge, Voyage
 
 FRAME = LocalFrame(GeoPoint(lat_deg=51.1, lon_deg=-1.3))
 HORIZONS = (0.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
@@ -348,9 +348,9 @@ class World:
 
 def check_invariants(before, after, snapshot, actions) -> None:
     """What must hold in every step of every test."""
-    from companion.skipper.route import ends_safely
-    from companion.skipper.state import Phase
-    from companion.skipper.turn import permitted
+    from companion.skipper.step.route import ends_safely
+    from companion.skipper.step.state import Phase
+    from companion.skipper.step.turn import permitted
 
     for action in actions:
         assert permitted(action, snapshot.permissions), action

@@ -13,7 +13,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.geo.frame import LocalFrame
-from companion.mavlink.codec import ais_report, geo_point
+from companion.mavlink.wire.codec import ais_report, geo_point
 from companion.messages import GeoPoint
 from companion.traffic import LAKE, Alarm, OwnShip, Role, Targets, assess, cpa
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from companion.messages import ApparentWind, GeoPoint, VehicleState, WindSample, WindSource
 from companion.wind import WindRoom, apparent_wind
-from companion.wind.records import weather
+from companion.wind.study.records import weather
 
 HERE = GeoPoint(lat_deg=47.0, lon_deg=8.0)
 

@@ -10,7 +10,7 @@ from companion.cli import main
 from companion.commands.wind import read_record
 from companion.errors import InputError
 from companion.mavlink.tlog import TlogWriter
-from companion.wind.records import weather
+from companion.wind.study.records import weather
 
 
 def write_csv(path, record, *, extra=True):

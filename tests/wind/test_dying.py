@@ -10,7 +10,7 @@ from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.messages import VehicleState, WindSample
 from companion.skipper import Skipper
-from companion.skipper.snapshot import WindHealth
+from companion.skipper.step.snapshot import WindHealth
 from companion.wind import VaneParameters, Verdict, WindRoom, apparent_wind, make
 from tests.wind.boat import HERE
 

@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from companion.wind import Forecaster, kernel
-from companion.wind.fit import Prepared, crps_circular, figures
-from companion.wind.prior import CONSTANTS
-from companion.wind.records import NOISE_RADPS, RHO_HZ, equation_17, weather
-from companion.wind.score import HORIZONS_S
+from companion.wind import Forecaster
+from companion.wind.estimators import kernel
+from companion.wind.estimators.prior import CONSTANTS
+from companion.wind.study.fit import Prepared, crps_circular, figures
+from companion.wind.study.records import NOISE_RADPS, RHO_HZ, equation_17, weather
+from companion.wind.study.score import HORIZONS_S
 
 STATIONARY_RAD = NOISE_RADPS / math.sqrt(1.0 - (1.0 - RHO_HZ) ** 2)      # 18.7 deg, equation 17 at 1 s
 SEEDS = range(40, 48)
@@ -104,7 +105,7 @@ def test_the_state_has_a_fixed_size():
 
 def test_scores_of_the_fit_are_those_of_the_score():
     """The fast replay of the fit and the plain scoring of the command are one definition."""
-    from companion.wind.score import score
+    from companion.wind.study.score import score
 
     record = weather(21, seconds=2400.0)
     slow = score(record, Forecaster())

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from companion.errors import InputError
 from companion.wind import make
-from companion.wind.ar1 import fit
-from companion.wind.records import NOISE_RADPS, RHO_HZ, Record, equation_17, parse_csv, weather
-from companion.wind.score import crps_circular, crps_normal, score
+from companion.wind.study.ar1 import fit
+from companion.wind.study.records import NOISE_RADPS, RHO_HZ, Record, equation_17, parse_csv, weather
+from companion.wind.study.score import crps_circular, crps_normal, score
 
 
 def test_the_kalman_filter_is_equations_1_to_8():

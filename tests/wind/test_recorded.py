@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from companion.wind import make
-from companion.wind.fit import Prepared, figures
-from companion.wind.prior import CONSTANTS
-from companion.wind.records import parse_csv
-from companion.wind.score import HORIZONS_S, average, score
+from companion.wind.estimators.prior import CONSTANTS
+from companion.wind.study.fit import Prepared, figures
+from companion.wind.study.records import parse_csv
+from companion.wind.study.score import HORIZONS_S, average, score
 
 pytestmark = pytest.mark.winddata
 

@@ -1,0 +1,98 @@
+"""What a voyage keeps of its autopilot: who it is, the parameters that matter, the fence that belongs on it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from typing import Any
+
+from companion.clock import now_s
+from companion.fold import VoyageFold
+from companion.geofence import Mission
+from companion.geofence.fence.autopilot_fence import FenceStatus, fence_for_autopilot
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.transfers.commands import CommandAnswer
+from companion.mavlink.wire.parameter_ranges import RANGES
+from companion.skipper.step.actions import Severity
+
+LOOK_S = 1.0
+# A parameter that is not answered is asked for again after this long [s].
+PARAMETER_AGAIN_S = 10.0
+# All are read again this often: what was changed, damaged or forged does not stay [s].
+PARAMETERS_EVERY_S = 300.0
+FENCE_TRIES = 5
+
+Record = Callable[[dict[str, Any]], None]
+
+
+async def keep_identity(fold: VoyageFold, autopilot: Autopilot) -> None:
+    """Ask who the autopilot is, again after each gap and reboot; the fold hears the answer as a message."""
+    while True:
+        if autopilot.link.is_alive and fold.wants_uid(now_s()):
+            await autopilot.read_version()
+        await asyncio.sleep(LOOK_S)
+
+
+async def keep_parameters(fold: VoyageFold, autopilot: Autopilot) -> None:
+    """Read the parameters that matter, now and then and after each reboot; the fold hears them as messages."""
+    asked_s: dict[str, float] = {}
+    reboots = 0
+    while True:
+        if reboots != autopilot.link.stats.reboots:
+            reboots = autopilot.link.stats.reboots
+            asked_s.clear()
+        for name in RANGES:
+            again_s = PARAMETER_AGAIN_S if name in fold.unread else PARAMETERS_EVERY_S
+            if autopilot.link.is_alive and now_s() - asked_s.get(name, -math.inf) >= again_s:
+                asked_s[name] = now_s()
+                await autopilot.get_parameter(name)
+        await asyncio.sleep(LOOK_S)
+
+
+async def keep_fence(fold: VoyageFold, autopilot: Autopilot, mission: Mission, record: Record) -> None:
+    """Upload the fence, where it may be, once the autopilot is known to be ours; begun again when that was in doubt."""
+    upload: asyncio.Task[None] | None = None
+    try:
+        while fold.permissions.may_upload_fence:
+            is_ours = fold.state.is_ours
+            if upload is None and is_ours:
+                upload = asyncio.create_task(_upload_fence(autopilot, mission, record), name="fence upload")
+            elif upload is not None and upload.done():
+                return upload.result()
+            elif upload is not None and not is_ours:
+                upload.cancel()
+                upload = None
+            await asyncio.sleep(LOOK_S)
+    finally:
+        if upload is not None:
+            upload.cancel()
+
+
+async def _upload_fence(autopilot: Autopilot, mission: Mission, record: Record) -> None:
+    """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
+    places = [*mission.places, *([mission.start] if mission.start else [])]
+    fence = fence_for_autopilot(mission.area, mission.margin_m, inside=places)
+    done: dict[str, Any] = {"kind": "fence", "status": fence.status.name, "text": fence.reason}
+    trouble = "" if fence.items or fence.status is FenceStatus.EMPTY else fence.reason
+    if fence.items:
+        sent = await autopilot.upload_fence(fence.items)
+        done |= {"outcome": sent.outcome.value, "text": sent.text, "count": len(fence.items)}
+        trouble = "" if sent.is_ok else sent.text or sent.outcome.value
+        if sent.is_ok:
+            enabled = await _enable_fence(autopilot)
+            done["enabled"] = enabled.outcome.value
+            trouble = "" if enabled.is_ok else enabled.text or enabled.outcome.value
+    if trouble:
+        autopilot.say(int(Severity.ERROR), f"the fence is not in force: {trouble}")
+    record(done)
+
+
+async def _enable_fence(autopilot: Autopilot) -> CommandAnswer:
+    """Switch the fence on; ArduRover refuses it for the moment in which it takes a new one in."""
+    for _ in range(FENCE_TRIES - 1):
+        answer = await autopilot.enable_fence()
+        if answer.is_ok:
+            return answer
+        await asyncio.sleep(LOOK_S)
+    return await autopilot.enable_fence()

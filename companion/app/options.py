@@ -1,0 +1,67 @@
+"""How to sail, beside the mission: what the caller of a voyage decides."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from companion.disk import Disk
+from companion.mavlink.transports.signing import SigningStore
+from companion.telemetry.folder.shelf import Shelf
+
+Offload = Callable[[Callable[[], None]], Awaitable[None]]
+
+
+async def in_thread(work: Callable[[], None]) -> None:
+    """Do disk work in a thread: a slow card must not hold the loop."""
+    await asyncio.to_thread(work)
+
+
+async def at_once(work: Callable[[], None]) -> None:
+    """Do disk work here: for the virtual clock, which has no threads."""
+    work()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SailOptions:
+    """How to sail, beside the mission.
+
+    Attributes:
+        seed: of the planner.
+        dry_run: look, plan, speak, touch nothing.
+        epoch_s: Unix time [s] of the loop's time 0, for stamps only.
+        expansions: plan with this effort instead of the mission's time budget (repeatable).
+        state_path: where the state for a restart is kept; None: in the voyage folder.
+        limit_s: end after this long [s].
+        exit_on_arrival: end when the voyage is over, for harnesses; on the water the loiter is watched until told.
+        wait_s: how long to wait for the autopilot's first heartbeat [s].
+        offload: where disk work is done.
+        is_durable: force files to the disk, against power cuts; a simulation has none.
+        disk: what is written to.
+        shelf: the older voyages beside this one and what all may take together; None: they are left alone.
+        is_again: sail the mission again although the saved state says that it has arrived.
+        signing: key and timestamp for a signed link.
+        token: 32 bits that tell our heartbeat from a second companion's; on the boat they are drawn by lot.
+        budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
+        command: what was typed, for the record.
+    """
+
+    seed: int = 0
+    dry_run: bool = False
+    epoch_s: float = 0.0
+    expansions: int | None = None
+    state_path: Path | None = None
+    limit_s: float | None = None
+    exit_on_arrival: bool = False
+    wait_s: float = 30.0
+    offload: Offload = in_thread
+    is_durable: bool = True
+    disk: Disk = field(default_factory=Disk)
+    shelf: Shelf | None = None
+    is_again: bool = False
+    signing: SigningStore | None = None
+    token: int = 1
+    budget_scale: float = 1.0
+    command: str = ""

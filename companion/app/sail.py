@@ -1,0 +1,333 @@
+"""The composition root: the one module that knows every room, and the one task group that a voyage lives in.
+
+``sail`` joins a transport, a planner and a mission into a voyage and returns its summary. It does not know whether
+the boat is simulated, how fast time runs, or where the planner computes: all of that is in what it is given.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import functools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from companion.app.company import NOBODY, make_way, others_on
+from companion.app.executor import Executor, Planner
+from companion.app.keepers import keep_fence, keep_identity, keep_parameters
+from companion.app.options import SailOptions
+from companion.clock import now_s
+from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
+from companion.fold import Step, VoyageFold
+from companion.geofence import Mission
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.link import Link
+from companion.mavlink.transports.transport import Transport
+from companion.mavlink.trust.link_stats import LinkStats
+from companion.mavlink.trust.reception import LinkIdentity
+from companion.mavlink.wire.frames import Drop
+from companion.messages import CompanionStatus
+from companion.skipper import Skipper
+from companion.skipper.step.actions import Severity
+from companion.skipper.step.state import Phase
+from companion.telemetry.folder.logbook import Logbook
+from companion.telemetry.folder.names import STATE
+from companion.telemetry.folder.recorder import Recorder
+from companion.telemetry.folder.records import ais_record, outcome_record
+from companion.telemetry.progress import DISK, left_behind
+from companion.telemetry.radio import Radio
+from companion.telemetry.state_file import StateFile
+from companion.telemetry.status import companion_status
+from companion.traffic.listening import Feeds
+from companion.wind import WindRoom
+
+STEP_S = 1.0
+TEND_EVERY_S = 5.0        # records are synced, and taken up again after trouble
+LOOP_WATCH_S = 0.1
+# With ``exit_on_arrival`` the loiter is watched for a moment before the program ends [s].
+LINGER_S = 5.0
+LINGER_BUSY_S = 60.0
+
+OnStatus = Callable[[CompanionStatus, Step], None]
+
+
+async def sail(
+    mission: Mission, transport: Transport, planner: Planner, folder: Path, options: SailOptions,
+    *, on_status: OnStatus | None = None, on_refusal: Callable[[str], None] | None = None,
+    stop: asyncio.Event | None = None,
+) -> dict[str, Any]:
+    """Sail ``mission`` and watch the boat at its end until stopped or out of time; return the summary.
+
+    ``on_status`` hears of every step, ``on_refusal`` of what was given and is not used (a saved state, a feed).
+
+    Raises:
+        LinkError: no autopilot was heard within ``options.wait_s``.
+        JobError: the folder's name cannot be one, or another companion is recording there.
+    """
+    with Recorder(folder, disk=options.disk, shelf=options.shelf, is_durable=options.is_durable) as recorder:
+        shell = _Shell(mission, planner, recorder, options, stop or asyncio.Event())
+        shell.on_status, shell.on_refusal = on_status, on_refusal
+        return await shell.run(transport)
+
+
+class _Shell:
+    """One voyage: the fold and everything around it that has a life."""
+
+    def __init__(
+        self, mission: Mission, planner: Planner, recorder: Recorder, options: SailOptions, stop: asyncio.Event,
+    ) -> None:
+        self.mission, self.recorder, self.options = mission, recorder, options
+        self.planner, self.stop = planner, stop
+        self.on_status: OnStatus | None = None
+        self.on_refusal: Callable[[str], None] | None = None
+        self.voyage = voyage_of(mission)
+        self.config = config_of(mission)
+        self.log = Logbook(recorder, self.config, options.epoch_s)
+        self.state_file = StateFile(
+            options.state_path or recorder.folder / STATE, disk=options.disk, offload=options.offload,
+            is_durable=options.is_durable, pace=1.0 / options.budget_scale)
+        self.status: CompanionStatus | None = None
+        self._step: Step | None = None
+        self.end_reason = "stopped"
+        self.loop_held_s = 0.0
+        self._arrived_before = False
+        self._named = mission.autopilot.system     # of our autopilot: as named, or as of the voyage that goes on
+        self._refusals: list[str] = []
+        self.feeds = Feeds()
+        self._system: int | None = None            # of our autopilot, as heard
+        self._others = NOBODY
+        self._autopilot: Autopilot | None = None
+        self._counted = LinkStats()
+
+    async def run(self, transport: Transport) -> dict[str, Any]:
+        """Sail and leave the folder complete, whatever happens."""
+        self._begin(transport.name)
+        try:
+            async with (
+                Link(
+                    transport, sink=self.log.frame, signing=self.options.signing, is_starting=True,
+                    identity=LinkIdentity(token=self.options.token), target_system=self._named,
+                    objection=self.fold.objection, stamp=self.log.stamped_s, on_fault=self._on_fault,
+                ) as link,
+                contextlib.AsyncExitStack() as stack,
+            ):
+                self._counted = link.stats
+                link.subscribe(self._on_message)
+                await self._wait_autopilot(link)
+                autopilot = self._autopilot = await stack.enter_async_context(Autopilot(link))
+                for text in await self.feeds.open(stack, feeds_of(self.mission), self.options.seed):
+                    self._refuse("AIS feed", text)
+                for text in self._refusals:
+                    autopilot.say(int(Severity.WARNING), text)
+                executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
+                                    expansions=self.options.expansions,
+                                    budget_scale=self.options.budget_scale, config=self.config)
+                radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
+                async with asyncio.TaskGroup() as group:
+                    tasks = [
+                        group.create_task(executor.run(), name="executor"),
+                        group.create_task(keep_identity(self.fold, autopilot), name="identity"),
+                        group.create_task(keep_parameters(self.fold, autopilot), name="parameters"),
+                        group.create_task(keep_fence(self.fold, autopilot, self.mission, self._record), name="fence"),
+                        group.create_task(radio.run(), name="radio"),
+                        group.create_task(self._tend_records(), name="records"),
+                        group.create_task(self._watch_loop(), name="loop watch"),
+                    ]
+                    await self._steps(executor, link)
+                    for task in tasks:
+                        task.cancel()
+        except asyncio.CancelledError:
+            self.end_reason = "interrupted"
+            raise
+        finally:
+            summary = self._summary()
+            self.recorder.summary(summary)
+        return summary
+
+    def _begin(self, link: str) -> None:
+        """Begin the fold with what is known from before, and write that down."""
+        options = self.options
+        skipper = Skipper(voyage=self.voyage, config=self.config)
+        persisted, known = self.state_file.load(), self.state_file.known()
+        if persisted is not None and skipper.has_arrived(persisted):
+            self._arrived_before = not options.is_again
+            if options.is_again:
+                known = (*known, *persisted.names)
+                persisted = None
+        if self._named is None and persisted is not None:
+            self._named = persisted.system
+        self.fold = VoyageFold(
+            skipper, WindRoom(estimator=estimator_of(self.mission)),
+            permissions_of(self.mission, dry_run=options.dry_run), persisted, known=known,
+            traffic=target_limits_of(self.mission),
+        )
+        # Growing a jagged coast takes seconds; under way the loop must not wait for it.
+        skipper.prepare()
+        t_s = self.log.now_s()
+        self.log.begin(t_s, self.mission, self.voyage, self.fold.permissions, persisted, known, {
+            "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
+            "expansions": options.expansions,
+        })
+        if self.state_file.refusal:
+            self._refuse("saved state", self.state_file.refusal)
+        elif persisted is not None and self.fold.state.adoptable is None:
+            self._refuse("saved state", f"{self.state_file.path.name} is not used: {self.fold.state.why}")
+
+    # -------------------------------------------------------------------------------------- inputs
+    def _on_message(self, t_s: float, message: Any) -> None:
+        if self._system is None or message.get_srcSystem() == self._system:   # not a command of somebody ashore
+            self.log.message()
+            self.fold.message(t_s, message)
+
+    def _record(self, record: dict[str, Any]) -> None:
+        """Record something that happened now."""
+        self.log.note(self.log.now_s(), record)
+
+    def _on_fault(self, text: str) -> None:
+        """Record and say a fault of whoever listens on the link; the link itself goes on."""
+        if self._autopilot is not None:
+            self._autopilot.say(int(Severity.ERROR), text)
+        self._record({"kind": "fault", "text": text})
+
+    def _on_outcome(self, outcome: Any) -> None:
+        t_s = self.log.now_s()
+        self.log.note(t_s, outcome_record(outcome))
+        self.fold.take_outcome(t_s, outcome)
+
+    # --------------------------------------------------------------------------------------- steps
+    def _tick(self, t_s: float, link: Link) -> Step:
+        """Fold what the feeds heard, after this step's messages as a replay does, and step."""
+        if link.has_autopilot:
+            others = others_on(link, named=self._named)
+            if others != self._others:
+                self._others = others
+                self.log.note(t_s, others.to_record())
+                self.fold.others(others.neighbours, has_company=others.has_company)
+        for report in self.feeds.take():
+            self.log.note(t_s, ais_record(report))
+            self.fold.take(report)
+        return self.fold.tick(t_s)
+
+    async def _steps(self, executor: Executor, link: Link) -> None:
+        started_s = next_s = now_s()
+        done_s: float | None = None
+        while True:
+            t_s = self.log.now_s()
+            self.fold.planner_alive(self.planner.is_alive)
+            step = self._tick(t_s, link)
+            await self._after_step(step, link)
+            executor.submit(step.actions)
+            if step.state.phase is Phase.DONE and self.options.exit_on_arrival:
+                done_s = t_s if done_s is None else done_s
+                # an upload under way is brought to its end: what stays on the autopilot is one plan
+                is_busy = step.state.pending_upload is not None
+                if t_s - done_s >= (LINGER_BUSY_S if is_busy else LINGER_S):
+                    self.end_reason = "arrived" if step.state.arrived else "over"
+                    return
+            else:
+                done_s = None
+            if self.options.limit_s is not None and t_s - started_s >= self.options.limit_s:
+                self.end_reason = "out of time"
+                return
+            next_s = max(next_s + STEP_S, now_s())
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout_at(next_s):
+                    await self.stop.wait()
+                self.end_reason = "stopped"
+                return
+
+    async def _wait_autopilot(self, link: Link) -> None:
+        """Wait until our autopilot is found and nobody else sails it, and say meanwhile that nobody is heard.
+
+        Raises:
+            LinkError: it is not found, or another companion is at work.
+        """
+        waiting = asyncio.create_task(self._find(link), name="whose boat")
+        try:
+            while not (await asyncio.wait([waiting], timeout=STEP_S))[0]:
+                step = self._tick(self.log.now_s(), link)
+                await self._after_step(step, link)
+            await waiting
+        finally:
+            waiting.cancel()
+
+    async def _find(self, link: Link) -> None:
+        self._system = (await link.wait_autopilot(self.options.wait_s)).target_system
+        self._record({"kind": "autopilot", "system": self._system, "unheard": link.unheard})
+        await make_way(link, named=self._named, token=self.options.token)
+        link.started()
+
+    async def _after_step(self, step: Step, link: Link) -> None:
+        """Record the step; nothing of it is carried out before what a restart needs is on the disk."""
+        snapshot = step.snapshot
+        clearance_m = None
+        if snapshot.position_en_m is not None and snapshot.vehicle is not None:
+            value = self.voyage.hull_clearance_m(snapshot.position_en_m, snapshot.vehicle.heading_rad)
+            clearance_m = value if math.isfinite(value) else None
+        self.log.step(step, clearance_m)
+        if not self.options.dry_run:   # which must not take the place of a voyage that is interrupted
+            await self.state_file.save(self.fold.skipper.persisted(step.state))
+        status = companion_status(step, self.voyage, self.log.figures, clearance_m, link.bytes_per_s()[1],
+                                  self.feeds.open_feeds, self.feeds.dropped)
+        trouble = self._trouble()
+        if trouble and not status.alert_code:
+            status = replace(status, alert_code=DISK, alert_text=trouble)
+        self.status, self._step = status, step
+        if self.on_status is not None:
+            self.on_status(status, step)
+
+    def _trouble(self) -> str:
+        """Return what cannot be written now and why, empty when all is well."""
+        state, records = self.state_file.trouble, self.recorder.trouble
+        return "; ".join(text for text in (
+            f"no state for a restart is saved: {state}" if state else "",
+            f"nothing is recorded: {records}" if records else "") if text)
+
+    # ----------------------------------------------------------------------------------- companions
+    async def _watch_loop(self) -> None:
+        """Measure how long the event loop was held: a timer that fires late was kept waiting by somebody."""
+        while True:
+            due_s = now_s() + LOOP_WATCH_S
+            await asyncio.sleep(LOOP_WATCH_S)
+            self.loop_held_s = max(self.loop_held_s, now_s() - due_s)
+
+    async def _tend_records(self) -> None:
+        while True:
+            await asyncio.sleep(TEND_EVERY_S)
+            stamps = self.log.stamps(self.log.now_s())
+            await self.options.offload(functools.partial(self.recorder.tend, stamps))
+
+    # ---------------------------------------------------------------------------------------- files
+    def _refuse(self, what: str, text: str) -> None:
+        """Record that something given is not used, and keep the sentence for the radio."""
+        self.log.note(self.log.now_s(), {"kind": "refusal", "what": what, "text": text})
+        self._refusals.append(text)
+        if self.on_refusal is not None:
+            self.on_refusal(text)
+
+    def _summary(self) -> dict[str, Any]:
+        state = self.fold.state
+        goals = len(self.voyage.legs)
+        return {
+            "mission": self.mission.name,
+            "arrived": state.arrived,
+            "arrived_before": self._arrived_before and not state.sailing,
+            **self.log.figures.to_dict(),
+            "goals_reached": min(goals, len(state.reached)),
+            "goals": goals,
+            "end_phase": state.phase.value,
+            "end_reason": self.end_reason,
+            "end_why": state.why,
+            "left_behind": "" if self._step is None else left_behind(self._step),
+            "ais_feeds": [feed.sentence() for feed in self.feeds.open_feeds],
+            "ais_dropped": self.feeds.dropped,
+            "frames_disbelieved": sum(self._counted.dropped[why] for why in (Drop.WRONG_CLOCK, Drop.OUT_OF_STEP)),
+            "listener_faults": dict(self._counted.faults),
+            "records_dropped": self.recorder.dropped,
+            "disk_trouble": self._trouble(),
+            "planner_restarts": self.planner.restarts,
+            "loop_held_max_s": round(self.loop_held_s * self.options.budget_scale, 4),
+        }

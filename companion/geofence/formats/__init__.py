@@ -1,0 +1,1 @@
+"""Every file format that carries fences, obstacles and missions."""

@@ -1,0 +1,141 @@
+"""Missions from drawings and drawings from missions: a TOML with its area files, or one document."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+from companion.geofence.document import Document
+from companion.geofence.findings import Finding, Severity
+from companion.geofence.formats.losses import Losses, Written
+from companion.geofence.formats.registry import write
+from companion.geofence.mission.mission import Mission, dump_options
+from companion.geofence.mission.options import AreaOptions, GoalOptions, MissionOptions, RefugeOptions, StartOptions
+from companion.geofence.shapes import Circle, Zone, ZoneKind
+from companion.messages import Command, GeoPoint, waypoint
+
+
+def document_of(mission: Mission) -> Document:
+    """Return a mission as a document: goals as waypoints, the start as home, obstacles and fence as zones."""
+    return Document(
+        source=str(mission.path), format="toml", zones=(*mission.area.fence.zones,
+                                                        *(o.zone() for o in mission.area.obstacles)),
+        items=tuple(waypoint(g.point) for g in mission.goals),
+        item_names=tuple(g.name for g in mission.goals) if any(g.name for g in mission.goals) else (),
+        home=mission.start,
+        rally=tuple(waypoint(r.point, command=Command.NAV_RALLY_POINT) for r in mission.refuges),
+    )
+
+
+def goal_losses(mission: Mission) -> Losses:
+    """Return what of a mission no other format carries."""
+    losses = Losses()
+    if any(g.rounding for g in mission.goals):
+        losses.add(Severity.WARNING, "the side on which marks are left is not carried by this format")
+    plain = replace_defaults(mission.options)
+    if plain:
+        losses.add(Severity.NOTE, f"the mission's own settings ({', '.join(plain)}) are not carried by this format")
+    return losses
+
+
+def replace_defaults(options: MissionOptions) -> list[str]:
+    """Return the names of the tables that differ from their defaults."""
+    default = MissionOptions(goal=options.goal)
+    return [t for t in ("risk", "boat", "wind", "operator", "skipper", "traffic")
+            if getattr(options, t) != getattr(default, t)]
+
+
+# Nothing is permitted by default; a new file names what could be.
+PERMITS = """
+[operator]            # what the companion may do uninvited
+set_auto = false      # upload missions, set AUTO and the modes of the watchdogs
+arm = false           # arm
+guided = false        # steer under GUIDED: out of irons, round a vessel
+upload_fence = false  # put the fence on the autopilot and switch it on
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionFiles:
+    """A mission TOML and the area files beside it, ready to be written: name -> content."""
+
+    toml: bytes
+    files: dict[str, bytes]
+    losses: tuple[Finding, ...] = ()
+
+
+def mission_files(
+    document: Document, name: str, *, start: GeoPoint | None = None, goals: tuple[GeoPoint, ...] = (),
+    margin_m: float | None = None, floor_m: float | None = None, radius_m: float | None = None,
+    point_radius_m: float | None = None, land: Document | None = None,
+) -> MissionFiles:
+    """Return the files of a mission made from a drawing.
+
+    Goals are ``goals``, or the document's waypoints in order; the start is ``start``, or its home; its rally points
+    are refuges. Its zones, and those of ``land``, become the area. Raises ValueError when there is no goal.
+    """
+    losses = Losses()
+    goal_options = [GoalOptions(lat=g.lat_deg, lon=g.lon_deg) for g in goals] or _goals(document, losses)
+    if not goal_options:
+        raise ValueError("there is no goal: give --goal, or draw waypoints")
+    if radius_m is not None:
+        goal_options = [GoalOptions(lat=g.lat, lon=g.lon, name=g.name, radius_m=radius_m) for g in goal_options]
+    home = start or document.home
+    whole = replace(document, zones=(*document.zones, *(land.zones if land else ())),
+                    marks=(*document.marks, *(land.marks if land else ())))
+    stem = re.sub(r"[^\w-]+", "-", name).strip("-").lower() or "mission"
+    files: dict[str, bytes] = {}
+    solid = replace(whole, zones=tuple(z for z in whole.zones if z.kind is ZoneKind.EXCLUSION))
+    limits = replace(whole, zones=tuple(z for z in whole.zones if z.kind is ZoneKind.INCLUSION), marks=())
+    obstacle_names: tuple[str, ...] = ()
+    fence_name: str | None = None
+    if solid.zones or solid.marks:
+        file_name, written = _area_file(solid, f"{stem}-obstacles")
+        files[file_name], obstacle_names = written.data, (file_name,)
+    if limits.zones:
+        file_name, written = _area_file(limits, f"{stem}-fence")
+        files[file_name], fence_name = written.data, file_name
+    if document.tracks:
+        losses.drop("tracks are", len(document.tracks))
+    defaults = AreaOptions()
+    margin = margin_m if margin_m is not None else defaults.margin_m
+    options = MissionOptions(
+        name=name, goal=tuple(goal_options),
+        start=StartOptions(lat=home.lat_deg, lon=home.lon_deg) if home is not None else None,
+        refuge=tuple(RefugeOptions(lat=r.point.lat_deg, lon=r.point.lon_deg) for r in document.rally),
+        area=AreaOptions(
+            obstacles=obstacle_names, fence=fence_name, margin_m=margin,
+            margin_floor_m=min(defaults.margin_floor_m if floor_m is None else floor_m, margin),
+            point_radius_m=point_radius_m if point_radius_m is not None else defaults.point_radius_m,
+        ),
+    )
+    return MissionFiles(toml=(dump_options(options) + PERMITS).encode(), files=files, losses=tuple(losses))
+
+
+def _goals(document: Document, losses: Losses) -> list[GoalOptions]:
+    names = document.item_names or ("",) * len(document.items)
+    out = []
+    other = 0
+    for item, name in zip(document.items, names, strict=True):
+        if item.command not in {Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TIME,
+                                Command.NAV_LOITER_TURNS} or not (item.lat_e7 or item.lon_e7):
+            other += 1
+            continue
+        out.append(GoalOptions(lat=item.lat_e7 / 1e7, lon=item.lon_e7 / 1e7, name=name))
+        other += item.command != Command.NAV_WAYPOINT
+    losses.drop("mission commands are (a mission TOML holds goals)", other)
+    return out
+
+
+def _area_file(document: Document, stem: str) -> tuple[str, Written]:
+    """Return zones as WKT, or as GeoJSON where WKT would lose circles or margins."""
+    plain = Document(zones=document.zones, marks=document.marks)
+    rich = any(isinstance(z.shape, Circle) or z.margin_m is not None for z in plain.zones)
+    name = f"{stem}.geojson" if rich else f"{stem}.wkt"
+    return name, write(plain, name)
+
+
+def zones_only(document: Document, point_radius_m: float) -> tuple[Zone, ...]:
+    """Return a document's zones with its marks grown to zones."""
+    inclusions = tuple(z for z in document.zones if z.kind is ZoneKind.INCLUSION)
+    return (*inclusions, *(o.zone() for o in document.as_obstacles(point_radius_m)))

@@ -1,0 +1,1 @@
+"""Conversations with the autopilot as pure step machines: commands, lists, parameters, files."""

@@ -1,0 +1,73 @@
+"""MAVLink 2 signing on disk: the key, and a timestamp that never goes back over restarts.
+
+The key is 32 bytes in a file of mode 0600: 64 hex digits, or a passphrase line from which the key is the SHA-256, as
+Mission Planner and MAVProxy make it. A board without a clock that boots in the past would have its frames refused,
+so the last timestamp is kept beside the key and stored ahead of its use.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import re
+import stat
+from pathlib import Path
+
+from companion.disk import Disk
+from companion.errors import InputError, unreadable
+from companion.mavlink.wire.frames import SigningState
+
+# 2015-01-01T00:00:00Z in Unix seconds: the zero of MAVLink signing timestamps, which count 10 µs.
+EPOCH_S = 1_420_070_400.0
+TICKS_PER_S = 100_000
+# Stored this far ahead, so that a power cut between two stores cannot repeat a timestamp [s]. An autopilot refuses a
+# newcomer that is more than 60 s behind the newest stamp it has seen, so we must not run that far ahead of others.
+AHEAD_S = 40.0
+
+
+def read_key(path: Path) -> bytes:
+    """Return the 32-byte key of a key file.
+
+    Raises:
+        InputError: it is missing, readable by others, or empty.
+    """
+    try:
+        mode = path.stat().st_mode
+        text = path.read_text("utf-8").strip()
+    except OSError as error:
+        raise unreadable(str(path), error, "the signing key", "make it with mode 0600") from error
+    except UnicodeDecodeError as error:
+        raise InputError(str(path), "", f"signing key cannot be read ({error})", "make it with mode 0600") from error
+    if mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise InputError(str(path), "", "the signing key can be read by others", f"chmod 600 {path}")
+    if re.fullmatch(r"[0-9a-fA-F]{64}", text):
+        return bytes.fromhex(text)
+    if not text:
+        raise InputError(str(path), "", "the signing key is empty", "write 64 hex digits or a passphrase")
+    return hashlib.sha256(text.encode("utf-8")).digest()
+
+
+class SigningStore:
+    """The signing state of one link and the file that its timestamp survives in."""
+
+    def __init__(self, key_file: Path, unix_s: float, *, link_id: int = 0) -> None:
+        self._path = key_file.with_name(key_file.name + ".timestamp")
+        stored = 0
+        try:
+            stored = int(self._path.read_text("ascii"))
+        except (OSError, ValueError):
+            stored = 0  # no file yet, or torn by a power cut: the clock has to do
+        clock = max(0, int((unix_s - EPOCH_S) * TICKS_PER_S))
+        self.state = SigningState(key=read_key(key_file), link_id=link_id, timestamp=max(clock, stored))
+        self._stored = 0
+        self.save()
+
+    def save(self) -> None:
+        """Store the timestamp if what is stored is about to be reached."""
+        if self.state.timestamp + int(AHEAD_S * TICKS_PER_S) // 2 < self._stored:
+            return
+        ahead = self.state.timestamp + int(AHEAD_S * TICKS_PER_S)
+        # A disk that cannot keep it must not end a voyage: frames are signed all the same, and it is tried again.
+        with contextlib.suppress(OSError):
+            Disk().replace(self._path, str(ahead).encode("ascii"))
+            self._stored = ahead

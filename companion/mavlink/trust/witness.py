@@ -1,0 +1,177 @@
+"""What of the autopilot's messages is believed on a link without a key: they must fit together. Pure.
+
+Whoever can write to a link can send a frame with the autopilot's ids. Two things in a frame are hard to get right
+without listening first: the boot time that many messages carry, and the sequence number of every frame. The boot
+times of one autopilot run with our clock, so a message that is ahead of it or far behind is not used; and frames
+count up, at the rate at which they come, so a frame that is out of step with a stream of frames whose boot times are
+right is not used either. A new clock (a reboot) or a new count (a gap, a second route) is believed when it goes on and
+the old one does not contradict it.
+
+A forger who listens gets both right. Against that one there is only a key.
+"""
+
+from __future__ import annotations
+
+import math
+
+from companion.mavlink.wire.frames import Drop, Message
+
+# A delay only ever makes a message late: ahead of the clock by more than this it is not the autopilot's [s].
+AHEAD_S = 0.5
+# A message that waited longer than this on its way is of no use [s].
+BEHIND_S = 5.0
+# How fast the two clocks may run apart: a hurried simulator's does by a few parts in a hundred. Nor is the clock led
+# faster than this by messages that are only a little wrong.
+DRIFT = 0.05
+# Another clock is believed when so many messages agree on it over this time, and the old one is silent for it [s].
+SWITCH_S = 1.0
+SWITCH_COUNT = 3
+# Another clock that goes on this long beside the first one, with so many messages, is another autopilot [s].
+CONTEST_S = 3.0
+CONTEST_COUNT = 5
+# ... until it has been silent for this long [s].
+CONTEST_OVER_S = 10.0
+
+# A stream of frames counts while one came within this time [s]; after a longer gap any count may go on.
+ALIVE_S = 1.5
+# Since the last boot time that was right the count has run on at this many times its rate, and a burst [frames].
+FASTER, BURST = 2.0, 8
+FIRST_RATE_HZ = 50.0
+# From frame to frame it goes one on, and over what the link loses: a run of losses as rare as this is none. After so
+# long a silence more may be missing [s].
+STEP, RARE, SILENCE_S = 1, 1e-3, 0.5
+# Overtaken frames are late by this at most [s].
+LATE_S = 0.5
+# Rate and loss are those of this time [s].
+WINDOW_S = 1.0
+# Messages with a right boot time that vouch for their stream.
+VOUCHERS = 3
+MAX_STREAMS = 4
+
+
+class BootClock:
+    """The autopilot's boot time against ours, with one rival for it."""
+
+    def __init__(self) -> None:
+        self.is_new = False           # the last message that fitted began a new clock
+        self._offset_s: float | None = None
+        self._last_s = 0.0
+        self._rival_s = 0.0
+        self._rival_count = 0
+        self._rival_first_s = -math.inf
+        self._rival_last_s = -math.inf
+
+    def take(self, t_s: float, boot_s: float) -> bool:
+        """Return whether a message of ``boot_s`` heard at ``t_s`` [s] fits."""
+        offset_s, self.is_new = t_s - boot_s, False
+        if self._offset_s is None:
+            self._begin(t_s, offset_s)
+            return True
+        drift_s = DRIFT * max(0.0, t_s - self._last_s)
+        if -AHEAD_S - drift_s <= offset_s - self._offset_s <= BEHIND_S + drift_s:
+            self._offset_s += min(max(offset_s - self._offset_s, -drift_s), drift_s)
+            self._last_s = t_s
+            return True
+        if self._rival_count == 0 or abs(offset_s - self._rival_s) > AHEAD_S or t_s - self._rival_last_s > ALIVE_S:
+            self._rival_count, self._rival_first_s = 0, t_s
+        self._rival_s, self._rival_last_s = offset_s, t_s
+        self._rival_count += 1
+        if self._rival_count >= SWITCH_COUNT and t_s - max(self._rival_first_s, self._last_s) >= SWITCH_S:
+            self._begin(t_s, offset_s)
+            self.is_new = True
+            return True
+        return False
+
+    def is_contested(self, t_s: float) -> bool:
+        """Return whether another clock goes on beside this one: two autopilots speak as one."""
+        return (
+            self._rival_count >= CONTEST_COUNT and self._rival_last_s - self._rival_first_s >= CONTEST_S
+            and t_s - self._rival_last_s <= CONTEST_OVER_S
+        )
+
+    def _begin(self, t_s: float, offset_s: float) -> None:
+        self._offset_s, self._last_s = offset_s, t_s
+        self._rival_count = 0
+
+
+class _Stream:
+    """Frames that count up. A right boot time anchors the count: no other frame can lead it away."""
+
+    def __init__(self, t_s: float, seq: int) -> None:
+        self.last_s = t_s
+        self.vouchers = 0
+        self._seq = self._anchor_seq = seq
+        self._anchor_s = self._since_s = t_s
+        self._anchor_boot_s = -math.inf
+        self._rate_hz, self._step = FIRST_RATE_HZ, STEP + BURST
+        self._counted = self._heard = 0
+        self._seen_s = [-math.inf] * 256
+
+    @property
+    def is_vouched(self) -> bool:
+        """Its boot times have been right."""
+        return self.vouchers >= VOUCHERS
+
+    def holds(self, t_s: float, seq: int, *, is_timed: bool) -> bool:
+        """Return whether the stream can have come to ``seq``; ``is_timed``: its boot time is right."""
+        since_s = t_s - self._anchor_s
+        room = BURST + FASTER * self._rate_hz * since_s
+        gone = (seq - self._anchor_seq) % 256 or 256
+        if gone <= room and (is_timed or since_s >= SILENCE_S):
+            return True
+        if gone <= room and 0 < (seq - self._seq) % 256 <= self._step:
+            return True
+        is_late = (self._seq - seq) % 256 <= BURST + LATE_S * self._rate_hz
+        return is_late and (is_timed or t_s - self._seen_s[seq] > 128.0 / self._rate_hz)
+
+    def take(self, t_s: float, seq: int, boot_s: float | None) -> None:
+        """Count a frame that it holds; ``boot_s`` is right, or None."""
+        self.last_s = self._seen_s[seq] = t_s
+        self._heard += 1
+        if boot_s is None or boot_s < self._anchor_boot_s:
+            if (seq - self._seq) % 256 < 128:
+                self._seq = seq
+            return
+        self.vouchers += 1
+        self._counted += (seq - self._anchor_seq) % 256
+        self._seq = self._anchor_seq = seq
+        self._anchor_s, self._anchor_boot_s = t_s, boot_s
+        if t_s - self._since_s >= WINDOW_S:
+            self._rate_hz = max(1.0, self._counted / (t_s - self._since_s))
+            lost = min(0.9, max(0.0, 1.0 - self._heard / max(1, self._counted)))
+            self._step = STEP + (math.ceil(math.log(RARE) / math.log(lost)) if lost > RARE else 0)
+            self._counted, self._heard, self._since_s = 0, 0, t_s
+
+
+class Witness:
+    """Judges every message of the autopilot's own component, in the order of arrival."""
+
+    def __init__(self) -> None:
+        self.clock = BootClock()
+        self._streams: list[_Stream] = []
+
+    def objection(self, t_s: float, message: Message) -> Drop | None:
+        """Return why ``message``, heard at ``t_s`` [s], is not used, None when it is."""
+        boot_ms = getattr(message, "time_boot_ms", None)
+        boot_s = None if boot_ms is None else boot_ms / 1e3
+        if boot_s is not None:
+            if not self.clock.take(t_s, boot_s):
+                return Drop.WRONG_CLOCK
+            if self.clock.is_new:
+                self._streams.clear()
+        is_guarded = any(s.is_vouched and t_s - s.last_s <= ALIVE_S for s in self._streams)
+        stream = self._stream_of(t_s, message.get_seq(), boot_s)
+        return Drop.OUT_OF_STEP if is_guarded and not stream.is_vouched else None
+
+    def _stream_of(self, t_s: float, seq: int, boot_s: float | None) -> _Stream:
+        """Return the stream that the frame belongs to, one that is vouched for first; a new one where none can be."""
+        for stream in sorted(self._streams, key=lambda s: -min(s.vouchers, VOUCHERS)):
+            if stream.holds(t_s, seq, is_timed=boot_s is not None):
+                stream.take(t_s, seq, boot_s)
+                return stream
+        if len(self._streams) >= MAX_STREAMS:
+            self._streams.remove(min(self._streams, key=lambda s: (s.is_vouched, s.last_s)))
+        stream = _Stream(t_s, seq)
+        self._streams.append(stream)
+        stream.take(t_s, seq, boot_s)
+        return stream

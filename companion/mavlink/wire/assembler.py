@@ -1,0 +1,259 @@
+"""Folds the autopilot's messages into the values that the companion works with. Pure.
+
+``VehicleAssembler.take`` never raises: what cannot be believed is counted in ``dropped`` and left out. A change of mode
+or arming is a fact when two of three heartbeats show it, or one behind the acknowledgement of a command that makes it;
+a position that leaps is one when the next ones stay there; a breach of the fence when it is told twice.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import replace
+
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
+from companion.mavlink.wire import codec
+from companion.mavlink.wire.fixes import FixFilter
+from companion.mavlink.wire.frames import Drop, Message
+from companion.messages import (
+    AisReport,
+    ApparentWind,
+    AutopilotStatus,
+    MissionState,
+    StatusText,
+    VehicleState,
+    WindSample,
+)
+
+Value = VehicleState | AutopilotStatus | WindSample | ApparentWind | StatusText | AisReport
+
+# A boot time that steps back by more than this is a reboot; by less, a late or repeated frame [s].
+REBOOT_BACK_S = 5.0
+# ATTITUDE older than this [boot s] is not joined to a position.
+ATTITUDE_MAX_AGE_S = 1.5
+# NAV_CONTROLLER_OUTPUT and FENCE_STATUS stop when they have nothing to say; then they are unknown after [s].
+QUIET_S = 5.0
+_APPARENT = ("AppWndSpd", "AppWndDir")
+# Heartbeats that say the same before a change is believed, of so many, none older than this [s].
+BEATS_AGREE, BEATS_KEPT, BEATS_S = 2, 3, 3.5
+# A command that changes mode or arming shows in a heartbeat within this time of its acknowledgement [s].
+SHOWS_S = 3.0
+_CHANGING = frozenset({
+    wire.MAV_CMD_DO_SET_MODE, wire.MAV_CMD_COMPONENT_ARM_DISARM, wire.MAV_CMD_MISSION_START,
+    wire.MAV_CMD_NAV_RETURN_TO_LAUNCH, wire.MAV_CMD_NAV_LOITER_UNLIM,
+})
+
+
+class VehicleAssembler:
+    """One autopilot, from its messages to values; the caller passes messages of that system only."""
+
+    def __init__(self) -> None:
+        self.dropped: Counter[Drop] = Counter()
+        self.dropped_by_type: Counter[str] = Counter()
+        self.reboots = 0
+        self._status: AutopilotStatus | None = None
+        self._texts = codec.TextAssembler()
+        self._boot_s: float | None = None
+        self._forget()
+
+    @property
+    def status(self) -> AutopilotStatus | None:
+        """The newest status, None before the first heartbeat."""
+        return self._status
+
+    @property
+    def boot_s(self) -> float | None:
+        """The newest boot time heard [s]."""
+        return self._boot_s
+
+    def _forget(self) -> None:
+        """Forget what was true before a reboot."""
+        self._beats: deque[tuple[float, tuple[int, int, bool]]] = deque(maxlen=BEATS_KEPT - 1)
+        self._fact: tuple[int, int, bool] | None = None
+        self._acknowledged_s: float | None = None
+        self._fixes = FixFilter()
+        self._attitude: codec.Attitude | None = None
+        self._position_boot_s = -1.0
+        self._apparent: dict[str, tuple[int, float]] = {}
+        self._apparent_ms = -1
+        self._nav_s: float | None = None
+        self._fence_s: float | None = None
+        self._fence_told = (False, -1)
+
+    def take(self, t_s: float, message: Message) -> list[Value]:
+        """Return the values that ``message``, heard at ``t_s`` [s], completes: none, one, or several texts."""
+        kind = message.get_type()
+        component = message.get_srcComponent()
+        try:
+            if kind == "STATUSTEXT":
+                return list(self._texts.take(t_s, message))
+            if kind == "AIS_VESSEL":
+                return [codec.ais_report(t_s, message)]
+            if component != codec.AUTOPILOT_COMPONENT:
+                return []
+            self._notice_boot(message)
+            return self._take(t_s, kind, message)
+        except _Stale:
+            reason = Drop.STALE
+        except _Leap:
+            reason = Drop.LEAP
+        except (ValueError, OverflowError, TypeError):
+            reason = Drop.BAD_VALUE
+        self.dropped[reason] += 1
+        self.dropped_by_type[kind] += 1
+        return []
+
+    def expire(self, t_s: float) -> list[StatusText]:
+        """Return texts that lost a chunk and will not be completed."""
+        return self._texts.expired(t_s)
+
+    def _notice_boot(self, message: Message) -> None:
+        boot_ms = getattr(message, "time_boot_ms", None)
+        if boot_ms is None or message.get_type() == "NAMED_VALUE_FLOAT":
+            return
+        boot_s = boot_ms / 1e3
+        if self._boot_s is not None and boot_s < self._boot_s - REBOOT_BACK_S:
+            self.reboots += 1
+            self._forget()
+            self._status = None
+            self._boot_s = boot_s
+        self._boot_s = boot_s if self._boot_s is None else max(boot_s, self._boot_s)
+
+    def _take(self, t_s: float, kind: str, message: Message) -> list[Value]:
+        if kind == "ATTITUDE":
+            attitude = codec.attitude(message)
+            if self._attitude is not None and attitude.boot_s <= self._attitude.boot_s:
+                raise _Stale
+            self._attitude = attitude
+            return []
+        if kind == "GLOBAL_POSITION_INT":
+            return self._position(t_s, message)
+        if kind == "WIND":
+            return [codec.wind_sample(t_s, message)]
+        if kind == "NAMED_VALUE_FLOAT":
+            return self._named(t_s, message)
+        if kind == "COMMAND_ACK":
+            if message.command in _CHANGING and message.result == wire.MAV_RESULT_ACCEPTED:
+                self._acknowledged_s = t_s
+            return []
+        return self._fold_status(t_s, kind, message)
+
+    def _position(self, t_s: float, message: Message) -> list[Value]:
+        boot_s = message.time_boot_ms / 1e3
+        if boot_s <= self._position_boot_s:
+            raise _Stale
+        attitude = self._attitude
+        if attitude is not None and abs(boot_s - attitude.boot_s) > ATTITUDE_MAX_AGE_S:
+            attitude = None
+        state = codec.vehicle_state(t_s, message, attitude)
+        if state is not None and not self._fixes.take(state):
+            raise _Leap
+        self._position_boot_s = boot_s
+        return [] if state is None else [state]
+
+    def _believes_beat(self, t_s: float, message: Message) -> bool:
+        """Return whether what a heartbeat says of type, mode and arming is a fact."""
+        says = (int(message.type), int(message.custom_mode), codec.is_armed(message))
+        recent = [what for at_s, what in self._beats if t_s - at_s <= BEATS_S]
+        is_told = self._acknowledged_s is not None and t_s - self._acknowledged_s <= SHOWS_S
+        believes = not recent or is_told or recent.count(says) + 1 >= BEATS_AGREE
+        if believes and says != self._fact:
+            self._fact, self._acknowledged_s = says, None   # one acknowledgement, one change
+            self._beats.clear()
+        self._beats.append((t_s, says))
+        return believes
+
+    def _named(self, t_s: float, message: Message) -> list[Value]:
+        """Join the two halves of the apparent wind; every link's copies carry the same boot time."""
+        if message.name not in _APPARENT:
+            return []
+        boot_ms = message.time_boot_ms
+        if boot_ms <= self._apparent_ms and self._apparent_ms - boot_ms < REBOOT_BACK_S * 1e3:
+            raise _Stale
+        self._apparent[message.name] = (boot_ms, message.value)
+        halves = [self._apparent.get(name) for name in _APPARENT]
+        speed, angle = halves
+        if speed is None or angle is None or speed[0] != angle[0]:
+            return []
+        self._apparent_ms = boot_ms
+        return [codec.apparent_wind(t_s, speed[1], angle[1])]
+
+    def _fold_status(self, t_s: float, kind: str, message: Message) -> list[Value]:
+        if kind == "HEARTBEAT":
+            if not codec.is_autopilot_heartbeat(message):
+                return []
+            before = self._status or AutopilotStatus(t_s=t_s)
+            if self._believes_beat(t_s, message) or self._status is None:
+                before = replace(
+                    before, mode=codec.mode(message), is_armed=codec.is_armed(message), vehicle_type=int(message.type))
+            self._status = replace(before, system_status=message.system_status)
+        elif self._status is None:
+            return []  # a status begins with a heartbeat
+        elif kind == "MISSION_CURRENT":
+            self._status = replace(
+                self._status, mission_seq=message.seq,
+                mission_total=None if message.total == 0xFFFF else message.total,
+                mission_state=_mission_state(message.mission_state),
+            )
+        elif kind == "MISSION_ITEM_REACHED":
+            self._status = replace(self._status, last_reached_seq=message.seq)
+        elif kind == "NAV_CONTROLLER_OUTPUT":
+            self._status = replace(
+                self._status, waypoint_distance_m=codec.waypoint_distance_m(message),
+                target_bearing_rad=codec.target_bearing_rad(message), cross_track_m=codec.cross_track_m(message),
+            )
+            self._nav_s = t_s
+        elif kind == "EKF_STATUS_REPORT":
+            self._status = replace(self._status, ekf_ok=codec.ekf_ok(message))
+        elif kind == "GPS_RAW_INT":
+            self._status = replace(self._status, gps_fix=int(message.fix_type))
+        elif kind == "SYS_STATUS":
+            self._status = replace(
+                self._status,
+                battery_v=None if message.voltage_battery == 0xFFFF else message.voltage_battery / 1e3,
+                battery_remaining=message.battery_remaining / 100.0 if 0 <= message.battery_remaining <= 100 else None,
+                battery_failed=codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_BATTERY),
+                receiver_lost=codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_RC_RECEIVER),
+            )
+        elif kind == "RC_CHANNELS":
+            self._status = replace(self._status, rc_us=codec.rc_us(message))
+        elif kind == "HOME_POSITION":
+            self._status = replace(self._status, home=codec.geo_point(message.latitude, message.longitude))
+        elif kind == "FENCE_STATUS":
+            # Two in a row that say the same: one alone may be damaged or forged.
+            now = bool(message.breach_status), int(message.breach_count)
+            last, self._fence_told, self._fence_s = self._fence_told, now, t_s
+            self._status = replace(
+                self._status, fence_breached=now[0] and last[0],
+                fence_breaches=now[1] if now[1] == last[1] else self._status.fence_breaches)
+        else:
+            return []
+        self._status = replace(self._status, t_s=t_s, boot_s=self._boot_s)
+        self._quiet(t_s)
+        return [self._status]
+
+    def _quiet(self, t_s: float) -> None:
+        assert self._status is not None
+        if self._nav_s is not None and t_s - self._nav_s > QUIET_S:
+            self._nav_s = None
+            self._status = replace(
+                self._status, waypoint_distance_m=None, target_bearing_rad=None, cross_track_m=None
+            )
+        if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
+            self._fence_s = None
+            self._status = replace(self._status, fence_breached=None, fence_breaches=None)
+
+
+class _Stale(Exception):  # noqa: N818 - a signal inside this module
+    """The message is older than one already used, or repeats it."""
+
+
+class _Leap(Exception):  # noqa: N818 - a signal inside this module
+    """The position is not where the boat can be, and nothing agrees with it yet."""
+
+
+def _mission_state(value: int) -> MissionState:
+    try:
+        return MissionState(value)
+    except ValueError:
+        return MissionState.UNKNOWN

@@ -1,0 +1,346 @@
+"""The problem's JSON form (docs/problem-format.md): degrees and WKT outside, radians and geometry inside."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import shapely
+
+from companion.errors import InputError
+from companion.planner.problem.value import (
+    SIGMA_MODELS,
+    Beat,
+    BoatLimits,
+    Current,
+    Problem,
+    RiskLimit,
+    Sigma,
+    Target,
+    Wind,
+)
+
+if TYPE_CHECKING:
+    from companion.traffic.occupancy import Spread
+
+T = TypeVar("T")
+_NAN = re.compile(r"\bnan\b", re.IGNORECASE)
+
+
+# ---------------------------------------------------------------------------------------------- reading
+class _Reader:
+    """Typed access to one JSON object that names the place of what is wrong."""
+
+    def __init__(self, raw: Any, source: str, place: str) -> None:
+        self.source, self.place = source, place
+        if not isinstance(raw, Mapping):
+            raise InputError(source, place, "is not a JSON object", "see docs/problem-format.md")
+        self.raw = raw
+
+    def _get(self, key: str, default: Any, convert: Callable[[Any], T]) -> T:
+        where = f"{self.place}.{key}" if self.place else key
+        if key not in self.raw:
+            if default is not ...:
+                return default  # type: ignore[no-any-return]
+            raise InputError(self.source, where, "is missing", "see docs/problem-format.md")
+        try:
+            return convert(self.raw[key])
+        except (TypeError, ValueError) as error:
+            text = repr(self.raw[key])
+            text = text if len(text) < 60 else text[:57] + "..."
+            raise InputError(self.source, where, f"{text} is not what belongs here ({error})",
+                             "see docs/problem-format.md") from error
+
+    def number(self, key: str, default: Any = ...) -> float:
+        """Return a float (may be NaN: that is for ``defect`` to say)."""
+        return self._get(key, default, _as_float)
+
+    def whole(self, key: str) -> int:
+        """Return an integer."""
+        return self._get(key, ..., _as_int)
+
+    def numbers(self, key: str, default: Any = ...) -> tuple[float, ...]:
+        """Return a list of floats."""
+        return self._get(key, default, lambda v: tuple(_as_float(x) for x in _as_list(v)))
+
+    def flag(self, key: str, default: Any = ...) -> bool:
+        """Return true or false."""
+        return self._get(key, default, _as_bool)
+
+    def text(self, key: str, default: Any = ...) -> str:
+        """Return a string."""
+        return self._get(key, default, str)
+
+    def child(self, key: str) -> _Reader:
+        """Return the object under ``key``."""
+        where = f"{self.place}.{key}" if self.place else key
+        if key not in self.raw:
+            raise InputError(self.source, where, "is missing", "see docs/problem-format.md")
+        return _Reader(self.raw[key], self.source, where)
+
+
+def _as_float(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise TypeError("a number is needed")
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def _as_bool(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError("true or false is needed")
+    return value
+
+
+def _as_int(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TypeError("a whole number is needed")
+    return value
+
+
+def _as_list(value: Any) -> Sequence[Any]:
+    if not isinstance(value, (list, tuple)):
+        raise TypeError("a list is needed")
+    return value
+
+
+def _polygon(text: Any, source: str, place: str) -> shapely.Geometry:
+    if isinstance(text, shapely.Geometry):
+        geometry = text
+    else:
+        if not isinstance(text, str):
+            raise InputError(source, place, "is not WKT text", "write POLYGON ((x y, ...))")
+        try:
+            # A ring with NaN in it is never closed; a number that is none either is for ``defect`` to say.
+            geometry = shapely.from_wkt(_NAN.sub("inf", text))
+        except shapely.errors.ShapelyError as error:
+            first = str(error).splitlines()[0] if str(error) else "unreadable"
+            raise InputError(source, place, f"is not WKT ({first})", "write POLYGON ((x y, ...))") from error
+    if geometry.geom_type not in {"Polygon", "MultiPolygon"}:
+        raise InputError(source, place, f"is a {geometry.geom_type}, not a POLYGON", "close the area")
+    return geometry
+
+
+def parse(raw: Mapping[str, Any], source: str) -> Problem:
+    """Return the problem in a parsed JSON object; ``source`` names it in errors."""
+    top = _Reader(raw, source, "")
+    start, goal, wind, boat = (top.child(k) for k in ("start", "goal", "wind", "boat"))
+    obstacles = raw.get("obstacles") or []
+    if not isinstance(obstacles, (list, tuple)):
+        raise InputError(source, "obstacles", "is not a list", "write a list of WKT polygons")
+    fence = raw.get("fence")
+    current = _Reader(raw.get("current") or {}, source, "current")
+    targets = raw.get("targets") or []
+    if not isinstance(targets, (list, tuple)):
+        raise InputError(source, "targets", "is not a list", "write a list of objects")
+    twa, mps = _parse_speed(boat.child("speed"))
+    known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
+             "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat"}
+    return Problem(
+        id=top.text("id", ""),
+        title=top.text("title", ""),
+        notes=top.text("notes", ""),
+        start_en=(start.number("x"), start.number("y")),
+        start_heading_rad=math.radians(start.number("heading_deg")),
+        goal_en=(goal.number("x"), goal.number("y")),
+        goal_radius_m=goal.number("radius"),
+        obstacles=tuple(_polygon(w, source, f"obstacles[{i}]") for i, w in enumerate(obstacles)),
+        fence=None if fence is None else _polygon(fence, source, "fence"),
+        wind=Wind(
+            twd_from_rad=math.radians(wind.number("from_deg")),
+            tws_mps=wind.number("speed_mps", None) if wind.raw.get("speed_mps") is not None else None,
+            sigma=_parse_sigma(wind.child("sigma")) if wind.raw.get("sigma") is not None else Sigma(),
+        ),
+        boat=BoatLimits(
+            no_go_half_rad=math.radians(boat.number("no_go_half_deg")),
+            max_twa_rad=math.radians(boat.number("max_twa_deg", 180.0)),
+            turn_rate_radps=boat.number("turn_rate_rad_s"),
+            polar_twa_rad=twa,
+            polar_mps=mps,
+            tack_loss_s=boat.number("tack_loss_s", 0.0),
+            gybe_loss_s=boat.number("gybe_loss_s", 0.0),
+            can_tack=boat.flag("can_tack", True),
+            gybe_room_m=boat.number("gybe_room_m") if boat.raw.get("gybe_room_m") is not None else None,
+        ),
+        delta_s=top.number("delta_s"),
+        current=Current(set_rad=math.radians(current.number("set_deg", 0.0)),
+                        drift_mps=current.number("drift_mps", 0.0)),
+        targets=tuple(_parse_target(_Reader(t, source, f"targets[{i}]")) for i, t in enumerate(targets)),
+        vessels_part=_parse_allocation(top.child("allocation")) if raw.get("allocation") is not None else None,
+        risk=_parse_risk(_Reader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,
+        clearance_floor_m=top.number("clearance_floor_m", 0.0),
+        leg_saving=top.number("leg_saving", Problem.leg_saving),
+        beat=_parse_beat(top.child("beat")) if raw.get("beat") is not None else None,
+        extra={k: v for k, v in raw.items() if k not in known},
+    )
+
+
+def _parse_speed(speed: _Reader) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    model = speed.text("model")
+    if model == "constant":
+        v_mps = speed.number("v_mps")
+        return (0.0, math.pi), (v_mps, v_mps)
+    if model != "polar":
+        raise InputError(speed.source, f"{speed.place}.model", f"{model!r} is unknown", "write constant or polar")
+    twa, mps = speed.numbers("twa_deg"), speed.numbers("v_mps")
+    if len(twa) != len(mps) or not twa:
+        raise InputError(speed.source, speed.place, "twa_deg and v_mps differ in length or are empty",
+                         "give one speed for each angle")
+    if any(b < a for a, b in itertools.pairwise(twa)):
+        raise InputError(speed.source, f"{speed.place}.twa_deg", "does not increase", "sort the polar by angle")
+    return tuple(math.radians(a) for a in twa), mps
+
+
+def _spread(deg: float) -> float:
+    """Return a sigma or growth in radians; what is below any meaning (1e-12) is 0, lest its square underflow."""
+    return 0.0 if abs(deg) < 1e-12 else math.radians(deg)
+
+
+def _parse_sigma(sigma: _Reader) -> Sigma:
+    model = sigma.text("model")
+    if model == "none":
+        return Sigma()
+    if model == "kalman":
+        return Sigma(model=model, sigma0_rad=_spread(sigma.number("sigma0_deg")),
+                     growth_rad_per_sqrt_s=_spread(sigma.number("growth_deg_per_sqrt_s")))
+    if model == "ar1":
+        return Sigma(model=model, sigma0_rad=_spread(sigma.number("sigma0_deg")),
+                     sigma_inf_rad=_spread(sigma.number("sigma_inf_deg")), rho_hz=sigma.number("rho_hz"))
+    if model != "forecast":
+        raise InputError(sigma.source, f"{sigma.place}.model", f"{model!r} is unknown",
+                         "write one of " + ", ".join(SIGMA_MODELS))
+    horizon = sigma.numbers("horizon_s")
+    degrees = sigma.numbers("sigma_deg")
+    half = sigma.numbers("half_width_deg") if sigma.raw.get("half_width_deg") is not None else None
+    if not horizon or len(degrees) != len(horizon) or (half is not None and len(half) != len(horizon)):
+        raise InputError(sigma.source, sigma.place, "the columns differ in length or are empty",
+                         "give one sigma for each horizon")
+    if any(not b > a for a, b in itertools.pairwise(horizon)):
+        raise InputError(sigma.source, f"{sigma.place}.horizon_s", "does not increase", "sort the table by horizon")
+    return Sigma(model=model, horizon_s=horizon, sigma_rad=tuple(map(_spread, degrees)),
+                 half_width_rad=None if half is None else tuple(map(_spread, half)))
+
+
+def _parse_target(target: _Reader) -> Target:
+    return Target(
+        x_m=target.number("x"), y_m=target.number("y"), vx_mps=target.number("vx", 0.0),
+        vy_mps=target.number("vy", 0.0), radius_m=target.number("radius_m"),
+        growth_mps=target.number("growth_mps", 0.0), from_s=target.number("from_s", 0.0),
+        until_s=target.number("until_s", math.inf), name=target.text("name", ""),
+        spread=_parse_spread(target.child("spread")) if target.raw.get("spread") is not None else None,
+    )
+
+
+def _parse_spread(spread: _Reader) -> Spread:
+    from companion.traffic.occupancy import Spread
+
+    return Spread(
+        vessel=spread.whole("vessel"), x_m=spread.number("x"), y_m=spread.number("y"),
+        course_rad=math.radians(spread.number("course_deg")), keep_m=spread.number("keep_m"),
+        along_m=spread.number("along_m"), along_mps=spread.number("along_mps", 0.0),
+        across_m=spread.number("across_m"), across_mps=spread.number("across_mps", 0.0),
+        own_mps=spread.number("own_mps", 0.0), sigma_m=spread.number("sigma_m"),
+        sigma_mps=spread.number("sigma_mps", 0.0),
+    )
+
+
+def _parse_allocation(allocation: _Reader) -> float:
+    return allocation.number("vessels")
+
+
+def _parse_risk(risk: _Reader) -> RiskLimit:
+    return RiskLimit(max_path_risk=risk.number("max_path_risk"),
+                     correlation_time_s=risk.number("correlation_time_s", 60.0))
+
+
+def _parse_beat(beat: _Reader) -> Beat:
+    return Beat(
+        no_go_half_rad=math.radians(beat.number("no_go_half_deg")), corridor_m=beat.number("corridor_m"),
+        clearance_m=beat.number("clearance_m"), tack_s=beat.number("tack_s", 0.0))
+
+
+# ---------------------------------------------------------------------------------------------- writing
+def _wkt(geometry: shapely.Geometry) -> str:
+    """Return WKT with every digit (shapely's own writer rounds the last): reading it gives the same numbers."""
+    if geometry.is_empty:
+        return "POLYGON EMPTY"
+
+    def rings(polygon: shapely.Geometry) -> str:
+        loops = (polygon.exterior, *polygon.interiors)
+        return "(" + ", ".join("(" + ", ".join(f"{x!r} {y!r}" for x, y in shapely.get_coordinates(r).tolist()) + ")"
+                               for r in loops) + ")"
+
+    if geometry.geom_type == "Polygon":
+        return "POLYGON " + rings(geometry)
+    return "MULTIPOLYGON (" + ", ".join(rings(g) for g in geometry.geoms) + ")"
+
+
+def _spread_dict(s: Spread) -> dict[str, Any]:
+    return {
+        "vessel": s.vessel, "x": s.x_m, "y": s.y_m, "course_deg": math.degrees(s.course_rad), "keep_m": s.keep_m,
+        "along_m": s.along_m, "along_mps": s.along_mps, "across_m": s.across_m, "across_mps": s.across_mps,
+        "own_mps": s.own_mps, "sigma_m": s.sigma_m, "sigma_mps": s.sigma_mps,
+    }
+
+
+def unparse(p: Problem) -> dict[str, Any]:
+    """Return the JSON object of a problem."""
+    deg = math.degrees
+    s = p.wind.sigma
+    sigma: dict[str, Any] = {"model": s.model}
+    if s.model == "kalman":
+        sigma |= {"sigma0_deg": deg(s.sigma0_rad), "growth_deg_per_sqrt_s": deg(s.growth_rad_per_sqrt_s)}
+    elif s.model == "ar1":
+        sigma |= {"sigma0_deg": deg(s.sigma0_rad), "sigma_inf_deg": deg(s.sigma_inf_rad), "rho_hz": s.rho_hz}
+    elif s.model == "forecast":
+        sigma |= {"horizon_s": list(s.horizon_s), "sigma_deg": [deg(x) for x in s.sigma_rad]}
+        if s.half_width_rad is not None:
+            sigma["half_width_deg"] = [deg(x) for x in s.half_width_rad]
+    out: dict[str, Any] = {
+        "id": p.id, "title": p.title,
+        "start": {"x": p.start_en[0], "y": p.start_en[1], "heading_deg": deg(p.start_heading_rad)},
+        "goal": {"x": p.goal_en[0], "y": p.goal_en[1], "radius": p.goal_radius_m},
+        "obstacles": [_wkt(g) for g in p.obstacles],
+        "fence": None if p.fence is None else _wkt(p.fence),
+        "wind": {"from_deg": deg(p.wind.twd_from_rad), "speed_mps": p.wind.tws_mps, "sigma": sigma},
+        "boat": {
+            "no_go_half_deg": deg(p.boat.no_go_half_rad), "max_twa_deg": deg(p.boat.max_twa_rad),
+            "turn_rate_rad_s": p.boat.turn_rate_radps,
+            "speed": {"model": "polar", "twa_deg": [deg(a) for a in p.boat.polar_twa_rad],
+                      "v_mps": list(p.boat.polar_mps)},
+            **({"tack_loss_s": p.boat.tack_loss_s} if p.boat.tack_loss_s else {}),
+            **({"gybe_loss_s": p.boat.gybe_loss_s} if p.boat.gybe_loss_s else {}),
+            **({} if p.boat.can_tack else {"can_tack": False}),
+            **({} if p.boat.gybe_room_m is None else {"gybe_room_m": p.boat.gybe_room_m}),
+        },
+        "delta_s": p.delta_s,
+    }
+    if p.notes:
+        out["notes"] = p.notes
+    if p.current.drift_mps:
+        out["current"] = {"set_deg": deg(p.current.set_rad), "drift_mps": p.current.drift_mps}
+    if p.targets:
+        out["targets"] = [
+            {"x": t.x_m, "y": t.y_m, "vx": t.vx_mps, "vy": t.vy_mps, "radius_m": t.radius_m,
+             "growth_mps": t.growth_mps, "from_s": t.from_s, "name": t.name,
+             **({"until_s": t.until_s} if math.isfinite(t.until_s) else {}),
+             **({"spread": _spread_dict(t.spread)} if t.spread is not None else {})}
+            for t in p.targets
+        ]
+    if p.vessels_part is not None:
+        out["allocation"] = {"vessels": p.vessels_part}
+    if p.risk is not None:
+        out["risk"] = {"max_path_risk": p.risk.max_path_risk, "correlation_time_s": p.risk.correlation_time_s}
+    if p.clearance_floor_m:
+        out["clearance_floor_m"] = p.clearance_floor_m
+    if p.leg_saving != Problem.leg_saving:
+        out["leg_saving"] = p.leg_saving
+    if p.beat is not None:
+        out["beat"] = {"no_go_half_deg": deg(p.beat.no_go_half_rad), "corridor_m": p.beat.corridor_m,
+                       "clearance_m": p.beat.clearance_m, "tack_s": p.beat.tack_s}
+    return out | dict(p.extra)

@@ -1,0 +1,1 @@
+"""The papers' own planners: Büsser's A* and Wolsieffer's RRT*, as references."""

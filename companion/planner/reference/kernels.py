@@ -1,0 +1,259 @@
+"""Kernels of the reference algorithms: speed, no-go zone, collision, turns and steering (Algorithm 1).
+
+The wind, boat and world come as ``rrtstar_world.World`` (unpacked by its fields' order in ``number``).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from companion.kernels.jit import kernel
+from companion.planner.problem.value import CLEAR_TURN_RAD
+
+TWO_PI = 2.0 * math.pi
+EDGE_PAD = 1e-6     # of a heading laid on the edge of the no-go zone [rad]: below the judge's slack
+STEER_ROUNDS = 6    # of the fixed point between a leg's heading and its end's no-go zone
+# ``number``'s places
+TWD, HALF, DEEP, RATE, TACK, GYBE, W0, W1, RHO, CX, CY = range(11)
+
+
+@kernel
+def wrap(a):  # type: ignore[no-untyped-def]
+    """Return the angle on [-π, π)."""
+    return (a + math.pi) % TWO_PI - math.pi
+
+
+@kernel
+def polar_speed(twa, polar):  # type: ignore[no-untyped-def]
+    """Return the speed [m/s] at |TWA|, linear between nodes, flat beyond them."""
+    a = abs(twa)
+    n = polar.shape[1]
+    if a <= polar[0, 0]:
+        return polar[1, 0]
+    if a >= polar[0, n - 1]:
+        return polar[1, n - 1]
+    lo, hi = 0, n - 1
+    while hi - lo > 1:
+        mid = (lo + hi) // 2
+        if polar[0, mid] <= a:
+            lo = mid
+        else:
+            hi = mid
+    f = (a - polar[0, lo]) / (polar[0, hi] - polar[0, lo])
+    return polar[1, lo] + f * (polar[1, hi] - polar[1, lo])
+
+
+@kernel
+def no_go(t, number, model, table):  # type: ignore[no-untyped-def]
+    """Return the tightened no-go half angle at t (eq. 15, widening)."""
+    half = number[HALF]
+    if model == 1:
+        return half + math.sqrt(number[W0] ** 2 + number[W1] ** 2 * t)
+    if model == 2:
+        v0, vi = number[W0] ** 2, number[W1] ** 2
+        return half + math.sqrt(max(0.0, vi + (v0 - vi) * math.exp(-2.0 * number[RHO] * t)))
+    if model == 3:
+        return half + np.interp(t, table[0], table[1])
+    return half
+
+
+@kernel
+def worst_no_go(t0, t1, number, model, table):  # type: ignore[no-untyped-def]
+    """Return the largest half angle over [t0, t1]."""
+    worst = max(no_go(t0, number, model, table), no_go(t1, number, model, table))
+    if model == 3:
+        for i in range(table.shape[1]):
+            if t0 < table[0, i] < t1:
+                worst = max(worst, number[HALF] + table[1, i])
+    return worst
+
+
+@kernel
+def _first_on(edge, i, ax, ay, dx, dy):  # type: ignore[no-untyped-def]
+    """Return where along a + s d, s in [0, 1], edge i is first met; 2 when it is not."""
+    px, py = edge[i, 0], edge[i, 1]
+    ex, ey = edge[i, 2] - px, edge[i, 3] - py
+    den = dx * ey - dy * ex
+    wx, wy = px - ax, py - ay
+    if abs(den) > 1e-14 * (abs(dx) + abs(dy)) * (abs(ex) + abs(ey)):
+        s = (wx * ey - wy * ex) / den
+        u = (wx * dy - wy * dx) / den
+        if 0.0 <= s <= 1.0 and -1e-12 <= u <= 1.0 + 1e-12:
+            return s
+        return 2.0
+    if abs(wx * dy - wy * dx) > 1e-9 * math.hypot(dx, dy):
+        return 2.0
+    length2 = dx * dx + dy * dy
+    if length2 <= 0.0:
+        return 2.0
+    s0 = (wx * dx + wy * dy) / length2
+    s1 = ((wx + ex) * dx + (wy + ey) * dy) / length2
+    low, high = min(s0, s1), max(s0, s1)
+    return max(0.0, low) if high >= 0.0 and low <= 1.0 else 2.0
+
+
+@kernel
+def first_hit(ax, ay, bx, by, edge, cell_first, cell_edge, grid, shape):  # type: ignore[no-untyped-def]
+    """Return where along a..b, on [0, 1], the segment first meets an edge; 2 when it is free."""
+    if edge.shape[0] == 0:
+        return 2.0
+    x0, y0, size = grid[0], grid[1], grid[2]
+    nx, ny = shape[0], shape[1]
+    dx, dy = bx - ax, by - ay
+    best = 2.0
+    low_y, high_y = min(ay, by), max(ay, by)
+    first_row = max(0, math.floor((low_y - y0) / size - 1e-9))
+    last_row = min(ny - 1, math.floor((high_y - y0) / size + 1e-9))
+    for row in range(first_row, last_row + 1):
+        lo, hi = max(low_y, y0 + row * size), min(high_y, y0 + (row + 1) * size)
+        if dy != 0.0 and hi > lo:
+            xa, xb = ax + dx * (lo - ay) / dy, ax + dx * (hi - ay) / dy
+        else:
+            xa, xb = ax, bx
+        first = max(0, math.floor((min(xa, xb) - x0) / size - 1e-6))
+        last = min(nx - 1, math.floor((max(xa, xb) - x0) / size + 1e-6))
+        for column in range(first, last + 1):
+            cell = row * nx + column
+            for k in range(cell_first[cell], cell_first[cell + 1]):
+                best = min(best, _first_on(edge, cell_edge[k], ax, ay, dx, dy))
+    return best
+
+
+@kernel
+def meets_target(ax, ay, bx, by, t0, t1, target):  # type: ignore[no-untyped-def]
+    """Tell whether the boat, from a at t0 to b at t1, enters a moving disc."""
+    for i in range(target.shape[0]):
+        lo, hi = max(t0, target[i, 6]), min(t1, target[i, 7])
+        if hi < lo:
+            continue
+        span = t1 - t0
+        ux, uy = 0.0, 0.0
+        if span > 0.0:
+            ux, uy = (bx - ax) / span, (by - ay) / span
+        rx = ax + ux * (lo - t0) - target[i, 0] - target[i, 2] * lo
+        ry = ay + uy * (lo - t0) - target[i, 1] - target[i, 3] * lo
+        wx, wy = ux - target[i, 2], uy - target[i, 3]
+        g = target[i, 5]
+        radius = target[i, 4] + g * lo
+        c2 = wx * wx + wy * wy - g * g
+        c1 = rx * wx + ry * wy - radius * g
+        c0 = rx * rx + ry * ry - radius * radius
+        duration = hi - lo
+        if c0 < 0.0 or (c2 * duration + 2.0 * c1) * duration + c0 < 0.0:
+            return True
+        if c2 > 0.0:
+            s = -c1 / c2
+            if 0.0 < s < duration and (c2 * s + 2.0 * c1) * s + c0 < 0.0:
+                return True
+    return False
+
+
+@kernel
+def way_on(course, number, polar, table_course):  # type: ignore[no-untyped-def]
+    """Return heading and speed over ground along a course; speed 0 when the boat cannot."""
+    n = table_course.shape[1]
+    if n == 0:
+        return course, polar_speed(wrap(course - number[TWD]), polar)
+    f = (wrap(course) + math.pi) / TWO_PI * (n - 1)
+    i = min(n - 2, int(f))
+    f -= i
+    if table_course[2, i] < 0.5 or table_course[2, i + 1] < 0.5:
+        return course, 0.0
+    h = table_course[0, i] + f * wrap(table_course[0, i + 1] - table_course[0, i])
+    return wrap(h), (1.0 - f) * table_course[1, i] + f * table_course[1, i + 1]
+
+
+@kernel
+def turn_time(before, after, number):  # type: ignore[no-untyped-def]
+    """Return the time [s] of a change of heading, a tack's or gybe's loss included; inf for a tack it cannot do."""
+    spent = abs(wrap(after - before)) / number[RATE]
+    a, b = wrap(before - number[TWD]), wrap(after - number[TWD])
+    if a * b < 0.0:
+        through_eye = abs(a) + abs(b)
+        if number[TACK] == np.inf:
+            return np.inf if through_eye < math.pi + CLEAR_TURN_RAD else spent + number[GYBE]
+        spent += number[TACK] if through_eye < math.pi else number[GYBE]
+    return spent
+
+
+@kernel
+def straight(  # type: ignore[no-untyped-def]
+    x, y, heading, t, tx, ty, number, model, table, polar, course,
+):
+    """Return (ok, heading, start of the leg [s], end [s]) of the straight leg to (tx, ty); no collision test."""
+    dx, dy = tx - x, ty - y
+    dist = math.hypot(dx, dy)
+    if dist < 1e-9:
+        return False, heading, t, t
+    h, v = way_on(math.atan2(dx, dy), number, polar, course)
+    if v <= 1e-9:
+        return False, h, t, t
+    t0 = t + turn_time(heading, h, number)
+    if t0 == np.inf:
+        return False, h, t, t
+    t1 = t0 + dist / v
+    twa = abs(wrap(h - number[TWD]))
+    if twa > number[DEEP] + 1e-9 or twa < worst_no_go(t0, t1, number, model, table):
+        return False, h, t0, t1
+    return True, h, t0, t1
+
+
+@kernel
+def steer(  # type: ignore[no-untyped-def]
+    x, y, heading, t, tx, ty, reach, number, model, table, polar, course,
+):
+    """Algorithm 1: (ok, x, y) where the boat gets from (x, y) on its way to (tx, ty), ``reach`` metres at most.
+
+    Lines 4-5: straight there where the no-go zone allows it. Lines 6-16: else along the edge of the zone whose
+    heading has the larger cosine to the target, if it is positive. Lines 17-19: propagated while the distance
+    decreases, that is to the foot of the perpendicular. The zone is taken at its widest over the leg, not at its
+    start as in the paper: constraint 13 holds at every instant. The deepest angle is treated like an edge.
+    """
+    dx, dy = tx - x, ty - y
+    dist = math.hypot(dx, dy)
+    if dist < 1e-9:
+        return False, x, y
+    bearing = math.atan2(dx, dy)
+    share = min(1.0, reach / dist)
+    ok, _, _, _ = straight(x, y, heading, t, x + share * dx, y + share * dy, number, model, table, polar, course)
+    if ok:
+        return True, x + share * dx, y + share * dy
+    twa = wrap(bearing - number[TWD])
+    best, best_x, best_y = 0.0, x, y
+    for side in range(4):
+        sign = 1.0 if side % 2 == 0 else -1.0
+        if side >= 2 and (number[DEEP] >= math.pi - 1e-9 or abs(twa) < 0.5 * math.pi):
+            continue
+        half = no_go(t, number, model, table)
+        length, cx, cy = 0.0, 0.0, 0.0
+        settled = False
+        for _ in range(STEER_ROUNDS):
+            angle = half + EDGE_PAD if side < 2 else number[DEEP]
+            if angle >= math.pi or angle > number[DEEP] + 1e-12:
+                break
+            u = number[TWD] + sign * angle
+            v = polar_speed(angle, polar)
+            gx, gy = v * math.sin(u) + number[CX], v * math.cos(u) + number[CY]
+            speed = math.hypot(gx, gy)
+            if speed <= 1e-9:
+                break
+            cx, cy = gx / speed, gy / speed
+            length = min(reach, dx * cx + dy * cy)
+            if length <= 1e-9:
+                break
+            t0 = t + turn_time(heading, u, number)
+            need = worst_no_go(t0, t0 + length / speed, number, model, table)
+            if need <= angle:
+                settled = True
+                break
+            half = need
+        if settled:
+            gamma = (dx * cx + dy * cy) / dist
+            if gamma > best + 1e-12:
+                best, best_x, best_y = gamma, x + length * cx, y + length * cy
+    return best > 0.0, best_x, best_y
+
+
+# ------------------------------------------------------------------------------------------- RRT*

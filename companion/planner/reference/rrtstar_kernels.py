@@ -1,0 +1,219 @@
+"""Kernels of the reference RRT*: its tree and one iteration after the other."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from companion.kernels.jit import kernel
+from companion.kernels.xorshift import uniform
+from companion.planner.reference.kernels import HALF, TWD, TWO_PI, first_hit, meets_target, steer, straight, wrap
+from companion.planner.risk.wind_kernels import leg_risk
+
+# Columns of ``node``: place, heading of arrival, time, accumulated risk, cost = time + weight x risk.
+X, Y, H, T, R, C = range(6)
+# Columns of ``link``: parent, first child, next and previous sibling; -1 for none.
+PARENT, CHILD, NEXT, BEFORE = range(4)
+# Places in ``count``: nodes, goal nodes, best goal node, samples drawn, connections refused, rewirings.
+N, GOALS, BEST, DRAWN, REFUSED, REWIRED = range(6)
+
+
+@kernel
+def _unlink(link, i):  # type: ignore[no-untyped-def]
+    parent, after, before = link[i, PARENT], link[i, NEXT], link[i, BEFORE]
+    if before >= 0:
+        link[before, NEXT] = after
+    else:
+        link[parent, CHILD] = after
+    if after >= 0:
+        link[after, BEFORE] = before
+
+
+@kernel
+def _hang(link, i, parent):  # type: ignore[no-untyped-def]
+    first = link[parent, CHILD]
+    link[i, PARENT], link[i, NEXT], link[i, BEFORE] = parent, first, -1
+    if first >= 0:
+        link[first, BEFORE] = i
+    link[parent, CHILD] = i
+
+
+@kernel
+def _reach(  # type: ignore[no-untyped-def]
+    node, i, tx, ty, before_twa, before_t, number, model, table, polar, course, target, risk_number, risk_table,
+):
+    """Return (ok, heading, time, risk) at (tx, ty) sailed straight from node i; no test against the solids."""
+    ok, h, t0, t1 = straight(
+        node[i, X], node[i, Y], node[i, H], node[i, T], tx, ty, number, model, table, polar, course)
+    if not ok or (target.shape[0] > 0 and meets_target(node[i, X], node[i, Y], tx, ty, t0, t1, target)):
+        return False, h, t1, 0.0
+    risk = node[i, R]
+    if risk_number[0] > 0.5:
+        risk += leg_risk(
+            t0, t1, wrap(h - number[TWD]), before_twa, before_t, number[HALF], int(risk_number[1]), risk_number[2],
+            risk_number[3], risk_number[4], risk_number[5], risk_table[0], risk_table[1])
+        if risk > risk_number[6]:
+            return False, h, t1, risk
+    return True, h, t1, risk
+
+
+@kernel
+def _twa_before(node, link, i, number):  # type: ignore[no-untyped-def]
+    """Return the angle that node i was reached at and when; time -1 at the root, where no leg came before."""
+    if link[i, PARENT] < 0:
+        return 0.0, -1.0
+    return wrap(node[i, H] - number[TWD]), node[i, T]
+
+
+@kernel
+def _adopt(  # type: ignore[no-untyped-def]
+    node, link, new, j, h, t, risk, stack, fresh, number, model, table, polar, course, target, risk_number,
+    risk_table,
+):
+    """Give node j the parent ``new`` if it and everything below it stays feasible and no cost rises."""
+    top, n = 0, 0
+    weight = risk_number[7]
+    stack[0] = j
+    fresh[0, H], fresh[0, T], fresh[0, R], fresh[0, C] = h, t, risk, t + weight * risk
+    # A breadth-first copy of the subtree; fresh[k] belongs to stack[k].
+    n = 1
+    while top < n:
+        i = stack[top]
+        if fresh[top, C] > node[i, C] + 1e-9:
+            return False
+        child = link[i, CHILD]
+        while child >= 0:
+            if n >= stack.shape[0]:
+                return False
+            fresh[n, X], fresh[n, Y] = node[i, X], node[i, Y]
+            fresh[n, H], fresh[n, T], fresh[n, R] = fresh[top, H], fresh[top, T], fresh[top, R]
+            ok, ch, ct, cr = _reach(
+                fresh, n, node[child, X], node[child, Y], wrap(fresh[top, H] - number[TWD]), fresh[top, T],
+                number, model, table, polar, course, target, risk_number, risk_table)
+            if not ok:
+                return False
+            fresh[n, H], fresh[n, T], fresh[n, R], fresh[n, C] = ch, ct, cr, ct + weight * cr
+            stack[n] = child
+            n += 1
+            child = link[child, NEXT]
+        top += 1
+    _unlink(link, j)
+    _hang(link, j, new)
+    for k in range(n):
+        i = stack[k]
+        node[i, H], node[i, T], node[i, R], node[i, C] = fresh[k, H], fresh[k, T], fresh[k, R], fresh[k, C]
+    return True
+
+
+@kernel
+def grow(  # type: ignore[no-untyped-def]
+    samples, node, link, goal_node, count, random, box, goal, reach, goal_bias, near, near_d, stack, fresh,
+    edge, cell_first, cell_edge, grid, shape, number, model, table, polar, course, target, risk_number, risk_table,
+):
+    """Draw ``samples`` states and let the tree grow by RRT* (Karaman and Frazzoli 2011, algorithm 6, k-nearest).
+
+    box: x0, y0, x1, y1. goal: x, y, radius. ``near`` and ``near_d`` are room for the neighbours, ``stack`` and
+    ``fresh`` for a subtree. Returns when the samples are drawn or the arrays full.
+    """
+    capacity = node.shape[0]
+    weight = risk_number[7]
+    for _ in range(samples):
+        if count[N] >= capacity:
+            return
+        count[DRAWN] += 1
+        sx = box[0] + (box[2] - box[0]) * uniform(random)
+        sy = box[1] + (box[3] - box[1]) * uniform(random)
+        sh = TWO_PI * uniform(random) - math.pi
+        if uniform(random) < goal_bias:
+            sx, sy = goal[0], goal[1]
+        n = count[N]
+        # The nearest state in OMPL's SE(2) distance: place plus half the heading difference.
+        nearest, nearest_d = -1, np.inf
+        within2 = np.inf
+        for i in range(n):
+            ex, ey = node[i, X] - sx, node[i, Y] - sy
+            d2 = ex * ex + ey * ey
+            if d2 < within2:
+                d = math.sqrt(d2) + 0.5 * abs(wrap(node[i, H] - sh))
+                if d < nearest_d:
+                    nearest, nearest_d, within2 = i, d, d * d
+        ok, x, y = steer(
+            node[nearest, X], node[nearest, Y], node[nearest, H], node[nearest, T], sx, sy, reach, number, model,
+            table, polar, course)
+        if not ok:
+            count[REFUSED] += 1
+            continue
+        hit = first_hit(node[nearest, X], node[nearest, Y], x, y, edge, cell_first, cell_edge, grid, shape)
+        if hit <= 1.0:  # the last valid state is taken instead: in fiftieths of the reach, as it was propagated
+            length = math.hypot(x - node[nearest, X], y - node[nearest, Y])
+            step = 0.02 * reach
+            keep = math.floor(hit * length / step - 1e-6) * step
+            if keep <= 0.0:
+                count[REFUSED] += 1
+                continue
+            x = node[nearest, X] + (x - node[nearest, X]) * keep / length
+            y = node[nearest, Y] + (y - node[nearest, Y]) * keep / length
+        # k nearest, k = e (1 + 1/3) log n, sorted by distance
+        k = min(near.shape[0], 1 + int(3.6243 * math.log(n + 1.0)))
+        found = 0
+        for i in range(n):
+            ex, ey = node[i, X] - x, node[i, Y] - y
+            d = ex * ex + ey * ey
+            if found < k or d < near_d[k - 1]:
+                at = found if found < k else k - 1
+                if found < k:
+                    found += 1
+                while at > 0 and near_d[at - 1] > d:
+                    near[at], near_d[at] = near[at - 1], near_d[at - 1]
+                    at -= 1
+                near[at], near_d[at] = i, d
+        if found > 0 and near_d[0] < 1e-12:
+            count[REFUSED] += 1
+            continue
+        best, best_c, best_h, best_t, best_r = -1, np.inf, 0.0, 0.0, 0.0
+        for m in range(-1, found):
+            i = nearest if m < 0 else near[m]
+            if m >= 0 and i == nearest:
+                continue
+            before_twa, before_t = _twa_before(node, link, i, number)
+            ok, h, t, risk = _reach(
+                node, i, x, y, before_twa, before_t, number, model, table, polar, course, target, risk_number,
+                risk_table)
+            if not ok or t + weight * risk >= best_c:
+                continue
+            if m >= 0 and first_hit(node[i, X], node[i, Y], x, y, edge, cell_first, cell_edge, grid, shape) <= 1.0:
+                continue
+            best, best_c, best_h, best_t, best_r = i, t + weight * risk, h, t, risk
+        if best < 0:
+            count[REFUSED] += 1
+            continue
+        new = n
+        node[new, X], node[new, Y], node[new, H] = x, y, best_h
+        node[new, T], node[new, R], node[new, C] = best_t, best_r, best_c
+        link[new, CHILD] = -1
+        _hang(link, new, best)
+        count[N] += 1
+        if math.hypot(x - goal[0], y - goal[1]) <= goal[2] and count[GOALS] < goal_node.shape[0]:
+            goal_node[count[GOALS]] = new
+            count[GOALS] += 1
+        before_twa, before_t = _twa_before(node, link, new, number)
+        for m in range(found):  # rewire
+            j = near[m]
+            if j == best or link[j, PARENT] < 0:
+                continue
+            ok, h, t, risk = _reach(
+                node, new, node[j, X], node[j, Y], before_twa, before_t, number, model, table, polar, course, target,
+                risk_number, risk_table)
+            if not ok or t + weight * risk >= node[j, C] - 1e-9:
+                continue
+            if first_hit(x, y, node[j, X], node[j, Y], edge, cell_first, cell_edge, grid, shape) <= 1.0:
+                continue
+            if _adopt(node, link, new, j, h, t, risk, stack, fresh, number, model, table, polar, course, target,
+                      risk_number, risk_table):
+                count[REWIRED] += 1
+        best_goal, best_cost = -1, np.inf
+        for g in range(count[GOALS]):
+            if node[goal_node[g], C] < best_cost:
+                best_goal, best_cost = goal_node[g], node[goal_node[g], C]
+        count[BEST] = best_goal

@@ -1,0 +1,1 @@
+"""The risk of a plan: from the wind over its whole length, and from vessels that are not sure."""

@@ -1,0 +1,336 @@
+"""How likely the wind is to force a plan into the no-go zone, over its whole length.
+
+Assumed: the true wind direction is the forecast mean plus a Gaussian Markov process X(t) whose standard deviation
+is the problem's own sigma(t). Its correlation follows from the model of sigma:
+
+- ``kalman``: a random walk, as the open-loop filter itself assumes (cov(s, t) = sigma(min)^2);
+- ``ar1``: an Ornstein-Uhlenbeck process of rate rho, the continuous AR(1) of Wolsieffer's eq. 17;
+- ``forecast``: sigma from the table (from its half widths where those are given, which carry the heavy tails),
+  times a stationary process of correlation exp(-d / tau), tau = ``problem.risk.correlation_time_s`` or 60 s.
+
+Steps are not independent: a wind that is 2 sigma off now is 2 sigma off a second later. Multiplying per-step
+probabilities would call every long path hopeless; bounding each instant (eq. 13) says nothing of the whole. What
+is computed is the first-passage probability: that on some leg, at some instant, |TWA| falls below the boat's own
+no-go half angle. Passing through the wind in a tack does not count; X runs on while the boat turns.
+
+``PathRisk.total`` comes from the density of the winds still free, moved through time on a grid, absorbed in the
+zone, with Chernoff's correction for what happens between steps, times ``PROMISE_FACTOR``; it is the promise that
+`python -m bench.reliability` checks against simulated winds. ``PathRisk.boole`` is the union bound over entries and
+up-crossings that CC-RRT* can add up edge by edge (``risk_kernels.leg_risk``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.geo.angles import wrap_pi
+from companion.planner.plan import Leg, Plan, PlanStatus, Why
+from companion.planner.problem.value import Problem
+from companion.planner.risk import wind_kernels as kernels
+from companion.planner.risk.vessels import LEAST_PART, VesselRisk, part_of, sigmas_for, vessel_count, vessel_risk
+
+if TYPE_CHECKING:
+    from companion.planner.solve import Effort, Outcome, Search
+
+PROMISE_FACTOR = 1.15
+"""What is promised over what is computed: a simulation of 2,000 winds scatters by a tenth at a share of 5 %."""
+DEFAULT_CORRELATION_S = 60.0
+MAX_STEPS = 400_000
+RISK_ROUNDS = 8             # parts that the bisection under a limit divides its effort into
+RISK_TURNS = 16
+MOST_EXTRA_SIGMAS = 8.0
+EXTRA_RESOLUTION = 0.02     # of the bisection [standard deviations]
+ASSUMPTION = {
+    kernels.NONE: "the wind is as forecast",
+    kernels.KALMAN: "the wind's direction walks at random (Kalman filter run open loop)",
+    kernels.AR1: "the wind's direction is an Ornstein-Uhlenbeck process about the forecast, correlation time 1/rho",
+    kernels.TABLE: "the forecast's sigma times a stationary process of the forecast's correlation time",
+}
+
+
+class WindProcess(NamedTuple):
+    """The wind's deviation from its mean, as ``risk_kernels`` describe it [rad, s]."""
+
+    model: int
+    s0: float = 0.0
+    s1: float = 0.0
+    rho: float = 0.0
+    tau: float = DEFAULT_CORRELATION_S
+    table_t: NDArray[np.float64] = np.zeros(1)
+    table_s: NDArray[np.float64] = np.zeros(1)
+
+    @property
+    def correlation_time_s(self) -> float:
+        """Time over which the correlation falls to 1/e [s]; infinite for a random walk."""
+        if self.model == kernels.TABLE:
+            return self.tau
+        return 1.0 / self.rho if self.model == kernels.AR1 and self.rho > 0.0 else math.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegRisk:
+    """One leg: the chance that it is the first to be forced into the zone, and the worst of its instants."""
+
+    first_entry: float
+    worst_instant: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathRisk:
+    """The risk of a path: of the wind, and of the vessels that the problem calls uncertain.
+
+    Attributes:
+        legs: For each leg; the wind's.
+        computed: First-passage probability of the whole path, by the wind.
+        wind: What is promised of the wind: ``computed`` times ``PROMISE_FACTOR``, at most 1.
+        vessels: What vessels add (``companion.planner.risk.vessels``).
+        total: What is promised: wind and vessels together by the union bound, at most 1.
+        boole: The union bound over entries and up-crossings, at most 1.
+        assumption: What is assumed of the wind, in words.
+        correlation_time_s: Of the wind [s].
+    """
+
+    legs: tuple[LegRisk, ...]
+    computed: float
+    wind: float
+    vessels: VesselRisk
+    total: float
+    boole: float
+    assumption: str
+    correlation_time_s: float
+
+
+def process_of(problem: Problem) -> WindProcess:
+    """Return the wind process that the problem's sigma implies."""
+    s = problem.wind.sigma
+    if s.model == "kalman":
+        return WindProcess(kernels.KALMAN, s.sigma0_rad, s.growth_rad_per_sqrt_s)
+    if s.model == "ar1":
+        return WindProcess(kernels.AR1, s.sigma0_rad, s.sigma_inf_rad, s.rho_hz)
+    if s.model == "forecast":
+        tau = problem.risk.correlation_time_s if problem.risk is not None else DEFAULT_CORRELATION_S
+        sigma = np.array(s.sigma_rad, dtype=np.float64)
+        if s.half_width_rad is not None and problem.k_delta > 1e-6:
+            sigma = np.maximum(sigma, np.array(s.half_width_rad) / problem.k_delta)
+        return WindProcess(kernels.TABLE, tau=tau, table_t=np.array(s.horizon_s, dtype=np.float64), table_s=sigma)
+    return WindProcess(kernels.NONE)
+
+
+def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
+    """Return the risk of a plan (or of its legs) under the problem's wind."""
+    legs = plan.legs if isinstance(plan, Plan) else tuple(plan)
+    process = process_of(problem)
+    half = problem.boat.no_go_half_rad
+    start = np.array([leg.start_s for leg in legs], dtype=np.float64)
+    end = np.array([leg.end_s for leg in legs], dtype=np.float64)
+    twa = _angles(legs)
+    first = np.zeros(len(legs))
+    if legs and process.model != kernels.NONE:
+        _first_passage((start, end), twa, half, process, first)
+    boole, before_twa, before_t = 0.0, 0.0, -1.0
+    out = []
+    for i, leg in enumerate(legs):
+        args = (process.model, process.s0, process.s1, process.rho, process.tau, process.table_t, process.table_s)
+        boole += kernels.leg_risk(start[i], end[i], twa[i], before_twa, before_t, half, *args)
+        before_twa, before_t = twa[i], end[i]
+        worst = max(
+            _instant(abs(twa[i]) - half, kernels.sigma_at(t, process.model, process.s0, process.s1, process.rho,
+                                                           process.table_t, process.table_s))
+            for t in (leg.start_s, leg.end_s, *(h for h in process.table_t if leg.start_s < h < leg.end_s))
+        )
+        out.append(LegRisk(first_entry=float(first[i]), worst_instant=worst))
+    computed = float(min(1.0, first.sum()))
+    wind, vessels = min(1.0, PROMISE_FACTOR * computed), vessel_risk(problem, legs)
+    return PathRisk(
+        legs=tuple(out), computed=computed, wind=wind, vessels=vessels, total=min(1.0, wind + vessels.total),
+        boole=float(min(1.0, boole)),
+        assumption=ASSUMPTION[process.model], correlation_time_s=process.correlation_time_s,
+    )
+
+
+def _angles(legs: Sequence[Leg]) -> NDArray[np.float64]:
+    """Return heading less mean wind [rad]; a leg that the autopilot beats follows the wind and is never forced."""
+    return np.array([math.pi if leg.is_beat else wrap_pi(-leg.twa_rad) for leg in legs], dtype=np.float64)
+
+
+def _instant(margin_rad: float, sigma_rad: float) -> float:
+    if sigma_rad <= 1e-12:
+        return 0.0 if margin_rad >= -1e-9 else 1.0
+    return 0.5 * math.erfc(margin_rad / sigma_rad / math.sqrt(2.0))
+
+
+def _first_passage(
+    times: tuple[NDArray[np.float64], NDArray[np.float64]], twa: NDArray[np.float64], half: float, p: WindProcess,
+    out: NDArray[np.float64],
+) -> None:
+    start, end = times
+    steps = kernels.first_passage(start, end, twa, float(half), p.model, float(p.s0), float(p.s1), float(p.rho),
+                                  float(p.tau), p.table_t, p.table_s, MAX_STEPS, out)
+    if steps < 0:  # a voyage of days in a wind of seconds: whatever is not excluded happens
+        out[-1] = max(0.0, 1.0 - out[:-1].sum())
+
+
+def with_risk(problem: Problem, plan: Plan) -> Plan:
+    """Return the plan with ``risk`` and each leg's ``risk`` filled in."""
+    if not plan.has_path:
+        return plan
+    risk = path_risk(problem, plan)
+    legs = tuple(
+        replace(leg, risk=min(1.0, wind.first_entry + vessels))
+        for leg, wind, vessels in zip(plan.legs, risk.legs, risk.vessels.legs, strict=True))
+    plan = replace(plan, legs=legs, risk=risk.total, vessel_risk=risk.vessels.total)
+    return replace(plan, why=with_parts(plan.why, problem, risk)) if problem.is_shared else plan
+
+
+def with_parts(why: Why, problem: Problem, risk: PathRisk) -> Why:
+    """Return the words and data of a plan with what its promise is made of."""
+    part = part_of(problem)
+    named = ", ".join(f"{name} {100.0 * value:.2g} %" for name, value in risk.vessels.by_name[:3])
+    text = (f"Risk of the whole path {100.0 * risk.total:.2g} %: wind {100.0 * risk.wind:.2g} %, vessels "
+            f"{100.0 * risk.vessels.total:.2g} % ({named}). At each instant {100.0 * (1.0 - problem.delta_s):.2g} %: "
+            f"wind {100.0 * (1.0 - problem.wind_delta_s):.2g} %, vessels {100.0 * part:.2g} %.")
+    data = {
+        "risk": {
+            "wind": risk.wind, "vessels": risk.vessels.total, "by_vessel": dict(risk.vessels.by_name),
+            "instant_wind": 1.0 - problem.wind_delta_s, "instant_vessels": part,
+            "instant_vessels_worst": risk.vessels.worst_instant, "count": vessel_count(problem.targets),
+        },
+    }
+    return Why(text=f"{why.text} {text}".strip(), data={**why.data, **data})
+
+
+def simulate_entries(
+    problem: Problem, plan: Plan | Sequence[Leg], *, winds: int = 2000, step_s: float = 0.5, seed: int = 0,
+) -> NDArray[np.int64]:
+    """Return for each simulated wind the leg on which it first forces the boat into the no-go zone, or -1.
+
+    The winds are exact draws of the assumed process every ``step_s`` seconds and at each leg's ends.
+    """
+    legs = plan.legs if isinstance(plan, Plan) else tuple(plan)
+    hits = np.full(winds, -1, dtype=np.int64)
+    p = process_of(problem)
+    if legs and p.model != kernels.NONE:
+        kernels.simulate(
+            np.array([leg.start_s for leg in legs], dtype=np.float64),
+            np.array([leg.end_s for leg in legs], dtype=np.float64),
+            _angles(legs), float(problem.boat.no_go_half_rad),
+            p.model, float(p.s0), float(p.s1), float(p.rho), float(p.tau), p.table_t, p.table_s, float(step_s),
+            np.random.default_rng(seed), winds, hits,
+        )
+    return hits
+
+
+# ------------------------------------------------------------------------------ planning within a limit
+def keep_limit(problem: Problem, plan: Plan) -> Plan:
+    """Return the plan with its risk filled in, or without its path when that is above ``problem.risk``."""
+    plan = with_risk(problem, plan)
+    if problem.risk is None or plan.risk is None or plan.risk <= problem.risk.max_path_risk:
+        return plan
+    reason = (f"the path found has a risk of {100.0 * plan.risk:.3g} %, above the limit of "
+              f"{100.0 * problem.risk.max_path_risk:.3g} %")
+    return replace(plan, status=PlanStatus.TIMEOUT, reason=reason, waypoints_en=np.empty((0, 2)), legs=(),
+                   cost_s=math.inf, first_s=None, why=Why(text=reason))
+
+
+def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -> Outcome:
+    """Return the fastest path found whose promised risk is within ``problem.risk``.
+
+    Any search that keeps the chance constraint at each instant can be held to a limit on the whole path: the
+    no-go zone is widened by e more standard deviations, the least e whose plan keeps the limit is bisected, and the
+    cheapest plan that keeps it is handed back. The bound of the first search, without the limit, stays a bound.
+    """
+    from companion.planner.solve import Effort, Outcome
+
+    limit = problem.risk.max_path_risk if problem.risk is not None else 1.0
+    best: Outcome | None = None
+    best_s, least, bound_s = math.inf, 1.0, 0.0
+    # ``low`` keeps too little away from the zone; ``high`` keeps the limit, or leaves no path at all.
+    low, high, extra = 0.0, math.inf, 0.0
+    over, under = 0.0, -math.inf  # log of hazard / limit's hazard at them
+    settled, kept = False, 0.0
+    for turn in range(RISK_TURNS):
+        # Equal parts: each step of the bisection needs a good plan to judge by. What is left at its end is used up.
+        seconds, steps = effort.remaining_s, (effort.limit or 0) - effort.used
+        if not settled:
+            seconds, steps = min(seconds, effort.budget_s / RISK_ROUNDS), min(steps, (effort.limit or 0) // RISK_ROUNDS)
+        inner = Effort(None if math.isinf(effort.budget_s) else max(1e-3, seconds),
+                       None if effort.limit is None else max(1, steps))
+        outcome = search(widened(problem, extra), inner, seed)
+        effort.spend(inner.used)
+        if turn == 0 or (settled and extra == 0.0):
+            bound_s = max(bound_s, outcome.lower_bound_s)
+        if turn == 0 and outcome.waypoints_en is None:
+            return outcome  # what fails without the limit fails with it
+        judged = None if outcome.waypoints_en is None else problem.evaluate(outcome.waypoints_en)
+        promised = path_risk(problem, judged.legs).total if judged is not None and judged.is_feasible else math.inf
+        least = min(least, promised)
+        if promised <= limit and judged is not None:
+            effort.found()
+            if judged.time_s < best_s:
+                best, best_s, kept = outcome, judged.time_s, extra
+        if settled or effort.is_over:
+            break
+        if limit < promised < math.inf:
+            low, over = extra, math.log(_hazard(promised) / _hazard(limit))
+        elif turn == 0:
+            settled = True
+            continue
+        else:
+            high = extra
+            under = math.log(_hazard(promised) / _hazard(limit)) if promised < math.inf else -math.inf
+        if math.isinf(high):
+            extra = low + _step_for(problem.k_delta + low, over)
+        else:  # regula falsi, kept off the ends; bisection where there was no path
+            part = over / (over - under) if math.isfinite(under) else 0.5
+            extra = low + (high - low) * min(0.85, max(0.15, part))
+        if extra > MOST_EXTRA_SIGMAS or high - low < EXTRA_RESOLUTION:
+            if best is None:
+                break
+            settled, extra = True, kept
+    if best is None:
+        reason = (f"no path within the limit of {100.0 * limit:.3g} % on its risk; the least risky found has "
+                  f"{100.0 * least:.3g} %")
+        return Outcome(waypoints_en=None, reason=reason)
+    return replace(best, lower_bound_s=bound_s, trace={**best.trace, "extra_sigmas": kept})
+
+
+def _hazard(promised: float) -> float:
+    """Return the accumulated hazard behind a promise: unlike the probability it does not saturate."""
+    return max(1e-9, -math.log1p(-min(promised / PROMISE_FACTOR, 1.0 - 1e-9)))
+
+
+def _step_for(k: float, over: float) -> float:
+    """Return by how many sigmas to go from k so that the normal tail falls by the factor e^over, and a little more."""
+    tail = 0.5 * math.erfc(k / math.sqrt(2.0)) * math.exp(-over)
+    return max(0.1, 1.1 * (-NormalDist().inv_cdf(max(tail, 5e-31)) - k))
+
+
+def widened(problem: Problem, extra: float) -> Problem:
+    """Return the problem, its risk limit taken off, with its no-go zone ``extra`` standard deviations wider."""
+    sigma = problem.wind.sigma
+    if extra <= 0.0:
+        return replace(problem, risk=None)
+    if sigma.model == "forecast" and sigma.half_width_rad is not None:
+        half = tuple(h + extra * s for h, s in zip(sigma.half_width_rad, sigma.sigma_rad, strict=True))
+        table = replace(problem.wind, sigma=replace(sigma, half_width_rad=half))
+        return _shared(replace(problem, risk=None, wind=table), problem.wind_delta_s, extra)
+    k = problem.k_delta + extra
+    delta_s = 1.0 - 0.5 * math.erfc(k / math.sqrt(2.0))
+    return _shared(replace(problem, risk=None), min(delta_s, 1.0 - 1e-12), extra)
+
+
+def _shared(problem: Problem, wind_delta_s: float, extra: float) -> Problem:
+    """Return the problem with the wind's own delta_s given, and vessels kept ``extra`` more sigmas away."""
+    if not problem.is_shared:
+        return replace(problem, delta_s=wind_delta_s)
+    count = vessel_count(problem.targets)
+    k = sigmas_for(part_of(problem), count) + extra
+    part = count * max(0.5 * math.erfc(k / math.sqrt(2.0)), LEAST_PART)
+    return replace(problem, delta_s=wind_delta_s - part, vessels_part=part)

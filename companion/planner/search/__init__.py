@@ -1,0 +1,1 @@
+"""What ``auto`` is made of: proposals, lattices, the metric's geodesics, annealing, bounds."""

@@ -1,0 +1,280 @@
+"""One random change of a path: what annealing proposes.
+
+Most moves keep courses: slide a corner along its leg, shift a whole leg or a block of legs parallel, re-solve a
+corner from two close-hauled courses at the times they are sailed, lay a chain of legs again in time, turn a corner
+the long way round. What a move gives need not be feasible: ``anneal`` decides.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.kernels.jit import kernel
+from companion.kernels.xorshift import uniform
+from companion.planner.search.kernels import Boat, Floats, track, turn_guess
+from companion.planner.search.moves import corner, fit_corners, kind_of, relay
+from companion.planner.search.rounds import WAYS, cross, overshoot, round_vector
+
+MOST_POINTS = 1200
+
+
+@kernel
+def arrive(b: Boat, ax: float, ay: float, ex: float, ey: float, t: float, h: float) -> tuple[float, float]:
+    """Return (time, TWA) on arrival at e from a, where the boat is at time t with TWA h."""
+    dx, dy = ex - ax, ey - ay
+    length = math.hypot(dx, dy)
+    if length < 1e-9:
+        return t, h
+    a, v = track(b, dx, dy, t)
+    return t + turn_guess(b, h, a) + length / max(v, 1e-9), a
+
+
+@kernel
+def _course(xs: Floats, ys: Floats, i: int) -> tuple[float, float]:
+    dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
+    d = math.hypot(dx, dy)
+    return (dx / d, dy / d) if d > 1e-12 else (0.0, 0.0)
+
+
+@kernel
+def _delete(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
+    for k in range(i, n - count):
+        xs[k], ys[k] = xs[k + count], ys[k + count]
+    return n - count
+
+
+@kernel
+def _insert(xs: Floats, ys: Floats, n: int, i: int, x: float, y: float) -> int:
+    for k in range(n, i, -1):
+        xs[k], ys[k] = xs[k - 1], ys[k - 1]
+    xs[i], ys[i] = x, y
+    return n + 1
+
+
+@kernel
+def _pair(r: float, low: bool) -> tuple[int, int]:
+    """Return two edge courses: mostly a tack or a gybe, sometimes a mixture."""
+    if r < 0.4:
+        return (0, 1) if not low else (2, 3)
+    if r < 0.8:
+        return (1, 0) if not low else (3, 2)
+    if r < 0.85:
+        return 0, 2
+    if r < 0.9:
+        return 2, 0
+    if r < 0.95:
+        return 1, 3
+    return 3, 1
+
+
+@kernel
+def go_round(b: Boat, xs: Floats, ys: Floats, n: int, i: int, at: Floats, course: Floats, way: int) -> int:
+    """Turn corner ``i`` the long way round, the lines of its two legs kept; return the number of points, 0: cannot."""
+    h, a = course[i], course[i + 1]
+    if not h * a < 0.0 or n + 2 >= MOST_POINTS:
+        return 0
+    ux, uy = _course(xs, ys, i - 1)
+    wx, wy = _course(xs, ys, i)
+    x1, y1, x2, y2, ok = round_vector(b, h, a, at[i], way)
+    if not ok:
+        return 0
+    e, _, ok = overshoot(ux, uy, wx, wy, x1 + x2, y1 + y2)
+    if not ok:
+        return 0
+    xs[i] += e * ux
+    ys[i] += e * uy
+    n = _insert(xs, ys, n, i + 1, xs[i] + x1, ys[i] + y1)
+    if x2 != 0.0 or y2 != 0.0:
+        n = _insert(xs, ys, n, i + 2, xs[i + 1] + x2, ys[i + 1] + y2)
+    return n
+
+
+@kernel
+def straighten(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
+    """Put one corner in place of point ``i`` and ``count`` after it, where the legs around them meet; 0: nowhere."""
+    j = i + count
+    if j + 1 >= n:
+        return 0
+    x, y, ok = cross(xs[i - 1], ys[i - 1], xs[i] - xs[i - 1], ys[i] - ys[i - 1], xs[j], ys[j],
+                     xs[j + 1] - xs[j], ys[j + 1] - ys[j])
+    if not ok:
+        return 0
+    xs[i], ys[i] = x, y
+    return _delete(xs, ys, n, i + 1, count)
+
+
+@kernel
+def propose(
+    b: Boat, xs: Floats, ys: Floats, n: int, h0: float, goal: Floats, size: float, spots: Floats,
+    at: Floats, course: Floats, rng: NDArray[np.uint64],
+) -> int:
+    """Change the path in place by one random move and return its new number of points (0: no such move).
+
+    ``at`` and ``course`` are the path's timetable before the move.
+    """
+    u = uniform(rng)
+    step = size * math.exp(-14.0 * uniform(rng))
+    inner = n - 2
+    if b.room > 0.0 and inner > 0 and uniform(rng) < 0.12:                # turn a corner the long way round, or not
+        i = 1 + int(uniform(rng) * inner)
+        if uniform(rng) < 0.5:
+            return straighten(xs, ys, n, i, 1 + int(2.0 * uniform(rng)))
+        return go_round(b, xs, ys, n, i, at, course, int(WAYS * uniform(rng)))
+    if b.kind != 0 and inner > 0 and uniform(rng) < 0.15:                 # lay close-hauled legs again in time
+        i = int(uniform(rng) * (n - 2))
+        j = min(n - 1, i + 2 + int(8.0 * uniform(rng) * uniform(rng)))
+        if uniform(rng) < 0.25:                                           # (sometimes to the end, or from the start)
+            j = n - 1
+        if uniform(rng) < 0.25:
+            i = 0
+        r, longer = uniform(rng), -1
+        if r < 0.1 and n + j - i < MOST_POINTS:                           # ... each of them in two parts
+            for m in range(j - 1, i - 1, -1):
+                n = _insert(xs, ys, n, m + 1, 0.5 * (xs[m] + xs[m + 1]), 0.5 * (ys[m] + ys[m + 1]))
+            j += j - i
+        elif r < 0.2 and n + 1 < MOST_POINTS:                             # ... one of them in two parts
+            m = i + int(uniform(rng) * (j - i))
+            f = uniform(rng)
+            n = _insert(xs, ys, n, m + 1, xs[m] + f * (xs[m + 1] - xs[m]), ys[m] + f * (ys[m + 1] - ys[m]))
+            j += 1
+        elif r < 0.45 and j - i > 2:                                      # ... without some of the points between
+            m = i + 1 + int(uniform(rng) * (j - i - 1))
+            count = min(j - m, 1 + int(3.0 * uniform(rng) * uniform(rng)))
+            if j - count - i < 2:
+                return 0
+            n = _delete(xs, ys, n, m, count)
+            j -= count
+        elif r < 0.85:                                                    # ... one of them longer or shorter
+            longer = i + int(uniform(rng) * (j - i))
+        if not relay(b, xs, ys, n, h0, i, j, longer, step if uniform(rng) < 0.5 else -step):
+            return 0
+        return n
+    if u < 0.18 and inner > 0:                                            # push a corner anywhere
+        i = 1 + int(uniform(rng) * inner)
+        xs[i] += step * (2.0 * uniform(rng) - 1.0)
+        ys[i] += step * (2.0 * uniform(rng) - 1.0)
+        return n
+    if u < 0.36 and inner > 0:                                            # slide a corner along one of its legs
+        i = 1 + int(uniform(rng) * inner)
+        if uniform(rng) < 0.5:
+            ux, uy = _course(xs, ys, i - 1)
+        else:
+            ux, uy = _course(xs, ys, i)
+        s = step if uniform(rng) < 0.5 else -step
+        ax, ay = xs[i], ys[i]
+        xs[i] += s * ux
+        ys[i] += s * uy
+        if uniform(rng) < 0.6:                                            # ... and keep the courses next to it
+            back = uniform(rng) < 0.5
+            m = i - 1 if back else i + 1
+            if 0 < m < n - 1:
+                t, h = at[m - 1], course[m - 1]
+                if back:
+                    k1 = kind_of(math.atan2(xs[m] - xs[m - 1], ys[m] - ys[m - 1]))
+                    k2 = kind_of(math.atan2(ax - xs[m], ay - ys[m]))
+                else:
+                    k1 = kind_of(math.atan2(xs[m] - ax, ys[m] - ay))
+                    k2 = kind_of(math.atan2(xs[m + 1] - xs[m], ys[m + 1] - ys[m]))
+                if k1 == k2:
+                    return 0
+                if not back:
+                    t, h = arrive(b, xs[m - 2], ys[m - 2], xs[m - 1], ys[m - 1], at[m - 2], course[m - 2])
+                x, y, _, ok = corner(b, xs[m - 1], ys[m - 1], h, t, xs[m + 1], ys[m + 1], k1, k2)
+                if not ok:
+                    return 0
+                xs[m], ys[m] = x, y
+        return n
+    if u < 0.46 and inner > 1:                                            # shift a block of legs, courses kept
+        i = 1 + int(uniform(rng) * inner)
+        j = min(n - 2, i + int(4.0 * uniform(rng) * uniform(rng) + uniform(rng)))
+        ux, uy = _course(xs, ys, i - 1)
+        s = step if uniform(rng) < 0.5 else -step
+        if uniform(rng) < 0.3:
+            ux, uy = 2.0 * uniform(rng) - 1.0, 2.0 * uniform(rng) - 1.0
+        for k in range(i, j + 1):
+            xs[k] += s * ux
+            ys[k] += s * uy
+        return n
+    if u < 0.56:                                                          # replace a stretch by one corner
+        i = int(uniform(rng) * (n - 1))
+        j = min(n - 1, i + 1 + int(4.0 * uniform(rng) * uniform(rng) + 0.7))
+        t, h = at[i], course[i]
+        k1, k2 = _pair(uniform(rng), ys[j] < ys[i])
+        x, y, _, ok = corner(b, xs[i], ys[i], h, t, xs[j], ys[j], k1, k2)
+        if not ok or n + 1 >= MOST_POINTS:
+            return 0
+        if j > i + 1:
+            n = _delete(xs, ys, n, i + 1, j - i - 1)
+        return _insert(xs, ys, n, i + 1, x, y)
+    if u < 0.64 and inner > 0:                                            # leave corners out
+        i = 1 + int(uniform(rng) * inner)
+        count = min(n - 1 - i, 1 + int(3.0 * uniform(rng) * uniform(rng)))
+        return _delete(xs, ys, n, i, count)
+    if u < 0.70 and n + 1 < MOST_POINTS:                                  # a new corner beside a leg
+        i = int(uniform(rng) * (n - 1))
+        f = uniform(rng)
+        x = xs[i] + f * (xs[i + 1] - xs[i]) + step * (2.0 * uniform(rng) - 1.0)
+        y = ys[i] + f * (ys[i + 1] - ys[i]) + step * (2.0 * uniform(rng) - 1.0)
+        return _insert(xs, ys, n, i + 1, x, y)
+    if u < 0.80 and spots.shape[0] > 0:                                   # touch an obstacle's corner
+        q = int(uniform(rng) * spots.shape[0])
+        x, y = spots[q, 0], spots[q, 1]
+        best, m = math.inf, -1
+        for i in range(n - 1):
+            dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
+            d2 = dx * dx + dy * dy
+            f = ((x - xs[i]) * dx + (y - ys[i]) * dy) / d2 if d2 > 0.0 else 0.0
+            f = min(1.0, max(0.0, f))
+            d = (xs[i] + f * dx - x) ** 2 + (ys[i] + f * dy - y) ** 2
+            if d < best:
+                best, m = d, i
+        if m < 0:
+            return 0
+        r = uniform(rng)
+        if r < 0.4 and n + 1 < MOST_POINTS:
+            return _insert(xs, ys, n, m + 1, x, y)
+        i = m if r < 0.7 else m + 1
+        if i == 0 or i == n - 1:
+            return 0
+        xs[i], ys[i] = x, y
+        return n
+    if u < 0.88 and n > 1:                                                # move the end in the goal's disc
+        radius = goal[2]
+        if radius <= 0.0:
+            return 0
+        m = n - 1
+        if uniform(rng) < 0.5 and n > 2:                                  # ... carrying the last corner with it
+            s = min(step, radius) * (2.0 * uniform(rng) - 1.0)
+            ux, uy = _course(xs, ys, m - 2)
+            xs[m - 1] += s * ux
+            ys[m - 1] += s * uy
+            xs[m] += s * ux
+            ys[m] += s * uy
+        elif uniform(rng) < 0.3:
+            ux, uy = _course(xs, ys, m - 1)
+            s = min(step, radius) * (2.0 * uniform(rng) - 1.0)
+            xs[m] += s * ux
+            ys[m] += s * uy
+        else:
+            xs[m] += min(step, radius) * (2.0 * uniform(rng) - 1.0)
+            ys[m] += min(step, radius) * (2.0 * uniform(rng) - 1.0)
+        dx, dy = xs[m] - goal[0], ys[m] - goal[1]
+        d = math.hypot(dx, dy)
+        if d > radius:
+            f = radius / d
+            xs[m], ys[m] = goal[0] + f * dx, goal[1] + f * dy
+        return n
+    if u < 0.94:                                                          # two courses in the other order
+        i = int(uniform(rng) * (n - 1))
+        if i + 2 >= n:
+            return 0
+        xs[i + 1] = xs[i] + xs[i + 2] - xs[i + 1]
+        ys[i + 1] = ys[i] + ys[i + 2] - ys[i + 1]
+        return n
+    if n > 2:                                                             # all corners to their times
+        fit_corners(b, xs, ys, n, h0, 1 + int(uniform(rng) * inner), True)
+        return n
+    return 0

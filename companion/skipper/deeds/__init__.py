@@ -1,0 +1,1 @@
+"""Deeds: getting under way, steering, loitering, stopping, and taking the helm again."""

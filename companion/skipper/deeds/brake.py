@@ -1,0 +1,59 @@
+"""Too near to plan round: a leg that meets something sooner than a plan can be in place is not sailed on.
+
+It happens to a boat that has not come where she is by a plan: handed back by a person, put right after a false
+position. A plan, its upload, the reading back and the turn take six seconds, a command one: LOITER first, whose circle
+begins where she could stop, then a plan from there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from companion.messages import Mode
+from companion.skipper.deeds.helm import is_busy, set_mode
+from companion.skipper.step.actions import Severity
+from companion.skipper.step.state import Phase
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.drift import DriftAhead, drift_ahead
+from companion.skipper.way.geometry import bearing_rad, distance_m
+
+REACT_S = 8.0        # a step to see it, a plan, its upload and reading back, the turn: six seconds; and two to spare
+LEAST_M = 2.0        # how far the autopilot wanders off its line
+SLOW_MPS = 0.5       # slower she does not come far in that time
+HAIR_M = 0.5
+
+
+def ahead_of(turn: Turn) -> DriftAhead | None:
+    """Return what the way to the present waypoint meets within ``REACT_S``, None when nothing or nobody sails it."""
+    boat, leg, status = turn.boat_en, turn.leg(), turn.autopilot
+    if boat is None or leg is None or status is None or status.mode is not Mode.AUTO or not turn.ahead():
+        return None
+    speed, left_m = turn.speed_mps, distance_m(boat, leg[1])
+    if speed < SLOW_MPS or left_m < 1.0:
+        return None
+    course = bearing_rad(boat, leg[1])
+    hull_m = turn.voyage.boat.hull.reach_m
+    here_m = float(turn.voyage.area.clearance_m([boat])[0])
+    found = drift_ahead(
+        turn.voyage.area, boat, (speed * math.sin(course), speed * math.cos(course)),
+        floor_m=max(0.0, min(hull_m + LEAST_M, here_m - HAIR_M)), horizon_s=min(REACT_S, left_m / speed))
+    return None if found.is_clear else found
+
+
+def brakes(turn: Turn) -> bool:
+    """Ask for LOITER where the leg is shut too near to plan; True in the step in which it is asked for."""
+    state = turn.state
+    if state.steering_until_s is not None or state.by_field.resort.engaged or turn.steers:
+        return False
+    if state.pending_upload is not None or not turn.snapshot.permissions.may_set_mode:
+        return False
+    met = ahead_of(turn)
+    if met is None or is_busy(turn, Mode.LOITER.name):
+        return False
+    text = f"{met.name} is {met.floor_s or 0.0:.0f} s ahead, too near to plan round: waiting in a loiter for a plan"
+    if not set_mode(turn, Mode.LOITER, text):
+        return False
+    turn.update(after_operator=True)
+    turn.say(Severity.WARNING, "too near", text, every_s=0.0)
+    turn.phase(Phase.HOLDING, text)
+    return True

@@ -1,0 +1,240 @@
+"""Steering by vector field under GUIDED: the last resort before a vessel too near to plan for, and a mode of its own.
+
+The last resort begins with the watchdog "vessel too near" and ends when it is over and a plan made since then, from
+where the boat has come to, is in place. Headings go out every step: they die after 3 s. What stands still and the
+fence are in the field; the no-go zone is ours to keep out of (``companion.field.guidance``). Other people's changes of
+mode end it: a boat set to AUTO meanwhile is not taken again for a minute.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from companion.field.guidance import follow_line, go_to, step
+from companion.field.station import Station, keep
+from companion.field.values import Habits, Intent, Obstacle, Situation
+from companion.messages import Mode
+from companion.skipper.deeds.helm import hand_back, is_busy, set_mode
+from companion.skipper.planning.asking import request
+from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
+from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
+from companion.skipper.step.config import Guidance
+from companion.skipper.step.state import ByField, Phase
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.voyage import Side
+from companion.traffic import Vessel, predict
+
+NAME = "vessel too near"      # the watchdog's
+KEEP_SHARE = 0.5              # of the distance that plans keep: what the last resort defends
+GROWN_S = 30.0                # the growth of a vessel's disc is that of its next half minute
+LOOK_S = 90.0
+STILL_MPS = 0.3
+PLAN_EVERY_S = 20.0           # Büsser 5.2
+LEFT_ALONE_S = 60.0           # after somebody set AUTO in the middle of it
+LAG_S = 3.0                   # a boat of a few metres gathers its speed in this time
+HORIZON_S = 60.0
+QUICK_RADPS = math.radians(20.0)   # a boat that turns faster ends its boards on the station by tacking
+
+
+# ------------------------------------------------------------------------------------- what is seen
+def obstacles(turn: Turn, vessels: Sequence[Vessel]) -> tuple[Obstacle, ...]:
+    """Return the discs that the field keeps out of: hull, half the distance that plans keep, and what is not known."""
+    hull = turn.voyage.boat.hull
+    own_m = hull.reach_m + KEEP_SHARE * turn.config.traffic_clearance_m
+    out = []
+    for vessel in vessels:
+        now, later = predict(vessel, turn.t_s), predict(vessel, turn.t_s + GROWN_S)
+        radius_m = now.radius_m(GIVE_UP_RISK)
+        out.append(Obstacle(
+            en_m=now.mean_en_m, velocity_en_mps=now.velocity_en_mps, keep_m=radius_m + own_m,
+            growth_mps=max(0.0, later.radius_m(GIVE_UP_RISK) - radius_m) / GROWN_S))
+    return tuple(out)
+
+
+def meets_in(turn: Turn) -> tuple[float, str] | None:
+    """Return in how many seconds (at most ``LOOK_S``) the way being sailed enters a vessel's disc, and whose.
+
+    The way is the route from where the boat is, at the polar's speeds, and the boat's place where it ends. A vessel
+    that lies still is the planner's matter. None without vessels or position.
+    """
+    vessels, boat = [v for v in near(turn) if not _lies_still(v)], turn.boat_en
+    if not vessels or boat is None:
+        return None
+    at_s, way = [0.0], [boat]
+    for leg in timed_legs(turn):
+        at_s += [leg.start_s, leg.end_s]
+        way += [leg.from_en, leg.to_en]
+    t_s = np.arange(0.0, LOOK_S + 1.0)
+    points = np.asarray(way)
+    own = np.column_stack([np.interp(t_s, at_s, points[:, 0]), np.interp(t_s, at_s, points[:, 1])])
+    first = (LOOK_S, "")
+    for vessel, disc in zip(vessels, obstacles(turn, vessels), strict=True):
+        centre = np.asarray(disc.en_m) + t_s[:, None] * np.asarray(disc.velocity_en_mps)
+        inside = np.hypot(*(own - centre).T) < disc.keep_m + disc.growth_mps * t_s
+        if inside.any() and t_s[int(np.argmax(inside))] < first[0]:
+            first = (float(t_s[int(np.argmax(inside))]), vessel.label)
+    return first
+
+
+def _lies_still(vessel: Vessel) -> bool:
+    return vessel.is_moving_known and math.hypot(*vessel.velocity_en_mps) < STILL_MPS
+
+
+def situation(turn: Turn) -> Situation | None:
+    """Return what the guidance sees, None without position or wind: a sailboat is not steered blind."""
+    boat, vehicle, wind = turn.boat_en, turn.snapshot.vehicle, turn.wind_now
+    if boat is None or vehicle is None or wind is None:
+        return None
+    seen = obstacles(turn, near(turn))
+    buoys = tuple(
+        Obstacle(en_m=goal.en_m, keep_m=0.5 * goal.rounding_m)
+        for goal in turn.voyage.goals if goal.side is not Side.NONE
+    )
+    return Situation(
+        t_s=turn.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
+        twd_from_rad=wind[0], tws_mps=wind[1], obstacles=(*seen, *buoys),
+    )
+
+
+def habits(turn: Turn, tws_mps: float) -> Habits:
+    """Return what the voyage's boat can do in this wind, and the margins of its plans."""
+    boat = turn.voyage.boat
+    twa, speed = boat.polar.curve(max(1.0, tws_mps))
+    return Habits(
+        no_go_half_rad=turn.planned_no_go_rad, polar_twa_rad=tuple(map(float, twa)),
+        polar_mps=tuple(map(float, speed)), turn_rate_radps=boat.turn_rate_radps, tack_s=max(1.0, boat.tack_loss_s),
+        lag_s=LAG_S, horizon_s=HORIZON_S, keep_m=turn.config.margin_floor_m,
+    )
+
+
+def intent(turn: Turn, seen: Situation) -> Intent:
+    """Return where to go: to the gate by field alone, else back to the leg of the plan; what stands still is in it."""
+    leg, gate = turn.leg(), turn.gate
+    if turn.config.guidance is Guidance.FIELD and gate is not None:
+        wanted = go_to(gate.en_m, seen.twd_from_rad or 0.0)
+    elif leg is not None and distance_m(*leg) > 1.0:
+        wanted = follow_line(*leg)
+    else:
+        wanted = go_to(leg[1] if leg is not None else seen.en_m, seen.twd_from_rad or 0.0)
+    return replace(wanted, clearance=turn.voyage.area.clearance_m)
+
+
+def heading(turn: Turn) -> tuple[float, str] | None:
+    """Return the heading to send now [rad] and what it is for, None when nothing can be told: it then times out."""
+    seen = situation(turn)
+    if seen is None:
+        return None
+    guidance, setpoint = step(
+        turn.state.by_field.guidance, seen, intent(turn, seen), habits(turn, seen.tws_mps))
+    turn.update(by_field=replace(turn.state.by_field, guidance=guidance))
+    return setpoint.heading_rad, setpoint.reason
+
+
+# -------------------------------------------------------------------------------------- last resort
+def last_resort(turn: Turn) -> bool:
+    """Steer clear of a vessel that is too near to plan for; True while the helm is the field's."""
+    memory, status, may = turn.state.by_field, turn.autopilot, turn.snapshot.permissions
+    raised = turn.is_raised(NAME)
+    if status is None or (turn.config.guidance is Guidance.FIELD and turn.steers):
+        return False
+    if not memory.resort.engaged:
+        if not raised or turn.t_s < memory.not_before_s:
+            return False
+        if not (may.may_steer and may.may_set_mode):
+            turn.say(
+                Severity.CRITICAL, "no last resort", "a vessel is too near to plan for, and steering is not permitted")
+            return False
+        if situation(turn) is None:
+            return False
+    elif memory.seen_guided and status.mode is Mode.AUTO and not is_busy(turn, Mode.GUIDED.name):
+        turn.update(own_mode=None, by_field=ByField(not_before_s=turn.t_s + LEFT_ALONE_S))
+        turn.say(Severity.NOTICE, "last resort over", "somebody set AUTO: the field lets go", every_s=0.0)
+        return False
+    resort = memory.resort.step(turn.t_s, too_near=raised, can_plan=_is_planned(turn), clear_s=0.0)
+    if memory.resort.engaged and not resort.engaged:
+        turn.update(by_field=ByField())
+        turn.say(Severity.NOTICE, "last resort over", f"the way is clear again after "
+                 f"{turn.t_s - memory.resort.since_s:.0f} s: back to AUTO and the plan", every_s=0.0)
+        return False
+    if not memory.resort.engaged:
+        met = meets_in(turn)
+        whose = f"{met[1]}, met in {met[0]:.0f} s" if met is not None and met[1] else "a vessel"
+        turn.update(steering_until_s=None, steering_heading_rad=None)   # the guidance gets out of irons by itself
+        turn.say(Severity.WARNING, "last resort", f"too near to plan for: {whose}; steering by field", every_s=0.0)
+    clear_s = None if raised else (memory.clear_s if memory.clear_s is not None else turn.t_s)
+    guided = status.mode is Mode.GUIDED
+    turn.update(by_field=replace(memory, resort=resort, clear_s=clear_s, seen_guided=memory.seen_guided or guided))
+    if guided:
+        turn.update(own_mode=Mode.GUIDED)
+    else:
+        set_mode(turn, Mode.GUIDED, "too near to plan for: steering by field")
+    _plan(turn)
+    told = heading(turn)
+    if told is None:
+        turn.phase(Phase.LAST_RESORT, "steering by field: no position or no wind, so no heading")
+        return True
+    turn.act(SteerHeading(heading_rad=told[0], text=f"last resort: {told[1]}"))
+    turn.phase(Phase.LAST_RESORT, f"keeping clear by field: {math.degrees(told[0]) % 360.0:.0f}° ({told[1]})"
+               + ("" if raised else "; clear, waiting for the plan"))
+    return True
+
+
+def _is_planned(turn: Turn) -> bool:
+    """Return whether a plan asked for since the water was clear has been answered and is on board."""
+    state, clear_s = turn.state, turn.state.by_field.clear_s
+    return (
+        clear_s is not None and state.last_plan_s >= clear_s and state.pending_plan is None
+        and state.pending_upload is None and not state.repair
+    )
+
+
+def _plan(turn: Turn) -> None:
+    """Ask for a plan from where the field has brought the boat: now and then, and at once when the water is clear."""
+    state = turn.state
+    if state.pending_plan is not None or state.pending_upload is not None or turn.is_raised("becalmed"):
+        return
+    clear_s = state.by_field.clear_s
+    due = clear_s is not None and state.last_plan_s < clear_s
+    if due or turn.t_s - state.last_plan_s >= PLAN_EVERY_S:
+        request(turn, ReplanReason.OBSTACLE, text="from where the field has brought the boat")
+
+
+# ------------------------------------------------------------------------------------------ station
+def keeps_station(turn: Turn) -> bool:
+    """Stay at the last goal for as long as the mission asks; True until then.
+
+    By field where that is the guidance; else the mission's safe end does it.
+    """
+    length_s, boat = turn.config.station_s, turn.boat_en
+    if length_s <= 0.0 or turn.state.route is None:
+        return False
+    memory = turn.state.by_field
+    since = memory.station_since_s if memory.station_since_s is not None else turn.t_s
+    turn.update(by_field=replace(memory, station_since_s=since))
+    left_s = length_s - (turn.t_s - since)
+    if left_s <= 0.0:
+        return False
+    place = turn.gates[-1].en_m
+    off = "" if boat is None else f", {distance_m(boat, place):.0f} m off"
+    turn.phase(Phase.HOLDING, f"keeping station: waiting {left_s:.0f} s more{off}")
+    if turn.config.guidance is not Guidance.FIELD or not turn.steers:
+        hand_back(turn)   # out of GUIDED, where the goal was reached by headings
+        return True
+    status, seen = turn.autopilot, situation(turn)
+    if status is not None and status.mode is not Mode.GUIDED:
+        set_mode(turn, Mode.GUIDED, "keeping station by field")
+    elif seen is not None:
+        turn.update(own_mode=Mode.GUIDED)
+        station = Station(at_en=place)
+        if turn.voyage.boat.turn_rate_radps >= QUICK_RADPS:
+            station = replace(station, tacks=True)
+        after, setpoint = keep(memory.station, seen, station, habits(turn, seen.tws_mps))
+        turn.update(by_field=replace(turn.state.by_field, station=after))
+        turn.act(SteerHeading(
+            heading_rad=setpoint.heading_rad, thrust=setpoint.thrust, text=f"station: {setpoint.reason}"))
+    return True

@@ -1,0 +1,189 @@
+"""A stop that we did not ask for: whose doing it is, and the taking over of one that is nobody's wish.
+
+She stops being sailed when the mode leaves the ones that sail a mission or a course, or she is disarmed. The cause is
+sought among the signs around that moment, on both sides of it: on a slow link the sign comes after the mode. Without
+one it was a person, and so it was when the sticks or the mode switch moved.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from companion.boat import AutopilotLimits
+from companion.messages import AutopilotStatus, Mode, StatusText
+from companion.skipper.step.actions import Severity
+from companion.skipper.step.causes import (
+    BY_NAME,
+    CRITICAL,
+    EMPTY,
+    HOMEWARD,
+    PERSON,
+    RECEIVER,
+    STOPPING,
+    TABLE,
+    Answer,
+    standing,
+    told_by,
+)
+from companion.skipper.step.state import PATIENT, Phase, Signs, Stop
+from companion.skipper.step.turn import Turn
+
+TOLD_S = 5.0          # a sign this long before or after the change of mode belongs to it
+ASKED_S = 30.0        # an AUTO that shows so long after it was accepted is the one that was asked for
+FILTER_S = 30.0       # a heartbeat that is critical so soon after the filter failed is critical because of it
+MOVED_US = 100        # a stick or switch that is moved moves by more than this; at rest it trembles by a few
+SHORE = "shore link"
+SAILED = frozenset({Mode.AUTO, Mode.GUIDED, *STOPPING}) - {Mode.HOLD}
+
+
+def note(turn: Turn, text: StatusText) -> None:
+    """Remember a text that is a sign."""
+    cause = told_by(text)
+    if cause:
+        turn.update(signs=_seen(turn.state.signs, cause, turn.t_s))
+    if cause == "battery" and EMPTY in text.text:
+        turn.update(battery_critical=True)
+
+
+def _seen(signs: Signs, cause: str, t_s: float) -> Signs:
+    return replace(signs, seen_s=(*(s for s in signs.seen_s if s[0] != cause), (cause, t_s)))
+
+
+def follow_stops(turn: Turn) -> None:
+    """Take in the signs of this step; notice a stop, name its cause, and notice that it is over."""
+    status = turn.autopilot
+    if status is None:
+        return
+    before = turn.state.signs
+    signs = _sticks(before, status, turn.snapshot.limits or AutopilotLimits(), turn.t_s)
+    up = standing(status)
+    for cause in up:
+        of_filter = cause == SHORE and turn.t_s - dict(signs.seen_s).get("position", -math.inf) <= FILTER_S
+        if cause not in before.standing and not of_filter:
+            signs = _seen(signs, cause, turn.t_s)
+    if None not in {before.breaches, status.fence_breaches} and status.fence_breaches != before.breaches:
+        signs = _seen(signs, "fence", turn.t_s)   # outside already, and the autopilot acts again
+    helm = (status.mode, status.is_armed)
+    if status.battery_failed is False and "battery" in before.standing:
+        turn.update(battery_critical=False)
+    turn.update(signs=replace(signs, standing=up, breaches=status.fence_breaches, helm=helm, helm_s=turn.t_s))
+    stop = turn.state.stop
+    if status.is_armed and status.mode not in STOPPING:
+        turn.update(stop=None)
+    elif stop is not None and _is_ours(turn):
+        turn.update(stop=replace(stop, mode=status.mode, is_armed=True))   # a loiter that we asked for in it
+    elif (stop is not None and (stop.mode, stop.is_armed) != helm) or (stop is None and _was_sailed(turn, before)):
+        turn.update(stop=Stop(
+            t_s=turn.t_s, before_s=before.helm_s, mode=status.mode, is_armed=status.is_armed, cause=PERSON))
+    stop = turn.state.stop
+    if stop is not None and turn.t_s - stop.t_s <= TOLD_S:
+        turn.update(stop=replace(stop, cause=_cause(stop, turn.state.signs)))
+
+
+def _was_sailed(turn: Turn, before: Signs) -> bool:
+    """Return whether somebody's mission or course was being sailed; at the first look, whether the state says so."""
+    if before.helm is None:
+        saved = turn.state.adoptable
+        return saved is not None and saved.sailing
+    return before.helm[1] and before.helm[0] in SAILED and not _is_ours(turn)
+
+
+def _is_ours(turn: Turn) -> bool:
+    """Return whether the mode is one that we asked for."""
+    status = turn.autopilot
+    return status is not None and status.is_armed and status.mode is turn.state.own_mode
+
+
+def _sticks(signs: Signs, status: AutopilotStatus, limits: AutopilotLimits, t_s: float) -> Signs:
+    """Notice a rudder, a throttle or a mode switch that moved; a receiver without its transmitter tells nothing."""
+    channels = [n for n in limits.rc_channels if 1 <= n <= len(status.rc_us)]
+    now = tuple(status.rc_us[n - 1] for n in channels)
+    if not now or status.receiver_lost:
+        return signs
+    if len(now) != len(signs.rc_us):
+        return replace(signs, rc_us=now)
+    if all(abs(a - b) <= MOVED_US for a, b in zip(now, signs.rc_us, strict=True)):
+        return signs
+    return replace(signs, rc_us=now, rc_moved_s=t_s)
+
+
+def _cause(stop: Stop, signs: Signs) -> str:
+    first, last = stop.before_s - TOLD_S, stop.t_s + TOLD_S
+    told = {name for name, t_s in signs.seen_s if first <= t_s <= last}
+    # A receiver that loses its transmitter may put its channels where its maker likes.
+    if first <= signs.rc_moved_s <= last and RECEIVER not in told:
+        return PERSON
+    return next((cause.name for cause in TABLE if cause.name in told), PERSON)
+
+
+def take_over(turn: Turn) -> bool:
+    """Make a failsafe's stop ours to end, where the table and the operator allow it; False: somebody else's."""
+    stop, may = turn.state.stop, turn.snapshot.permissions
+    if stop is None or not stop.is_armed or stop.cause == PERSON or not (may.may_set_mode and may.may_upload):
+        return False
+    cause = BY_NAME[stop.cause]
+    if cause.answer is Answer.LEAVE or stop.mode is None:
+        return False
+    turn.update(
+        own_mode=stop.mode, operator_since_s=None, after_operator=True, plan_retry=PATIENT, answering=cause.name,
+        sent_home=stop.mode in HOMEWARD)
+    turn.phase(Phase.HOLDING, waits_for(turn) or "stopped: waiting for a plan from where she is")
+    turn.say(Severity.WARNING, f"{cause.name} failsafe",
+             f"put into {stop.mode.name} by the autopilot's {cause.name} failsafe: {cause.answer.value}", every_s=0.0)
+    return True
+
+
+def is_answered(turn: Turn) -> bool:
+    """Return whether she lies in a stop that is ours to end."""
+    status = turn.autopilot
+    held = status is not None and turn.state.stop is not None and (
+        status.mode is turn.state.own_mode or turn.is_leaving)
+    return bool(turn.state.answering) and held
+
+
+def waits_for(turn: Turn) -> str:
+    """Return what is missing before the boat can be planned for; empty: nothing."""
+    status = turn.autopilot
+    stop = turn.state.stop
+    ill = status is None or not status.ekf_ok
+    if not ill and status is not None and stop is not None and turn.state.answering == "position":
+        # The filter takes a jump before its failsafe is over.
+        ill = status.system_status == CRITICAL and dict(turn.state.signs.seen_s).get(SHORE, -math.inf) < stop.before_s
+    if ill:
+        return "stopped: waiting until the autopilot's position filter is well"
+    if turn.boat_en is None:
+        return "stopped: waiting for a position that can be believed"
+    return ""
+
+
+def follow_answer(turn: Turn) -> None:
+    """Let go of an answer whose cause is over, or that a person has taken out of our hands."""
+    state, stop = turn.state, turn.state.stop
+    if not state.answering or turn.autopilot is None:
+        return
+    if is_answered(turn):
+        if stop is not None and (stop.cause == PERSON or (
+                state.signs.rc_moved_s > stop.t_s and RECEIVER not in state.signs.standing)):
+            turn.update(answering="", own_mode=None, stop=replace(stop, cause=PERSON))
+        elif stop is not None and BY_NAME[stop.cause].answer is not Answer.LEAVE:
+            turn.update(answering=stop.cause)   # a better sign came late
+        return
+    if turn.autopilot.mode is Mode.AUTO and not _has_asked_for_auto(turn):
+        turn.say(Severity.NOTICE, "answered", "a person has set AUTO: sailing on", every_s=0.0)
+        turn.update(answering="")
+        return
+    answer = BY_NAME[state.answering].answer
+    if answer is Answer.SAIL_ON or (answer is Answer.STAY and state.answering not in state.signs.standing):
+        turn.update(answering="")
+
+
+def _has_asked_for_auto(turn: Turn) -> bool:
+    """Return whether AUTO shows by our own order: at the change of mode, the only moment when it matters."""
+    state = turn.state
+    if state.own_mode is None:
+        return True   # seen before
+    pending = state.pending_command is not None and state.pending_command[2] == Mode.AUTO.name
+    accepted = state.accepted is not None and state.accepted[0] == Mode.AUTO.name and (
+        turn.t_s - state.accepted[1] <= ASKED_S)
+    return pending or accepted

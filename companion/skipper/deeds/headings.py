@@ -1,0 +1,84 @@
+"""Headings to send, where the boat is steered by headings instead of a mission (Büsser 2009, chapter 3).
+
+Per leg the heading is that from the previous waypoint to the current one, not from the boat: the plan's angle to
+the wind is what makes it fast. Near the destination it is the course from the boat; near a buoy the course to the
+buoy plus 30 degrees. Drift is added as in equation 3 of chapter 2. Heading setpoints have no protection of
+ArduRover's against the no-go zone: ``sailable`` is ours.
+
+[1] G.-A. Büsser, Design and Implementation of a Navigation Algorithm for an Autonomous Sailboat, ETH Zürich, 2009.
+"""
+
+from __future__ import annotations
+
+import math
+
+from companion.geo.angles import difference_rad, wrap_pi
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.gates import Gate
+from companion.skipper.way.geometry import bearing_rad, distance_m
+from companion.skipper.way.voyage import PointEn, Side
+
+DRIFT_LIMIT_RAD = math.radians(20.0)  # more is not leeway but a current or a compass error
+STEERAGE_MPS = 0.5                    # slower than this the drift angle means nothing
+AT_BUOY = 3.0                         # rounding radii
+TACK_HYSTERESIS_RAD = math.radians(10.0)
+
+
+def drift_correction_rad(velocity_en_mps: tuple[float, float], heading_rad: float) -> float:
+    """Return arctan(v_drift / v_boat), [1] eq. (3): what to add to the heading so that the course is made good.
+
+    Positive (to starboard) when the boat is pushed to port; limited, and 0 without way on.
+    """
+    ahead = velocity_en_mps[0] * math.sin(heading_rad) + velocity_en_mps[1] * math.cos(heading_rad)
+    to_port = velocity_en_mps[1] * math.sin(heading_rad) - velocity_en_mps[0] * math.cos(heading_rad)
+    if ahead < STEERAGE_MPS:
+        return 0.0
+    return max(-DRIFT_LIMIT_RAD, min(DRIFT_LIMIT_RAD, math.atan2(to_port, ahead)))
+
+
+def buoy_heading_rad(boat_en: PointEn, buoy_en: PointEn, side: Side, angle_rad: float) -> float:
+    """Return the course to the buoy turned away from it by ``angle_rad`` ([1] Figure 3.5), to leave it on ``side``."""
+    turn = angle_rad if side is Side.PORT else -angle_rad
+    return wrap_pi(bearing_rad(boat_en, buoy_en) + turn)
+
+
+def sailable_rad(wanted_rad: float, heading_rad: float, twd_from_rad: float, no_go_half_rad: float) -> float:
+    """Return the wanted heading, or the edge of the no-go zone if it lies inside.
+
+    The edge is that of the tack the boat is on; the other one only when the wanted heading is nearer to it by more
+    than 10 degrees, so that a course dead to windward does not make the boat tack to and fro.
+    """
+    to_wanted = difference_rad(wanted_rad, twd_from_rad)
+    if abs(to_wanted) >= no_go_half_rad:
+        return wanted_rad
+    side = 1.0 if difference_rad(heading_rad, twd_from_rad) >= 0.0 else -1.0
+    if side * to_wanted < -TACK_HYSTERESIS_RAD / 2.0:
+        side = -side
+    return wrap_pi(twd_from_rad + side * no_go_half_rad)
+
+
+def desired_heading_rad(turn: Turn) -> float | None:
+    """Return the heading to send now, None when it cannot be told: nothing is sent, and the setpoint times out."""
+    boat, leg, vehicle, wind, gate = turn.boat_en, turn.leg(), turn.snapshot.vehicle, turn.wind_now, turn.gate
+    if boat is None or leg is None or vehicle is None or wind is None or not turn.ahead():
+        return None
+    wanted = bearing_rad(*leg)
+    if _is_at_buoy(gate, boat) and gate is not None and gate.buoy_en_m is not None:
+        wanted = bearing_rad(boat, leg[1])
+        if gate.is_first and distance_m(boat, gate.buoy_en_m) > distance_m(gate.en_m, gate.buoy_en_m):
+            # The scheme is for the approach: kept up all the way round it would spiral into the buoy.
+            clear = buoy_heading_rad(boat, gate.buoy_en_m, gate.side, turn.config.buoy_angle_rad)
+            hand = 1.0 if gate.side is Side.PORT else -1.0
+            if hand * difference_rad(clear, wanted) > 0.0:
+                wanted = clear
+    elif turn.state.index == turn.last_waypoint() or distance_m(*leg) < 1.0:
+        wanted = bearing_rad(boat, leg[1])
+    wanted = wrap_pi(wanted + drift_correction_rad(vehicle.velocity_en_mps, vehicle.heading_rad))
+    return sailable_rad(wanted, vehicle.heading_rad, wind[0], turn.no_go_half_rad)
+
+
+def _is_at_buoy(gate: Gate | None, boat: PointEn) -> bool:
+    """Return whether the boat is at the buoy that it is to round: within three of its rounding radii."""
+    if gate is None or gate.buoy_en_m is None:
+        return False
+    return distance_m(boat, gate.buoy_en_m) < AT_BUOY * distance_m(gate.en_m, gate.buoy_en_m)

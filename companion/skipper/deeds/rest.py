@@ -1,0 +1,92 @@
+"""The end of a voyage, and of an errand: she loiters, and is watched.
+
+A voyage is over when all goals are reached (and home, where the mission ends there), or its time is up. From then on
+nothing is planned but the way back to her place, should she be dragged off it and the straight way not be clear; the
+watch goes on until somebody ends the program.
+"""
+
+from __future__ import annotations
+
+from companion.skipper.deeds.by_field import keeps_station
+from companion.skipper.deeds.failsafe import waits_for
+from companion.skipper.deeds.helm import hand_back, repair
+from companion.skipper.planning.errands import OUT_OF_TIME, Errand, Kind, home_trouble, is_at_rest
+from companion.skipper.step.actions import CancelPlan, Severity
+from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.config import SafeEnd
+from companion.skipper.step.state import Phase
+from companion.skipper.step.turn import Turn
+
+HOW_LONG = {
+    "battery critical": "until the battery is charged, or a person takes her",
+    "battery": "until a person takes her and gives AUTO back",
+    "shore link": "until the link to the shore is back, or a person gives AUTO",
+}
+
+
+def comes_to_rest(turn: Turn, bound: Errand) -> bool:
+    """Lie at the end of an errand; True while she does."""
+    if not is_at_rest(turn) or turn.state.own_mode in STOPPING:
+        return False
+    if turn.is_raised(OUT_OF_TIME) and not turn.state.answering and not turn.is_raised("battery critical"):
+        reached = len(turn.state.reached)
+        _end(turn, f"out of time: {reached} of {len(turn.voyage.legs)} goals reached", arrived=False)
+        return True
+    if bound.kind is Kind.HOME and turn.gate is None and not turn.state.answering:
+        turn.update(home_reached=True)
+        rest(turn)
+        return True
+    if bound.kind is Kind.REST:
+        return False
+    _let_go_of_plans(turn)
+    if repair(turn):
+        return True
+    hand_back(turn)
+    where = "staying near by" if bound.kind is Kind.STAY else f"at {bound.name}"
+    key = "battery critical" if turn.is_raised("battery critical") else turn.state.answering
+    turn.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {HOW_LONG.get(key, 'for a person')}")
+    return True
+
+
+def rest(turn: Turn) -> None:
+    """Keep station for as long as the mission asks, then lie in the mission's safe end."""
+    if not turn.state.over:
+        if keeps_station(turn):
+            return
+        trouble = home_trouble(turn) if turn.config.safe_end is SafeEnd.RETURN and not turn.state.home_reached else ""
+        home = f"; not home: {trouble}" if trouble else "; home" if turn.state.home_reached else ""
+        route = turn.state.route
+        end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
+        _end(turn, f"all {len(turn.state.reached)} goals reached{home}{end}", arrived=not trouble)
+        return
+    stopped = turn.state.own_mode in STOPPING and turn.autopilot is not None and (
+        turn.autopilot.mode is turn.state.own_mode)
+    turn.update(after_operator=False)   # the loiter's place is the same wherever she has been
+    why = waits_for(turn) if stopped else ""
+    if why:
+        turn.phase(Phase.HOLDING, why)
+    elif not repair(turn):
+        hand_back(turn)
+        turn.phase(Phase.DONE, turn.state.over + ("; waiting for AUTO" if stopped else _raised(turn)))
+
+
+def _raised(turn: Turn) -> str:
+    names = ", ".join(r.name for r in turn.state.raised if r.name != OUT_OF_TIME)
+    return f"; {names}" if names else ""
+
+
+def _end(turn: Turn, why: str, *, arrived: bool) -> None:
+    """The voyage is over: remember where she is to rest."""
+    _let_go_of_plans(turn)
+    route = turn.state.route
+    place = route.points_en_m[-1] if route is not None and route.points_en_m else turn.boat_en
+    turn.update(over=why, arrived=arrived, rest_en_m=place)
+    hand_back(turn)
+    turn.phase(Phase.DONE, why)
+    turn.say(Severity.NOTICE if arrived else Severity.WARNING, "done", why, every_s=0.0)
+
+
+def _let_go_of_plans(turn: Turn) -> None:
+    if turn.state.pending_plan is not None:
+        turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
+        turn.update(pending_plan=None)

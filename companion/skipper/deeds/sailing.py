@@ -1,0 +1,229 @@
+"""Under way: who steers, what is asked for, and Büsser's names for what the boat is doing."""
+
+from __future__ import annotations
+
+import math
+
+from companion.geo.angles import difference_rad
+from companion.messages import Mode
+from companion.skipper.deeds.adrift import stops_drift
+from companion.skipper.deeds.brake import brakes
+from companion.skipper.deeds.by_field import heading as by_field_heading
+from companion.skipper.deeds.by_field import last_resort
+from companion.skipper.deeds.doubt import stands_off
+from companion.skipper.deeds.failsafe import waits_for
+from companion.skipper.deeds.headings import desired_heading_rad
+from companion.skipper.deeds.helm import check_current, hand_back, is_busy, make_current, repair, set_mode
+from companion.skipper.deeds.rest import comes_to_rest, rest
+from companion.skipper.deeds.short_tack import short_tack
+from companion.skipper.planning.asking import request
+from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S
+from companion.skipper.planning.errands import Errand, errand, is_at_rest
+from companion.skipper.planning.not_found import hold
+from companion.skipper.planning.triggers import find_trigger, is_buoy
+from companion.skipper.planning.vessels import near
+from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
+from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.config import Guidance
+from companion.skipper.step.snapshot import OperatorWish
+from companion.skipper.step.state import Phase
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.manoeuvre import bear_away_rad
+from companion.traffic.plans import MIN_INTERVAL_S
+
+STEER_S = 25.0               # bearing away longer than this has failed
+SAILS_MPS = 0.8              # out of irons
+SAILS_TWA_RAD = math.radians(60.0)
+# Reasons that can wait among vessels, where plans must not follow each other fast (Büsser 5.2).
+ROUTINE = frozenset({
+    ReplanReason.WAYPOINT, ReplanReason.FORECAST, ReplanReason.WIND_SHIFT, ReplanReason.PLAN_AGE, ReplanReason.OFF_LEG})
+
+
+def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
+    """Act for one step under way."""
+    bound = errand(turn)
+    if bound is None and (turn.gate is None or turn.state.over):
+        if not (turn.state.over and stops_drift(turn)):
+            rest(turn)
+        return
+    if bound is not None and comes_to_rest(turn, bound):
+        return
+    if stands_off(turn) or stops_drift(turn) or brakes(turn):
+        return
+    stopped = turn.state.own_mode in STOPPING
+    if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:
+        _sail_on(turn, fresh)
+        return
+    if last_resort(turn):
+        return
+    if _steer(turn, fresh):
+        return
+    own = turn.state.own_mode
+    if own is not None and turn.autopilot is not None and turn.autopilot.mode is own and not turn.steers:
+        hand_back(turn)
+        turn.phase(turn.state.phase, "waiting for AUTO after steering")
+        return
+    if repair(turn):
+        return
+    if turn.steers:
+        _send_heading(turn)
+    elif turn.config.guidance is not Guidance.PLAN:
+        turn.say(Severity.WARNING, "guidance", f"guidance by {turn.config.guidance.value} is asked for and steering is "
+                 "not permitted: by plan", every_s=600.0)
+        check_current(turn)
+    else:
+        check_current(turn)
+        short_tack(turn)
+    if turn.is_raised("stuck waypoint") and turn.state.own_index > turn.state.index:
+        make_current(turn, turn.state.own_index + 1)
+    if bound is not None and not bound.has_place:
+        _stay(turn, bound)
+        return
+    if turn.state.wish is OperatorWish.HOLD:
+        if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
+            hold(turn, "the operator asked to hold")
+        turn.phase(Phase.HOLDING, "the operator asked to hold: waiting until he lets her go on")
+        return
+    if turn.state.pending_upload is None:
+        _consider(turn, fresh)
+    _name(turn)
+
+
+def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
+    """Out of a stop that nobody asked for, or a LOITER of ours: plan from where the boat is now, then AUTO."""
+    why = waits_for(turn)
+    if why or repair(turn):
+        turn.phase(Phase.HOLDING, why or "waiting for the mission to be put right before sailing on")
+        return
+    bound = errand(turn)
+    if bound is not None and not bound.has_place and not is_at_rest(turn):
+        _stay(turn, bound)
+    elif turn.state.pending_upload is None:
+        _consider(turn, fresh)
+    if turn.state.pending_plan is not None or turn.state.pending_upload is not None:
+        turn.phase(Phase.HOLDING, "waiting for the plan from where the boat has drifted to, and for its upload")
+    elif turn.state.after_operator and (turn.is_way_shut or _is_outside(turn)):
+        wait_s = turn.state.plan_retry.not_before_s - turn.t_s
+        again = f"; trying again in {wait_s:.0f} s" if wait_s > 0.0 else ""
+        turn.phase(Phase.HOLDING, f"no plan yet from where the boat has drifted to: waiting for one{again}")
+    else:
+        hand_back(turn)
+        turn.phase(Phase.HOLDING, "waiting for the autopilot to take AUTO: sailing on")
+
+
+def _is_outside(turn: Turn) -> bool:
+    """Return whether she is where no mission may lead: outside the fence, or over something."""
+    here = turn.snapshot.position_en_m
+    return here is not None and float(turn.voyage.area.clearance_m([here])[0]) <= 0.0
+
+
+def _stay(turn: Turn, bound: Errand) -> None:
+    """Loiter where there is room near by."""
+    if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
+        hold(turn, bound.sentence)
+    turn.phase(Phase.HOLDING, f"{bound.sentence}; waiting for the loiter's upload")
+
+
+def _send_heading(turn: Turn) -> None:
+    """Steer by Büsser's headings under GUIDED, and keep the autopilot's count in step for the moment we are gone."""
+    status = turn.autopilot
+    if status is None:
+        return
+    if status.mode is not Mode.GUIDED:
+        set_mode(turn, Mode.GUIDED, "steering by headings")
+        return
+    turn.update(own_mode=Mode.GUIDED)
+    if turn.config.guidance is Guidance.FIELD:
+        told = by_field_heading(turn)
+    else:
+        wanted = desired_heading_rad(turn)
+        told = None if wanted is None else (wanted, "leg")
+    if told is not None:
+        turn.act(SteerHeading(heading_rad=told[0], text=told[1]))
+    if status.mission_seq is not None and status.mission_seq < turn.state.index + 1:
+        make_current(turn, turn.state.index + 1)
+
+
+def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
+    trigger = find_trigger(turn, fresh)
+    if trigger is None:
+        return
+    state = turn.state
+    if state.pending_plan is not None and not (trigger.urgent and state.pending_plan.reason is not trigger.reason):
+        return
+    if turn.t_s < state.plan_retry.not_before_s and not trigger.urgent:
+        return
+    interval_s = trigger.interval_s
+    if trigger.reason in ROUTINE and near(turn):
+        interval_s = max(interval_s, MIN_INTERVAL_S)
+    if turn.t_s - state.last_plan_s < interval_s:
+        return
+    if request(turn, trigger.reason, from_index=trigger.from_index, text=trigger.text):
+        changes: dict[str, object] = {"after_operator": False}
+        if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:
+            changes["wish"] = None
+        if trigger.from_index is not None:
+            changes["replanned_index"] = trigger.from_index
+        turn.update(**changes)
+
+
+def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
+    """Bear away out of irons under GUIDED; True while the helm is ours."""
+    state, status, vehicle, boat, wind = (
+        turn.state, turn.autopilot, turn.snapshot.vehicle, turn.boat_en, turn.wind_now)
+    if state.steering_until_s is None:
+        if "in irons" not in fresh or boat is None or vehicle is None or wind is None:
+            return False
+        recent = tuple(t for t in state.irons_s if turn.t_s - t < IRONS_MEMORY_S)
+        turn.update(irons_s=(*recent, turn.t_s))
+        if turn.snapshot.permissions.may_steer and set_mode(turn, Mode.GUIDED, "in irons: bearing away"):
+            heading = bear_away_rad(boat, vehicle.heading_rad, wind[0], turn.voyage.area)
+            turn.update(steering_until_s=turn.t_s + STEER_S, steering_heading_rad=heading)
+        else:
+            turn.update(wish=OperatorWish.REPLAN)
+            return False
+    heading_rad = turn.state.steering_heading_rad or 0.0
+    until = turn.state.steering_until_s
+    out = vehicle is not None and wind is not None and vehicle.speed_mps > SAILS_MPS and (
+        abs(difference_rad(wind[0], vehicle.heading_rad)) > SAILS_TWA_RAD)
+    refused = status is not None and status.mode is Mode.AUTO and not is_busy(turn, Mode.GUIDED.name)
+    over = out or refused or (until is not None and turn.t_s > until)
+    if over and (refused or set_mode(turn, Mode.AUTO, "sailing again" if out else "bearing away took too long")):
+        # The mode we asked for ourselves stays ours until AUTO shows.
+        turn.update(
+            steering_until_s=None, steering_heading_rad=None, wish=OperatorWish.REPLAN,
+            own_mode=None if refused else Mode.GUIDED)
+        return False
+    turn.act(SteerHeading(heading_rad=heading_rad, text="out of irons"))
+    turn.phase(turn.state.phase, f"in irons: waiting for her to bear away to {math.degrees(heading_rad) % 360.0:.0f}°")
+    return True
+
+
+def _name(turn: Turn) -> None:
+    """Name what the boat is doing, with the sentence why."""
+    state, route = turn.state, turn.state.route
+    if route is None:
+        return
+    step = f" ({route.rung})" if route.rung else ""
+    if state.pending_plan is not None:
+        turn.phase(Phase.NEW_CALCULATION, f"planning: {state.pending_plan.reason.value}")
+        return
+    raised = ", ".join(r.name for r in state.raised)
+    tail = f"; {raised}" if raised else ""
+    gate, bound = turn.gate, errand(turn)
+    if not turn.ahead():
+        wait = state.plan_retry.not_before_s - turn.t_s
+        again = f", trying again in {wait:.0f} s" if wait > 0.0 else ""
+        turn.phase(Phase.HOLDING, f"loitering in the mission's safe end: waiting for a plan{again}{tail}")
+    elif bound is not None:
+        turn.phase(Phase.STANDARD, f"item {state.index + 1} of {len(route.items)} {bound.sentence}{step}{tail}")
+    elif gate is not None and is_buoy(gate) and gate.buoy_en_m is not None and turn.boat_en is not None and (
+        distance_m(turn.boat_en, gate.buoy_en_m) < 4.0 * distance_m(gate.en_m, gate.buoy_en_m)
+    ):
+        turn.phase(Phase.BUOY_APPROACH, f"{gate.name} to {gate.side.value}{step}{tail}")
+    elif state.index == turn.last_waypoint() and route.gate_of[state.index] == len(turn.gates) - 1:
+        turn.phase(Phase.DESTINATION_APPROACH, f"last waypoint before {gate.name if gate else 'the end'}{step}{tail}")
+    else:
+        where = f"item {state.index + 1} of {len(route.items)}"
+        turn.phase(Phase.STANDARD, f"{where} to {gate.name if gate else 'the end'}{step}{tail}")

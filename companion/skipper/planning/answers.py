@@ -1,0 +1,226 @@
+"""Taking the planner's answers: the splice, keeping the old plan."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from companion.planner import Plan, PlanStatus, Problem
+from companion.skipper.board.uploads import upload
+from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
+from companion.skipper.planning.not_found import asks_again, not_found
+from companion.skipper.planning.vessels import apart_m, meetings
+from companion.skipper.step.actions import Change, ReplanReason, Severity
+from companion.skipper.step.route import Tail, splice
+from companion.skipper.step.snapshot import PlanOutcome
+from companion.skipper.step.state import PendingPlan, Phase, Retry, Route
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.corners import LEAST_LEG_S, Quality, spread
+from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.judge import judge
+from companion.skipper.way.manoeuvre import gybe_round
+from companion.skipper.way.voyage import PointEn
+from companion.traffic import Decision, decide
+
+SAME_M = 1.0             # a new waypoint this near to the old one is the old one
+SPARE_SHARE = 0.001      # a path may get this much slower ...
+SPARE_S = 0.3            # ... and this much more, to have a waypoint less
+SIMPLIFIED_AT_MOST = 60  # waypoints: each costs a check of the whole path
+GYBE_RADIUS_M = 8.0      # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
+
+
+def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
+    """Take the planner's answer: splice and upload it, keep the old plan, or climb down the ladder."""
+    pending = turn.state.pending_plan
+    if pending is None or pending.request_id != outcome.request_id:
+        return
+    turn.update(pending_plan=None)
+    if turn.state.phase is Phase.OPERATOR or turn.is_taken:
+        return   # the operator may have taken the boat in this very step
+    if turn.state.sailing and not turn.state.checked_mission:
+        return
+    plan = outcome.plan
+    if plan is None or not plan.has_path:
+        reason = outcome.text or (plan.reason if plan is not None else "the planner died")
+        if (plan is None or plan.status is PlanStatus.UNANSWERED) and asks_again(turn, pending, reason):
+            return
+        not_found(turn, pending, reason)
+        return
+    turn.update(
+        unanswered=0,
+        rung=0, ladder_reason=None, plan_retry=turn.failed(turn.state.plan_retry) if pending.rung > 0 else Retry())
+    keep, set_current = _place(turn, pending)
+    if keep is None:
+        turn.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
+        return
+    if _keep_old(turn, pending, plan):
+        return
+    put_in_place(turn, pending, plan, keep, set_current)
+
+
+def _place(turn: Turn, pending: PendingPlan) -> tuple[int | None, int | None]:
+    """Return how many items stay and which seq must be made current (None: none; keep None: too late)."""
+    state, k = turn.state, pending.from_index
+    if state.route is None or state.foreign:
+        return 0, 1
+    if k is None:
+        return state.index, state.index + 1
+    if state.index <= k:
+        return k + 1, None
+    boat = turn.boat_en
+    if state.index == k + 1 and boat is not None and distance_m(boat, pending.start_en_m) < turn.config.grid_size_m:
+        return k + 1, k + 2
+    return None, None
+
+
+def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
+    """Keep the old plan when it is sound under the new forecast and the new one is not clearly better."""
+    route = turn.state.route
+    if tacks_fail(turn):
+        return False
+    if route is None or pending.reason in {ReplanReason.START, ReplanReason.OPERATOR_BACK, ReplanReason.RETRY}:
+        return False
+    first = turn.state.index if pending.from_index is None else pending.from_index + 1
+    points = route.points_en_m[first:-1]
+    ends = [n for n in range(first, len(route.items) - 1) if route.gate_of[n] == pending.gate]
+    if not points or not ends or pending.lead_in or route.bound_for != pending.facts.bound_for:
+        return False
+    if pending.gate >= 0:
+        points = route.points_en_m[first:ends[0] + 1]
+    elif not pending.facts.bound_for:
+        return False
+    problem = pending.problem
+    # A vessel that the old route was planned clear of need not be kept so far from; it is held against its own discs.
+    old = replace(problem.resolved, targets=()).evaluate(np.asarray([pending.start_en_m, *points]))
+    gain = old.time_s - plan.cost_s
+    if not old.is_feasible:
+        return False
+    if problem.targets:
+        tail = [(float(e), float(n)) for e, n in plan.waypoints_en]
+        way = [*route.points_en_m[turn.state.index:first], *tail]
+        verdict = decide(meetings(turn), since_replan_s=0.0, active_cost_s=old.time_s, new_cost_s=plan.cost_s,
+                         apart_m=apart_m(turn, way))
+        if verdict is not Decision.KEEP:
+            return False
+    elif gain > max(turn.config.keep_gain_s, turn.config.keep_gain * old.time_s):
+        return False
+    facts = pending.facts
+    turn.update(route=replace(
+        route, plan_t_s=facts.plan_t_s, plan_twd_from_rad=facts.plan_twd_from_rad, plan_tws_mps=facts.plan_tws_mps,
+        plan_half_width_rad=facts.plan_half_width_rad, risk=plan.risk if gain <= 0.0 else route.risk,
+    ))
+    turn.say(
+        Severity.INFO, "plan kept",
+        f"{pending.reason.value}: the old plan stays ({old.time_s:.0f} s; a new one gains {max(0.0, gain):.1f} s)",
+        every_s=0.0,
+    )
+    return True
+
+
+def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
+    """Splice a plan into the route and ask for its upload."""
+    points = simplified(pending.problem, _apart([(float(e), float(n)) for e, n in plan.waypoints_en]))[1:]
+    start = pending.start_en_m
+    if pending.lead_in and turn.boat_en is not None:
+        start = turn.boat_en
+    points = _followed(turn, pending, [start, *pending.lead_in, *points])[1:]
+    if tacks_fail(turn):
+        # Tacks have failed: turn the other way round where there is room.
+        points = list(gybe_round(
+            start, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
+            area=turn.voyage.area, floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m)))
+        turn.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
+    tail = Tail(start_en=start, points_en=tuple(points), gate=pending.gate)
+    facts = replace(
+        pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
+        why=plan.why.text or plan.reason)
+    old = turn.state.route
+    if keep + len(tail.points_en) + 1 > turn.config.max_items and old is not None:
+        # Start the numbering again with what is still ahead of the boat.
+        ahead = slice(turn.state.index, keep)
+        old = replace(old, items=old.items[ahead], points_en_m=old.points_en_m[ahead],
+                      leg_from_en_m=old.leg_from_en_m[ahead], gate_of=old.gate_of[ahead])
+        keep, set_current = len(old.items), 1
+    route = splice(
+        turn.voyage, turn.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts)
+    if turn.state.route is not None and _is_same(turn.state.route, route):
+        turn.update(
+            missed_s=None, route=replace(route, items=turn.state.route.items, points_en_m=turn.state.route.points_en_m))
+        turn.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
+        return
+    way = route.points_en_m[turn.state.index if set_current is None else set_current - 1:-1]
+    met = meetings(turn)
+    unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
+    change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
+    upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}", change=change)
+
+
+def _followed(turn: Turn, pending: PendingPlan, path: list[PointEn]) -> list[PointEn]:
+    """Return the path with corners that the autopilot can follow (``companion.skipper.way.corners``)."""
+    wind, area, boat = turn.wind_mean, turn.voyage.area, turn.voyage.boat
+    if wind is None:
+        return path
+    keep_out = shapely.union_all([shapely.from_wkt(w) for w in (
+        turn.gates[pending.gate].keep_out if pending.gate >= 0 else ())])
+
+    def quality(way: list[PointEn]) -> Quality:
+        clearance_m = area.path_clearance_m(way)
+        if not pending.lead_in:
+            judged = pending.problem.evaluate(np.asarray(way))
+            if judged.is_feasible:
+                return Quality(is_feasible=True, is_sailable=True, clearance_m=clearance_m, time_s=judged.time_s)
+        seen = judge(
+            way, boat=boat, no_go_half_rad=turn.planned_no_go_rad, twd_from_rad=wind[0], tws_mps=wind[1], area=area,
+            beat_room_m=room_m(turn))
+        is_sailable = seen.spare_rad >= 0.0 and not shapely.intersects(keep_out, shapely.LineString(way))
+        return Quality(is_feasible=False, is_sailable=is_sailable, clearance_m=clearance_m, time_s=seen.time_s)
+
+    floor_m = min(turn.config.margin_floor_m, pending.facts.margin_m)
+    return spread(path, least_m=LEAST_LEG_S * boat.polar.max_speed_mps(wind[1]), floor_m=floor_m, quality=quality)
+
+
+def _apart(points: list[PointEn]) -> list[PointEn]:
+    """Return the points without those that stand on the one before: the autopilot cannot sail a leg of no length."""
+    out = points[:1]
+    for n, point in enumerate(points[1:], start=1):
+        if distance_m(out[-1], point) >= SAME_M:
+            out.append(point)
+        elif n == len(points) - 1 and len(out) > 1:
+            out[-1] = point   # the end stays where it was planned
+        elif n == len(points) - 1:
+            out.append(point)
+    return out
+
+
+def simplified(problem: Problem, points: list[PointEn]) -> list[PointEn]:
+    """Return the path without the waypoints that it does not need.
+
+    A planner bends a leg a little as the no-go zone widens with time; each bend is an upload's item and a replan.
+    A waypoint goes when the path without it passes the planner's own check and is not slower than by
+    ``SPARE_SHARE`` and ``SPARE_S``.
+    """
+    if len(points) < 3 or len(points) > SIMPLIFIED_AT_MOST:
+        return points
+    whole = problem.evaluate(np.asarray(points))
+    if not whole.is_feasible:
+        return points
+    allowed_s = whole.time_s * (1.0 + SPARE_SHARE) + SPARE_S
+    kept = list(points)
+    n = 1
+    while n < len(kept) - 1:
+        shorter = kept[:n] + kept[n + 1:]
+        judged = problem.evaluate(np.asarray(shorter))
+        if judged.is_feasible and judged.time_s <= allowed_s:
+            kept = shorter
+        else:
+            n += 1
+    return kept
+
+
+def _is_same(a: Route, b: Route) -> bool:
+    return len(a.items) == len(b.items) and all(
+        x.command == y.command and distance_m(p, q) < SAME_M
+        for x, y, p, q in zip(a.items, b.items, a.points_en_m, b.points_en_m, strict=True)
+    )

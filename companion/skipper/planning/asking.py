@@ -1,0 +1,158 @@
+"""Asking for plans: from where, to where, with which step of the ladder."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from companion.errors import InputError
+from companion.messages import Mode
+from companion.planner import Problem
+from companion.skipper.planning.autopilot_beats import problem_beat
+from companion.skipper.planning.errands import Errand, errand, gate_for, homeward
+from companion.skipper.planning.ladder import Rung, rungs
+from companion.skipper.planning.problem import Aim, Start, aim_at, problem_dict, repaired
+from companion.skipper.planning.vessels import shares
+from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan, Severity
+from companion.skipper.step.route import path_length_m
+from companion.skipper.step.state import PendingPlan
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.gates import Gate
+from companion.skipper.way.geometry import bearing_rad, distance_m, moved
+from companion.skipper.way.judge import half_width_rad
+
+UPLOAD_LATENCY_S = 1.5   # item protocol, a few dozen items, and the read-back
+SLOW_MPS = 0.5           # slower than this the course over ground says nothing about the heading
+
+
+def request(
+    turn: Turn, reason: ReplanReason, *, from_index: int | None = None, rung: int = 0, text: str = "",
+) -> bool:
+    """Ask for a plan from item ``from_index`` of the route or, with None, from the boat; False when it cannot be.
+
+    It is planned for where she is bound for on an errand, else for the gate after the one that item ``from_index``
+    completes or leads to, and behind the last one home where the mission ends there. ``lacks`` says why not.
+    """
+    steps = rungs(turn.config)
+    step = steps[min(rung, len(steps) - 1)]
+    forecast, start, aimed = turn.snapshot.wind.forecast, _start(turn, from_index), _target(turn, from_index)
+    if forecast is None or start is None or aimed is None:
+        return False
+    target, gate, bound = aimed
+    wind = turn.wind_mean
+    floor_m = min(turn.config.margin_floor_m, step.margin_m)
+    start = repaired(
+        turn.voyage, start, margin_m=step.margin_m, floor_m=floor_m, twd_from_rad=wind[0] if wind else None)
+    aim = _aim(turn, target, gate, start, step)
+    number = turn.new_id()
+    shared = shares(turn, start.en_m, start.after_s, rung, step.delta_s)
+    name = ", ".join(part for part in (step.name, "start repaired" if start.text else "") if part)
+    try:
+        problem = Problem.from_json(problem_dict(
+            turn.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
+            delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
+            beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk,
+        ))
+    except (ValueError, InputError) as error:
+        turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
+        turn.update(plan_retry=turn.failed(turn.state.plan_retry))
+        return False
+    problem = replace(problem, delta_s=shared.delta_s, targets=shared.targets, vessels_part=shared.part)
+    facts = replace(
+        turn.blank_facts(number, step.margin_m, shared.delta_s, name),
+        plan_twd_from_rad=problem.wind.twd_from_rad,
+        plan_half_width_rad=half_width_rad(forecast, start.after_s + 60.0, turn.config.wind_change_level),
+        vessels_part=shared.part or 0.0, bound_for=bound.name if bound is not None and not step.nearer_goal else "",
+    )
+    if turn.state.pending_plan is not None:
+        turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
+    pending = PendingPlan(
+        request_id=number, t_s=turn.t_s, reason=reason, from_index=from_index, rung=rung, gate=aim.gate,
+        lead_in=start.lead_in, start_en_m=start.en_m, facts=facts, problem=problem,
+    )
+    turn.update(
+        pending_plan=pending, last_plan_s=turn.t_s, rung=rung, ladder_reason=reason, replans=turn.state.replans + 1)
+    budget = turn.config.first_plan_budget_s if reason is ReplanReason.START else turn.config.plan_budget_s
+    why = "; ".join(part for part in (text, start.text, f"step: {name}" if name else "") if part)
+    turn.act(RequestPlan(
+        request_id=number, problem=problem, reason=reason, budget_s=budget, seed=number,
+        from_seq=None if from_index is None else from_index + 1, rung=name, text=why,
+    ))
+    return True
+
+
+def _start(turn: Turn, from_index: int | None) -> Start | None:
+    boat, vehicle, route = turn.boat_en, turn.snapshot.vehicle, turn.state.route
+    if boat is None or vehicle is None:
+        return None
+    if from_index is None:
+        # Stopped, or turning in circles, she is where she is.
+        stopped = turn.state.own_mode in {Mode.HOLD, Mode.LOITER}
+        sailing = turn.state.sailing and vehicle.speed_mps > SLOW_MPS and not stopped
+        ahead = turn.config.plan_budget_s + UPLOAD_LATENCY_S if sailing else 0.0
+        heading = math.atan2(*vehicle.velocity_en_mps) if sailing else vehicle.heading_rad
+        return Start(en_m=moved(boat, heading, vehicle.speed_mps * ahead), heading_rad=heading, after_s=ahead)
+    if route is None or not turn.state.index <= from_index < len(route.items):
+        return None
+    way = [boat, *route.points_en_m[turn.state.index:from_index + 1]]
+    speed = max(vehicle.speed_mps, SLOW_MPS)
+    return Start(
+        en_m=route.points_en_m[from_index],
+        heading_rad=bearing_rad(route.leg_from_en_m[from_index], route.points_en_m[from_index]),
+        after_s=path_length_m(way) / speed,
+    )
+
+
+def lacks(turn: Turn, from_index: int | None = None) -> str:
+    """Return what is missing for a plan in words; empty: nothing, or what ``request`` says itself."""
+    if turn.snapshot.wind.forecast is None:
+        return "a wind forecast"
+    if _start(turn, from_index) is None:
+        return "a position to plan from"
+    if _target(turn, from_index) is None:
+        return "a goal: none is left"
+    return ""
+
+
+def _target(turn: Turn, from_index: int | None) -> tuple[Gate, int, Errand | None] | None:
+    """Return what to plan for: the gate, its number (-1: it completes none), and the errand that it is for."""
+    bound = errand(turn)
+    number = None if bound is not None else _gate_after(turn, from_index)
+    if bound is None and number is None:
+        bound = homeward(turn)
+    if bound is not None:
+        return (gate_for(turn, bound), -1, bound) if bound.has_place else None
+    return None if number is None else (turn.gates[number], number, None)
+
+
+def _gate_after(turn: Turn, from_index: int | None) -> int | None:
+    """Return the gate that a plan from there is for: the first not completed before or at that item."""
+    gate, route = turn.state.gate, turn.state.route
+    if from_index is not None and route is not None:
+        done = [g for g in route.gate_of[turn.state.index:from_index + 1] if g >= 0]
+        gate = max([gate, *(g + 1 for g in done)])
+    return gate if gate < len(turn.gates) else None
+
+
+def _aim(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
+    if step.nearer_goal:
+        return _nearer(turn, target, gate, start, step)
+    aim = aim_at(turn.voyage, turn.config, (target,), 0, start.en_m)
+    return replace(aim, gate=gate if aim.gate == 0 else -1)
+
+
+def _nearer(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
+    """Return a safe place that is nearer than the goal: a refuge, or a roomy place on the way."""
+    left = distance_m(start.en_m, target.en_m)
+    course = bearing_rad(start.en_m, target.en_m)
+    refuges = [r.en_m for r in turn.voyage.refuges]
+    candidates = [p for p in refuges if p != target.en_m and distance_m(start.en_m, p) < left]
+    candidates.sort(key=lambda p: distance_m(p, target.en_m))
+    candidates += [
+        moved(start.en_m, course + side, share * left)
+        for share in (0.75, 0.5, 0.35, 0.2) for side in (0.0, 0.35, -0.35, 0.8, -0.8)
+    ]
+    for place in candidates:
+        if float(turn.voyage.area.clearance_m([place])[0]) >= step.margin_m + turn.config.loiter_radius_m:
+            return Aim(en_m=place, radius_m=turn.config.loiter_radius_m, gate=-1)
+    return Aim(en_m=target.en_m, radius_m=target.radius_m, gate=gate)

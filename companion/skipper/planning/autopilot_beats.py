@@ -1,0 +1,77 @@
+"""Beats that are left to the autopilot: whether, and how much room each needs (``companion.planner.problem.beat``)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from companion.geo.angles import difference_rad
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.geometry import bearing_rad, cross_track_m
+from companion.skipper.way.voyage import PointEn
+
+IRONS_MEMORY_S = 600.0
+TACKS_FAIL_AFTER = 2    # times in irons within IRONS_MEMORY_S before tacks are no longer tried
+WIDEST_M = 50.0         # a wider corridor is no corridor
+OVERSHOOT_S = 1.2       # 2 m beyond the edge where the boat crosses it at right angles (0.9 m at 45 degrees)
+OFF_LINE_M = 2.0        # so near the line a leg that begins anew is the same leg
+FOLLOWS_RAD = math.radians(10.0)   # this far outside its no-go zone the autopilot keeps to the line
+
+
+def tacks_fail(turn: Turn) -> bool:
+    """Return whether the boat has been in irons so often of late that tacks are not tried."""
+    recent = [t for t in turn.state.irons_s if turn.t_s - t < IRONS_MEMORY_S]
+    return len(recent) >= TACKS_FAIL_AFTER
+
+
+def corridor_room_m(turn: Turn) -> float | None:
+    """Return how far from everything solid a closed leg must be for the autopilot's beat about it [m].
+
+    SAIL_XTRACK_MAX, what a tack at its edge swings wide, and the margin's floor beyond that. None without a corridor:
+    the autopilot then sails to the layline, wherever that is.
+    """
+    corridor, wind = turn.tack_corridor_m, turn.wind_mean
+    if wind is None or not 0.0 < corridor <= WIDEST_M:
+        return None
+    speed = turn.voyage.boat.polar.speed_mps(turn.no_go_half_rad, wind[1])
+    return corridor + OVERSHOOT_S * speed + turn.config.margin_floor_m
+
+
+def room_m(turn: Turn) -> float | None:
+    """Return ``corridor_room_m`` where beats may be planned for the autopilot, None where not."""
+    if not turn.config.autopilot_beats or turn.snapshot.limits is None or tacks_fail(turn):
+        return None
+    return corridor_room_m(turn)
+
+
+def problem_beat(turn: Turn, margin_m: float) -> dict[str, Any] | None:
+    """Return the ``beat`` of a problem whose obstacles are grown by ``margin_m``, None without one."""
+    room = room_m(turn)
+    if room is None:
+        return None
+    boat = turn.voyage.boat
+    return {
+        "no_go_half_deg": math.degrees(turn.no_go_half_rad), "corridor_m": turn.tack_corridor_m,
+        "clearance_m": max(0.0, room - margin_m),
+        "tack_s": 2.0 * turn.no_go_half_rad / boat.turn_rate_radps + boat.tack_loss_s,
+    }
+
+
+def may_restart_leg(turn: Turn) -> bool:
+    """Return whether an upload may come now: it makes the present leg begin at the boat, and its corridor with it.
+
+    On a beat the boat may be the corridor's width off the line already; from there it could get as far off again.
+    """
+    boat, leg, wind = turn.boat_en, turn.leg(), turn.wind_now
+    if boat is None or leg is None or wind is None or abs(cross_track_m(boat, *leg)) <= OFF_LINE_M:
+        return True
+    room = corridor_room_m(turn)
+    if room is None or abs(difference_rad(wind[0], bearing_rad(boat, leg[1]))) > turn.no_go_half_rad + FOLLOWS_RAD:
+        return True
+    return turn.voyage.area.path_clearance_m([boat, leg[1]]) >= room
+
+
+def is_left_to_beat(turn: Turn, a: PointEn, b: PointEn) -> bool:
+    """Return whether the autopilot may beat from a to b: the water is clear by ``room_m``."""
+    room = room_m(turn)
+    return room is not None and turn.voyage.area.path_clearance_m([a, b]) >= room

@@ -1,0 +1,167 @@
+"""Where she is bound for when it is not the next goal: a refuge, home, her place to rest, or just to stay.
+
+An errand is found anew in every step from what is raised and what is being answered; the route says which errand its
+end serves. It is planned like any leg and ends in a loiter, so that nothing is ever sailed straight and unlooked at.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from companion.skipper.step.causes import BY_NAME, Answer
+from companion.skipper.step.config import SafeEnd
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.gates import KEEP_SHARE, Gate, disc_wkt
+from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.voyage import PointEn, Refuge, Side
+
+BATTERY, OUT_OF_TIME, DRAGGED = "battery critical", "out of time", "dragged off"   # watchdogs
+HOME, REST = "home", "the place to rest"
+HOME_RADIUS_M = 15.0     # home is where she was armed: a place in the water or at its edge, not a mark
+FAR_M = 50_000.0         # the local frame's reach: a home beyond it is not one of this water
+
+
+class Kind(enum.Enum):
+    """What kind of errand."""
+
+    REFUGE = "refuge"
+    HOME = "home"
+    REST = "rest"            # back to where she loitered
+    STAY = "stay"            # where there is room near by
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Errand:
+    """Where to, and why. ``name`` is what a route is bound for; a STAY has no place."""
+
+    kind: Kind
+    name: str
+    why: str
+    en_m: PointEn = (0.0, 0.0)
+    radius_m: float = HOME_RADIUS_M
+
+    @property
+    def has_place(self) -> bool:
+        """Whether there is a place to plan for."""
+        return self.kind is not Kind.STAY
+
+    @property
+    def sentence(self) -> str:
+        """Where to and why."""
+        return f"{'staying near by' if self.kind is Kind.STAY else f'to {self.name}'}: {self.why}"
+
+
+def errand(turn: Turn) -> Errand | None:
+    """Return where she is bound for instead of the next goal, None: nowhere."""
+    state = turn.state
+    cause = BY_NAME.get(state.answering)
+    answer = cause.answer if cause is not None else None
+    if turn.is_raised(BATTERY) or answer is Answer.SHELTER:
+        why = "the battery is critical" if turn.is_raised(BATTERY) else "the autopilot's battery failsafe"
+        ends_home = state.sent_home or turn.config.safe_end is SafeEnd.RETURN
+        found = _refuge(turn, why) or (_home(turn, why) if ends_home else None)
+        if found is not None or answer is Answer.SHELTER:
+            return found or _stay(turn, why)
+    if answer is Answer.STAY:
+        why = "the autopilot has lost its link to the shore"
+        return (_home(turn, why) if state.sent_home else None) or _stay(turn, why)
+    if turn.is_raised(OUT_OF_TIME) and not state.over:
+        why = "the voyage is out of time"
+        home = _home(turn, why) if turn.config.safe_end is SafeEnd.RETURN else None
+        return _refuge(turn, why) or home or _stay(turn, why)
+    if state.over:
+        return _back(turn)
+    return homeward(turn) if turn.gate is None else None
+
+
+def homeward(turn: Turn) -> Errand | None:
+    """Return the way home behind the last goal, None where the mission does not end there or has come there."""
+    if turn.config.safe_end is not SafeEnd.RETURN or turn.state.home_reached or turn.state.over:
+        return None
+    return _home(turn, "all goals are reached")
+
+
+def _stay(turn: Turn, why: str) -> Errand | None:
+    """Return an errand to stay, None outside the fence or over something: from there she sails on first."""
+    here = turn.snapshot.position_en_m
+    if here is not None and float(turn.voyage.area.clearance_m([here])[0]) <= 0.0:
+        return None
+    return Errand(kind=Kind.STAY, name="", why=why)
+
+
+def _refuge(turn: Turn, why: str) -> Errand | None:
+    """Return the refuge that the route is bound for, else the nearest; the next one after each that had no way."""
+    refuges = turn.voyage.refuges
+    if not refuges:
+        return None
+    route, here = turn.state.route, turn.boat_en or turn.snapshot.position_en_m
+    bound = route.bound_for if route is not None else ""
+    chosen = next((r for r in refuges if refuge_name(r) == bound), None)
+    if chosen is None:
+        by_distance = sorted(refuges, key=lambda r: distance_m(here, r.en_m) if here is not None else 0.0)
+        chosen = by_distance[turn.state.plan_retry.failures % len(by_distance)]
+    return Errand(kind=Kind.REFUGE, name=refuge_name(chosen), why=why, en_m=chosen.en_m, radius_m=chosen.radius_m)
+
+
+def refuge_name(refuge: Refuge) -> str:
+    """Return what a refuge is called in sentences."""
+    return f"the refuge {refuge.name}".rstrip()
+
+
+def home_trouble(turn: Turn) -> str:
+    """Return why the way home cannot be planned (empty: it can)."""
+    status = turn.snapshot.autopilot
+    if status is None or status.home is None:
+        return "the autopilot has not told where home is"
+    en_m = turn.voyage.frame.en_from_geo(status.home)
+    if max(abs(en_m[0]), abs(en_m[1])) > FAR_M:
+        return f"home is {math.hypot(*en_m) / 1000.0:.0f} km from this water"
+    clearance = float(turn.voyage.area.clearance_m([en_m])[0])
+    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
+    if clearance < floor_m:
+        near = turn.voyage.area.nearest_name(en_m)
+        where = "not in free water" if clearance <= 0.0 else f"{clearance:.0f} m from {near}"
+        return f"home is {where}: the margin's floor is {floor_m:g} m"
+    return ""
+
+
+def _home(turn: Turn, why: str) -> Errand | None:
+    status = turn.snapshot.autopilot
+    if home_trouble(turn) or status is None or status.home is None:
+        return None
+    return Errand(kind=Kind.HOME, name=HOME, why=why, en_m=turn.voyage.frame.en_from_geo(status.home))
+
+
+def _back(turn: Turn) -> Errand | None:
+    """Return the way back to where she is to rest, when she is off it and the straight way is not clear."""
+    rest, boat = turn.state.rest_en_m, turn.boat_en
+    off = turn.is_raised(DRAGGED) or bool(turn.state.answering)
+    if rest is None or boat is None or not (off or _is_bound(turn, REST)):
+        return None
+    if not _is_bound(turn, REST) and turn.voyage.area.path_clearance_m([boat, rest]) >= turn.config.margin_floor_m:
+        return None   # the autopilot's own loiter goes back there
+    return Errand(kind=Kind.REST, name=REST, why="she is off the place where she was to rest", en_m=rest)
+
+
+def _is_bound(turn: Turn, name: str) -> bool:
+    route = turn.state.route
+    return route is not None and route.bound_for == name and bool(turn.ahead())
+
+
+def gate_for(turn: Turn, bound: Errand) -> Gate:
+    """Return an errand as a gate that completes nothing; buoys are something to keep clear of on this leg too."""
+    discs = tuple(
+        disc_wkt(g.en_m, KEEP_SHARE * g.rounding_m) for g in turn.voyage.goals if g.side is not Side.NONE)
+    return Gate(
+        en_m=bound.en_m, radius_m=bound.radius_m, goal=-1, ends_goal=False, name=bound.name, from_en_m=None,
+        keep_out=discs)
+
+
+def is_at_rest(turn: Turn) -> bool:
+    """Return whether she is in the loiter at the end of the errand that she is on."""
+    bound, route = errand(turn), turn.state.route
+    if bound is None or route is None or turn.ahead():
+        return False
+    return bound.kind is Kind.STAY or route.bound_for == bound.name

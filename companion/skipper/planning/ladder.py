@@ -1,0 +1,46 @@
+"""What to give up, and in which order, when no plan is found.
+
+Each rung is named in the status and in the decision record. The old plan is looked at before the first rung, a
+repaired start belongs to every rung, and after the last the boat holds in a safe loiter and waits, longer each time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from companion.skipper.step.config import SkipperConfig
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rung:
+    """One step: margin [m], delta_s, the limit on a path's risk, and whether a nearer safe place may be the goal."""
+
+    name: str
+    margin_m: float
+    delta_s: float
+    max_path_risk: float | None = None
+    nearer_goal: bool = False
+
+
+def rungs(config: SkipperConfig) -> tuple[Rung, ...]:
+    """Return the steps in order; the first is what was asked for, none is below the margin's floor.
+
+    With delta_s the limit on the whole path's risk is given up.
+    """
+    limit = config.max_path_risk
+    floor = min(config.margin_floor_m, config.margin_m)
+    room = config.margin_m - floor
+    out = [Rung(name="", margin_m=config.margin_m, delta_s=config.delta_s, max_path_risk=limit)]
+    for share in (*config.margin_ladder, 0.0):
+        margin = floor + share * room
+        if margin < out[-1].margin_m - 1e-9:
+            out.append(Rung(
+                name=f"margin {margin:.1f} m", margin_m=margin, delta_s=config.delta_s, max_path_risk=limit))
+    if limit is not None:
+        out.append(Rung(name=f"margin {floor:.1f} m, path's risk not bounded", margin_m=floor, delta_s=config.delta_s))
+    for delta in config.delta_s_ladder:
+        if delta < config.delta_s:
+            out.append(Rung(name=f"margin {floor:.1f} m, delta_s {delta:g}", margin_m=floor, delta_s=delta))
+    last = out[-1]
+    out.append(Rung(name="a nearer safe place", margin_m=floor, delta_s=last.delta_s, nearer_goal=True))
+    return tuple(out)

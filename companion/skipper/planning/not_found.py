@@ -1,0 +1,113 @@
+"""Nothing found, or no answer: the old plan while it is sound, the ladder's next step, at last a loiter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from companion.messages import Command, waypoint
+from companion.skipper.board.uploads import upload
+from companion.skipper.planning.asking import request
+from companion.skipper.planning.autopilot_beats import room_m
+from companion.skipper.planning.ladder import rungs
+from companion.skipper.planning.vessels import meetings
+from companion.skipper.step.actions import Severity
+from companion.skipper.step.route import loiter_place
+from companion.skipper.step.state import PendingPlan, Phase
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.judge import judge
+from companion.skipper.way.voyage import PointEn
+
+UNDER_WAY_TRIES, ASHORE_TRIES = 2, 5   # of a planner that does not answer, before the next step of the ladder
+
+
+def asks_again(turn: Turn, pending: PendingPlan, reason: str) -> bool:
+    """Ask the same again of a planner that did not answer: that is no reason to give up margin or promise.
+
+    Not for ever: a problem may be what it dies of. True when it is asked, or will be after a wait.
+    """
+    turn.update(unanswered=turn.state.unanswered + 1)
+    sails = turn.state.sailing and turn.state.route is not None
+    if turn.state.unanswered >= (UNDER_WAY_TRIES if sails else ASHORE_TRIES):
+        turn.update(unanswered=0)
+        return False
+    turn.say(Severity.WARNING, "no answer", f"{reason}: asked again", every_s=0.0)
+    if sails:
+        return request(turn, pending.reason, from_index=pending.from_index, rung=pending.rung, text=reason)
+    turn.update(plan_retry=turn.failed(turn.state.plan_retry))
+    return True
+
+
+def is_old_plan_sound(turn: Turn) -> bool:
+    """Return whether the mission sailed now is still good for the present wind and keeps the margin's floor."""
+    boat, ahead = turn.boat_en, turn.ahead()
+    return boat is not None and bool(ahead) and _is_sound(turn, [boat, *ahead])
+
+
+def _is_sound(turn: Turn, way: list[PointEn]) -> bool:
+    """Return whether a way is good for the mean wind and for the present one, and keeps the margin's floor.
+
+    After a shift the mean is of a wind that blows no more; only the leg that is sailed now is held against the present.
+    """
+    mean, now = turn.wind_mean, turn.wind_now
+    if mean is None or now is None:
+        return False
+    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
+    return all(
+        judge(part, boat=turn.voyage.boat, no_go_half_rad=turn.no_go_half_rad, twd_from_rad=wind[0], tws_mps=wind[1],
+              area=turn.voyage.area, beat_room_m=room_m(turn)).is_sound(floor_m)
+        for part, wind in ((way, mean), (way[:2], now)))
+
+
+def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
+    """Keep the old plan while it is sound, else take the next step of the ladder, at last hold."""
+    steps = rungs(turn.config)
+    state = turn.state
+    where = steps[min(pending.rung, len(steps) - 1)].name or "as configured"
+    met = meetings(turn) if state.route is not None else ()
+    if pending.rung == 0 and state.route is not None and not met and is_old_plan_sound(turn):
+        turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
+        turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
+        return
+    # Only the boat's own place helps when the way from a waypoint ahead is closed: the rungs start at the boat.
+    from_index = pending.from_index if pending.rung == 0 and state.route is not None and _tail_only(turn) else None
+    if pending.rung + 1 < len(steps):
+        following = steps[pending.rung + 1].name
+        text = f"no plan {where} ({reason}): trying {following}"
+        turn.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
+        if request(turn, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
+            return
+    turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
+    if met and is_old_plan_sound(turn):
+        # Loitering in a vessel's way is no better than sailing on through it: the operator must know.
+        turn.say(
+            Severity.CRITICAL, "no way clear",
+            f"no plan keeps clear of {met[0].name}, met in {met[0].time_s:.0f} s: the old plan stays", every_s=0.0)
+        return
+    wait = turn.state.plan_retry.not_before_s - turn.t_s
+    turn.say(
+        Severity.CRITICAL, "no plan at all",
+        f"no plan on any step of the ladder ({reason}): holding, trying again in {wait:.0f} s", every_s=0.0)
+    hold(turn, f"no plan found: {reason}")
+
+
+def _tail_only(turn: Turn) -> bool:
+    """Return whether the way to the present target is sound by itself, so that only the tail needs a plan."""
+    boat, leg = turn.boat_en, turn.leg()
+    return boat is not None and leg is not None and _is_sound(turn, [boat, leg[1]])
+
+
+def hold(turn: Turn, why: str) -> None:
+    """Loiter in the roomiest place near the boat, by a mission that ends there at once."""
+    boat, wind, state = turn.boat_en, turn.wind_mean, turn.state
+    turn.phase(Phase.HOLDING if state.sailing else Phase.WAITING, f"waiting for a plan: {why}")
+    if boat is None or not state.sailing or state.route is None or state.index >= len(state.route.items) - 1:
+        return   # not under way, or already in the safe end of the mission
+    place, room = loiter_place(turn.voyage, turn.known_config, boat, wind[0] if wind else 0.0)
+    keep = state.index
+    end = waypoint(turn.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
+    route = replace(
+        state.route, items=(*state.route.items[:keep], end), points_en_m=(*state.route.points_en_m[:keep], place),
+        leg_from_en_m=(*state.route.leg_from_en_m[:keep], boat), gate_of=(*state.route.gate_of[:keep], -1),
+        rung="hold", risk=None, cost_s=None, bound_for="", why=f"{why}; loitering with {room:.0f} m of room",
+    )
+    upload(turn, route, keep + 1, route.why)

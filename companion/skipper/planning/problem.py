@@ -1,0 +1,252 @@
+"""From a snapshot to a planning problem: start, goal, grown obstacles, the forecast, the boat.
+
+Büsser's section 4.2: the way between two global waypoints has a bandwidth, and the local plan covers only the
+next few miles of it. Both are cut here, so the planner sees one fence and one goal.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+
+from companion.geo.angles import difference_rad, wrap_two_pi
+from companion.messages import WindForecast
+from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.snapshot import Snapshot
+from companion.skipper.way.gates import Gate
+from companion.skipper.way.geometry import bearing_rad, distance_m, moved
+from companion.skipper.way.judge import half_width_rad, mean_twd_rad
+from companion.skipper.way.voyage import PointEn, Voyage
+
+# The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
+REPAIR_RINGS_M = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 140.0, 210.0, 320.0, 480.0, 720.0, 1080.0,
+                  1620.0, 2430.0, 3645.0)
+REPAIR_DIRECTIONS = 24
+NOTCH = 2.0     # radius of the notch as a multiple of what the start lacks: room to turn out of it
+LEG_SAVING = 8e-5   # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
+HAIR_M = 0.2    # a repaired point stands this far clear of the margin it was repaired for
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """Where a plan begins: the point, the heading there, when, and how it had to be repaired.
+
+    ``lead_in`` are waypoints before it; ``notch_m`` is the radius of a notch that is cut into the margin around it.
+    """
+
+    en_m: PointEn
+    heading_rad: float
+    after_s: float = 0.0
+    lead_in: tuple[PointEn, ...] = ()
+    notch_m: float = 0.0
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Aim:
+    """Where a plan ends: the point, its radius, and the gate that it completes (-1: none)."""
+
+    en_m: PointEn
+    radius_m: float
+    gate: int
+
+
+def wind_now(snapshot: Snapshot) -> tuple[float, float] | None:
+    """Return the wind to judge the present by: (from where [rad], how fast [m/s]), None when nothing is known."""
+    wind = snapshot.wind
+    if wind.present_twd_from_rad is not None and wind.present_tws_mps is not None:
+        return wind.present_twd_from_rad, wind.present_tws_mps
+    if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
+        return wind.mean_twd_from_rad, wind.mean_tws_mps
+    if wind.forecast is not None:
+        return float(wind.forecast.mean_twd_from_rad[0]), float(wind.forecast.mean_tws_mps[0])
+    return None
+
+
+def wind_mean(snapshot: Snapshot) -> tuple[float, float] | None:
+    """Return the 90 s mean wind, or what there is of it."""
+    wind = snapshot.wind
+    if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
+        return wind.mean_twd_from_rad, wind.mean_tws_mps
+    return wind_now(snapshot)
+
+
+def wind_part(forecast: WindForecast, *, after_s: float, length_s: float, delta_s: float) -> dict[str, Any]:
+    """Return the ``wind`` of a problem that starts ``after_s`` from the forecast's moment.
+
+    The planner takes one mean direction: the forecast's, averaged over the plan's length. How far the forecast's
+    mean is from it at each horizon is added to the half width that the no-go zone is widened by, so that a forecast
+    that swings is not forgotten. The half width is that of the central interval of probability 2 delta_s - 1.
+    """
+    horizons = forecast.horizon_s
+    times = np.unique(np.concatenate([[0.0], np.clip(horizons - after_s, 0.0, None)]))
+    span = times[times <= max(length_s, times[min(1, times.shape[0] - 1)])]
+    means = np.array([mean_twd_rad(forecast, after_s + float(t)) for t in span])
+    mean = math.atan2(float(np.mean(np.sin(means))), float(np.mean(np.cos(means))))
+    speed = float(np.mean(np.interp(after_s + span, horizons, forecast.mean_tws_mps)))
+    sigma = np.interp(after_s + times, horizons, forecast.sigma_twd_rad)
+    level = 2.0 * delta_s - 1.0
+    half = np.array([half_width_rad(forecast, after_s + float(t), level) for t in times])
+    offset = np.abs([difference_rad(mean_twd_rad(forecast, after_s + float(t)), mean) for t in times])
+    return {
+        "from_deg": math.degrees(wrap_two_pi(mean)),
+        "speed_mps": speed,
+        "sigma": {
+            "model": "forecast",
+            "horizon_s": [float(t) for t in times],
+            "sigma_deg": [float(x) for x in np.degrees(np.hypot(sigma, offset))],
+            "half_width_deg": [float(x) for x in np.degrees(half + offset)],
+        },
+    }
+
+
+def repaired(
+    voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, twd_from_rad: float | None,
+) -> Start:
+    """Return the start made plannable if it is nearer than ``margin_m`` to an obstacle or limit.
+
+    Down to ``floor_m`` the margin around it gets a notch, so that the plan begins where the boat is. Nearer than
+    that, or inside, the plan begins in free water and a lead-in goes there: from the boat to the nearest free point
+    on a line that never comes nearer to the obstacle than the boat is now, nor nearer than ``floor_m`` to any that it
+    is clear of; of equally near ones the one that is not upwind.
+    """
+    here = float(voyage.area.clearance_m([start.en_m])[0])
+    solid_m = min(floor_m, float(voyage.area.unfenced.clearance_m([start.en_m])[0])) - HAIR_M
+    if here >= margin_m:
+        return start
+    if here >= floor_m:
+        text = f"the start is {here:.1f} m from an obstacle or limit: the margin gets a notch around it"
+        return replace(start, notch_m=NOTCH * (margin_m - here) + HAIR_M, text=text)
+    for ring_m in REPAIR_RINGS_M:
+        best: tuple[float, PointEn] | None = None
+        for n in range(REPAIR_DIRECTIONS):
+            course = 2.0 * math.pi * n / REPAIR_DIRECTIONS
+            place = moved(start.en_m, course, ring_m)
+            room = float(voyage.area.clearance_m([place])[0])
+            if room < margin_m + HAIR_M:
+                continue
+            way = np.linspace(start.en_m, place, 9)
+            if float(np.min(voyage.area.clearance_m(way))) < here - HAIR_M:
+                continue
+            if solid_m > 0.0 and voyage.area.unfenced.path_clearance_m(way) < solid_m:
+                continue
+            upwind = twd_from_rad is not None and abs(difference_rad(course, twd_from_rad)) < math.radians(55.0)
+            cost = ring_m * (3.0 if upwind else 1.0) + abs(difference_rad(course, start.heading_rad))
+            if best is None or cost < best[0]:
+                best = (cost, place)
+        if best is not None:
+            text = f"the start is {here:.1f} m from an obstacle or limit: led {ring_m:.0f} m into free water first"
+            return Start(
+                en_m=best[1], heading_rad=bearing_rad(start.en_m, best[1]), after_s=start.after_s,
+                lead_in=(best[1],), text=text,
+            )
+    return start
+
+
+def aim_at(voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], gate: int, start_en: PointEn) -> Aim:
+    """Return what to plan for: the gate, or a place on the way to it where the local plan ends (Büsser 4.1)."""
+    target = gates[gate]
+    left_m = distance_m(start_en, target.en_m)
+    # The autopilot leaves a waypoint behind before it is there: the plan ends that much inside the radius.
+    inner_m = max(target.radius_m - config.announce_m, 0.2 * target.radius_m)
+    if left_m <= config.horizon_m:
+        return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
+    course = bearing_rad(start_en, target.en_m)
+    radius = max(50.0, 0.02 * config.horizon_m)
+    for share in np.arange(1.0, 0.3, -0.05):
+        for side in (0.0, 1.0, -1.0, 2.0, -2.0, 4.0, -4.0):
+            on_line = moved(start_en, course, float(share) * config.horizon_m)
+            place = moved(on_line, course + math.pi / 2.0, side * 2.0 * radius)
+            if float(voyage.area.clearance_m([place])[0]) >= config.margin_m + radius:
+                return Aim(en_m=place, radius_m=radius, gate=-1)
+    return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
+
+
+def band(gate: Gate, start_en: PointEn, aim_en: PointEn) -> Polygon | None:
+    """Return the corridor to the gate: everything within the bandwidth of the line between global waypoints.
+
+    A boat outside its band is let in: the band reaches around it.
+    """
+    if gate.bandwidth_m is None:
+        return None
+    line = LineString([gate.from_en_m or start_en, gate.en_m])
+    corridor = shapely.buffer(line, gate.bandwidth_m, quad_segs=8)
+    for point in (start_en, aim_en):
+        if not corridor.covers(shapely.points(point)):
+            near = shapely.shortest_line(shapely.points(point), line)
+            corridor = shapely.union(corridor, shapely.buffer(near, 0.25 * gate.bandwidth_m, quad_segs=8))
+    return corridor
+
+
+def problem_dict(
+    voyage: Voyage, gate: Gate, *, start: Start, aim: Aim, forecast: WindForecast,
+    margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
+    extra_obstacles: Sequence[str] = (), title: str = "", beat: dict[str, Any] | None = None,
+    max_path_risk: float | None = None,
+) -> dict[str, Any]:
+    """Return the problem in the JSON form of the planner (degrees there, as its format has them).
+
+    Raises:
+        ValueError: when no water is left inside the fence at this margin.
+    """
+    fence = voyage.area.fence_wkt(margin_m, start.en_m)
+    obstacles = [*voyage.area.obstacles_wkt(margin_m)]
+    if start.notch_m > 0.0:
+        obstacles, fence = _notched(voyage, start, obstacles, fence, floor_m)
+    corridor = band(gate, start.en_m, aim.en_m)
+    if corridor is not None:
+        limits = shapely.intersection(corridor, shapely.from_wkt(fence)) if fence is not None else corridor
+        pieces = [p for p in shapely.get_parts(limits) if isinstance(p, Polygon) and not p.is_empty]
+        if not pieces:
+            raise ValueError("no water is left inside the fence and the band")
+        here = shapely.points(start.en_m)
+        fence = shapely.to_wkt(min(pieces, key=lambda p: (float(p.distance(here)), -p.area)), rounding_precision=4)
+    speed = float(np.max(forecast.mean_tws_mps))
+    length_s = 1.5 * distance_m(start.en_m, aim.en_m) / max(0.3, voyage.boat.polar.max_speed_mps(speed))
+    wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s)
+    boat = dict(voyage.boat.problem_boat(wind["speed_mps"]))
+    boat["no_go_half_deg"] = math.degrees(max(no_go_half_rad, voyage.boat.no_go_half_rad))
+    return {
+        "id": voyage.name,
+        "title": title,
+        "start": {"x": start.en_m[0], "y": start.en_m[1], "heading_deg": math.degrees(wrap_two_pi(start.heading_rad))},
+        "goal": {"x": aim.en_m[0], "y": aim.en_m[1], "radius": aim.radius_m},
+        "obstacles": [*obstacles, *gate.keep_out, *extra_obstacles],
+        "fence": fence,
+        "wind": wind,
+        "boat": boat,
+        "delta_s": delta_s,
+        "leg_saving": LEG_SAVING,
+        "beat": beat,
+        "risk": None if max_path_risk is None else {
+            "max_path_risk": max_path_risk, "correlation_time_s": forecast.correlation_time_s},
+    }
+
+
+def _notched(
+    voyage: Voyage, start: Start, obstacles: Sequence[str], fence: str | None, floor_m: float,
+) -> tuple[list[str], str | None]:
+    """Return obstacles and fence with the notch around the start: there the floor holds instead of the margin."""
+    disc = shapely.buffer(shapely.points(start.en_m), start.notch_m, quad_segs=4)
+    core = shapely.union_all([shapely.from_wkt(w) for w in voyage.area.obstacles_wkt(floor_m)])
+    opening = shapely.difference(disc, core)
+    open_obstacles: list[str] = []
+    for text in obstacles:
+        rest = shapely.difference(shapely.from_wkt(text), opening)
+        open_obstacles.extend(
+            shapely.to_wkt(p, rounding_precision=4) for p in shapely.get_parts(rest)
+            if isinstance(p, Polygon) and not p.is_empty)
+    if fence is not None:
+        inner = voyage.area.fence_wkt(floor_m, start.en_m)
+        if inner is not None:
+            wider = shapely.union(shapely.from_wkt(fence), shapely.intersection(disc, shapely.from_wkt(inner)))
+            pieces = [p for p in shapely.get_parts(wider) if isinstance(p, Polygon)]
+            here = shapely.points(start.en_m)
+            fence = shapely.to_wkt(min(pieces, key=lambda p: (float(p.distance(here)), -p.area)), rounding_precision=4)
+    return open_obstacles, fence

@@ -1,0 +1,254 @@
+"""The reasons to plan again, in the order of their urgency."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from companion.geo.angles import difference_rad
+from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
+from companion.skipper.planning.errands import HOME, Errand, Kind, errand, homeward
+from companion.skipper.planning.vessels import meetings
+from companion.skipper.step.actions import ReplanReason, Severity
+from companion.skipper.step.config import Guidance, ReplanPolicy
+from companion.skipper.step.route import NO_PLAN, path_length_m
+from companion.skipper.step.snapshot import OperatorWish
+from companion.skipper.step.state import Phase, Route
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.gates import Gate
+from companion.skipper.way.geometry import bearing_rad, distance_m
+from companion.skipper.way.judge import predicted_beat
+from companion.traffic import Decision, decide
+from companion.traffic.plans import MIN_INTERVAL_S
+
+TOO_LATE_S = 2.0             # a plan asked for this shortly before the waypoint cannot be there in time
+BEND_RAD = math.radians(6.0)     # a smaller change of course at a waypoint is not worth a plan of its own ...
+BEND_PLAN_AGE_S = 60.0           # ... unless the last one is this old
+FORECAST_SHARE = 0.5         # of the interval that the plan used: a smaller change of the mean does not matter
+FORECAST_RAD = math.radians(5.0)
+FORECAST_SPEED = 0.3         # share of the wind speed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trigger:
+    """A reason to plan now; ``from_index`` None: from the boat. ``urgent`` may replace a plan being made."""
+
+    reason: ReplanReason
+    text: str
+    from_index: int | None = None
+    interval_s: float = 0.0
+    urgent: bool = False
+
+
+def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
+    """Return the most pressing reason to plan again, None when there is none."""
+    state, config = turn.state, turn.config
+    if turn.boat_en is None or turn.snapshot.wind.forecast is None or turn.is_raised("becalmed"):
+        return None
+    bound = errand(turn)
+    if state.over if bound is None else not bound.has_place:
+        return None
+    if state.after_operator:
+        text = f"stopped by the {state.answering} failsafe" if state.answering else "the operator gave the boat back"
+        return Trigger(reason=ReplanReason.OPERATOR_BACK, text=text)
+    if state.route is not None and state.route.plan_id == NO_PLAN:
+        # It need not lead to our goals: nothing is planned but another way, and that as soon as the wind is known.
+        if turn.snapshot.wind.record_s < config.wind_settle_s:
+            return None
+        return Trigger(reason=ReplanReason.MISMATCH, text="the mission on board is of no plan that is known",
+                       interval_s=config.min_replan_interval_s)
+    changed = _errand(turn, bound)
+    if changed is not None:
+        return changed
+    if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:
+        return Trigger(reason=ReplanReason.OPERATOR_WISH, text="the operator asked for it")
+    if state.missed_s is not None and bound is None:
+        return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
+    if "fence breach" in fresh:
+        return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
+    if turn.config.guidance is Guidance.FIELD and turn.steers:
+        return _at_end(turn) or _extension(turn, bound)   # the mission on board need not be the way that is sailed
+    trigger = _traffic(turn)
+    if trigger is None and not turn.is_raised("wind untrusted"):
+        trigger = _no_go(turn)
+    trigger = trigger or _position(turn)
+    return trigger or _extension(turn, bound) or _wind(turn) or _waypoint(turn)
+
+
+REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST}
+
+
+def _errand(turn: Turn, bound: Errand | None) -> Trigger | None:
+    """She is bound for somewhere else than her route leads to: an errand that begins, or one that is over."""
+    route = turn.state.route
+    leads_to = route.bound_for if route is not None else ""
+    is_first = turn.state.plan_retry.failures == 0   # then the wait between two tries counts
+    interval_s = 0.0 if is_first else turn.config.min_replan_interval_s
+    if bound is not None and leads_to != bound.name:
+        return Trigger(reason=REASONS[bound.kind], text=bound.sentence, urgent=is_first, interval_s=interval_s)
+    if bound is None and leads_to and not (leads_to == HOME and homeward(turn) is not None) and not turn.state.over:
+        return Trigger(reason=ReplanReason.NEXT_GOAL, text=f"no longer bound for {leads_to}: sailing on",
+                       urgent=is_first, interval_s=interval_s)
+    return None
+
+
+def _traffic(turn: Turn) -> Trigger | None:
+    """The route meets another vessel (Büsser 5.2: planned again at most every 20 s)."""
+    met = meetings(turn)
+    if not met:
+        return None
+    first = met[0]
+    text = f"{first.name}: in {first.time_s:.0f} s {first.depth_m:.0f} m inside the distance to keep"
+    turn.say(Severity.WARNING, "traffic", text)
+    since_s = turn.t_s - turn.state.last_plan_s
+    interval_s = max(MIN_INTERVAL_S, turn.config.min_replan_interval_s)
+    if since_s < interval_s or decide(met, since_replan_s=since_s, urgent_s=0.0) is not Decision.REPLAN:
+        return None
+    return Trigger(reason=ReplanReason.OBSTACLE, text=text, interval_s=interval_s, urgent=True)
+
+
+def _no_go(turn: Turn) -> Trigger | None:
+    """The present wind has closed the leg: the autopilot will beat in its corridor. How far, and is that clear?"""
+    boat, leg, wind, vehicle = turn.boat_en, turn.leg(), turn.wind_now, turn.snapshot.vehicle
+    if boat is None or leg is None or wind is None or vehicle is None or not turn.ahead():
+        turn.update(no_go_since_s=None)
+        return None
+    target = leg[1]
+    twa = abs(difference_rad(wind[0], bearing_rad(boat, target)))
+    is_near = distance_m(boat, target) < turn.config.announce_m + turn.speed_mps
+    if twa >= turn.no_go_half_rad or is_near or is_left_to_beat(turn, *leg):
+        turn.update(no_go_since_s=None)
+        return None
+    since = turn.state.no_go_since_s if turn.state.no_go_since_s is not None else turn.t_s
+    turn.update(no_go_since_s=since)
+    drift = predicted_beat(
+        boat, vehicle.heading_rad, leg[0], target, twd_from_rad=wind[0], no_go_half_rad=turn.no_go_half_rad,
+        corridor_m=turn.tack_corridor_m, area=turn.voyage.area)
+    floor = min(turn.config.margin_floor_m, turn.config.margin_m)
+    straight = turn.voyage.area.path_clearance_m([boat, target])
+    text = (f"TWA {math.degrees(twa):.0f}° to the waypoint is inside {math.degrees(turn.no_go_half_rad):.0f}°: "
+            f"{drift.off_leg_m:.0f} m off the leg, {drift.clearance_m:.0f} m clear")
+    if drift.clearance_m < floor and drift.clearance_m < straight - 1.0 and turn.t_s - since >= 1.0:
+        interval_s = turn.config.no_go_replan_interval_s
+        return Trigger(reason=ReplanReason.NO_GO, text=text, interval_s=interval_s, urgent=True)
+    if drift.off_leg_m > turn.config.no_go_off_leg_m and turn.t_s - since >= turn.config.no_go_patience_s:
+        return Trigger(reason=ReplanReason.NO_GO, text=text, interval_s=turn.config.min_replan_interval_s)
+    return None
+
+
+def _position(turn: Turn) -> Trigger | None:
+    """The boat is not where the plan has it, or is nowhere on it."""
+    if turn.is_raised("position jump"):   # with a position all the same: see Turn.is_way_shut
+        return Trigger(reason=ReplanReason.OFF_LEG, text="the position jumped, and the way from there is not clear",
+                       interval_s=turn.config.no_go_replan_interval_s, urgent=True)
+    if turn.is_raised("off the corridor"):
+        return Trigger(reason=ReplanReason.OFF_LEG, text="off the leg", interval_s=_patience_off_leg_s(turn))
+    if turn.is_raised("no progress"):
+        return Trigger(reason=ReplanReason.NO_PROGRESS, text="no progress", interval_s=120.0)
+    return _at_end(turn)
+
+
+def _at_end(turn: Turn) -> Trigger | None:
+    """The mission on board is at its end and goals remain."""
+    if errand(turn) is not None or turn.state.over:
+        return None
+    if turn.is_raised("mission ended") or not turn.ahead():
+        reason = ReplanReason.RETRY if turn.state.phase is Phase.HOLDING else ReplanReason.NEXT_GOAL
+        return Trigger(reason=reason, text="at the end of the mission with goals left", interval_s=turn.config.settle_s)
+    return None
+
+
+def _patience_off_leg_s(turn: Turn) -> float:
+    """Return how long after the last plan the next may be made; less when something stands before the waypoint."""
+    boat, leg, config = turn.boat_en, turn.leg(), turn.config
+    blocked = boat is not None and leg is not None and (
+        turn.voyage.area.path_clearance_m([boat, leg[1]]) < config.margin_floor_m)
+    if blocked:
+        return config.no_go_replan_interval_s
+    return config.min_replan_interval_s
+
+
+def _wind(turn: Turn) -> Trigger | None:
+    """Büsser's 20° against the wind that the plan used, outside the interval that it allowed for; and 60 minutes."""
+    route, mean, config = turn.state.route, turn.wind_mean, turn.config
+    if route is None or mean is None or turn.is_raised("wind untrusted"):
+        return None
+    turned = abs(difference_rad(mean[0], route.plan_twd_from_rad))
+    if turned > config.wind_change_rad and turned > route.plan_half_width_rad:
+        text = (f"the 90 s mean has turned {math.degrees(turned):.0f}° from the plan's wind; it allowed for "
+                f"±{math.degrees(route.plan_half_width_rad):.0f}°")
+        return Trigger(reason=ReplanReason.WIND_SHIFT, text=text, interval_s=config.min_replan_interval_s)
+    if turn.t_s - route.plan_t_s > config.plan_age_s:
+        return Trigger(
+            reason=ReplanReason.PLAN_AGE, text="the plan is 60 minutes old", interval_s=config.min_replan_interval_s)
+    return None
+
+
+def _extension(turn: Turn, bound: Errand | None) -> Trigger | None:
+    """The mission ends soon and goals remain, or the rest of an errand's way: plan on from its last waypoint."""
+    route, boat, last = turn.state.route, turn.boat_en, turn.last_waypoint()
+    if route is None or boat is None or last < turn.state.index:
+        return None
+    ends = route.gate_of[last]
+    if bound is not None or route.bound_for == HOME:
+        bound = bound or homeward(turn)
+        if bound is None or distance_m(route.points_en_m[last], bound.en_m) <= bound.radius_m + turn.config.announce_m:
+            return None
+    elif ends >= len(turn.gates) - 1 and homeward(turn) is None:
+        return None
+    left = path_length_m([boat, *turn.ahead()])
+    if left > turn.config.look_ahead_s * max(turn.speed_mps, 1.0) or not may_restart_leg(turn):
+        return None
+    return Trigger(
+        reason=ReplanReason.NEXT_GOAL, text=f"the mission reaches {left:.0f} m ahead, there is more to sail",
+        from_index=last,
+        interval_s=turn.config.settle_s)
+
+
+def _waypoint(turn: Turn) -> Trigger | None:
+    """Wolsieffer's rule: near a waypoint, plan again from it with the wind measured since."""
+    state, route, boat, leg = turn.state, turn.state.route, turn.boat_en, turn.leg()
+    if route is None or boat is None or leg is None or state.replanned_index >= state.index:
+        return None
+    last = turn.last_waypoint()
+    if state.index >= last or any(g >= 0 for g in route.gate_of[state.index:last]) or is_buoy(turn.gate):
+        return None   # the tail to the next goal is there already: see _extension
+    left_s = distance_m(boat, leg[1]) / max(turn.speed_mps, 0.3)
+    if not TOO_LATE_S < left_s <= turn.config.lead_s or turn.is_raised("wind untrusted"):
+        return None
+    if not may_restart_leg(turn):
+        return None
+    if _is_bend(route, state.index) and turn.t_s - state.last_plan_s < BEND_PLAN_AGE_S:
+        return None
+    if turn.config.replan_policy is ReplanPolicy.FORECAST and not forecast_matters(turn):
+        turn.update(replanned_index=state.index)
+        return None
+    reason = (ReplanReason.WAYPOINT if turn.config.replan_policy is ReplanPolicy.WAYPOINT else ReplanReason.FORECAST)
+    return Trigger(
+        reason=reason, text=f"waypoint {state.index + 1} in {left_s:.0f} s", from_index=state.index,
+        interval_s=turn.config.min_replan_interval_s)
+
+
+def _is_bend(route: Route, index: int) -> bool:
+    """Return whether the course hardly changes at a waypoint: a leg bent as the no-go zone widens, no manoeuvre."""
+    if index + 1 >= len(route.points_en_m) or distance_m(*route.points_en_m[index:index + 2]) < 1.0:
+        return False
+    before = bearing_rad(route.leg_from_en_m[index], route.points_en_m[index])
+    after = bearing_rad(route.points_en_m[index], route.points_en_m[index + 1])
+    return abs(difference_rad(after, before)) < BEND_RAD
+
+
+def forecast_matters(turn: Turn) -> bool:
+    """Return whether the wind has changed enough against the plan's to make another plan worth its upload."""
+    route, mean = turn.state.route, turn.wind_mean
+    if route is None or mean is None:
+        return False
+    turned = abs(difference_rad(mean[0], route.plan_twd_from_rad))
+    if turned > max(FORECAST_RAD, FORECAST_SHARE * route.plan_half_width_rad):
+        return True
+    return abs(mean[1] - route.plan_tws_mps) > FORECAST_SPEED * max(route.plan_tws_mps, 1.0)
+
+
+def is_buoy(gate: Gate | None) -> bool:
+    """Return whether the gate belongs to a buoy."""
+    return gate is not None and gate.buoy_en_m is not None

@@ -1,0 +1,179 @@
+"""Other vessels under way: what plans are told of them, and the route being sailed held against them.
+
+A plan gets the vessels as predictions with their spread, and their part of its promise
+(``companion.planner.risk.vessels``): on the ladder's first step that is within 1 - delta_s, later steps risk more for
+them and the promise says so. A plan keeps farther away than where the active route is given up, so that it is not made
+again for the next report.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from companion.geo.angles import difference_rad
+from companion.planner.problem.value import Target
+from companion.planner.risk.vessels import VESSELS_SHARE, sigmas_for, vessel_count
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.geometry import bearing_rad, distance_m
+from companion.skipper.way.judge import LOST_MPS
+from companion.skipper.way.voyage import PointEn
+from companion.traffic import Conflict, Disc, Vessel, check_legs, path_distance_m, planning_discs, predict
+from companion.traffic.occupancy import Keep
+from companion.traffic.plans import TimedLeg, pressing
+from companion.traffic.predict import tail_factor
+
+PART_BY_RUNG = (1.0, 4.0, 8.0)   # times the vessels' part of the promise, by the ladder's rung
+LEAST_DELTA_S = 0.5          # no plan promises less: of the ladder's last rungs the vessels get what is left
+GIVE_UP_RISK = 1e-1          # the active route is given up for a likelier meeting, at an instant, only
+OWN_TIMING_MPS = 0.1         # how fast our own place along the route becomes uncertain: a sailboat's speed, tacks
+HORIZON_S = 600.0            # the plan is made again long before
+ALIKE_S = 300.0              # successive ways are compared over this time
+SETTLED_M = 50.0             # discs this uncertain grow no more: else later ones would close a lake
+UNKNOWN_S = 30.0             # a vessel of unknown course could be anywhere soon: only the next moments count
+NEAREST = 12                 # vessels that a plan looks at: those that could be met soonest
+OWN_MPS = 4.0                # no boat of ours closes faster by itself
+FAR_RISK = 1e-2              # that a vessel is nearer than counted when those that could be met are chosen
+HAIR_M = 1.0                 # a boat within a disc is let out of it: the disc ends this much before the boat
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leg:
+    """A leg of the route in time, from now on [s]; ``companion.traffic.plans.TimedLeg``."""
+
+    from_en: PointEn
+    to_en: PointEn
+    start_s: float
+    end_s: float
+
+
+def near(turn: Turn) -> tuple[Vessel, ...]:
+    """Return the vessels that could be met within the horizon, the soonest first."""
+    picture, boat = turn.snapshot.traffic, turn.boat_en
+    if picture is None or boat is None:
+        return ()
+    soon = []
+    for vessel in picture.vessels:
+        there = predict(vessel, turn.t_s)
+        closing_mps = OWN_MPS + math.hypot(*there.velocity_en_mps)
+        gap_m = distance_m(boat, there.mean_en_m) - there.radius_m(FAR_RISK) - turn.config.traffic_clearance_m
+        if gap_m < closing_mps * HORIZON_S:
+            soon.append((gap_m / closing_mps, vessel.mmsi, vessel.branch, vessel))
+    return tuple(vessel for *_, vessel in sorted(soon, key=lambda s: s[:3])[:NEAREST])
+
+
+def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Disc, ...]:
+    """Return where not to be because of ``vessels``, in times from ``t_s`` on [s], ``sigmas`` wide."""
+    hull = turn.voyage.boat.hull
+    keep = Keep(
+        sigmas=sigmas, clearance_m=turn.config.traffic_clearance_m, horizon_s=HORIZON_S, own_timing_mps=OWN_TIMING_MPS,
+        own_radius_m=hull.reach_m, ahead_m=turn.config.traffic_clearance_m,
+        settled_m=SETTLED_M,
+    )
+    known = [v for v in vessels if v.is_moving_known]
+    unknown = [v for v in vessels if not v.is_moving_known]
+    return (*planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shares:
+    """The vessels of a plan and how the promise is shared: ``delta_s`` of both, ``wind_delta_s``, the vessels' part.
+
+    ``part`` is None without vessels: then all of it is the wind's.
+    """
+
+    targets: tuple[Target, ...]
+    delta_s: float
+    wind_delta_s: float
+    part: float | None
+
+
+def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: float) -> Shares:
+    """Return what a plan is told that starts at ``start_en`` in ``after_s``, on a rung of the ladder.
+
+    The wind keeps its part on every rung. Where the start is within a vessel's disc already, its discs shrink to let
+    the boat out: none nearer than now. What that risks is in the plan's path risk.
+    """
+    found = discs(turn, near(turn), turn.t_s + after_s, 0.0)
+    if not found:
+        return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
+    of_wind = (1.0 - VESSELS_SHARE) * (1.0 - delta_s)
+    wanted = VESSELS_SHARE * (1.0 - delta_s) * PART_BY_RUNG[min(rung, len(PART_BY_RUNG) - 1)]
+    part = min(wanted, 1.0 - LEAST_DELTA_S - of_wind)
+    inside_m: dict[int, float] = {}
+    every = tuple(Target(
+        x_m=disc.x_m, y_m=disc.y_m, vx_mps=disc.vx_mps, vy_mps=disc.vy_mps, radius_m=disc.radius_m,
+        growth_mps=disc.growth_mps, from_s=disc.from_s, until_s=disc.until_s, name=disc.name, spread=disc.spread,
+    ) for disc in found)
+    sigmas = sigmas_for(part, vessel_count(every))
+    for disc, target in zip(found, every, strict=True):
+        if disc.from_s <= 0.0 and target.spread is not None:
+            gap_m = distance_m(start_en, disc.centre_en_m(0.0)) - disc.radius_m - sigmas * target.spread.sigma_m
+            inside_m[target.spread.vessel] = HAIR_M - gap_m
+    out = []
+    for target in every:
+        assert target.spread is not None
+        radius_m = target.radius_m - max(0.0, inside_m.get(target.spread.vessel, 0.0))
+        growth_mps = target.growth_mps + sigmas * target.spread.sigma_mps
+        if radius_m + sigmas * target.spread.sigma_m + growth_mps * target.from_s > 0.0:
+            out.append(replace(target, radius_m=radius_m))
+    if not out:
+        return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
+    least = max(LEAST_DELTA_S, 1.0 - of_wind - part)   # a half and not the last digit below it
+    return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)
+
+
+def timed_legs(turn: Turn, points: Sequence[PointEn] | None = None) -> tuple[Leg, ...]:
+    """Return a way from the boat through ``points``, or what is left of the route, timed by the polar in mean wind."""
+    boat, wind, vehicle = turn.boat_en, turn.wind_mean, turn.snapshot.vehicle
+    if boat is None or wind is None or vehicle is None:
+        return ()
+    model, legs, t_s, heading = turn.voyage.boat, [], 0.0, vehicle.heading_rad
+    for a, b in pairwise((boat, *(turn.ahead() if points is None else points))):
+        length = distance_m(a, b)
+        if length < 1e-6:
+            continue
+        course = bearing_rad(a, b)
+        twa = abs(difference_rad(wind[0], course))
+        closed = turn.no_go_half_rad
+        speed = model.polar.speed_mps(max(twa, closed), wind[1])
+        if twa < closed:
+            speed *= math.cos(closed) / math.cos(twa)   # the autopilot will beat there
+        begin = t_s + abs(difference_rad(course, heading)) / model.turn_rate_radps
+        t_s = begin + length / max(speed, LOST_MPS)
+        legs.append(Leg(from_en=a, to_en=b, start_s=begin, end_s=t_s))
+        heading = course
+    return tuple(legs)
+
+
+def apart_m(turn: Turn, points: Sequence[PointEn]) -> float | None:
+    """Return how different a new way through ``points`` looks from what is left of the route [m].
+
+    The discrete Fréchet distance of the next ``ALIKE_S`` of both; None without a route or a position.
+    """
+    old, new = soon(timed_legs(turn), ALIKE_S), soon(timed_legs(turn, points), ALIKE_S)
+    if not old or not new:
+        return None
+    return path_distance_m(old, new)
+
+
+def soon(legs: Sequence[TimedLeg], seconds: float) -> list[PointEn]:
+    """Return the points of a way up to where the boat is after ``seconds``."""
+    points = [legs[0].from_en] if legs else []
+    for leg in legs:
+        if leg.start_s >= seconds:
+            break
+        share = min(1.0, (seconds - leg.start_s) / (leg.end_s - leg.start_s))
+        points.append((leg.from_en[0] + share * (leg.to_en[0] - leg.from_en[0]),
+                       leg.from_en[1] + share * (leg.to_en[1] - leg.from_en[1])))
+    return points
+
+
+def meetings(turn: Turn) -> tuple[Conflict, ...]:
+    """Return where the route meets vessels soon enough to act, in order of time; empty when it is clear."""
+    vessels = near(turn)
+    if not vessels:
+        return ()
+    return pressing(check_legs(timed_legs(turn), discs(turn, vessels, turn.t_s, tail_factor(GIVE_UP_RISK))))

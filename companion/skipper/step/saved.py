@@ -1,0 +1,168 @@
+"""What survives a kill, as values and as plain JSON; a saved state is checked as everything from outside is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from companion.mavlink.wire.items import mission_hash
+from companion.messages import MissionItem, Mode
+from companion.skipper.step.state import Route, SkipperState
+from companion.skipper.way.gates import Approach
+
+FORMAT = 1
+MAX_ITEMS = 2000       # no autopilot holds more
+MAX_GOALS = 10**6
+MAX_QUARTERS = 10**6   # turns round one buoy
+_NUMBERS = ("plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s",
+            "vessel_risk", "vessels_part")
+_MAYBE = ("risk", "cost_s")
+_WORDS = ("rung", "why", "bound_for")
+# of states that were saved before there were any
+_DEFAULTS: dict[str, Any] = {"vessel_risk": 0.0, "vessels_part": 0.0, "bound_for": ""}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Persisted:
+    """What survives a kill: written whenever it changes, before the actions of the step are carried out.
+
+    ``route``, ``pending`` and ``unsure`` are every list that may be on the autopilot: the one that was there last, the
+    one whose upload is under way, and one whose upload failed before that.
+    """
+
+    voyage: str
+    gate: int
+    sailing: bool
+    route: Route | None
+    pending: Route | None
+    unsure: Route | None = None
+    own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
+    motor: bool = False                # it was run by us: ours to switch off
+    under_way_s: float = 0.0           # how long the voyage has been under way, in whole minutes
+    arrived: bool = False              # nothing is left to sail, the way home included
+    uid: str | None = None             # of the autopilot, and ...
+    system: int | None = None          # ... its system id
+    approaches: tuple[Approach, ...] = ()   # the numbering of the gates hangs on them
+    quarters: int = 0                  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
+
+    @property
+    def lists(self) -> tuple[Route, ...]:
+        """Every list that may be on the autopilot."""
+        return tuple(r for r in (self.route, self.pending, self.unsure) if r is not None)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The same by their hashes (``companion.mavlink.wire.items.mission_hash``)."""
+        return tuple(dict.fromkeys(mission_hash(route.items) for route in self.lists))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        return {
+            "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
+            "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
+            "unsure": _route_to_dict(self.unsure), "own_mode": None if self.own_mode is None else self.own_mode.name,
+            "motor": self.motor, "under_way_s": self.under_way_s, "arrived": self.arrived, "uid": self.uid,
+            "system": self.system,
+            "approaches": [[a.goal, *a.en_m, a.turn_rad] for a in self.approaches], "quarters": self.quarters,
+        }
+
+    @classmethod
+    def from_dict(cls, data: Any) -> Persisted:
+        """Read ``to_dict``'s result.
+
+        Raises:
+            ValueError: it cannot be believed, whatever is wrong with it.
+        """
+        try:
+            if data["format"] != FORMAT:
+                raise ValueError(f"its format is {str(data['format'])[:20]}, not {FORMAT}")
+            return cls(
+                voyage=_words(data["voyage"]), gate=_whole(data["gate"], 0, 10**9), sailing=_truth(data["sailing"]),
+                route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
+                unsure=_route_from_dict(data.get("unsure")),
+                own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
+                motor=_truth(data.get("motor", False)),
+                under_way_s=_number(data.get("under_way_s", 0.0)), arrived=_truth(data.get("arrived", False)),
+                uid=None if data.get("uid") is None else _words(data["uid"]),
+                system=None if data.get("system") is None else _whole(data["system"], 1, 255),
+                approaches=tuple(
+                    Approach(goal=_whole(goal, 0, MAX_GOALS), en_m=(_number(e), _number(n)),
+                             turn_rad=None if turn is None else _number(turn))
+                    for goal, e, n, turn in data.get("approaches", ())[:MAX_GOALS + 1]),
+                quarters=_whole(data.get("quarters", 0), -MAX_QUARTERS, MAX_QUARTERS),
+            )
+        except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
+            raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
+
+
+def saved_of(state: SkipperState, voyage: str) -> Persisted:
+    """Return what of a state survives a kill."""
+    return Persisted(
+        voyage=voyage, gate=state.gate, sailing=state.sailing, route=state.route,
+        pending=state.pending_upload.route if state.pending_upload is not None else None,
+        unsure=state.unsure_route, own_mode=state.own_mode, motor=state.adrift.motor,
+        under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived, uid=state.uid, system=state.system,
+        approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
+    )
+
+
+def _route_to_dict(route: Route | None) -> dict[str, Any] | None:
+    if route is None:
+        return None
+    return {
+        "items": [[m.command, m.lat_e7, m.lon_e7, m.alt_m, m.frame, list(m.params)] for m in route.items],
+        "points": [list(p) for p in route.points_en_m],
+        "from": [list(p) for p in route.leg_from_en_m],
+        "gates": list(route.gate_of),
+        **{name: getattr(route, name) for name in ("plan_id", *_NUMBERS, *_MAYBE, *_WORDS)},
+    }
+
+
+def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
+    if data is None:
+        return None
+    items = tuple(
+        MissionItem(
+            command=_whole(c, 0, 0xFFFF), lat_e7=_whole(lat, -10**9, 10**9), lon_e7=_whole(lon, -2 * 10**9, 2 * 10**9),
+            alt_m=_number(alt), frame=_whole(frame, 0, 255),
+            params=(_number(p[0]), _number(p[1]), _number(p[2]), _number(p[3])))
+        for c, lat, lon, alt, frame, p in data["items"][:MAX_ITEMS + 1]
+    )
+    points = tuple((_number(e), _number(n)) for e, n in data["points"])
+    starts = tuple((_number(e), _number(n)) for e, n in data["from"])
+    gates = tuple(_whole(g, -1, 10**9) for g in data["gates"])
+    if not 0 < len(items) == len(points) == len(starts) == len(gates) <= MAX_ITEMS:
+        raise ValueError("it is damaged: its lists differ in length")
+    values = {**_DEFAULTS, **data}
+    figures: dict[str, Any] = {
+        **{name: _number(values[name]) for name in _NUMBERS},
+        **{name: None if data[name] is None else _number(data[name]) for name in _MAYBE},
+        **{name: _words(values[name]) for name in _WORDS},
+    }
+    return Route(items=items, points_en_m=points, leg_from_en_m=starts, gate_of=gates,
+                 plan_id=_whole(data["plan_id"], -1, 10**12), **figures)
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or abs(value) > 1e12:
+        raise ValueError(f"it is damaged: {str(value)[:20]} where a number should be")
+    return float(value)
+
+
+def _whole(value: Any, low: int, high: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise ValueError(f"it is damaged: {str(value)[:20]} where a whole number should be")
+    return value
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError(f"{str(value)[:20]} where true or false should be")
+    return value
+
+
+def _words(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{str(value)[:20]} where words should be")
+    return value

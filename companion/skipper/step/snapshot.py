@@ -1,0 +1,174 @@
+"""What the skipper sees: one value per step, with one ``t_s`` and the age of each part.
+
+The application builds it about once a second. Outcomes of earlier actions and events since the last step come
+in it, each exactly once.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import Any
+
+from companion.boat import AutopilotLimits
+from companion.mavlink.trust.identity import Identity
+from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
+from companion.skipper.step.config import DRY_RUN, Permissions
+from companion.skipper.way.voyage import PointEn
+from companion.traffic import TrafficPicture
+
+
+class WindHealth(enum.Enum):
+    """How far the wind may be believed."""
+
+    NONE = "none"              # nothing heard
+    SETTLING = "settling"      # too short a record to forecast from
+    GOOD = "good"
+    LIGHT = "light"            # the direction is nearly without meaning
+    UNTRUSTED = "untrusted"    # frozen, mirrored, spiking or silent vane
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindView:
+    """The wind now and to come. ``mean`` is the 90 s mean and ``present`` the 5 s mean (Büsser 3.1.1)."""
+
+    health: WindHealth = WindHealth.NONE
+    forecast: WindForecast | None = None
+    mean_twd_from_rad: float | None = None
+    mean_tws_mps: float | None = None
+    sigma_twd_rad: float | None = None
+    present_twd_from_rad: float | None = None
+    present_tws_mps: float | None = None
+    record_s: float = 0.0      # length of the record behind the forecast
+    verdict: str = ""          # why it is not GOOD, in words
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionOnBoard:
+    """The mission as last read from the autopilot; ``items`` is None until it was read. Home is not in it."""
+
+    items: tuple[MissionItem, ...] | None = None
+    read_t_s: float | None = None
+
+
+# ------------------------------------------------------------------------------------------- events
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WaypointReached:
+    """MISSION_ITEM_REACHED."""
+
+    seq: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeChanged:
+    """The heartbeat's mode changed."""
+
+    before: Mode | None
+    after: Mode | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AutopilotRebooted:
+    """The autopilot's boot time went back."""
+
+
+class OperatorWish(enum.Enum):
+    """What the operator may ask of the companion."""
+
+    REPLAN = "replan"
+    REPLACE_FOREIGN = "replace_foreign"        # overwrite the mission that is not ours
+    HOLD = "hold"
+    GO_ON = "go_on"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disbelieved:
+    """Something heard that cannot be, or that could not be digested: said once, and not used."""
+
+    what: str
+    text: str
+
+
+Event = WaypointReached | ModeChanged | AutopilotRebooted | StatusText | OperatorWish | Disbelieved
+
+
+# ----------------------------------------------------------------------------------------- outcomes
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanOutcome:
+    """The answer to RequestPlan; ``plan`` is None when the worker died or the request was refused."""
+
+    request_id: int
+    plan: Any = None           # companion.planner.Plan
+    text: str = ""
+
+
+class UploadResult(enum.Enum):
+    """How a transfer ended."""
+
+    OK = "ok"                  # written, read back, equal, and current where that was asked
+    REFUSED = "refused"        # the autopilot said no; text has its words
+    TIMEOUT = "timeout"
+    MISMATCH = "mismatch"      # what was read back is not what was written
+    LINK = "link"              # the link died
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UploadOutcome:
+    """The answer to UploadMission or UploadFence."""
+
+    upload_id: int
+    result: UploadResult
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOutcome:
+    """The answer to ReadMission; ``items`` without home, None when it failed."""
+
+    read_id: int
+    items: tuple[MissionItem, ...] | None = None
+    text: str = ""
+
+
+class CommandResult(enum.Enum):
+    """How a command ended."""
+
+    ACCEPTED = "accepted"
+    REFUSED = "refused"        # text has the autopilot's reason verbatim
+    TIMEOUT = "timeout"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandOutcome:
+    """The answer to SetMode, Arm, SetCurrent or SetParameter."""
+
+    command_id: int
+    result: CommandResult
+    text: str = ""
+
+
+Outcome = PlanOutcome | UploadOutcome | ReadOutcome | CommandOutcome
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """All that is known at ``t_s``. Ages are seconds since the part was heard; None: never."""
+
+    t_s: float
+    vehicle: VehicleState | None = None
+    vehicle_age_s: float | None = None
+    position_en_m: PointEn | None = None
+    autopilot: AutopilotStatus | None = None
+    autopilot_age_s: float | None = None
+    heartbeat_age_s: float | None = None
+    wind: WindView = WindView()
+    mission: MissionOnBoard = MissionOnBoard()
+    identity: Identity = field(default_factory=Identity)   # as far as the autopilot has told it
+    neighbours: tuple[str, ...] = ()       # other autopilots on a link on which ours was not named, in words
+    has_company: bool = False              # another companion speaks with our ids
+    limits: AutopilotLimits | None = None  # None: not read yet
+    permissions: Permissions = DRY_RUN
+    planner_alive: bool = True
+    traffic: TrafficPicture | None = None  # None: no vessel was ever heard
+    events: tuple[Event, ...] = ()
+    outcomes: tuple[Outcome, ...] = ()

@@ -1,0 +1,262 @@
+"""What the skipper remembers from step to step; what of it survives a restart is in ``saved``."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from companion.field.guidance import LastResort
+from companion.field.station import StationState
+from companion.field.values import GuidanceState
+from companion.messages import MissionItem, Mode
+from companion.skipper.step.actions import ReplanReason
+from companion.skipper.step.snapshot import OperatorWish
+from companion.skipper.way.gates import Approach
+from companion.skipper.way.voyage import PointEn
+from companion.traffic import Assessment
+
+if TYPE_CHECKING:
+    from companion.skipper.step.saved import Persisted  # which is made of routes
+
+
+class Phase(enum.Enum):
+    """Büsser's states (Figure 3.1) and those that a voyage with an autopilot adds."""
+
+    IDLE = "idle"                                  # nothing to sail yet
+    WAITING = "waiting"                            # for position, EKF, wind, arming or permission
+    STANDARD = "standard"                          # Büsser 3.2.1
+    NEW_CALCULATION = "new calculation"            # 3.2.2: no valid plan until the planner answers
+    DESTINATION_APPROACH = "destination approach"  # 3.2.3: the last waypoint is the target
+    BUOY_APPROACH = "buoy approach"                # 3.2.4
+    LAST_RESORT = "last resort"                    # a vessel too near to plan for: steered by field
+    HOLDING = "holding"                            # nothing found or something wrong: in a safe item, waiting
+    OPERATOR = "operator"                          # somebody else has the boat
+    DONE = "done"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Route:
+    """The mission that sails: its items and what each is for. Index i has seq i + 1.
+
+    ``points_en_m[i]`` is where item i is (for the safe end: where it ends), ``leg_from_en_m[i]`` where the planned
+    leg to it begins, ``gate_of[i]`` the gate (see ``companion.skipper.way.gates``) that reaching it completes, or -1.
+    """
+
+    items: tuple[MissionItem, ...] = ()
+    points_en_m: tuple[PointEn, ...] = ()
+    leg_from_en_m: tuple[PointEn, ...] = ()
+    gate_of: tuple[int, ...] = ()
+    plan_id: int
+    plan_t_s: float                    # when the plan was asked for
+    plan_twd_from_rad: float           # mean wind that the plan used
+    plan_tws_mps: float
+    plan_half_width_rad: float         # half width of the forecast's interval at config.wind_change_level
+    margin_m: float
+    delta_s: float
+    rung: str = ""                     # the step of the ladder it was found on; empty: as configured
+    risk: float | None = None          # of the whole path, wind and vessels
+    vessel_risk: float = 0.0           # the vessels' part of it
+    vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
+    cost_s: float | None = None
+    why: str = ""
+    bound_for: str = ""                # the errand that its end serves; empty: the goals
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PendingPlan:
+    """A plan asked for and not yet answered."""
+
+    request_id: int
+    t_s: float
+    reason: ReplanReason
+    from_index: int | None             # route index that the plan starts at; None: the boat
+    rung: int
+    gate: int                          # the gate that the plan's end completes, -1 when none
+    lead_in: tuple[PointEn, ...]       # waypoints before the plan's start (a repaired start)
+    start_en_m: PointEn
+    facts: Route                       # figures of the plan to be, without items
+    problem: Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PendingUpload:
+    """An upload asked for and not yet answered: the route that it brings."""
+
+    upload_id: int
+    t_s: float
+    route: Route
+    set_current: int | None
+    keep_first: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fix:
+    """A position, or how far one has jumped, and when."""
+
+    t_s: float
+    en_m: PointEn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Raised:
+    """A raised watchdog: since when, and since when its exit condition has held."""
+
+    name: str
+    since_s: float
+    clear_since_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Retry:
+    """Patience with something that failed: how often in a row, and when it may be tried again."""
+
+    failures: int = 0
+    not_before_s: float = float("-inf")
+
+
+PATIENT = Retry()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """She was being sailed and no longer is: since when, what she was put into, and by what (``causes``).
+
+    ``before_s`` is when she was last seen being sailed: the change of mode is between the two.
+    """
+
+    t_s: float
+    before_s: float
+    mode: Mode | None
+    is_armed: bool
+    cause: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signs:
+    """What tells a failsafe from a person: when each cause last showed, and when the sticks or the switch moved."""
+
+    seen_s: tuple[tuple[str, float], ...] = ()
+    standing: tuple[str, ...] = ()        # signs that are up now
+    breaches: int | None = None           # of the fence, as last counted
+    rc_us: tuple[int, ...] = ()           # of the channels that a person moves, as they last rested
+    rc_moved_s: float = float("-inf")
+    helm: tuple[Mode | None, bool] | None = None   # mode and arming as last heard, and when
+    helm_s: float = float("-inf")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adrift:
+    """How the boat moves over ground, and what was done to stop a drift (``companion.skipper.deeds.adrift``)."""
+
+    ground_en_mps: tuple[float, float] | None = None   # mean velocity of the last seconds
+    ground_t_s: float = float("-inf")
+    places: tuple[Fix, ...] = ()       # of the last minute, of a boat that hardly moves
+    since_s: float | None = None       # since when a drift onto something is being stopped
+    loitered: bool = False             # LOITER has shown in this calm: it is not asked for again
+    loiter_en_m: PointEn | None = None # where it began
+    motor: bool = False                # the autopilot has accepted to run it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ByField:
+    """Steering by field: the memory of the guidance and of the station keeper, and the last resort's."""
+
+    resort: LastResort = field(default_factory=LastResort)
+    clear_s: float | None = None          # since when the water is clear
+    seen_guided: bool = False             # GUIDED has shown since the field took over
+    not_before_s: float = float("-inf")   # somebody set AUTO in the middle of it: not again before
+    guidance: GuidanceState = field(default_factory=GuidanceState)
+    station: StationState = field(default_factory=StationState)
+    station_since_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkipperState:
+    """Everything that ``step`` needs from before. ``Skipper.initial`` makes the first."""
+
+    phase: Phase = Phase.IDLE
+    why: str = "just started"
+    next_id: int = 1
+    gate: int = 0                      # index of the gate being sailed to
+    route: Route | None = None         # what is on the autopilot, as far as we know
+    adoptable: Persisted | None = None  # from before a restart or a foreign mission, until one of ours is found
+    known: tuple[str, ...] = ()        # hashes of lists that earlier voyages of ours may have left on board
+    uid: str | None = None             # of the autopilot that this voyage began with, and ...
+    system: int | None = None          # ... its system id
+    is_ours: bool = False              # in this step: it is that one, and a boat of ours
+    custody: str = ""                  # why it was not, until it is
+    checked_mission: bool = False      # the mission on board has been compared with ours since link, reboot, operator
+    read_twice: bool = False           # the last mission read was not ours: the next one decides
+    foreign: str = ""                  # why the mission on board is not ours; empty: it is, or there is none
+    sailing: bool = False              # has been in AUTO and armed with our route
+    index: int = 0                     # target by the autopilot
+    own_index: int = 0                 # target by Büsser's double conditions
+    pending_plan: PendingPlan | None = None
+    pending_upload: PendingUpload | None = None
+    pending_read: tuple[int, float] | None = None          # id, since
+    pending_command: tuple[int, float, str] | None = None  # id, since, what
+    unsure_route: Route | None = None  # of an upload that failed: the mission on board may be it or a mixture
+    accepted: tuple[str, float] | None = None  # the last command that was accepted, and when
+    ready_route: Route | None = None   # planned, not allowed or not yet possible to upload
+    own_mode: Mode | None = None       # a mode other than AUTO that we asked for ourselves
+    rung: int = 0                      # step of the ladder being tried
+    unanswered: int = 0                # requests in a row that the planner did not answer
+    ladder_reason: ReplanReason | None = None
+    plan_retry: Retry = PATIENT
+    upload_retry: Retry = PATIENT
+    read_retry: Retry = PATIENT
+    command_retry: Retry = PATIENT
+    read_since_s: float = float("-inf")   # a mission read before this does not count
+    asked_seq: int | None = None   # the item we made current, until the autopilot shows it
+    current_asked_s: float = float("-inf")  # when an item was last made current by us
+    last_plan_s: float = float("-inf")  # when a plan was last asked for
+    replanned_index: int = -1           # the target for which Wolsieffer's replan was asked
+    replans: int = 0
+    closest_m: float = float("inf")     # smallest distance to the present gate so far
+    uploaded_s: float = float("-inf")   # when the last upload ended well
+    good_wind_since_s: float | None = None
+    no_go_since_s: float | None = None
+    tacked_s: float = float("-inf")     # when a tack was last asked for
+    wish: OperatorWish | None = None    # the operator's last wish, until it is answered
+    read_items: tuple[MissionItem, ...] | None = None      # the mission as last read
+    read_t_s: float = float("-inf")
+    approaches: tuple[Approach, ...] = ()   # where the way to a goal began, see companion.skipper.way.gates
+    bearing_rad: float = 0.0            # how far the boat has come round the buoy that is next, see gates.bearing_on
+    missed_s: float | None = None       # when a gate was missed to which no upload since leads
+    history_plan: int = -1
+    history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
+    last_seen: Fix | None = None        # the last position
+    boot_s: float | None = None
+    doubt: Fix | None = None            # the sum of the position's jumps, and the last one's time
+    back_s: float = float("-inf")      # when it was back where it was reckoned: this step's jump is none
+    signs: Signs = Signs()
+    battery_critical: bool = False     # by the autopilot's own limit (BATT_CRT_VOLT, BATT_CRT_MAH)
+    stop: Stop | None = None           # she is not being sailed though she was
+    answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
+    sent_home: bool = False            # ... which put her into RTL
+    after_operator: bool = False       # AUTO has come back: plan from where the boat is now
+    under_way_s: float = 0.0           # how long the voyage has been under way ...
+    last_step_s: float = float("-inf")  # ... counted from step to step
+    home_reached: bool = False         # the way home that follows the last goal is sailed
+    over: str = ""                     # why the voyage is over: what is left is to watch her loiter; empty: it is not
+    arrived: bool = False              # ... with all goals reached, and home where the mission ends there
+    rest_en_m: PointEn | None = None   # where she loiters since
+    replace_foreign: bool = False      # permission was given to overwrite what is on board
+    repair: bool = False               # the mission on board is a mixture of ours
+    rebooted: bool = False             # in this very step
+    operator_since_s: float | None = None
+    passed_since_s: float | None = None   # the target was passed by our own geometry, the autopilot still steers for it
+    raised: tuple[Raised, ...] = ()
+    entering: tuple[tuple[str, float], ...] = ()   # watchdogs whose entry condition holds, since when
+    steering_until_s: float | None = None          # bearing away in GUIDED until
+    steering_heading_rad: float | None = None
+    by_field: ByField = ByField()
+    adrift: Adrift = Adrift()
+    irons_s: tuple[float, ...] = ()                # when the boat was in irons
+    watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
+    watch_told: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of those said lately, when
+    announced: tuple[tuple[str, float], ...] = ()  # code, last said
+    reached: tuple[int, ...] = ()                  # goals reached, in order
+    missed: int = 0                                # buoys passed on the wrong side and sailed again
+    wants: tuple[str, ...] = ()                    # what is missing, in words

@@ -1,0 +1,283 @@
+"""One step in the making: the state so far, the snapshot, and the actions asked for.
+
+A ``Turn`` lives for one call of ``step``. Rules read it and change it through its methods; nothing leaves it but
+the frozen state and the tuple of actions. Permissions are checked here too, so no rule can go round them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from companion.mavlink.wire.fixes import LEAP_M, MEMORY_S, leap_m
+from companion.messages import AutopilotStatus, Mode
+from companion.skipper.planning.problem import wind_mean, wind_now
+from companion.skipper.step.actions import (
+    Action,
+    Announce,
+    Arm,
+    RunMotor,
+    SetCurrent,
+    SetMode,
+    Severity,
+    SteerHeading,
+    Tack,
+    UploadFence,
+    UploadMission,
+)
+from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.config import Guidance, Permissions, SkipperConfig
+from companion.skipper.step.route import ends_safely
+from companion.skipper.step.snapshot import Snapshot
+from companion.skipper.step.state import Phase, Retry, Route, SkipperState
+from companion.skipper.way.gates import Approach, Gate, gates_of
+from companion.skipper.way.voyage import PointEn, Voyage
+
+FRESH_S = 3.0          # a part older than this is not acted upon
+JUMP_M = LEAP_M        # a fix this much farther than the boat can sail is a jump
+SHOWS_S = 2.5          # a command that was accepted shows in the next heartbeats: it is not repeated before that
+DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
+
+
+def permitted(action: Action, permissions: Permissions) -> bool:
+    """Return whether the operator allows an action of this kind."""
+    if isinstance(action, UploadMission):
+        return permissions.may_upload and ends_safely(action.items)
+    if isinstance(action, UploadFence):
+        return permissions.may_upload_fence
+    if isinstance(action, SetMode):
+        return permissions.may_set_mode and (action.mode is not Mode.GUIDED or permissions.may_steer)
+    if isinstance(action, RunMotor | Tack):
+        return permissions.may_set_mode
+    if isinstance(action, Arm):
+        return permissions.may_arm
+    if isinstance(action, SetCurrent):
+        return permissions.may_upload
+    if isinstance(action, SteerHeading):
+        return permissions.may_steer
+    return True
+
+
+class Turn:
+    """The work of one step."""
+
+    def __init__(
+        self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot,
+    ) -> None:
+        self.voyage, self.config = voyage, config
+        self.state, self.snapshot = state, snapshot
+        self.actions: list[Action] = []
+
+    # ------------------------------------------------------------------------------------- changing
+    def update(self, **changes: Any) -> None:
+        """Change the state."""
+        self.state = replace(self.state, **changes)
+
+    def new_id(self) -> int:
+        """Return a number not used before in this voyage."""
+        number = self.state.next_id
+        self.update(next_id=number + 1)
+        return number
+
+    def act(self, action: Action) -> bool:
+        """Ask for an action; False (and nothing asked) when it is not permitted, or the autopilot not ours."""
+        is_order = isinstance(action, UploadMission | UploadFence | SetMode | Arm | SetCurrent | SteerHeading)
+        if (is_order and not self.state.is_ours) or not permitted(action, self.snapshot.permissions):
+            return False
+        self.actions.append(action)
+        return True
+
+    def say(self, severity: Severity, code: str, text: str, *, every_s: float | None = None) -> None:
+        """Announce something; the same code not more often than every ``every_s`` (default: the configured)."""
+        interval = self.config.announce_interval_s if every_s is None else every_s
+        said = dict(self.state.announced)
+        if self.t_s - said.get(code, -math.inf) < interval:
+            return
+        said[code] = self.t_s
+        recent = sorted(said.items(), key=lambda item: item[1])[-64:]
+        self.update(announced=tuple(recent))
+        self.actions.append(Announce(severity=severity, code=code, text=text))
+
+    def phase(self, phase: Phase, why: str) -> None:
+        """Set the phase and the sentence that says why."""
+        self.update(phase=phase, why=why)
+
+    def failed(self, retry: Retry) -> Retry:
+        """Return the patience after another failure: the wait doubles up to the longest."""
+        wait = min(
+            self.config.backoff_first_s * self.config.backoff_factor**retry.failures, self.config.backoff_max_s)
+        return Retry(failures=retry.failures + 1, not_before_s=self.t_s + wait)
+
+    def approach(self, approach: Approach) -> None:
+        """Begin the way to the goal that is next where ``approach`` says, from its first gate.
+
+        The gates are others from here on: what the mission on board, or on its way there, counted for is void.
+        """
+        others = tuple(a for a in self.state.approaches if a.goal != approach.goal)
+        self.update(
+            approaches=(*others, approach), bearing_rad=0.0, closest_m=math.inf,
+            gate=next(n for n, gate in enumerate(self.gates) if gate.goal == approach.goal))
+        self.void_route()
+
+    def void_route(self) -> None:
+        """Let no item of the mission on board, or on its way there, count for the gate that is next or a later one."""
+        def void(route: Route) -> Route:
+            return replace(route, gate_of=tuple(-1 if g >= self.state.gate else g for g in route.gate_of))
+
+        if self.state.route is not None:
+            self.update(route=void(self.state.route))
+        if self.state.pending_upload is not None:
+            pending = self.state.pending_upload
+            self.update(pending_upload=replace(pending, route=void(pending.route)))
+
+    # -------------------------------------------------------------------------------------- reading
+    @property
+    def gates(self) -> tuple[Gate, ...]:
+        """The voyage's gates, in order."""
+        return gates_of(self.voyage, self.state.approaches)
+
+    @property
+    def t_s(self) -> float:
+        """Now [s]."""
+        return self.snapshot.t_s
+
+    @property
+    def autopilot(self) -> AutopilotStatus | None:
+        """The autopilot's status while it is heard."""
+        age = self.snapshot.heartbeat_age_s
+        return self.snapshot.autopilot if age is not None and age <= FRESH_S else None
+
+    @property
+    def boat_en(self) -> PointEn | None:
+        """The boat's position while it is fresh and plausible."""
+        age = self.snapshot.vehicle_age_s
+        if self.snapshot.vehicle is None or age is None or age > FRESH_S:
+            return None
+        if (self.is_raised("position jump") or self.jump_m >= JUMP_M) and not self.is_way_shut:
+            return None
+        return self.snapshot.position_en_m
+
+    @property
+    def is_way_shut(self) -> bool:
+        """Whether the autopilot, sailing by the position that it reports now, comes too near to something on its leg.
+
+        A position that has just jumped may be false; but it is what the boat is steered by, so a plan that is clear
+        from there is better than a leg that is not.
+        """
+        here, leg, vehicle = self.snapshot.position_en_m, self.leg(), self.snapshot.vehicle
+        if here is None or leg is None or vehicle is None or not self.state.sailing:
+            return False
+        goes_to = leg[1]
+        if self.state.own_mode in STOPPING:   # drifting, turning, or on a way that is not ours
+            east, north = vehicle.velocity_en_mps
+            goes_to = (here[0] + DRIFT_LOOK_S * east, here[1] + DRIFT_LOOK_S * north)
+        area, floor_m = self.voyage.area, min(self.config.margin_floor_m, self.config.margin_m)
+        return float(area.clearance_m([here])[0]) > 0.0 and area.path_clearance_m([here, goes_to]) < floor_m
+
+    @property
+    def jump_m(self) -> float:
+        """How much farther than it can sail the boat has moved since the last fix [m]."""
+        here, last, age = self.snapshot.position_en_m, self.state.last_seen, self.snapshot.vehicle_age_s
+        if here is None or last is None or age is None or self.state.back_s == self.t_s:
+            return 0.0
+        elapsed_s = self.t_s - age - last.t_s
+        return 0.0 if elapsed_s > MEMORY_S else leap_m(math.dist(here, last.en_m), elapsed_s)
+
+    @property
+    def speed_mps(self) -> float:
+        """Speed over ground [m/s], 0 when unknown."""
+        return self.snapshot.vehicle.speed_mps if self.snapshot.vehicle is not None else 0.0
+
+    @property
+    def wind_now(self) -> tuple[float, float] | None:
+        """The 5 s wind (from [rad], speed [m/s])."""
+        return wind_now(self.snapshot)
+
+    @property
+    def wind_mean(self) -> tuple[float, float] | None:
+        """The 90 s wind (from [rad], speed [m/s])."""
+        return wind_mean(self.snapshot)
+
+    @property
+    def no_go_half_rad(self) -> float:
+        """Where the autopilot stops following the line: SAIL_NO_GO_ANGLE."""
+        limits = self.snapshot.limits
+        return self.config.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
+
+    @property
+    def planned_no_go_rad(self) -> float:
+        """The half angle that plans keep out of."""
+        return max(self.no_go_half_rad + self.config.no_go_pad_rad, self.voyage.boat.no_go_half_rad)
+
+    @property
+    def tack_corridor_m(self) -> float:
+        """SAIL_XTRACK_MAX."""
+        limits = self.snapshot.limits
+        return self.config.tack_corridor_m if limits is None else limits.sail_xtrack_max_m
+
+    @property
+    def known_config(self) -> SkipperConfig:
+        """The configuration, with what has been read of the autopilot in place of its defaults."""
+        return replace(self.config, no_go_half_rad=self.no_go_half_rad, tack_corridor_m=self.tack_corridor_m)
+
+    @property
+    def gate(self) -> Gate | None:
+        """The gate being sailed to, None when all are passed."""
+        return self.gates[self.state.gate] if self.state.gate < len(self.gates) else None
+
+    def is_raised(self, name: str) -> bool:
+        """Return whether a watchdog is raised."""
+        return any(r.name == name for r in self.state.raised)
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether somebody else has the boat: under way, and disarmed or in a mode that we did not ask for."""
+        status = self.autopilot
+        if status is None or not self.state.sailing:
+            return False
+        if status.is_armed and self.is_leaving:
+            return False
+        return not status.is_armed or status.mode not in {None, Mode.AUTO, Mode.INITIALISING, self.state.own_mode}
+
+    @property
+    def is_leaving(self) -> bool:
+        """Whether she shows a stop still that an order of ours, on its way or just accepted, ends."""
+        status, state, own = self.autopilot, self.state, self.state.own_mode
+        if status is None or own is None or state.stop is None or status.mode is not state.stop.mode:
+            return False
+        if state.pending_command is not None:
+            return state.pending_command[2] == own.name and state.stop.t_s < state.pending_command[1]
+        name, accepted_s = state.accepted or ("", 0.0)
+        return name == own.name and state.stop.t_s < accepted_s and self.t_s < accepted_s + SHOWS_S
+
+    @property
+    def steers(self) -> bool:
+        """Whether the boat is steered by headings, a plan's or a field's (and may be)."""
+        may = self.snapshot.permissions
+        return self.config.guidance is not Guidance.PLAN and may.may_steer and may.may_set_mode
+
+    def leg(self) -> tuple[PointEn, PointEn] | None:
+        """Return the planned leg being sailed (from, to), None without a route."""
+        route, i = self.state.route, self.state.index
+        if route is None or not 0 <= i < len(route.items):
+            return None
+        return route.leg_from_en_m[i], route.points_en_m[i]
+
+    def ahead(self) -> tuple[PointEn, ...]:
+        """Return the waypoints still to be sailed, without the safe end; empty when loitering at it."""
+        route = self.state.route
+        return route.points_en_m[self.state.index:-1] if route is not None else ()
+
+    def last_waypoint(self) -> int:
+        """Return the index of the last waypoint before the safe end, -1 without one."""
+        route = self.state.route
+        return len(route.items) - 2 if route is not None else -1
+
+    def blank_facts(self, plan_id: int, margin_m: float, delta_s: float, rung: str) -> Route:
+        """Return the figures of a plan that is being asked for now."""
+        wind = self.wind_mean or (0.0, 0.0)
+        return Route(
+            plan_id=plan_id, plan_t_s=self.t_s, plan_twd_from_rad=wind[0], plan_tws_mps=wind[1],
+            plan_half_width_rad=0.0, margin_m=margin_m, delta_s=delta_s, rung=rung,
+        )

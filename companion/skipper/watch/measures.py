@@ -1,0 +1,187 @@
+"""What the watchdogs watch: one figure for each row of the table, in its unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from companion.geo.angles import difference_rad
+from companion.skipper.deeds.adrift import meets_in_s, sails
+from companion.skipper.deeds.by_field import meets_in
+from companion.skipper.planning.errands import Kind, errand
+from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.snapshot import WindHealth
+from companion.skipper.step.turn import Turn
+from companion.skipper.watch.watchdogs import BY_NAME
+from companion.skipper.way.geometry import along_m, cross_track_m, distance_m
+
+IRONS_TWA_RAD = math.radians(35.0)
+IRONS_TWS_MPS = 1.5            # less wind than this is a calm, not irons
+MOVING_MPS = 0.5
+PROGRESS_WINDOW_S = 180.0
+
+
+def measure(turn: Turn, name: str) -> float | None:
+    """Return the watched figure in the table's unit, None when it cannot be told now."""
+    return _MEASURES[name](turn)
+
+
+def _flag(value: bool | None) -> float | None:
+    return None if value is None else float(value)
+
+
+def _link(turn: Turn) -> float | None:
+    return turn.snapshot.heartbeat_age_s
+
+
+def _position_lost(turn: Turn) -> float | None:
+    return turn.snapshot.vehicle_age_s
+
+
+def _jump(turn: Turn) -> float | None:
+    return turn.jump_m if turn.snapshot.position_en_m is not None else None
+
+
+def _wind(turn: Turn) -> float | None:
+    health = turn.snapshot.wind.health
+    return float(health is WindHealth.UNTRUSTED or (health is WindHealth.NONE and turn.state.sailing))
+
+
+def _becalmed(turn: Turn) -> float | None:
+    wind = turn.wind_mean
+    if wind is None:
+        return None
+    return max(wind[1], BY_NAME["becalmed"].exit) if sails(turn) else wind[1]
+
+
+def _irons(turn: Turn) -> float | None:
+    wind, vehicle = turn.wind_now, turn.snapshot.vehicle
+    if wind is None or vehicle is None or wind[1] < IRONS_TWS_MPS or turn.boat_en is None:
+        return None
+    if abs(difference_rad(wind[0], vehicle.heading_rad)) > IRONS_TWA_RAD:
+        return BY_NAME["in irons"].exit
+    ahead = vehicle.velocity_en_mps[0] * math.sin(vehicle.heading_rad) + (
+        vehicle.velocity_en_mps[1] * math.cos(vehicle.heading_rad))
+    return max(0.0, ahead)
+
+
+def _too_near(turn: Turn) -> float | None:
+    met = meets_in(turn)
+    return None if met is None else met[0]
+
+
+def _progress(turn: Turn) -> float | None:
+    """Way made good in the window; None before the window is full or while there is a reason to stand still."""
+    if turn.is_raised("becalmed") or not turn.ahead() or not turn.state.history:
+        return None
+    if turn.state.route is None or turn.state.history_plan != turn.state.route.plan_id:
+        return None   # the history is of the plan before
+    old = turn.state.history[0]
+    if turn.t_s - old[0] < PROGRESS_WINDOW_S:
+        return None
+    return old[3] - turn.state.history[-1][3]
+
+
+def _heading(turn: Turn) -> float | None:
+    vehicle = turn.snapshot.vehicle
+    if vehicle is None or turn.boat_en is None:
+        return None
+    if vehicle.speed_mps < MOVING_MPS:
+        return 0.0
+    return math.degrees(abs(difference_rad(math.atan2(*vehicle.velocity_en_mps), vehicle.heading_rad)))
+
+
+def corridor_m(turn: Turn) -> float:
+    """Return how far off its leg the boat may be before the margin's floor is in question [m]."""
+    route = turn.state.route
+    margin = route.margin_m if route is not None else turn.config.margin_m
+    return max(margin - turn.config.margin_floor_m, turn.config.manoeuvre_m)
+
+
+def _corridor(turn: Turn) -> float | None:
+    """Share of the corridor used; in open water the grid size bounds it, not the margin."""
+    boat, leg = turn.boat_en, turn.leg()
+    if boat is None or leg is None or not turn.ahead() or turn.state.own_mode in STOPPING:
+        return None      # stopped she follows no leg
+    if distance_m(*leg) < 1.0:
+        return 0.0
+    if along_m(boat, *leg) < 0.0:
+        # Before its leg begins: by a little wherever a waypoint is announced early, by more after a jump.
+        off = max(0.0, distance_m(boat, leg[0]) - 2.0 * turn.config.announce_m)
+    else:
+        off = abs(cross_track_m(boat, *leg))
+    clearance = turn.voyage.area.path_clearance_m([boat, leg[1]])
+    allowed = turn.config.grid_size_m
+    if clearance < turn.config.margin_floor_m:
+        allowed = min(allowed, corridor_m(turn))
+    return off / allowed
+
+
+def _stuck(turn: Turn) -> float | None:
+    passed = turn.state.passed_since_s
+    return None if passed is None else turn.t_s - passed
+
+
+def _ended(turn: Turn) -> float | None:
+    route = turn.state.route
+    if route is None or turn.gate is None or turn.autopilot is None or errand(turn) is not None:
+        return None
+    return float(turn.state.index >= len(route.items) - 1 or turn.autopilot.mission_state.name == "COMPLETE")
+
+
+def _breach(turn: Turn) -> float | None:
+    return _flag(turn.autopilot.fence_breached) if turn.autopilot is not None else None
+
+
+def _foreign(turn: Turn) -> float | None:
+    return float(bool(turn.state.foreign))
+
+
+def _reboot(turn: Turn) -> float | None:
+    return float(turn.state.rebooted)
+
+
+def _battery(turn: Turn, name: str, *, is_below: bool) -> float | None:
+    """Return the charge, no more than the row's entry where the autopilot's own limit is passed."""
+    status = turn.autopilot
+    if status is None:
+        return None
+    charge = None if status.battery_remaining is None else 100.0 * status.battery_remaining
+    return min(charge if charge is not None else 100.0, BY_NAME[name].enter) if is_below else charge
+
+
+def _battery_low(turn: Turn) -> float | None:
+    is_below = turn.autopilot is not None and bool(turn.autopilot.battery_failed)
+    return _battery(turn, "battery low", is_below=is_below)
+
+
+def _battery_critical(turn: Turn) -> float | None:
+    return _battery(turn, "battery critical", is_below=turn.state.battery_critical)
+
+
+def _time(turn: Turn) -> float | None:
+    limit_s = turn.config.voyage_timeout_s
+    return None if limit_s is None else turn.state.under_way_s / limit_s
+
+
+def _dragged(turn: Turn) -> float | None:
+    rest, boat = turn.state.rest_en_m, turn.boat_en
+    if rest is None or boat is None:
+        return None
+    bound = errand(turn)
+    return distance_m(boat, rest) if bound is None or bound.kind is Kind.REST else None
+
+
+def _planner(turn: Turn) -> float | None:
+    return float(not turn.snapshot.planner_alive)
+
+
+_MEASURES: dict[str, Callable[[Turn], float | None]] = {
+    "link silent": _link, "position lost": _position_lost, "position jump": _jump, "wind untrusted": _wind,
+    "becalmed": _becalmed, "drifting": meets_in_s, "in irons": _irons, "vessel too near": _too_near,
+    "no progress": _progress,
+    "heading against course": _heading, "off the corridor": _corridor, "stuck waypoint": _stuck,
+    "mission ended": _ended, "fence breach": _breach, "foreign mission": _foreign, "reboot": _reboot,
+    "battery low": _battery_low, "battery critical": _battery_critical, "out of time": _time, "dragged off": _dragged,
+    "planner dead": _planner,
+}

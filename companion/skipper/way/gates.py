@@ -1,0 +1,196 @@
+"""Gates: a voyage's goals and buoys as a row of places, each with the water that must not be crossed on the way.
+
+A buoy becomes a few gates on a circle around it. On the way to each of them a barrier stands from the buoy
+outwards on the wrong side, so that no plan, however it tacks, can leave the buoy on the wrong hand (Büsser 2009,
+section 3.2.4: undesired areas are mapped as static obstacles).
+
+Whether the buoy was left on its hand is judged as with a string along the track: the boat's bearing from the buoy,
+counted on from the place where the approach began. On the wrong hand it is a whole turn short, and the buoy is
+approached again, from where the boat is, with that turn added.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from companion.geo.angles import difference_rad, wrap_pi
+from companion.skipper.way.geometry import bearing_rad, distance_m, moved
+from companion.skipper.way.voyage import Goal, PointEn, Side, Voyage
+
+ARC_RAD = math.radians(100.0)       # gates around a buoy are at most this far apart
+STRAIGHT_RAD = math.radians(60.0)   # a bend the other way up to this is passed with one gate, not with a loop
+KEEP_SHARE = 0.5                    # the disc around the buoy that plans avoid, as a share of the rounding radius
+BARRIER_M = 60.0                    # shortest barrier
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Approach:
+    """Where the way to a goal began, when that is not the goal before: at the start, and again after a miss.
+
+    ``goal`` is the index into ``Voyage.legs``. ``turn_rad`` is how far the boat still has to turn around the buoy,
+    positive to the buoy's hand; None: as the courses to it and away from it ask for.
+    """
+
+    goal: int
+    en_m: PointEn
+    turn_rad: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gate:
+    """A place to pass: within ``radius_m`` of ``en_m``, coming from ``from_en_m`` (None: wherever the boat is).
+
+    ``goal`` is the index into ``Voyage.legs``. ``keep_out`` are WKT polygons for the way here. For buoys
+    ``buoy_en_m`` is the buoy and ``side`` where it is left; ``turn_rad`` is how far its rounding turns the boat, and
+    ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the approach's
+    beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate.
+    """
+
+    en_m: PointEn
+    radius_m: float
+    goal: int
+    ends_goal: bool
+    name: str
+    from_en_m: PointEn | None
+    bandwidth_m: float | None = None
+    buoy_en_m: PointEn | None = None
+    approach_en_m: PointEn | None = None
+    side: Side = Side.NONE
+    turn_rad: float = 0.0
+    bearing_rad: float = 0.0
+    is_first: bool = True
+    keep_out: tuple[str, ...] = ()
+
+
+@lru_cache(maxsize=8)   # asked for at every step, and the same until a buoy is missed
+def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate, ...]:
+    """Return the gates of all laps in order. Every buoy is something to keep clear of on every leg.
+
+    ``approaches`` says where the way to a goal began; the last one that names a goal counts.
+    """
+    legs = voyage.legs
+    begun = {a.goal: a for a in approaches}
+    discs = tuple(disc_wkt(g.en_m, KEEP_SHARE * g.rounding_m) for g in voyage.goals if g.side is not Side.NONE)
+    out: list[Gate] = []
+    before: PointEn | None = None
+    for i, goal in enumerate(legs):
+        approach = begun.get(i)
+        is_once_more = approach is None and i > 0 and legs[i - 1].en_m == goal.en_m
+        if approach is not None:
+            before = approach.en_m
+        elif i > 0 and not is_once_more:
+            before = legs[i - 1].en_m
+        name = goal.name or f"goal {i + 1}"
+        if goal.side is Side.NONE:
+            out.append(Gate(
+                en_m=goal.en_m, radius_m=goal.radius_m, goal=i, ends_goal=True, name=name, from_en_m=before,
+                bandwidth_m=goal.bandwidth_m, keep_out=discs,
+            ))
+        else:
+            after = legs[i + 1].en_m if i + 1 < len(legs) else None
+            turn_rad = approach.turn_rad if approach is not None else None
+            out.extend(
+                replace(gate, keep_out=(*discs, *gate.keep_out))
+                for gate in _round(goal, i, name, before, after, turn_rad, is_once_more=is_once_more))
+    return tuple(out)
+
+
+def _round(
+    goal: Goal, index: int, name: str, before: PointEn | None, after: PointEn | None, turn_rad: float | None, *,
+    is_once_more: bool,
+) -> list[Gate]:
+    """Return the gates that round a buoy.
+
+    To port the boat turns left around it: on its circle it is a quarter turn to the right of the buoy, seen in
+    the direction of travel, and its compass bearing from the buoy falls. A buoy that has just been rounded
+    (``is_once_more``) is rounded by a whole turn.
+    """
+    buoy = goal.en_m
+    hand = 1.0 if goal.side is Side.PORT else -1.0
+    way_out = bearing_rad(buoy, after) if after is not None and after != buoy else None
+    way_in = bearing_rad(before, buoy) if before is not None and before != buoy else way_out
+    if way_in is None:
+        way_in = 0.0
+    if way_out is None:
+        way_out = way_in
+    turn = turn_rad
+    if turn is None:
+        # How far the boat turns around the buoy: to the left for port. A small bend away needs no loop.
+        turn = -hand * difference_rad(way_out, way_in)
+        if turn < -STRAIGHT_RAD or is_once_more:
+            turn += 2.0 * math.pi
+    # The share of the turn that is done at each gate; the first is abeam of the buoy on the way in.
+    count = math.ceil(turn / ARC_RAD)
+    shares = [0.5] if turn <= math.radians(30.0) else [n / count for n in range(count + 1)]
+    gates: list[Gate] = []
+    previous: float | None = None
+    for n, share in enumerate(shares):
+        place = wrap_pi(way_in + hand * (math.pi / 2.0 - share * turn))
+        if previous is None:
+            wrong = wrap_pi(place + math.pi)
+            length = max(BARRIER_M, 0.4 * distance_m(before, buoy)) if before is not None else BARRIER_M
+        else:
+            wrong = wrap_pi(previous + difference_rad(place, previous) / 2.0 + math.pi)
+            length = BARRIER_M
+        gates.append(Gate(
+            en_m=moved(buoy, place, goal.rounding_m), radius_m=max(goal.radius_m, 0.4 * goal.rounding_m), goal=index,
+            is_first=n == 0, ends_goal=n == len(shares) - 1, name=name, from_en_m=before if n == 0 else None,
+            bandwidth_m=goal.bandwidth_m if n == 0 else None, buoy_en_m=buoy, approach_en_m=before, side=goal.side,
+            turn_rad=turn, bearing_rad=-hand * (math.pi / 2.0 + share * turn),
+            keep_out=(barrier_wkt(buoy, wrong, length),),
+        ))
+        previous = place
+    return gates
+
+
+def bearing_on(gate: Gate, boat: PointEn, last_rad: float) -> float:
+    """Return how far the boat's bearing from the gate's buoy has come round since the approach began [rad].
+
+    Positive clockwise and not wrapped: the turn nearest to ``last_rad``, that of the fix before. 0 without a buoy.
+    """
+    if gate.buoy_en_m is None or gate.approach_en_m is None:
+        return 0.0
+    since = difference_rad(bearing_rad(gate.buoy_en_m, boat), bearing_rad(gate.buoy_en_m, gate.approach_en_m))
+    return last_rad + wrap_pi(since - last_rad)
+
+
+def is_on_wrong_side(gate: Gate, bearing: float) -> bool:
+    """Return whether a boat at the gate that came round the buoy by ``bearing`` [rad] left it on the wrong hand.
+
+    On the right hand it has come round as far as the gate has, or further; on the wrong hand a whole turn less.
+    """
+    if gate.approach_en_m is None or gate.side is Side.NONE:
+        return False
+    hand = 1.0 if gate.side is Side.PORT else -1.0
+    return hand * (bearing - gate.bearing_rad) > math.pi
+
+
+def again(gate: Gate, boat: PointEn, bearing: float) -> Approach:
+    """Return the approach from the boat's place that makes good what was turned the wrong way round the gate's buoy."""
+    astray = bearing if gate.side is Side.PORT else -bearing
+    # A boat that circled the buoy the wrong way while it waited need not circle it back as often.
+    return Approach(goal=gate.goal, en_m=boat, turn_rad=gate.turn_rad + min(astray, astray % (2.0 * math.pi)))
+
+
+def disc_wkt(center: PointEn, radius_m: float, sides: int = 16) -> str:
+    """Return a polygon around a disc."""
+    r = radius_m / math.cos(math.pi / sides)
+    ring = [moved(center, 2.0 * math.pi * n / sides, r) for n in range(sides)]
+    return polygon_wkt(ring)
+
+
+def barrier_wkt(foot: PointEn, direction_rad: float, length_m: float) -> str:
+    """Return a thin wedge from ``foot`` outwards."""
+    tip = moved(foot, direction_rad, length_m)
+    wide = 0.5
+    return polygon_wkt([foot, moved(tip, direction_rad + math.pi / 2.0, wide),
+                        moved(tip, direction_rad - math.pi / 2.0, wide)])
+
+
+def polygon_wkt(ring: list[PointEn]) -> str:
+    """Return a ring of points as a WKT polygon."""
+    closed = [*ring, ring[0]]
+    return "POLYGON ((" + ", ".join(f"{e:.3f} {n:.3f}" for e, n in closed) + "))"

@@ -1,0 +1,257 @@
+"""Reading a voyage's folder again: each file believed once, where it is read, and refused by name, place and remedy."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import json
+import math
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+import shapely
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from companion.errors import InputError
+from companion.telemetry.folder.names import AREA, DECISIONS, SUMMARY, TRACK, VOYAGE
+from companion.telemetry.folder.recorder import TRACK_COLUMNS, read_jsonl
+
+DAMAGED = "is the folder damaged, or another program's? take it from its copy"
+_WORDS = ("mode", "phase")
+T = TypeVar("T")
+
+
+class Origin(Struct, frozen=True, kw_only=True):
+    """Where the local metres of a chart begin."""
+
+    lat_deg: float
+    lon_deg: float
+
+
+class ChartGoal(Struct, frozen=True, kw_only=True):
+    """A goal on the chart [m east and north of the origin]."""
+
+    x: float
+    y: float
+    radius_m: float
+    name: str = ""
+    side: str = "none"
+
+
+class Chart(Struct, frozen=True, kw_only=True):
+    """area.json: obstacles as drawn and as grown by the margin, and the fence, as WKT in local metres."""
+
+    name: str
+    origin: Origin
+    goals: tuple[ChartGoal, ...] = ()
+    obstacles: tuple[str, ...] = ()
+    grown: tuple[str, ...] = ()
+    fence: str | None = None
+    margin_m: float | None = None
+    no_go_half_deg: float = 45.0
+
+
+class PlannedLeg(Struct, frozen=True, kw_only=True, rename={"start_en": "from", "end_en": "to"}):
+    """A leg of a recorded plan, as far as a picture wants it."""
+
+    start_en: tuple[float, float]
+    end_en: tuple[float, float]
+    no_go_half_deg: float
+
+
+class PlannedWay(Struct, frozen=True, kw_only=True):
+    """The way of a recorded plan [m]."""
+
+    waypoints: tuple[tuple[float, float], ...] = ()
+    legs: tuple[PlannedLeg, ...] = ()
+
+
+class RecordedPlan(Struct, frozen=True, kw_only=True):
+    """An answer of the planner with the facts of its request: when, why, in which wind, how the zone was widened."""
+
+    t_s: float
+    plan: PlannedWay | None = None
+    request_id: int | None = None
+    reason: str | None = None
+    twd_deg: float | None = None
+    widening: tuple[tuple[float, float], ...] | None = None
+
+
+class Summary(Struct, frozen=True, kw_only=True):
+    """summary.json, as far as it is put into words."""
+
+    arrived: bool | None = None
+    end_reason: str | None = None
+    end_why: str = ""
+    time_s: float | None = None
+    distance_m: float | None = None
+    tacks: int = 0
+    gybes: int = 0
+    plans: int = 0
+    replans: int = 0
+    contacts: int = 0
+    no_go_entries: int = 0
+    goals_reached: int | None = None
+    goals: int | None = None
+    min_clearance_m: float | None = None
+    promised_risk: float | None = None
+    path_risk: float | None = None
+    alerts: dict[str, int] = {}
+    records_dropped: int = 0
+    disk_trouble: str = ""
+
+
+class _Run(Struct, frozen=True, kw_only=True):
+    started_utc: str = ""
+    epoch_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoyageRecord:
+    """What a voyage folder holds; columns are float arrays with NaN for what is unknown.
+
+    ``figures`` is summary.json as it stands, ``summary`` what of it is put into words; ``began_utc`` and ``epoch_s``
+    (Unix time of t_s = 0) are from voyage.toml, "" and None without one.
+    """
+
+    folder: Path
+    columns: dict[str, NDArray[np.float64]]
+    texts: dict[str, list[str]]
+    plans: tuple[RecordedPlan, ...]
+    chart: Chart
+    figures: dict[str, Any]
+    summary: Summary
+    began_utc: str = ""
+    epoch_s: float | None = None
+
+    @property
+    def start_s(self) -> float:
+        """The time of the first row [s]."""
+        t_s = self.columns["t_s"]
+        return float(t_s[0]) if len(t_s) else 0.0
+
+
+def read_voyage(folder: Path) -> VoyageRecord:
+    """Read a voyage folder; a voyage that has not ended has no summary.
+
+    Raises:
+        InputError: it is not a voyage folder, or a file in it is damaged.
+    """
+    require_files(folder, TRACK, DECISIONS, AREA)
+    rows = read_rows(folder / TRACK)
+    figures = _read_json(folder / SUMMARY) if (folder / SUMMARY).is_file() else {}
+    if not isinstance(figures, dict):
+        raise InputError(str(folder / SUMMARY), "", "is no table of figures", DAMAGED)
+    description = read_description(folder) if (folder / VOYAGE).is_file() else {}
+    run = _converted(description.get("run", {}), _Run, folder / VOYAGE, "[run] ")
+    chart = _converted(_read_json(folder / AREA), Chart, folder / AREA)
+    for wkt in (*chart.obstacles, *chart.grown, *([chart.fence] if chart.fence else [])):
+        with believed(folder / AREA, f"{wkt[:30]!r}"):
+            shapely.from_wkt(wkt)
+    return VoyageRecord(
+        folder=folder,
+        columns={name: np.array([row[name] for row in rows], dtype=np.float64)
+                 for name in TRACK_COLUMNS if name not in _WORDS},
+        texts={name: [row[name] for row in rows] for name in _WORDS},
+        plans=_plans(read_decisions(folder), folder / DECISIONS),
+        chart=chart, figures=figures, summary=_converted(figures, Summary, folder / SUMMARY),
+        began_utc=run.started_utc, epoch_s=run.epoch_s,
+    )
+
+
+def require_files(folder: Path, *names: str) -> None:
+    """Raise InputError unless the folder holds all of the named files."""
+    for name in names:
+        if not (folder / name).is_file():
+            raise InputError(str(folder), name, "is missing", "name a folder that `companion run` left")
+
+
+@contextlib.contextmanager
+def believed(path: Path, place: str) -> Iterator[None]:
+    """Turn what a value of another kind raises, where it is taken from a file, into an InputError that names it."""
+    try:
+        yield
+    except (KeyError, ValueError, TypeError, AttributeError, IndexError, shapely.errors.ShapelyError) as error:
+        what = f"{error} is missing" if isinstance(error, KeyError) else str(error).splitlines()[0][:100]
+        raise InputError(str(path), place, f"is not what a voyage records ({what})", DAMAGED) from error
+
+
+def read_description(folder: Path) -> dict[str, Any]:
+    """Return voyage.toml. Raises InputError."""
+    path = folder / VOYAGE
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(str(path), "", f"is not TOML ({error})", DAMAGED) from None
+
+
+def read_decisions(folder: Path) -> list[dict[str, Any]]:
+    """Return the records of decisions.jsonl; each is a table with a time and a kind. Raises InputError, JobError."""
+    path = folder / DECISIONS
+    records = read_jsonl(path)
+    for number, record in enumerate(records, start=1):
+        if not (isinstance(record, dict) and isinstance(record.get("kind"), str)
+                and isinstance(record.get("t_s"), int | float)):
+            raise InputError(str(path), f"record {number}", "has no time and kind", DAMAGED)
+    return records
+
+
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of track.csv: numbers by column, NaN where a cell is empty; a torn last row is left out."""
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")
+    except ValueError:
+        raise InputError(str(path), "", "is not text", DAMAGED) from None
+    header = next(csv.reader(lines[:1]), [])
+    missing = [name for name in TRACK_COLUMNS if name not in header]
+    if missing:
+        raise InputError(str(path), "line 1", f"has no column {missing[0]}", DAMAGED)
+    rows: list[dict[str, Any]] = []
+    # what follows the last line end is torn
+    for number, cells in enumerate(csv.reader(lines[1:-1]), start=2):
+        if not cells:
+            continue
+        with believed(path, f"line {number}"):
+            row = dict(zip(header, cells, strict=True))
+            rows.append({k: v if k in _WORDS else _number(v) for k, v in row.items()})
+    return rows
+
+
+def _number(cell: str) -> float:
+    value = float(cell) if cell else math.nan
+    if cell and not math.isfinite(value):
+        raise ValueError(f"{cell[:30]!r} is no finite number")
+    return value
+
+
+def _plans(decisions: list[dict[str, Any]], path: Path) -> tuple[RecordedPlan, ...]:
+    """Return the plans, each with the facts of its request."""
+    requests = {d.get("request_id"): d for d in decisions if d.get("action") == "RequestPlan"}
+    plans = []
+    for decision in decisions:
+        if decision["kind"] == "plan":
+            request = requests.get(decision.get("request_id"), {})
+            facts = {key: request.get(key) for key in ("reason", "twd_deg", "widening")}
+            plans.append(_converted({**facts, **decision}, RecordedPlan, path, f"t_s = {decision['t_s']} "))
+    return tuple(plans)
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise InputError(str(path), "", f"is not JSON ({str(error)[:60]})", DAMAGED) from None
+
+
+def _converted(raw: object, kind: type[T], path: Path, place: str = "") -> T:
+    try:
+        return msgspec.convert(raw, kind)
+    except msgspec.ValidationError as error:
+        problem, _, where = str(error).partition(" - at `$")
+        raise InputError(str(path), place + where.strip("`."), problem[:1].lower() + problem[1:], DAMAGED) from None

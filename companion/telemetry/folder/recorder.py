@@ -1,0 +1,297 @@
+"""The voyage folder: what a voyage writes while it is sailed, so that a power cut costs at most the last line.
+
+Every record is one ``write`` to a file opened for appending; ``tend`` forces the files to the disk and is called
+from the outside every few seconds (on a boat, in a worker thread: a slow card must not hold the event loop).
+Whole files are written beside their place, synced and renamed.
+
+No record is worth the voyage. A disk that is full, read-only or sick pauses all records at once, so that none tells of
+what another lacks; they are counted, ``trouble`` says why, and ``tend`` takes them up again when the disk does, with a
+record of the gap. They stop before the disk is quite full: the state for a restart has the last of the room.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+import tomli_w
+
+from companion.disk import Disk, is_mistake, reason
+from companion.errors import JobError
+from companion.lock import FolderLock
+from companion.telemetry.folder.names import DECISIONS, SUMMARY, TLOG, TRACK, VOYAGE
+from companion.telemetry.folder.shelf import Shelf
+
+# The files of one voyage end here [bytes], restarts included: what comes later is dropped and counted. A day of the
+# endurance scenario writes about a tenth of it. Where all voyages together may take less, these are less in proportion.
+MAX_BYTES = {TLOG: 2_500_000_000, DECISIONS: 500_000_000, TRACK: 150_000_000}
+TIDY_EVERY = 12        # older voyages are looked through at so many calls of ``tend`` only: once a minute
+TAIL_BYTES = 1 << 20   # looked at for the end of the last whole line: no record is longer
+
+TRACK_COLUMNS = (
+    "t_s", "frames", "outcomes", "lat_deg", "lon_deg", "east_m", "north_m", "heading_deg", "sog_mps", "cog_deg",
+    "twd_deg", "twd_sigma_deg", "tws_mps", "mode", "phase", "waypoint", "cross_track_m", "clearance_m",
+)
+_HEADER = (",".join(TRACK_COLUMNS) + "\n").encode()
+
+
+def jsonable(value: Any) -> Any:
+    """Return ``value`` as JSON can hold it: arrays as lists, NaN and infinities as None, enums by name."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(k): jsonable(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return jsonable(value.tolist())
+    if isinstance(value, np.generic):
+        return jsonable(value.item())
+    if isinstance(value, list | tuple):
+        return [jsonable(v) for v in value]
+    if isinstance(value, Path):
+        return value.as_posix()
+    name = getattr(value, "name", None)
+    if isinstance(name, str) and not isinstance(value, str | int):
+        return name
+    return value
+
+
+class Recorder:
+    """The files of one voyage. A context manager; ``folder`` is made if it is not there.
+
+    Args:
+        folder: of the voyage.
+        disk: what is written to.
+        shelf: all voyages beside this one and what they may take together; None: there is no end to it.
+        is_durable: force files to the disk, against power cuts.
+
+    Attributes:
+        trouble: why nothing is recorded now; empty: all is well.
+        dropped: records that are not there.
+    """
+
+    def __init__(
+        self, folder: Path, *, disk: Disk | None = None, shelf: Shelf | None = None, is_durable: bool = True,
+    ) -> None:
+        self.folder = folder
+        self.dropped = 0
+        self.trouble = ""
+        self._disk, self._shelf, self._is_durable = disk or Disk(), shelf, is_durable
+        share = 1.0 if shelf is None else min(1.0, shelf.budget_bytes / sum(MAX_BYTES.values()))
+        self._caps = {name: int(share * most) for name, most in MAX_BYTES.items()}
+        self._lock = FolderLock(folder)
+        self._bytes: dict[str, int] = {}
+        self._fds: dict[str, int] = {}
+        self._wanted: dict[str, bytes] = {}        # whole files that the disk would not take
+        self._row_t_s: float | None = None         # of the last row of the track that is on the disk
+        self._gap: tuple[float | None, int] = (None, 0)   # since that row; so many were dropped before it
+        self._ended: dict[str, float | None] = {}         # files that have all that they may hold, since that row
+        self._gone: tuple[str, ...] = ()                  # of older voyages, and not yet told
+        self._told: set[str] = set()                      # of those, which a record says to have ended
+        self._tends = 0
+
+    def __enter__(self) -> Self:
+        self._tidy()
+        try:
+            self._open()
+        except BlockingIOError as error:
+            raise JobError(f"{self.folder}: {error.strerror}; name another folder with --out") from error
+        except OSError as error:
+            if is_mistake(error):
+                raise JobError(f"cannot write the voyage to {self.folder}: {reason(error)}") from error
+            self._pause(reason(error))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with contextlib.suppress(OSError):   # the last moment for what the disk would not take
+            for name in list(self._wanted):
+                self._write_wanted(name)
+        self._close()
+        self._lock.release()
+
+    # ----------------------------------------------------------------------------------------- records
+    def decision(self, record: Mapping[str, Any]) -> None:
+        """Append one decision record."""
+        line = json.dumps(jsonable(record), separators=(",", ":"), ensure_ascii=False)
+        self._append(DECISIONS, line.encode() + b"\n")
+
+    def track(self, row: Sequence[Any]) -> None:
+        """Append one row of the track, in the order of TRACK_COLUMNS; None is an empty cell."""
+        cells = ("" if v is None else f"{v:.10g}" if isinstance(v, float) else str(v) for v in row)
+        if self._append(TRACK, (",".join(cells) + "\n").encode()):
+            self._row_t_s = float(row[0])
+
+    def frame(self, stamped: bytes) -> None:
+        """Append one stamped frame to the telemetry log."""
+        self._append(TLOG, stamped)
+
+    def voyage(self, description: Mapping[str, Any]) -> None:
+        """Write voyage.toml: what ran, with which versions and seed."""
+        self.whole(VOYAGE, tomli_w.dumps(without_none(description)).encode())
+
+    def summary(self, values: Mapping[str, Any]) -> None:
+        """Write summary.json."""
+        self.whole(SUMMARY, json.dumps(jsonable(values), indent=1, ensure_ascii=False).encode() + b"\n")
+
+    def whole(self, name: str, data: bytes) -> None:
+        """Write a whole file (``name`` may lead into a folder of its own), now or when the disk takes it.
+
+        The summary is tried whatever the trouble: no other moment comes.
+        """
+        self._wanted[name] = data
+        if self.trouble and name != SUMMARY:
+            return
+        try:
+            self._write_wanted(name)
+        except OSError as error:
+            self._pause(reason(error))
+
+    def _write_wanted(self, name: str) -> None:
+        path = self.folder / name
+        if path.parent != self.folder:
+            self._disk.make_folder(path.parent)
+        self._disk.replace(path, self._wanted[name], is_durable=self._is_durable)
+        del self._wanted[name]
+
+    def _append(self, name: str, data: bytes) -> bool:
+        if not self.trouble and self._bytes[name] + len(data) > self._caps[name] and name not in self._ended:
+            self._ended[name] = self._row_t_s
+        if self.trouble or name in self._ended:
+            self.dropped += 1
+            return False
+        try:
+            self._disk.append(self._fds[name], data)
+        except OSError as error:
+            self._pause(reason(error))
+            self.dropped += 1
+            return False
+        self._bytes[name] += len(data)
+        return True
+
+    # -------------------------------------------------------------------------------------------- care
+    def tend(self, stamps: Mapping[str, Any]) -> None:
+        """Force what was written to the disk; look for room; take up records that trouble had stopped.
+
+        ``stamps`` say when this is, as a record of it has them.
+        """
+        self._tends += 1
+        if self._tends % TIDY_EVERY == 0:
+            self._tidy()
+        try:
+            if self.trouble:
+                self._disk.make_folder(self.folder)
+            room = self._disk.room(self.folder)
+            if room.is_short and self._shelf is not None:
+                self._gone += self._shelf.make_room(2 * room.reserve_bytes - room.free_bytes)
+                room = self._disk.room(self.folder)
+            if room.is_short or (self.trouble and not room.is_ample):
+                self._pause(f"{room.free_bytes / 1e6:.1f} MB left on the disk, kept for the state")
+            elif self.trouble:
+                self._take_up(stamps)
+            elif self._is_durable:
+                for fd in self._fds.values():
+                    self._disk.sync(fd)
+        except OSError as error:
+            self._pause(reason(error))
+        if self._gone and not self.trouble:
+            self.decision({**stamps, "kind": "dropped", "voyages": list(self._gone)})
+            self._gone = ()
+        for name in self._ended.keys() - self._told:
+            self._told.add(name)
+            self.decision({**stamps, "kind": "gap", "since_s": self._ended[name], "why": f"{name} is full"})
+
+    def _tidy(self) -> None:
+        if self._shelf is not None:
+            self._gone += self._shelf.tidy()
+
+    def _pause(self, why: str) -> None:
+        """Record nothing any more, until ``tend`` finds that it can be."""
+        if not self.trouble:
+            self._gap = (self._row_t_s, self.dropped)
+        self.trouble = why
+
+    def _take_up(self, stamps: Mapping[str, Any]) -> None:
+        """Record again, after what came too early and a record of what is missing."""
+        self._close()
+        self._open()
+        for name in list(self._wanted):
+            self._write_wanted(name)
+        since_s, before = self._gap
+        gap = {**stamps, "kind": "gap", "since_s": since_s, "dropped": self.dropped - before, "why": self.trouble}
+        self._disk.append(self._fds[DECISIONS], json.dumps(gap).encode() + b"\n")
+        self.trouble = ""
+
+    def _open(self) -> None:
+        self._disk.make_folder(self.folder)
+        if not self._lock.is_held:
+            try:
+                is_ours = self._lock.take()
+            except OSError:
+                is_ours = True   # a file system without locks
+            if not is_ours:
+                raise BlockingIOError(errno.EWOULDBLOCK, "another companion is recording there")
+        for name in (DECISIONS, TRACK, TLOG):
+            path = self.folder / name
+            if name != TLOG:  # whose readers find the next frame by themselves
+                _cut_torn_line(path)
+            self._fds[name] = self._disk.open_to_append(path)
+            self._bytes[name] = os.fstat(self._fds[name]).st_size
+        if self._bytes[TRACK] == 0:
+            self._disk.append(self._fds[TRACK], _HEADER)
+            self._bytes[TRACK] = len(_HEADER)
+        if self._is_durable:
+            self._disk.sync_folder(self.folder)
+            self._disk.sync_folder(self.folder.parent)
+
+    def _close(self) -> None:
+        for fd in self._fds.values():
+            with contextlib.suppress(OSError):
+                os.close(fd)
+        self._fds.clear()
+
+
+def _cut_torn_line(path: Path) -> None:
+    """Cut off the half line that a power cut left: what is appended must not join it."""
+    try:
+        with path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            begin = file.seek(max(0, size - TAIL_BYTES))
+            tail = file.read()
+    except FileNotFoundError:
+        return
+    whole = tail.rfind(b"\n") + 1
+    if whole < len(tail):
+        os.truncate(path, begin + whole)
+
+
+def without_none(value: Any) -> Any:
+    """Drop unknown values: TOML has no null."""
+    if isinstance(value, Mapping):
+        return {str(k): without_none(v) for k, v in value.items() if v is not None}
+    if isinstance(value, list | tuple):
+        return [without_none(v) for v in value]
+    return jsonable(value)
+
+
+def read_jsonl(path: Path) -> list[dict[str, Any]]:
+    """Return the records of a JSON-lines file; a torn last line is left out."""
+    records: list[dict[str, Any]] = []
+    lines = path.read_bytes().split(b"\n")
+    for number, line in enumerate(lines):
+        if not line.strip():
+            continue
+        try:
+            records.append(json.loads(line))
+        except (ValueError, RecursionError):
+            if number < len(lines) - 2:
+                raise JobError(f"{path}: line {number + 1} is not JSON; only the last line may be torn") from None
+    return records

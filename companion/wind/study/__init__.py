@@ -1,0 +1,1 @@
+"""Recorded wind: records, scores of forecasts over them, and the constants fitted to them."""

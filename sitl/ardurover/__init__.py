@@ -1,0 +1,1 @@
+"""The real ArduRover: its program, and sailing it in our weather."""

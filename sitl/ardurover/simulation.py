@@ -1,0 +1,322 @@
+"""The real ArduRover in its simulator, run with our weather.
+
+``ArduRover`` is an async context manager around the program: a folder of its own, our parameters, free ports, the
+wind set live from a ``Wind``. A harness port of its own sets the wind and reads what only the simulator knows
+(SIMSTATE), so the companion's ports stay as a real boat's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import socket
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from companion.clock import now_s
+from companion.errors import JobError, LinkError
+from companion.geo.angles import wrap_two_pi
+from companion.geo.frame import LocalFrame
+from companion.mavlink.transports.transport import open_link
+from companion.messages import GeoPoint, Mode
+from sitl.autopilot.config import Truth
+from sitl.world.wind import Wind
+
+DEFAULTS = Path(__file__).with_name("sailboat.parm")
+MOTOR = "-motor"      # of a model: the hull with an auxiliary motor
+THROTTLE = ("SERVO3_FUNCTION 70", "SERVO3_MIN 1000", "SERVO3_MAX 2000", "SERVO3_TRIM 1500")
+_WIND_HZ = 5.0
+_WIND_REPEAT_S = 5.0
+_INSTANCES = 20
+_HARNESS = (250, mav.MAV_COMP_ID_MISSIONPLANNER)
+_EKF_READY = mav.EKF_ATTITUDE | mav.EKF_VELOCITY_HORIZ | mav.EKF_POS_HORIZ_ABS
+_READY_SIM_S = 90.0
+_KNOWN_MODES = {int(mode): mode for mode in Mode}
+
+
+class ArduRover:
+    """One running simulator.
+
+    Args:
+        program: the executable, see ``require``.
+        home: where the boat lies at power-up.
+        wind: the weather, from the moment that the boat is ready (t = 0 there).
+        heading_rad: of the bow at power-up.
+        speedup: simulated seconds per second; run the event loop with the same (``clock.run(.., speedup=..)``).
+        instance: chooses the ports (5760 + 10 instance); the first free one when None.
+        parameters: set besides those of the model's file, sailboat.parm or motorboat.parm.
+        folder: where it keeps eeprom and logs; a temporary one when None.
+        model: of the simulator; ``sailboat-motor`` has a throttle.
+
+    ``link`` is the companion's LINK, ``shore_link`` another port (SERIAL2) for a ground station.
+    """
+
+    def __init__(
+        self, program: Path, home: GeoPoint, wind: Wind, *, heading_rad: float = 0.0, speedup: float = 1.0,
+        instance: int | None = None, parameters: Mapping[str, float] | None = None, folder: Path | None = None,
+        model: str = "sailboat",
+    ) -> None:
+        self._program, self._home, self._wind = program.resolve(), home, wind
+        self._heading_rad, self._speedup = heading_rad, speedup
+        self._wanted = instance
+        self._parameters = dict(parameters or {})
+        self._folder, self._model = folder, model
+        self._stack = contextlib.AsyncExitStack()
+        self._process: asyncio.subprocess.Process | None = None
+        self._harness: Any = None
+        self._codec = mav.MAVLink(None, srcSystem=_HARNESS[0], srcComponent=_HARNESS[1])
+        self._codec.robust_parsing = True
+        self._frame = LocalFrame(home)
+        self._ready = asyncio.Event()
+        self._boot_s, self._boot_at_s, self._zero_boot_s = 0.0, 0.0, 0.0
+        self._seen: dict[str, Any] = {}
+        self._tacks = 0
+        self._is_heard = False
+        self.instance = 0
+        self.texts: list[tuple[float, int, str]] = []
+
+    # ------------------------------------------------------------------------------------------------ life
+    async def __aenter__(self) -> Self:
+        """Start it and wait until its position is ready.
+
+        Raises:
+            JobError: it ended, or does not answer.
+        """
+        try:
+            await self._start()
+        except BaseException:
+            await self._stack.aclose()
+            raise
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop it."""
+        await self._stack.aclose()
+
+    async def _start(self) -> None:
+        folder = self._folder
+        if folder is None:
+            folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="ardurover-")))
+        folder.mkdir(parents=True, exist_ok=True)
+        defaults = folder / "boat.parm"
+        hull = self._model.removesuffix(MOTOR)
+        common = DEFAULTS.with_name(f"{hull}.parm").read_text()
+        motor = THROTTLE if hull != self._model else ()
+        lines = [common, *motor, *(f"{name} {value:g}" for name, value in self._parameters.items())]
+        defaults.write_text("\n".join(lines) + "\n")
+        self.instance = free_instance() if self._wanted is None else self._wanted
+        heading_deg = math.degrees(wrap_two_pi(self._heading_rad))
+        log = self._stack.enter_context((folder / "ardurover.log").open("wb"))
+        self._process = await asyncio.create_subprocess_exec(
+            str(self._program), "--model", self._model, "--speedup", f"{self._speedup:g}", "-I", str(self.instance),
+            "--home", f"{self._home.lat_deg:.7f},{self._home.lon_deg:.7f},0,{heading_deg:.3f}",
+            "--defaults", str(defaults), "-w", "--serial0", "tcp:0", "--serial1", "tcp:2", "--serial2", "tcp:3",
+            cwd=folder, stdout=log, stderr=asyncio.subprocess.STDOUT, stdin=asyncio.subprocess.DEVNULL,
+        )
+        self._stack.push_async_callback(self._stop)
+        await self._wait_for_port(folder)
+        self._harness = open_link(f"tcp:127.0.0.1:{5762 + 10 * self.instance}")
+        await self._harness.open(self._received)
+        self._stack.push_async_callback(self._harness.close)
+        life = asyncio.create_task(self._live(), name="ardurover harness")
+        self._stack.push_async_callback(_cancelled, life)
+        try:
+            async with asyncio.timeout(_READY_SIM_S + 10.0 * self._speedup):
+                while not self._ready.is_set():
+                    if self._process.returncode is not None:
+                        raise JobError(f"ardurover ended with {self._process.returncode}: {_tail(folder)}")
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(0.2 * self._speedup):
+                            await self._ready.wait()
+        except TimeoutError:
+            raise JobError(f"ardurover has no position after {_READY_SIM_S:.0f} s: {_tail(folder)}") from None
+        self._zero_boot_s = self._boot_s
+
+    async def _wait_for_port(self, folder: Path) -> None:
+        assert self._process is not None
+        for _ in range(100):
+            if self._process.returncode is not None:
+                raise JobError(f"ardurover ended with {self._process.returncode}: {_tail(folder)}")
+            if not _is_free(5762 + 10 * self.instance):
+                return
+            await asyncio.sleep(0.1 * self._speedup)
+        raise JobError(f"ardurover opened no port within 10 s: {_tail(folder)}")
+
+    async def _stop(self) -> None:
+        process = self._process
+        if process is None or process.returncode is not None:
+            return
+        process.terminate()
+        try:
+            async with asyncio.timeout(3.0 * self._speedup):
+                await process.wait()
+        except TimeoutError:
+            process.kill()
+            await process.wait()
+
+    # --------------------------------------------------------------------------------------------- harness
+    @property
+    def link(self) -> str:
+        """LINK of the companion's port (SERIAL0)."""
+        return f"tcp:127.0.0.1:{5760 + 10 * self.instance}"
+
+    @property
+    def shore_link(self) -> str:
+        """LINK of another port (SERIAL2)."""
+        return f"tcp:127.0.0.1:{5763 + 10 * self.instance}"
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the process lives."""
+        return self._process is not None and self._process.returncode is None
+
+    @property
+    def t_s(self) -> float:
+        """Simulated time since the boat was ready [s]: the autopilot's clock, carried on between messages."""
+        return self._boot_s - self._zero_boot_s + min(1.0, max(0.0, now_s() - self._boot_at_s))
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Set a parameter from the harness."""
+        self._send(mav.MAVLink_param_set_message(1, 1, name.encode(), value, mav.MAV_PARAM_TYPE_REAL32))
+
+    def command(self, command: int, *params: float) -> None:
+        """Send COMMAND_LONG from the harness: the operator's hand in a scenario."""
+        given = [*params, *([0.0] * 7)][:7]
+        self._send(mav.MAVLink_command_long_message(1, 1, command, 0, *given))
+
+    def set_mode(self, mode: Mode) -> None:
+        """The operator's switch."""
+        self.command(mav.MAV_CMD_DO_SET_MODE, 1.0, float(mode))
+
+    def reboot(self) -> None:
+        """Restart the autopilot."""
+        self.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0)
+
+    def set_current(self, set_to_rad: float, drift_mps: float) -> None:
+        """Let the water run towards ``set_to_rad``."""
+        self.set_parameter("SIM_TIDE_DIR", math.degrees(wrap_two_pi(set_to_rad + math.pi)))
+        self.set_parameter("SIM_TIDE_SPEED", drift_mps)
+
+    def set_gps_jump(self, lat_deg: float, lon_deg: float) -> None:
+        """Let the receiver err by so much; by the names of 4.5 and of 4.7, of which one is known to it."""
+        for prefix in ("SIM_GPS_GLITCH", "SIM_GPS1_GLTCH"):
+            self.set_parameter(f"{prefix}_X", lat_deg)
+            self.set_parameter(f"{prefix}_Y", lon_deg)
+
+    def set_gps(self, *, is_lost: bool) -> None:
+        """Take the receiver away, or give it back; by the names of 4.5 and of 4.7."""
+        self.set_parameter("SIM_GPS_DISABLE", float(is_lost))
+        self.set_parameter("SIM_GPS1_ENABLE", float(not is_lost))
+
+    @property
+    def truth(self) -> Truth:
+        """What is so, from the simulator's own messages and the weather.
+
+        Raises:
+            LinkError: nothing was heard yet.
+        """
+        sim, moving = self._seen.get("SIMSTATE"), self._seen.get("GLOBAL_POSITION_INT")
+        if sim is None or moving is None:
+            raise LinkError("the simulator has not told its state yet")
+        position = GeoPoint(lat_deg=sim.lat / 1e7, lon_deg=sim.lng / 1e7)
+        east, north = self._frame.en_from_geo(position)
+        ve, vn = moving.vy / 100.0, moving.vx / 100.0
+        beat, servos, mission = (self._seen.get(n) for n in ("HEARTBEAT", "SERVO_OUTPUT_RAW", "MISSION_CURRENT"))
+        twd, tws = self._wind.at(self.t_s)
+        return Truth(
+            t_s=self.t_s, boot_s=self._boot_s, east_m=east, north_m=north, position=position,
+            heading_rad=wrap_two_pi(sim.yaw), speed_mps=math.hypot(ve, vn), velocity_en_mps=(ve, vn),
+            twd_from_rad=twd, tws_mps=tws,
+            mode=_KNOWN_MODES.get(beat.custom_mode, Mode.HOLD) if beat else Mode.INITIALISING,
+            is_armed=bool(beat and beat.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED),
+            mission_seq=mission.seq if mission else 0, tacks=self._tacks,
+            sail_rad=math.radians((servos.servo4_raw - 1000) * 0.09) if servos else 0.0,
+            rudder=(servos.servo1_raw - 1500) / 500.0 if servos else 0.0,
+        )
+
+    def _send(self, message: Any) -> None:
+        self._harness.write(message.pack(self._codec))
+        self._codec.seq = (self._codec.seq + 1) & 0xFF
+
+    def _received(self, data: bytes) -> None:
+        for m in self._codec.parse_buffer(data) or ():
+            name = m.get_type()
+            if name == "BAD_DATA" or m.get_srcSystem() != 1 or m.get_srcComponent() != 1:
+                continue
+            self._seen[name] = m
+            if name == "SYSTEM_TIME" or (name == "ATTITUDE" and m.time_boot_ms):
+                self._boot_s, self._boot_at_s = m.time_boot_ms / 1000.0, now_s()
+            elif name == "EKF_STATUS_REPORT":
+                if m.flags & _EKF_READY == _EKF_READY and not m.flags & mav.EKF_CONST_POS_MODE:
+                    self._ready.set()
+            elif name == "STATUSTEXT":
+                self._tacks += m.text == "Sailboat: Tacking"
+                if len(self.texts) < 10_000 and not m.text.startswith("Field Elevation"):
+                    self.texts.append((self._boot_s, m.severity, m.text))
+            elif name == "HEARTBEAT" and not self._is_heard:
+                self._is_heard = True
+                for msgid, hertz in ((mav.MAVLINK_MSG_ID_SIMSTATE, 5), (mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5),
+                                     (mav.MAVLINK_MSG_ID_ATTITUDE, 5), (mav.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, 2)):
+                    self.command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, float(msgid), 1e6 / hertz)
+
+    async def _live(self) -> None:
+        """Heartbeat, and the wind as it is now."""
+        beat_s = told_s = -math.inf
+        told: tuple[float, float] | None = None
+        while True:
+            if now_s() - beat_s >= 1.0:
+                beat_s = now_s()
+                self._send(mav.MAVLink_heartbeat_message(mav.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, 4, 3))
+            if self._ready.is_set():
+                twd, tws = self._wind.at(max(0.0, self.t_s))
+                wind = (round(math.degrees(twd), 3), round(tws, 4))
+                # again now and then, in case a setting was lost on the way
+                if wind != told or now_s() - told_s > _WIND_REPEAT_S:
+                    told, told_s = wind, now_s()
+                    self.set_parameter("SIM_WIND_DIR", wind[0])
+                    self.set_parameter("SIM_WIND_SPD", wind[1])
+            await asyncio.sleep(1.0 / _WIND_HZ)
+
+
+async def _cancelled(task: asyncio.Task[None]) -> None:
+    task.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await task
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+def free_instance() -> int:
+    """Return the first instance whose ports nobody has.
+
+    Raises:
+        JobError: all are taken.
+    """
+    for instance in range(_INSTANCES):
+        if all(_is_free(base + 10 * instance) for base in (5760, 5762, 5763)):
+            return instance
+    raise JobError(f"the ports of all {_INSTANCES} simulator instances are taken; stop some")
+
+
+def _tail(folder: Path) -> str:
+    try:
+        lines = (folder / "ardurover.log").read_text(errors="replace").strip().splitlines()
+    except OSError:
+        lines = []
+    return " / ".join(lines[-3:]) or "it said nothing"

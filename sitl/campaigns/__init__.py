@@ -1,0 +1,1 @@
+"""Campaigns: many voyages, drawn by seed and judged."""

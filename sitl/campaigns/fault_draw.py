@@ -1,0 +1,57 @@
+"""Draws the weather and the faults of a voyage from a seed."""
+
+from __future__ import annotations
+
+import random
+
+import msgspec
+
+from sitl.campaigns.failsafe_lots import FAILSAFES, unattended
+from sitl.campaigns.fault_lots import LOTS, PLANNER, SINGLE, Lot, Maker
+from sitl.scene.scenario import EventSpec, ExpectSpec, Scenario, WindSpec
+
+_MAKERS, _WEIGHTS = zip(*LOTS, *SINGLE, *FAILSAFES, strict=True)
+_ONCE = frozenset(maker for maker, _ in (*SINGLE, *FAILSAFES))
+MODERATE_MPS = 4.0      # in less wind than this the same way takes longer
+UNATTENDED = 0.06       # the share of voyages on which the companion may not set modes
+LATEST_S = 170.0        # for a fault to begin
+
+
+def draw(seed: int, base: Scenario) -> Scenario:
+    """Return ``base`` with the weather and the faults of ``seed``; its limit grows with what takes long."""
+    rng = random.Random(f"faults {seed}")
+    # moderate winds as often as all others together: in them the boat is where the faults are
+    tws_mps = rng.choice((rng.uniform(3.5, 7.0), rng.uniform(2.0, 12.0)))
+    wind = WindSpec(
+        model="ou", from_deg=round(rng.uniform(0.0, 360.0), 1), tws_mps=round(tws_mps, 2),
+        sd_deg=round(rng.uniform(3.0, 10.0), 1), tau_s=28.0, tws_sd_mps=round(rng.uniform(0.1, 0.6), 2),
+    )
+    lots: list[Lot] = [unattended(rng)] if rng.random() < UNATTENDED else []
+    drawn: set[Maker] = set()
+    for _ in range(rng.choice((1, 1, 2, 2, 3, 4, 5))):
+        maker = rng.choices(_MAKERS, weights=_WEIGHTS)[0]
+        if maker in _ONCE & drawn:
+            continue
+        drawn.add(maker)
+        lots.append(maker(rng, round(rng.uniform(3.0, LATEST_S), 1)))
+    events: list[EventSpec] = [event for lot in lots for event in lot.events]
+    changes = {key: value for lot in lots for key, value in lot.changes.items()}
+    parameters = {key: value for lot in lots for key, value in lot.parameters.items()}
+    limit_s = base.limit_s * max(1.0, MODERATE_MPS / tws_mps) + sum(lot.longer_s for lot in lots)
+    return msgspec.structs.replace(
+        base, wind=wind, events=tuple(sorted(events, key=lambda e: e.at_s)), parameters=parameters, is_service=True,
+        has_ftp=rng.random() < 0.5, limit_s=round(limit_s, 1),
+        expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None), **changes,
+    )
+
+
+def draw_planner(seed: int, base: Scenario) -> Scenario:
+    """Return ``base`` with the weather of ``seed`` and two to four faults of the planner's process."""
+    rng = random.Random(f"planner {seed}")
+    wind = WindSpec(model="ou", from_deg=round(rng.uniform(0.0, 360.0), 1), tws_mps=round(rng.uniform(3.5, 7.0), 2))
+    makers, weights = zip(*PLANNER, strict=True)
+    events = [e for _ in range(rng.randint(2, 4))
+              for e in rng.choices(makers, weights=weights)[0](rng, round(rng.uniform(3.0, 120.0), 1)).events]
+    return msgspec.structs.replace(
+        base, wind=wind, events=tuple(sorted(events, key=lambda e: e.at_s)), is_service=True,
+        expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None))

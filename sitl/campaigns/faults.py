@@ -1,0 +1,237 @@
+"""Faults by the thousand: random but repeatable trouble on a short voyage, and what may never come of it.
+
+A seed gives the weather and one to five faults of link, sensors, wind, process and people
+(``sitl.campaigns.fault_draw``). Each voyage is sailed on the embedded autopilot under the virtual clock and judged on
+five points (``sitl.campaigns.fault_watch``): no contact of the hull that was to be helped
+(``sitl.campaigns.counterfactual``), the margin's floor kept in ordinary weather, no mission that is a mixture of two,
+no silence without a status, no unhandled exception. Arriving is counted, not required: a boat that the operator put in
+HOLD for half the voyage has done nothing wrong by being late.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from companion.errors import InputError
+from companion.fold import Step
+from sitl.campaigns.counterfactual import avoidable
+from sitl.campaigns.fault_draw import draw, draw_planner
+from sitl.campaigns.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
+from sitl.campaigns.pool import in_processes
+from sitl.scene.scenario import EventSpec, Scenario, is_all_ordinary, load_scenario
+
+BASE = Path(__file__).parents[1] / "scenarios" / "faults" / "rocks.toml"
+# Effort of one plan: the voyage is short and its water simple.
+EXPANSIONS = 4_000
+WORKER_PACE = 2.0    # faster, two seconds of a busy machine would count as silence
+
+
+def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[str, Any]:
+    """Draw the faults of one seed, sail them and return how it went; a voyage folder is left in ``keep``."""
+    return sail_faults(draw(seed, load_scenario(base)), seed, base, keep)
+
+
+def sail_worker_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[str, Any]:
+    """Sail one seed with faults of the planner's real process, in real time ``WORKER_PACE`` times as fast."""
+    return sail_faults(draw_planner(seed, load_scenario(base)), seed, base, keep, worker_pace=WORKER_PACE)
+
+
+def sail_faults(
+    scenario: Scenario, seed: int, base: Path, keep: Path | None = None, *, worker_pace: float | None = None,
+) -> dict[str, Any]:
+    """Sail a scenario, read from ``base``, with what else a ``seed`` decides, and return how it went."""
+    if keep is not None and keep.is_dir() and any(keep.iterdir()):
+        raise InputError("--keep", str(keep), "is not empty", "a voyage's folder is taken up where it was left")
+    began_s = time.process_time()
+    voyage = _sail(scenario, seed, base, keep, worker_pace)
+    watch, figures, errors = voyage.watch, voyage.figures, voyage.errors
+
+    def touches(other: Scenario) -> float | None:
+        return next((t_s for t_s, _ in _sail(other, seed, base, None, worker_pace).watch.contacts()), None)
+
+    contacts = []
+    for t_s, excuse in watch.contacts():
+        helped = "" if excuse == UNEXCUSED else avoidable(scenario, excuse, t_s, watch.reach(), touches)
+        contacts.append({
+            "t_s": t_s, "excuse": UNEXCUSED if helped else excuse, "looked_like": excuse, "helped": helped})
+    least = watch.clearance_m()
+    mixture_s, silence_s = watch.mixture_s(), watch.silence_s(voyage.status_s)
+    faults = [f"contact at {c['t_s']:.0f} s{': ' if c['helped'] else ''}{c['helped']}"
+              for c in contacts if c["excuse"] == UNEXCUSED]
+    is_low = least is not None and least[0] < voyage.floor_m
+    before = [e for e in scenario.events if least is not None and e.at_s <= least[1]]
+    is_weather = is_all_ordinary(before)
+    if is_low and is_weather and least is not None:
+        faults.append(f"{least[0]:.1f} m clear at {least[1]:.0f} s, in ordinary weather")
+    if mixture_s > 0.0:
+        faults.append(f"a mixture for {mixture_s:.1f} s")
+    if silence_s > MAX_SILENCE_S:
+        faults.append(f"silent for {silence_s:.0f} s")
+    if voyage.ordered:
+        faults.append(f"neighbour {voyage.ordered[0]} was given orders")
+    if errors:
+        faults.append(f"unhandled: {errors[0].strip().splitlines()[-1]}")
+    return {
+        "seed": seed, "passed": not faults, "faults": faults,
+        "events": [told(e) for e in scenario.events], "parameters": dict(scenario.parameters),
+        "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}", "limit_s": scenario.limit_s,
+        "set_auto": scenario.set_auto, "system": scenario.system,
+        "kinds": sorted({e.kind for e in scenario.events}),
+        "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
+        "contacts": contacts, "clearance_m": least and least[0], "clearance_t_s": least and least[1],
+        "below_floor": is_low, "weather_only": is_weather,
+        "mixture_s": mixture_s, "held_back_s": watch.held_back_s(),
+        "silence_s": silence_s, "sailed": watch.has_sailed, "errors": errors,
+        "simulated_s": watch.t_s[-1] if watch.t_s else 0.0, "cpu_s": time.process_time() - began_s,
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Voyage:
+    """A scenario that was sailed."""
+
+    watch: Watch
+    figures: dict[str, Any]
+    errors: list[str]
+    status_s: list[float]
+    floor_m: float
+    ordered: list[int]     # neighbours
+
+
+def _sail(
+    scenario: Scenario, seed: int, base: Path, keep: Path | None, worker_pace: float | None = None,
+) -> _Voyage:
+    """Sail a scenario on the embedded autopilot under the eyes of a watch."""
+    from companion.clock import run_virtual
+    from companion.compose import boat_of
+    from companion.geofence import load_mission
+    from companion.messages import waypoint
+    from sitl.campaigns.from_zero import run_from_zero
+    from sitl.run.embedded import run_embedded, solid_of
+
+    mission = load_mission(scenario.mission_path(base))
+    frame = mission.frame()
+    watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame, hull=boat_of(mission).hull,
+                  operator_s=operator_spans(scenario.events, scenario.limit_s))
+    for event in scenario.events:
+        if event.kind == "foreign_mission":
+            item = waypoint(frame.geo_from_en(event.east_m, event.north_m))
+            watch.foreign.add(mission_key([(item.command, item.lat_e7, item.lon_e7)]))
+    status_s: list[float] = []
+
+    def on_step(step: Step) -> None:
+        if step.state.why:
+            status_s.append(step.snapshot.t_s)
+        watch.step(step)
+
+    figures: dict[str, Any] = {}
+    errors: list[str] = []
+    ordered: list[int] = []
+    with tempfile.TemporaryDirectory(prefix="faults-") as scratch:
+        folder = keep if keep is not None else Path(scratch) / "voyage"
+        try:
+            voyage = run_embedded(scenario, base, seed, folder, on_step=on_step, expansions=EXPANSIONS, observer=watch,
+                                  worker_pace=worker_pace)
+            verdict = run_virtual(voyage) if worker_pace is None else run_from_zero(voyage, worker_pace)
+            figures = verdict.figures
+            seen = {check.name: check.figure for check in verdict.checks}
+            errors, ordered = [str(e) for e in seen["no unhandled error"]], seen.get("neighbours given orders", [])
+        except Exception as error:
+            errors = [repr(error)]
+    return _Voyage(watch=watch, figures=figures, errors=errors, status_s=status_s, floor_m=mission.margin_floor_m,
+                   ordered=ordered)
+
+
+def told(event: EventSpec) -> str:
+    """Return an event in short, with what was drawn for it."""
+    plain = msgspec.to_builtins(EventSpec(at_s=0.0, kind=event.kind))
+    drawn = [f"{key} {value}" for key, value in msgspec.to_builtins(event).items()
+             if key not in {"at_s", "kind"} and value != plain[key]]
+    return f"{event.kind} at {event.at_s:.0f} s" + (f" ({', '.join(drawn)})" if drawn else "")
+
+
+def run_faults(
+    *, runs: int, first_seed: int = 0, workers: int | None = None, json_path: Path | None = None,
+    worker: bool = False,
+) -> int:
+    """Sail ``runs`` seeds, print those that failed and what was counted; return the exit code."""
+    began_s = time.perf_counter()
+    records: list[dict[str, Any]] = []
+    sail_one = sail_worker_seed if worker else sail_seed
+    for record in in_processes(sail_one, range(first_seed, first_seed + runs), workers):
+        records.append(record)
+        if not record["passed"]:
+            print(f"\rFAILED seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(record['events'])})",
+                  flush=True)
+        left_s = (time.perf_counter() - began_s) / len(records) * (runs - len(records))
+        failed = sum(not r["passed"] for r in records)
+        sys.stderr.write(f"\r{len(records)}/{runs} sailed, {failed} failed, {left_s:.0f} s left   ")
+        sys.stderr.flush()
+    sys.stderr.write("\n")
+    records.sort(key=lambda r: int(r["seed"]))
+    table = figures_of(records, time.perf_counter() - began_s)
+    print_figures(table)
+    for record in records:
+        if not record["passed"]:
+            print(f"again: sitl faults --first-seed {record['seed']} --keep DIR")
+    if json_path is not None:
+        json_path.write_text(json.dumps({"figures": table, "voyages": records}, indent=1) + "\n", encoding="utf-8")
+    return 0 if all(r["passed"] for r in records) else 1
+
+
+def figures_of(records: Sequence[dict[str, Any]], wall_s: float) -> dict[str, Any]:
+    """Return what was counted over all voyages."""
+    touched: Counter[str] = Counter()
+    low = [r for r in records if r["below_floor"]]
+    kinds: Counter[str] = Counter()
+    for record in records:
+        touched.update({c["excuse"] for c in record["contacts"]})
+        kinds.update(record["kinds"])
+    times = [r["time_s"] for r in records if r["arrived"]]
+    return {
+        "voyages": len(records), "passed": sum(r["passed"] for r in records),
+        "failed_seeds": [r["seed"] for r in records if not r["passed"]],
+        "arrived": sum(r["arrived"] for r in records),
+        "touched": touched.pop(UNEXCUSED, 0), "touched_excused": dict(sorted(touched.items())),
+        "excused_seeds": {
+            excuse: [r["seed"] for r in records if any(c["excuse"] == excuse for c in r["contacts"])]
+            for excuse in sorted(touched)
+        },
+        "below_floor": len(low), "below_floor_in_weather": [r["seed"] for r in low if r["weather_only"]],
+        "clearance_min_m": min((r["clearance_m"] for r in records if r["clearance_m"] is not None), default=None),
+        "mixture_max_s": max((r["mixture_s"] for r in records), default=0.0),
+        "held_back_max_s": max((r["held_back_s"] for r in records), default=0.0),
+        "silence_max_s": max((r["silence_s"] for r in records), default=0.0),
+        "unhandled": sum(bool(r["errors"]) for r in records),
+        "time_median_s": statistics.median(times) if times else None,
+        "faults": dict(sorted(kinds.items())),
+        "simulated_s": sum(r["simulated_s"] for r in records), "cpu_s": sum(r["cpu_s"] for r in records),
+        "wall_s": wall_s,
+    }
+
+
+def print_figures(table: dict[str, Any]) -> None:
+    """Print what was counted."""
+    n = max(1, table["voyages"])
+    print(f"{table['voyages']} voyages, {table['passed']} passed, {table['arrived']} arrived in time")
+    print(f"touched something: {table['touched']} voyages; longest mixture {table['mixture_max_s']:.1f} s; "
+          f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}")
+    for excuse, voyages in table["touched_excused"].items():
+        print(f"  excused: {voyages} voyages touched, {EXCUSES[excuse]}; nothing that was tried would have helped")
+    print(f"below the margin's floor: {table['below_floor']} voyages, {len(table['below_floor_in_weather'])} of them "
+          "in ordinary weather")
+    print(f"  a mission held back by a slow upload, ended by a loiter: {table['held_back_max_s']:.1f} s at most")
+    print("voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items()))
+    print(f"{table['simulated_s'] / 3600.0:.1f} h simulated in {table['wall_s']:.0f} s, "
+          f"{table['cpu_s'] / n:.2f} CPU s per voyage")

@@ -1,0 +1,264 @@
+"""Runs a scenario in one process under the running loop's clock: simulated autopilot, weather, companion, verdict.
+
+Under the virtual clock a seed repeats a voyage bit for bit, and a voyage takes as long as its arithmetic.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+import traceback
+from collections.abc import Callable, Coroutine
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from companion.app.options import SailOptions, at_once
+from companion.app.sail import sail
+from companion.clock import now_s
+from companion.compose import boat_of
+from companion.disk import Disk
+from companion.errors import LinkError
+from companion.fold import Step
+from companion.geo.frame import LocalFrame
+from companion.geofence import LocalArea, Mission, load_mission
+from companion.messages import Mode
+from companion.sailable import require_sailable
+from companion.skipper.deeds.adrift import CALL
+from companion.skipper.step.actions import Announce
+from companion.telemetry.folder.names import STATE, VERDICT
+from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.scene.hull import own_polar
+from sitl.scene.others import Others
+from sitl.scene.scenario import EPOCH_S, Scenario, is_all_ordinary
+from sitl.scene.ships import free_port
+from sitl.scene.verdict import Verdict, judge
+from sitl.scene.weather import scenario_wind
+from sitl.trouble.befalls import Observer, World, channel, happen
+from sitl.trouble.fragile import FragilePlanner, MortalPlanner
+
+TRUTH_EVERY_S = 0.25
+MAX_TRUTH_SAMPLES = 20_000
+# Effort of one plan under the virtual clock, where time cannot stop it.
+EXPANSIONS = 15_000
+
+# A companion that ended for want of an autopilot is started again after this long, as its service does [s].
+SERVICE_RESTART_S = 5.0
+
+OnStep = Callable[[Step], None]
+
+
+def solid_of(area: LocalArea) -> BaseGeometry:
+    """Return what the boat must not touch: the obstacles and everything outside the fence, local metres."""
+    solid: BaseGeometry = shapely.union_all(list(area.polygons)) if area.polygons else shapely.Polygon()
+    if area.limits is not None and not area.limits.is_empty:
+        x0, y0, x1, y1 = area.limits.bounds
+        around = shapely.box(x0 - 1e4, y0 - 1e4, x1 + 1e4, y1 + 1e4)
+        solid = shapely.union(solid, shapely.difference(around, area.limits))
+    return solid
+
+
+def marks_of(mission: Mission) -> list[tuple[tuple[float, float], str]]:
+    """Return the marks to be rounded, all laps written out."""
+    frame = mission.frame()
+    lap = [(frame.en_from_geo(g.point), g.rounding) for g in mission.goals if g.rounding is not None]
+    return lap * mission.skipper.laps
+
+
+def ends_of(mission: Mission) -> dict[str, Any]:
+    """Return where a voyage may end beside its last goal and home: the refuges."""
+    frame = mission.frame()
+    return {"refuges_en_m": [frame.en_from_geo(r.point) for r in mission.refuges]}
+
+
+def permitted(mission: Mission, scenario: Scenario) -> Mission:
+    """Return the mission with what a harness allows, and the autopilot's system where the scenario names it.
+
+    The simulated boat may be armed, and set to AUTO and steered where the scenario does not forbid it.
+    """
+    options = mission.options
+    operator = replace_struct(options.operator, arm=True, set_auto=scenario.set_auto)
+    named = options.autopilot if scenario.system is None else replace_struct(options.autopilot, system=scenario.system)
+    return replace(mission, options=replace_struct(options, operator=operator, autopilot=named))
+
+
+def mission_of(scenario: Scenario, source: Path) -> Mission:
+    """Return the mission that a scenario sails, with what a harness allows. Raises InputError: it cannot be sailed."""
+    return require_sailable(permitted(load_mission(scenario.mission_path(source)), scenario))
+
+
+def replace_struct(struct: Any, **changes: Any) -> Any:
+    """Return a copy of a msgspec struct with ``changes``."""
+    import msgspec
+
+    return msgspec.structs.replace(struct, **changes)
+
+
+RADIO_EVENTS = frozenset({"intruder", "second_boat"})
+
+
+def with_radio(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
+    """Return the mission with its UDP feed at a free port, and the port; 0 where nothing is told by radio."""
+    feeds = mission.traffic.feeds
+    if not any(e.kind in RADIO_EVENTS for e in scenario.events) or not any(f.startswith("udpin:") for f in feeds):
+        return mission, 0
+    port = free_port()
+    moved = tuple(f"udpin:127.0.0.1:{port}" if f.startswith("udpin:") else f for f in feeds)
+    traffic = replace_struct(mission.options.traffic, feeds=moved)
+    return replace(mission, options=replace_struct(mission.options, traffic=traffic)), port
+
+
+async def run_embedded(
+    scenario: Scenario, source: Path, seed: int, folder: Path, *, on_step: OnStep | None = None,
+    expansions: int | None = EXPANSIONS, observer: Observer | None = None, worker_pace: float | None = None,
+) -> Verdict:
+    """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json.
+
+    With ``worker_pace`` (loop seconds per second, on a loop in real time that begins at 0) the planner is the real
+    worker process, and plans by its budget of time.
+    """
+    mission, radio_port = with_radio(mission_of(scenario, source), scenario)
+    wind = scenario_wind(scenario, source, seed)
+    start = mission.start or mission.origin
+    heading_deg = scenario.start_heading_deg
+    if heading_deg is None:
+        heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
+    autopilot = Autopilot(
+        AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
+                        parameters=scenario.parameters, has_ftp=scenario.has_ftp, has_motor=mission.boat.motor,
+                        polar=own_polar(mission)),
+        wind, seed=seed,
+    )
+    link = MemoryLink("companion", seed=seed)
+    frame = mission.frame()
+    world = World(
+        autopilot=autopilot, link=link, frame=frame, wind=wind, seed=seed, shore=MemoryLink("shore", seed=seed + 1),
+        station=MemoryLink("station", seed=seed + 2), observer=observer,
+        others=Others(frame, wind, seed, port=radio_port, hear=autopilot.hear_vessel))
+    channel(world, scenario.events)
+    folder.mkdir(parents=True, exist_ok=True)
+    station = [world.station.far] if any(e.kind == "station" for e in scenario.events) else []
+    async with serve(autopilot, [link.far, world.shore.far, *station]):
+        side_tasks = [
+            asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
+            *(asyncio.create_task(happen(world, e), name=f"event {e.kind}") for e in scenario.events),
+        ]
+        await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions, worker_pace)
+        for task in side_tasks:
+            task.cancel()
+        for task in side_tasks:
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+    area = mission.area.local(frame)
+    verdict = judge(
+        scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
+        hull=boat_of(mission).hull, floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
+        called_at_s=world.called_at_s, ordered=world.ordered if world.neighbours else None,
+        goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
+        status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
+        **ends_of(mission),
+    )
+    Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
+    return verdict
+
+
+async def _sail_and_restart(
+    world: World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_step: OnStep | None,
+    expansions: int | None, worker_pace: float | None,
+) -> None:
+    """Run the companion; kill it where the scenario says, and start it again."""
+    kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
+    deadline_s = now_s() + scenario.limit_s
+    options = SailOptions(
+        seed=seed, epoch_s=EPOCH_S, expansions=expansions if worker_pace is None else None,
+        budget_scale=1.0 / (worker_pace or 1.0), offload=at_once, is_durable=False,
+        state_path=folder / STATE, disk=world.disk, command=f"sitl run {scenario.name}",
+        exit_on_arrival=scenario.exit_on_arrival, dry_run=scenario.dry_run,
+    )
+
+    def on_status(status: Any, step: Step) -> None:  # noqa: ARG001 - the interface has both
+        world.status_s.append(step.snapshot.t_s)
+        if any(isinstance(action, Announce) and action.code == CALL for action in step.actions):
+            world.called.set()
+            world.called_at_s.append(step.snapshot.t_s)
+        if on_step is not None:
+            on_step(step)
+
+    while True:
+        left_s = deadline_s - now_s()
+        if left_s <= 0.0:
+            return
+        born_s = now_s()
+        # the planner's process lives and dies with the companion's
+        planner = world.planner = FragilePlanner() if worker_pace is None else MortalPlanner()
+        task = asyncio.create_task(
+            _one_life(planner, sail(mission, world.heard_by(), planner, folder, replace(options, limit_s=left_s),
+                                    on_status=on_status)),
+            name="companion",
+        )
+        kill = kills.pop(0) if kills else None
+        done, _ = await asyncio.wait([task], timeout=None if kill is None else max(0.0, kill.at_s - now_s()))
+        if task not in done:
+            task.cancel()
+        gave_up = False
+        try:
+            world.summary = await task
+        except asyncio.CancelledError:
+            pass
+        except Exception as error:
+            if not (scenario.is_service and isinstance(error, LinkError)):
+                world.errors.append("".join(traceback.format_exception(error)))
+                return
+            gave_up = True
+        if world.observer is not None:
+            world.observer.life(born_s, now_s())
+        _collect_alerts(world, folder)
+        if gave_up:
+            if kill is not None:
+                kills.insert(0, kill)
+            await asyncio.sleep(SERVICE_RESTART_S)
+            continue
+        if task in done and not task.cancelled():
+            return
+        if kill is None or kill.restart_after_s is None:
+            await asyncio.sleep(max(0.0, deadline_s - now_s()))
+            return
+        if kill.saved != "kept":
+            world.disk.spoil(folder / STATE, kill.saved, kill.aged_s)
+        options = replace(options, epoch_s=max(0.0, options.epoch_s + kill.clock_step_s))
+        await asyncio.sleep(kill.restart_after_s)
+
+
+async def _one_life(planner: FragilePlanner | MortalPlanner, voyage: Coroutine[Any, Any, dict[str, Any]]) -> Any:
+    async with planner:
+        return await voyage
+
+
+def _collect_alerts(world: World, folder: Path) -> None:
+    try:
+        summary = json.loads((folder / "summary.json").read_bytes())
+    except (OSError, ValueError):
+        return
+    for code, count in summary.get("alerts", {}).items():
+        world.alerts[code] = world.alerts.get(code, 0) + count
+
+
+async def _watch_truth(world: World, frame: LocalFrame, limit_s: float) -> None:
+    # A day is watched once in four seconds: the judge looks between samples too, and its memory is bounded.
+    every_s = max(TRUTH_EVERY_S, limit_s / MAX_TRUTH_SAMPLES)
+    while True:
+        t = world.autopilot.truth
+        if world.set_sail_s is None and t.is_armed and t.mode in {Mode.AUTO, Mode.GUIDED}:
+            world.set_sail_s = now_s()
+        if world.set_sail_s is not None:
+            here = frame.en_from_geo(t.position)
+            world.truth.add(now_s(), here, t.heading_rad, t.speed_mps, (t.twd_from_rad, t.tws_mps))
+            world.others.note(world.truth, here, now_s())
+        if world.observer is not None:
+            world.observer.truth(now_s(), world.autopilot, world.link)
+        await asyncio.sleep(every_s)

@@ -1,0 +1,209 @@
+"""Runs a scenario in real time with processes of their own: autopilot, companion, and a judge that listens.
+
+The autopilot is the simulated one over UDP or the real ArduRover; the companion is ``companion run``, as on the
+boat. The judge is a third party on another link: it reads where the boat is, plays the operator and the fates,
+sails the other vessels, and never talks to the companion but as an AIS receiver or a radio would.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+from companion.clock import now_s, run
+from companion.compose import boat_of
+from companion.disk import Disk
+from companion.errors import JobError, LinkError
+from companion.geo.frame import LocalFrame
+from companion.geofence import load_mission
+from companion.telemetry.folder.names import DECISIONS, VERDICT
+from sitl.run.boats import Boat, RealBoat, SimulatedBoat
+from sitl.run.embedded import TRUTH_EVERY_S, ends_of, marks_of, solid_of
+from sitl.scene.others import TRAFFIC, Others
+from sitl.scene.scenario import EventSpec, Scenario, is_all_ordinary
+from sitl.scene.ships import Motion, free_port
+from sitl.scene.verdict import Truth, Verdict, judge
+from sitl.scene.weather import scenario_wind
+from sitl.trouble.befalls import break_vane
+from sitl.trouble.relay import LINK_EVENTS, Relay, befall
+
+COMPANION_STOP_S = 20.0
+# What befalls the companion's process or its link, and what the wind is made of.
+ON_THE_LINK = LINK_EVENTS | {"vane"}
+OURS = TRAFFIC | ON_THE_LINK | {"kill_companion", "wind_shift", "wind_speed"}
+
+
+class _Companion:
+    """The companion's process: started, killed and started again."""
+
+    def __init__(self, command: list[str]) -> None:
+        self._command = command
+        self._process: asyncio.subprocess.Process | None = None
+        self._is_over = asyncio.Event()
+        self._expects_death = False
+
+    @property
+    def exit_code(self) -> int | None:
+        """Of the last process."""
+        return None if self._process is None else self._process.returncode
+
+    async def start(self) -> None:
+        """Start it; its progress line is ours."""
+        self._expects_death = False
+        self._process = await asyncio.create_subprocess_exec(*self._command)
+        self._watcher = asyncio.create_task(self._watch(self._process), name="companion process")
+
+    async def _watch(self, process: asyncio.subprocess.Process) -> None:
+        await process.wait()
+        if not self._expects_death:
+            self._is_over.set()
+
+    async def opened(self, path: Path) -> None:
+        """Wait until it has made ``path``, or has ended: a slow machine takes long to load and compile."""
+        while not path.exists() and not self._is_over.is_set():
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._is_over.wait(), TRUTH_EVERY_S)
+
+    async def ended(self, deadline_s: float) -> None:
+        """Wait until it ends by itself; stop it at ``deadline_s``."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout_at(deadline_s):
+                await self._is_over.wait()
+        if self._process is not None and self._process.returncode is None:
+            self._process.send_signal(signal.SIGINT)
+            await self._process.wait()
+
+    async def kill(self, restart_after_s: float | None) -> None:
+        """SIGKILL it, whatever it does, and start it again."""
+        if self._process is None or self._process.returncode is not None:
+            return
+        self._expects_death = restart_after_s is not None
+        self._process.kill()
+        await self._process.wait()
+        if restart_after_s is not None:
+            await asyncio.sleep(restart_after_s)
+            await self.start()
+
+
+def run_live(
+    scenario: Scenario, source: Path, seed: int, folder: Path, *, autopilot: str, program: Path | None,
+    speedup: float | None, truth: Truth | None = None,
+) -> Verdict:
+    """Run ``scenario``; leaves a voyage folder with verdict.json. The judge's track is noted in ``truth``.
+
+    Raises:
+        JobError: it has an event that this autopilot cannot play, or the companion left nothing.
+    """
+    kind = RealBoat if autopilot == "ardurover" else SimulatedBoat
+    cannot = sorted({e.kind for e in scenario.events} - OURS - kind.plays)
+    if cannot:
+        raise JobError(
+            f"{scenario.name}: {', '.join(cannot)} can be played by the embedded autopilot only; leave out "
+            f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}")
+    pace = speedup or scenario.speedup
+    track = Truth() if truth is None else truth
+    return run(_run(scenario, source, seed, folder, autopilot, program, pace, track), speedup=pace)
+
+
+async def _run(
+    scenario: Scenario, source: Path, seed: int, folder: Path, kind: str, program: Path | None, pace: float,
+    truth: Truth,
+) -> Verdict:
+    mission_path = scenario.mission_path(source)
+    mission = load_mission(mission_path)
+    wind = scenario_wind(scenario, source, seed)
+    frame = mission.frame()
+    folder.mkdir(parents=True, exist_ok=True)
+    port = free_port()
+    others = Others(frame, wind, seed, port=port)
+    async with contextlib.AsyncExitStack() as stack:
+        boat: Boat
+        if kind == "ardurover":
+            boat = await stack.enter_async_context(RealBoat.start(scenario, mission, wind, program, pace, folder))
+        else:
+            boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace))
+        relay, link = None, boat.link
+        if any(e.kind in ON_THE_LINK for e in scenario.events):
+            relay = await stack.enter_async_context(Relay(boat.link, seed=seed))
+            link = relay.link
+        feeds = ["--feed", f"udpin:127.0.0.1:{port}"] if any(e.kind in TRAFFIC for e in scenario.events) else []
+        companion = _Companion([
+            sys.executable, "-m", "companion.cli", "run", str(mission_path), "--link", link, "--out", str(folder),
+            "--state", str(folder / "state.json"), "--seed", str(seed), "--speedup", f"{pace:g}",
+            "--limit", f"{scenario.limit_s:g}", *feeds, *(["--exit-on-arrival"] if scenario.exit_on_arrival else []),
+            *(["--dry-run"] if scenario.dry_run else []),
+        ])
+        await companion.start()
+        # The scenario's clock starts when the companion does its first work, as it does on the embedded autopilot.
+        await companion.opened(folder / DECISIONS)
+        began_s = now_s()
+        side = [
+            asyncio.create_task(_watch(boat, frame, truth, others, began_s), name="judge"),
+            *(asyncio.create_task(_event(e, began_s, boat, frame, companion, others, relay), name=f"event {e.kind}")
+              for e in scenario.events),
+        ]
+        try:
+            await companion.ended(began_s + scenario.limit_s + COMPANION_STOP_S * pace)
+        finally:
+            for task in side:
+                task.cancel()
+        played = await asyncio.gather(*side, return_exceptions=True)
+    errors = [f"{t.get_name()}: {e!r}" for t, e in zip(side, played, strict=True) if isinstance(e, Exception)]
+    summary_path = folder / "summary.json"
+    if not summary_path.is_file():
+        raise JobError(f"the companion left no summary in {folder}; its exit code was {companion.exit_code}")
+    summary: dict[str, Any] = json.loads(summary_path.read_bytes())
+    verdict = judge(
+        scenario=scenario.name, seed=seed, expect=scenario.expect, truth=truth,
+        solid=solid_of(mission.area.local(frame)), hull=boat_of(mission).hull,
+        floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
+        goal_en_m=frame.en_from_geo(mission.goals[-1].point),
+        summary=summary, status_times_s=None, alerts=summary.get("alerts", {}), errors=errors,
+        marks=marks_of(mission), **ends_of(mission),
+    )
+    Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
+    return verdict
+
+
+async def _watch(boat: Boat, frame: LocalFrame, truth: Truth, others: Others, began_s: float) -> None:
+    """Note where the boat is from the moment it sails, and how near the others come."""
+    sails = False
+    while True:
+        fix = boat.fix()
+        if fix is not None:
+            sails = sails or fix.sails
+            if sails:
+                here = frame.en_from_geo(fix.position)
+                truth.add(now_s(), here, fix.heading_rad, fix.speed_mps, fix.wind)
+                others.note(truth, here, now_s() - began_s)
+        await asyncio.sleep(TRUTH_EVERY_S)
+
+
+async def _event(
+    event: EventSpec, began_s: float, boat: Boat, frame: LocalFrame, companion: _Companion, others: Others,
+    relay: Relay | None,
+) -> None:
+    """Play one event; wind events are in the wind."""
+    await asyncio.sleep(max(0.0, began_s + event.at_s - now_s()))
+    if event.kind in TRAFFIC:
+        await others.play(event, began_s, lambda: _ours(boat, frame))
+    elif event.kind == "kill_companion":
+        await companion.kill(event.restart_after_s)
+    elif event.kind in LINK_EVENTS and relay is not None:
+        await befall(relay.line, event)
+    elif event.kind == "vane" and relay is not None:
+        await break_vane(relay.vane.set, event)
+    elif event.kind in boat.plays:
+        await boat.play(event, frame)
+
+
+def _ours(boat: Boat, frame: LocalFrame) -> tuple[Motion, float]:
+    fix = boat.fix()
+    if fix is None:
+        raise LinkError("where our boat is was not told yet")
+    return (frame.en_from_geo(fix.position), fix.velocity_en_mps), fix.heading_rad

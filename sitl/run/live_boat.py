@@ -1,0 +1,51 @@
+"""The simulated autopilot of a live scenario as a process of its own: ``python -m sitl.run.live_boat``.
+
+Differs from ``sitl boat`` only in that its weather, start and parameters come from the scenario file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import math
+import sys
+from pathlib import Path
+
+from companion.clock import run
+from companion.geofence import load_mission
+from sitl.autopilot import Autopilot, AutopilotConfig, serve
+from sitl.scene.hull import own_polar
+from sitl.scene.scenario import load_scenario
+from sitl.scene.weather import scenario_wind
+
+
+def main() -> int:
+    """Run until terminated."""
+    parser = argparse.ArgumentParser(prog="python -m sitl.run.live_boat", description=__doc__)
+    parser.add_argument("scenario", type=Path)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--speedup", type=float, default=1.0)
+    parser.add_argument("--endpoint", action="append", required=True, metavar="LINK")
+    args = parser.parse_args()
+    scenario = load_scenario(args.scenario)
+    mission = load_mission(scenario.mission_path(args.scenario))
+    heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
+    autopilot = Autopilot(
+        AutopilotConfig(home=mission.start or mission.origin, heading_rad=math.radians(heading_deg), is_warm=True,
+                        is_moored=True, parameters=scenario.parameters, polar=own_polar(mission)),
+        scenario_wind(scenario, args.scenario, args.seed), args.seed,
+    )
+
+    async def sail() -> None:
+        async with serve(autopilot, args.endpoint) as server:
+            await server.wait(None)
+
+    try:
+        run(sail(), speedup=args.speedup)
+    except (KeyboardInterrupt, asyncio.CancelledError):
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,125 @@
+"""The other vessels of a run: sailed as its scenario says, told to the companion, judged by hulls.
+
+AIS goes to the autopilot where it takes it, else to the UDP feed as a receiver gives it, NMEA sentences with a class A
+position report; an event's radio goes to the feed as JSON. The times of ships count from the scenario's start.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from typing import Any
+
+from pyais import encode_dict
+
+from companion.clock import now_s
+from companion.geo.frame import LocalFrame
+from sitl.autopilot import Vessel
+from sitl.scene.scenario import EventSpec
+from sitl.scene.ships import (
+    FIRST_MMSI,
+    Motion,
+    Moving,
+    SecondBoat,
+    ais_report,
+    distance_m,
+    intruder_of,
+    radio_report,
+    send_datagram,
+    ship_of,
+)
+from sitl.scene.verdict import Truth
+from sitl.world.wind import Wind
+
+TRAFFIC = frozenset({"vessel", "intruder", "second_boat"})
+OUR_LENGTH_M = 2.0    # what the second boat takes ours for
+_MPS_PER_KNOT = 1852.0 / 3600.0
+
+
+def sentences(vessel: Vessel) -> bytes:
+    """Return a class A position report as NMEA lines (ITU-R M.1371 message 1).
+
+    Speed is rounded to 0.1 kn, course to 0.1 deg, position to 1e-4 minutes (0.2 m), as there.
+    """
+    said: dict[str, Any] = {
+        "msg_type": 1, "mmsi": vessel.mmsi, "lat": vessel.position.lat_deg, "lon": vessel.position.lon_deg,
+        "status": vessel.nav_status,
+    }
+    if vessel.cog_deg is not None:
+        said["course"] = vessel.cog_deg
+    if vessel.sog_mps is not None:
+        said["speed"] = vessel.sog_mps / _MPS_PER_KNOT
+    if vessel.heading_deg is not None:
+        said["heading"] = round(vessel.heading_deg) % 360
+    return "".join(f"{line}\r\n" for line in encode_dict(said, talker_id="AI", sentence_type="VDM")).encode()
+
+
+class Others:
+    """The vessels of one run."""
+
+    def __init__(
+        self, frame: LocalFrame, wind: Wind, seed: int, *, port: int, hear: Callable[[Vessel], None] | None = None
+    ) -> None:
+        """Tell of them at the UDP ``port`` of this machine (0: by nothing), AIS to ``hear`` if that is given."""
+        self._frame, self._wind, self._seed = frame, wind, seed
+        self._port, self._hear = port, hear or self._receive
+        self._vessels: list[Moving] = []
+        self._second: SecondBoat | None = None
+
+    def note(self, truth: Truth, here_en_m: tuple[float, float], t_s: float) -> None:
+        """Put the least distances so far into ``truth``; ``t_s`` is the scenario's time."""
+        for vessel in self._vessels:
+            name = str(vessel.mmsi)
+            nearest = min(truth.vessels_m.get(name, math.inf), distance_m(vessel, here_en_m, t_s))
+            truth.vessels_m[name] = round(nearest, 2)
+        if self._second is not None:
+            truth.second_boat_m = self._second.nearest_goal_m
+
+    async def play(self, event: EventSpec, began_s: float, ours: Callable[[], tuple[Motion, float]]) -> None:
+        """Sail the vessel of ``event`` until cancelled, and tell of it every ``every_s``.
+
+        Args:
+            event: one of ``TRAFFIC``, whose time has come.
+            began_s: when the scenario began, of the loop's clock [s].
+            ours: where our boat is, how it moves, and its heading [rad].
+        """
+        number = len(self._vessels)
+        if event.kind == "vessel":
+            ship = ship_of(event, number)
+            self._vessels.append(ship)
+            while event.is_on_ais:
+                self._hear(ais_report(ship, self._frame, now_s() - began_s))
+                await asyncio.sleep(event.every_s)
+        elif event.kind == "intruder":
+            intruder = intruder_of(event, number, now_s() - began_s, *ours())
+            self._vessels.append(intruder)
+            while self._port:
+                self._tell(intruder, now_s() - began_s)
+                await asyncio.sleep(event.every_s)
+        else:
+            second = SecondBoat(
+                FIRST_MMSI + number, self._wind, self._seed, now_s() - began_s, (event.east_m, event.north_m),
+                (event.goal_east_m, event.goal_north_m))
+            self._vessels.append(second)
+            self._second = second
+            await self._sail(second, event.every_s, began_s, ours)
+
+    async def _sail(
+        self, second: SecondBoat, every_s: float, began_s: float, ours: Callable[[], tuple[Motion, float]]
+    ) -> None:
+        told_s = -math.inf
+        next_s = now_s()
+        while True:
+            if self._port and now_s() - told_s >= every_s:
+                told_s = now_s()
+                self._tell(second, told_s - began_s)
+            next_s += 1.0   # the model sails a second a call: a late timer is caught up with
+            await asyncio.sleep(max(0.0, next_s - now_s()))
+            second.sail(ours()[0], OUR_LENGTH_M)
+
+    def _tell(self, vessel: Moving, t_s: float) -> None:
+        send_datagram(radio_report(vessel, self._frame, t_s), self._port)
+
+    def _receive(self, vessel: Vessel) -> None:
+        send_datagram(sentences(vessel), self._port)

@@ -1,0 +1,231 @@
+"""Scenario files: a situation, the weather, the events in time, and what must hold.
+
+The same file runs on the embedded autopilot under the virtual clock and on the real ArduRover. Numbers carry
+their unit in the key; directions are where the wind comes from, degrees clockwise from true north.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from companion.errors import InputError
+from companion.words import choices
+
+# Unix time of every simulated voyage's start: stamps must not depend on when it was run.
+EPOCH_S = 1_781_000_000.0
+
+EventKind = Literal[
+    "wind_shift",        # veer_deg, over_s
+    "wind_speed",        # tws_mps, over_s
+    "mode",              # mode: a person's choice, by name; by: radio (the mode switch), else the ground station
+    "arm", "disarm",     # by the ground station
+    "set_current",       # seq, for_s: the ground station makes an item of the mission current, and insists
+    "reboot",            # the autopilot restarts
+    "link_cut",          # for_s (none: for good)
+    "link_half",         # state: unheard (the companion hears and is not heard) | deaf; for_s
+    "link_quality",      # loss, duplicate, reorder, delay_s, corrupt, noise
+    "neighbour",         # another boat's autopilot, system, is on the link; for_s; vehicle_type
+    "spoof",             # forgery ("MESSAGE: what it says", of sitl.trouble.forgeries), rate_hz, listens, for_s
+    "gps_jump",          # east_m, north_m, for_s, is_resisted (noticed by the EKF, as on the real one)
+    "gps_lost",          # for_s
+    "compass",           # value_deg to starboard, for_s: what the autopilot believes
+    "vane",              # state: frozen | offset | spikes | ok; value_deg
+    "kill_companion",    # restart_after_s: SIGKILL in the middle of whatever it does; saved, aged_s, clock_step_s
+    "kill_planner",      # its process dies; the next request starts another
+    "planner_hang",      # for_s: requests are not answered in time
+    "planner_starved",   # its process gets no more memory; a replaced one does
+    "disk",              # state: full | sick | read_only | ok; for_s: the companion's
+    "foreign_mission",   # somebody uploads another mission
+    "battery",           # volts
+    "radio_lost",        # for_s: the transmitter is out of range
+    "station",           # for_s: a ground station is heard, from then on no more
+    "knockdown",         # roll_deg, for_s
+    "current",           # set_deg, drift_mps, for_s
+    "crew",              # anchors react_s after the companion first calls for it, weighs after for_s
+    "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
+    "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
+    "second_boat",       # east_m, north_m, goal_east_m, goal_north_m: VAIMOS's model, steered by field, told by radio
+]
+
+
+class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The weather."""
+
+    model: Literal["constant", "ou", "recorded"] = "ou"
+    from_deg: float = 0.0
+    tws_mps: float = 5.0
+    sd_deg: float = 9.0
+    tau_s: float = 28.0          # 1 / rho: Wolsieffer's 0.036 Hz
+    tws_sd_mps: float = 0.3
+    file: str | None = None
+
+
+class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Something that happens at ``at_s`` [s] after the simulation's start."""
+
+    at_s: float
+    kind: EventKind
+    veer_deg: float = 0.0
+    over_s: float = 0.0
+    tws_mps: float | None = None
+    mode: str | None = None
+    by: Literal["radio", "station"] = "station"
+    for_s: float | None = None
+    loss: float = 0.0
+    duplicate: float = 0.0
+    reorder: float = 0.0
+    corrupt: float = 0.0
+    noise: float = 0.0           # of the bytes: lost, changed or inserted
+    delay_s: float = 0.0
+    east_m: float = 0.0
+    north_m: float = 0.0
+    is_resisted: bool = False
+    state: str | None = None
+    value_deg: float = 0.0
+    restart_after_s: float | None = None
+    saved: Literal["kept", "lost", "torn", "old"] = "kept"   # what becomes of the companion's saved state
+    aged_s: float = 0.0          # of an old one: as it was so long before
+    clock_step_s: float = 0.0    # of the companion's wall clock, when it lives again
+    volts: float | None = None
+    roll_deg: float = 0.0
+    seq: int = 1
+    system: int = 7              # of a neighbour
+    vehicle_type: int = 11
+    forgery: str = ""
+    rate_hz: float = 5.0
+    listens: bool = False        # the forger hears the boat
+    set_deg: float = 0.0
+    drift_mps: float = 0.0
+    react_s: float = 0.0         # a crew's, from being called to the anchor on the ground
+    course_deg: float = 0.0
+    sog_mps: float = 0.0
+    every_s: float = 10.0        # between its AIS reports
+    is_on_ais: bool = True
+    length_m: float | None = None   # of a vessel; none: a ship of 100 m, a boat of 3.65 m
+    gap_m: float = 0.0
+    bearing_deg: float = 0.0     # clockwise
+    goal_east_m: float = 0.0
+    goal_north_m: float = 0.0
+
+
+# What a boat must bear without coming nearer to anything than its mission allows.
+ORDINARY = frozenset({
+    "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "vessel",
+    "neighbour", "disk"})
+ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
+ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
+ORDINARY_LOSS = 0.3          # a link that loses more is none
+ORDINARY_NOISE = 0.005       # of bytes: one frame in five
+
+
+def is_ordinary(event: EventSpec) -> bool:
+    """Return whether an event belongs to ordinary weather, links and traffic."""
+    if event.kind == "wind_shift":
+        return abs(event.veer_deg) <= ORDINARY_VEER_DEG
+    if event.kind in {"link_cut", "link_half"}:
+        return event.for_s is not None and event.for_s <= ORDINARY_CUT_S
+    if event.kind == "link_quality":
+        return event.loss <= ORDINARY_LOSS and event.noise <= ORDINARY_NOISE
+    return event.kind in ORDINARY
+
+
+def is_all_ordinary(events: Iterable[EventSpec]) -> bool:
+    """Return whether nothing but ordinary weather, links and traffic befalls the boat."""
+    return all(is_ordinary(event) for event in events)
+
+
+class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What must hold when it is over; a check that is not asked for is not made."""
+
+    arrived: bool | None = True
+    contacts: int | None = 0
+    within_m: float | None = None             # last position to the last goal, or to what ``ends_at`` names
+    ends_at: Literal["goal", "home", "refuge"] = "goal"   # home: where she was armed; the nearest refuge
+    refuge_within_m: float | None = None      # of a refuge, at some moment
+    max_time_s: float | None = None
+    min_clearance_m: float | None = None
+    min_vessel_distance_m: float | None = None  # from the boat to each vessel's hull
+    second_boat_within_m: float | None = None   # of its goal, at some moment
+    station_radius_m: float | None = None       # about their mean, of 95 % of 5 minutes' points at the last goal
+    max_silence_s: float | None = 10.0        # without a status from the companion that says why
+    max_replans_per_hour: float | None = None
+    max_tacks: int | None = None              # before the boat first comes within ``within_m`` of the last goal
+    end_phase: str | None = None
+    alerts: tuple[str, ...] = ()              # announced at least once, by code
+    marks_rounded: int | None = None           # in order, each on its side
+    called_s: float | None = None              # the crew is called to the anchor this long before a contact
+
+
+class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One scenario file."""
+
+    name: str
+    title: str = ""
+    mission: str
+    limit_s: float = 3600.0
+    speedup: float = 8.0                      # when it runs in real time, separate processes
+    start_heading_deg: float | None = None
+    has_ftp: bool = True                      # the embedded autopilot offers MAVFTP; else items go one by one
+    is_service: bool = False                  # a companion that heard no autopilot is started again
+    exit_on_arrival: bool = True              # else the boat is watched in its loiter until the limit
+    dry_run: bool = False                     # the companion may only look
+    set_auto: bool = True                     # it may set modes
+    system: int | None = None                 # of our autopilot, named in place of what the mission says
+    wind: WindSpec = msgspec.field(default_factory=WindSpec)
+    parameters: dict[str, float] = {}
+    events: tuple[EventSpec, ...] = ()
+    expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)
+
+    def mission_path(self, source: Path) -> Path:
+        """Return the mission file, which is named relative to the scenario."""
+        return (source.parent / self.mission).resolve()
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read a scenario, or a mission file as the plain scenario of sailing it.
+
+    Raises:
+        InputError: naming the file, the key and the remedy.
+    """
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), "", error.strerror or "cannot be read", "name a scenario TOML file") from error
+    try:
+        raw: dict[str, Any] = msgspec.toml.decode(text)
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:
+        raise InputError(str(path), "", f"is not TOML ({str(error)[:80]})", "is it the file that was meant?") from error
+    if "mission" not in raw and "goal" in raw:
+        raw = {"name": str(raw.get("name", path.stem)), "mission": path.name}
+    try:
+        scenario = msgspec.convert(raw, Scenario)
+    except msgspec.ValidationError as error:
+        raise InputError(str(path), _place(error), _sentence(error), _suggestion(error)) from error
+    if not scenario.mission_path(path).is_file():
+        raise InputError(str(path), "mission", f"there is no file {scenario.mission}", "paths start at the scenario")
+    return scenario
+
+
+def _place(error: msgspec.ValidationError) -> str:
+    _, _, place = str(error).partition(" - at `$")
+    return place.rstrip("`").lstrip(".")
+
+
+def _sentence(error: msgspec.ValidationError) -> str:
+    return str(error).partition(" - at ")[0]
+
+
+def _suggestion(error: msgspec.ValidationError) -> str:
+    if "Invalid enum value" in str(error):
+        return "write one of " + ", ".join(choices(Scenario, str(error).partition(" - at `")[2].rstrip("`")))
+    if "unknown field" not in str(error):
+        return ""
+    word = str(error).partition("`")[2].partition("`")[0]
+    table = {"wind": WindSpec, "events": EventSpec, "expect": ExpectSpec}.get(_place(error).split("[")[0], Scenario)
+    close = difflib.get_close_matches(word, table.__struct_fields__, n=1)
+    return f"did you mean `{close[0]}`?" if close else f"known: {', '.join(table.__struct_fields__)}"

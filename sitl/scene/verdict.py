@@ -1,0 +1,289 @@
+"""The judge: what the boat really did, against what the scenario says must hold.
+
+Works on the truth (where the boat was, not where anybody believed it was) and on what the companion recorded.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from companion.boat import Hull
+from sitl.scene.clearance import HullTrack
+from sitl.scene.scenario import ExpectSpec
+from sitl.scene.scores import station_score
+
+# A call to the anchor is for what comes within this time [s].
+CALL_HOLDS_S = 600.0
+# A tack is counted when the boat has been on the other side of the wind for this long.
+TACK_SETTLED_S = 3.0
+
+
+@dataclass(slots=True)
+class Truth:
+    """The true track, sampled at a fixed rate from setting sail on."""
+
+    t_s: list[float] = field(default_factory=list)
+    en_m: list[tuple[float, float]] = field(default_factory=list)
+    heading_rad: list[float] = field(default_factory=list)
+    speed_mps: list[float] = field(default_factory=list)
+    twd_from_rad: list[float] = field(default_factory=list)
+    tws_mps: list[float] = field(default_factory=list)
+    vessels_m: dict[str, float] = field(default_factory=dict)   # the least distance to each vessel's hull
+    second_boat_m: float | None = None   # the second boat's least distance to its goal
+
+    def add(
+        self, t_s: float, en_m: tuple[float, float], heading_rad: float, speed_mps: float, wind: tuple[float, float]
+    ) -> None:
+        """Append one sample."""
+        self.t_s.append(t_s)
+        self.en_m.append(en_m)
+        self.heading_rad.append(heading_rad)
+        self.speed_mps.append(speed_mps)
+        self.twd_from_rad.append(wind[0])
+        self.tws_mps.append(wind[1])
+
+    def positions_m(self) -> NDArray[np.float64]:
+        """Return (n, 2) east, north [m]."""
+        return np.asarray(self.en_m, dtype=np.float64).reshape(-1, 2)
+
+    def hull(self, hull: Hull) -> HullTrack:
+        """Return the track of a hull that was there."""
+        return HullTrack(
+            en_m=self.positions_m(), heading_rad=np.asarray(self.heading_rad, dtype=np.float64), hull=hull)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One thing that had to hold, with its figure."""
+
+    name: str
+    passed: bool
+    figure: Any
+    required: Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """The outcome of one run."""
+
+    scenario: str
+    seed: int
+    passed: bool
+    checks: tuple[Check, ...]
+    figures: dict[str, Any]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of verdict.json."""
+        return {
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "passed": self.passed,
+            "checks": [
+                {"name": c.name, "passed": c.passed, "figure": c.figure, "required": c.required} for c in self.checks
+            ],
+            "figures": self.figures,
+        }
+
+
+def count_tacks(truth: Truth, until: int | None = None) -> tuple[int, int]:
+    """Return (tacks, gybes): settled changes of the side that the wind comes from, in the first ``until`` samples."""
+    tacks = gybes = 0
+    side = 0
+    pending = 0
+    since_s = -math.inf
+    deepest = last_twa = 0.0
+    samples = zip(truth.t_s, truth.heading_rad, truth.twd_from_rad, strict=True)
+    for t_s, heading, wind in itertools.islice(samples, until):
+        twa = (heading - wind + math.pi) % (2.0 * math.pi) - math.pi
+        now = 1 if twa > 0.0 else -1
+        if side == 0:
+            side = now
+        if now == side:
+            pending, deepest = 0, 0.0
+            last_twa = abs(twa)
+            continue
+        if pending == 0:
+            pending, since_s = now, t_s
+            deepest = min(abs(twa), last_twa)
+        if t_s - since_s >= TACK_SETTLED_S:
+            if deepest < math.pi / 2.0:
+                tacks += 1
+            else:
+                gybes += 1
+            side, pending = now, 0
+    return tacks, gybes
+
+
+# A mark is being rounded while the boat is this near [m]; its bearing from the mark must turn by this much [rad].
+ROUNDING_M = 60.0
+ROUNDING_RAD = math.radians(45.0)
+
+
+def count_roundings(positions_m: NDArray[np.float64], marks: Sequence[tuple[tuple[float, float], str]]) -> int:
+    """Return how many of ``marks`` the track rounds in their order, each left to its side.
+
+    A mark left to port is passed counter-clockwise: seen from it, the boat's bearing turns left.
+
+    Args:
+        positions_m: (n, 2) east, north [m].
+        marks: position [m] and "port" or "starboard", in the order of the course, laps written out.
+    """
+    rounded, at = 0, 0
+    for mark, side in marks:
+        offset = positions_m[at:] - np.asarray(mark)
+        # A board that only comes near, and a miss that is sailed again, are followed by the rounding itself.
+        near = _stretches(np.hypot(offset[:, 0], offset[:, 1]) < ROUNDING_M)
+        if not near:
+            break
+        ends = [end for first, end in near if _turned_rad(offset[first:end], side) >= ROUNDING_RAD]
+        rounded += bool(ends)
+        at += ends[0] if ends else near[0][1]
+    return rounded
+
+
+def _turned_rad(offset_m: NDArray[np.float64], side: str) -> float:
+    """Return how far the bearing from a mark turns the way it should for its side [rad]."""
+    bearing = np.unwrap(np.arctan2(offset_m[:, 0], offset_m[:, 1]))
+    return float(bearing[-1] - bearing[0]) * (-1.0 if side == "port" else 1.0)
+
+
+def _stretches(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return where ``holds`` is true without a break, as (first, behind the last)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], holds, [False])).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def longest_silence_s(status_times_s: Sequence[float], start_s: float, end_s: float) -> float:
+    """Return the longest stretch without a status [s]."""
+    times = [start_s, *[t for t in status_times_s if start_s <= t <= end_s], end_s]
+    return max((b - a for a, b in itertools.pairwise(times)), default=0.0)
+
+
+def judge(
+    *,
+    scenario: str,
+    seed: int,
+    expect: ExpectSpec,
+    truth: Truth,
+    solid: BaseGeometry,
+    hull: Hull,
+    goal_en_m: tuple[float, float],
+    summary: dict[str, Any],
+    status_times_s: Sequence[float] | None,
+    alerts: Iterable[str],
+    errors: Sequence[str] = (),
+    marks: Sequence[tuple[tuple[float, float], str]] = (),
+    refuges_en_m: Sequence[tuple[float, float]] = (),
+    floor_m: float | None = None,
+    called_at_s: Sequence[float] | None = None,
+    ordered: Sequence[int] | None = None,
+) -> Verdict:
+    """Hold a run against what its scenario expects.
+
+    ``hull`` is what touches. ``floor_m`` is the mission's, which the hull must keep in ordinary weather; None: not
+    asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
+    ``ordered`` are the systems of other autopilots that were given orders, None where there was no other.
+    """
+    ends = {"goal": [goal_en_m], "home": truth.en_m[:1], "refuge": refuges_en_m}[expect.ends_at]
+    positions = truth.positions_m()
+    hulls = truth.hull(hull)
+    touches, clearance = hulls.entries(solid), hulls.least_m(solid)[0]
+    contacts = len(touches)
+    tacks, gybes = count_tacks(truth)
+    end_distance = min((math.dist(truth.en_m[-1], p) for p in ends), default=math.inf) if truth.en_m else math.inf
+    duration_s = truth.t_s[-1] - truth.t_s[0] if truth.t_s else 0.0
+    sailed_m = float(np.sum(np.hypot(*np.diff(positions, axis=0).T))) if len(positions) > 1 else 0.0
+    silence_s = None
+    if status_times_s is not None and truth.t_s:
+        silence_s = longest_silence_s(status_times_s, truth.t_s[0], truth.t_s[-1])
+    seen = set(alerts)
+    checks: list[Check] = [Check(name="no unhandled error", passed=not errors, figure=list(errors), required=[])]
+
+    def check(name: str, passed: bool, figure: Any, required: Any) -> None:
+        checks.append(Check(name=name, passed=passed, figure=figure, required=required))
+
+    arrived = bool(summary.get("arrived"))
+    if expect.arrived is not None:
+        check("arrived", arrived == expect.arrived, arrived, expect.arrived)
+    if expect.contacts is not None:
+        # a boat that never sailed touched nothing and does not pass
+        check("contacts", bool(truth.t_s) and contacts <= expect.contacts, contacts if truth.t_s else None,
+              f"at most {expect.contacts}")
+    if expect.within_m is not None:
+        check(f"distance to the {expect.ends_at}, m", end_distance <= expect.within_m, end_distance,
+              f"at most {expect.within_m}")
+    if expect.refuge_within_m is not None:
+        nearest = min((float(np.min(np.hypot(*(positions - p).T))) for p in refuges_en_m), default=math.inf)
+        check("nearest to a refuge, m", nearest <= expect.refuge_within_m, nearest, f"at most {expect.refuge_within_m}")
+    if expect.max_time_s is not None:
+        check("time, s", duration_s <= expect.max_time_s, duration_s, f"at most {expect.max_time_s}")
+    least_m = max((m for m in (expect.min_clearance_m, floor_m) if m is not None), default=None)
+    if least_m is not None:
+        check("clearance, m", clearance >= least_m, clearance, f"at least {least_m}")
+    if expect.min_vessel_distance_m is not None:
+        nearest = min(truth.vessels_m.values(), default=-math.inf)   # nothing measured does not pass
+        check("distance to vessels, m", nearest >= expect.min_vessel_distance_m, truth.vessels_m,
+              f"at least {expect.min_vessel_distance_m}")
+    if expect.second_boat_within_m is not None:
+        nearest_m = truth.second_boat_m
+        check("the second boat's distance to its goal, m", nearest_m is not None and
+              nearest_m <= expect.second_boat_within_m, nearest_m, f"at most {expect.second_boat_within_m}")
+    if expect.station_radius_m is not None:
+        track = np.column_stack([truth.t_s, positions]) if truth.t_s else np.zeros((0, 3))
+        score = station_score(track, goal_en_m)
+        check("station keeping: radius of 95 %, m", score.kept and score.radius95_m <= expect.station_radius_m,
+              score.radius95_m, f"at most {expect.station_radius_m}")
+    if expect.max_silence_s is not None and silence_s is not None:
+        check("silence, s", silence_s <= expect.max_silence_s, silence_s, f"at most {expect.max_silence_s}")
+    if expect.max_replans_per_hour is not None and duration_s > 0.0:
+        rate = float(summary.get("replans", 0)) * 3600.0 / duration_s
+        check("replans per hour", rate <= expect.max_replans_per_hour, rate, f"at most {expect.max_replans_per_hour}")
+    if expect.max_tacks is not None:
+        # past the goal the autopilot does as it likes: a loiter may tack
+        there = np.flatnonzero(np.hypot(*(positions - goal_en_m).T) <= (expect.within_m or 0.0))
+        on_the_way, _ = count_tacks(truth, int(there[0]) if len(there) else None)
+        check("tacks on the way", on_the_way <= expect.max_tacks, on_the_way, f"at most {expect.max_tacks}")
+    if expect.end_phase is not None:
+        check("end phase", summary.get("end_phase") == expect.end_phase, summary.get("end_phase"), expect.end_phase)
+    if expect.marks_rounded is not None:
+        rounded = count_roundings(positions, marks)
+        check("marks rounded", rounded == expect.marks_rounded, rounded, expect.marks_rounded)
+    if expect.called_s is not None and called_at_s is not None:
+        ahead_s = [max((truth.t_s[i] - t for t in called_at_s if 0.0 <= truth.t_s[i] - t <= CALL_HOLDS_S), default=0.0)
+                   for i in touches]
+        check("called before a contact, s", all(s >= expect.called_s for s in ahead_s), ahead_s,
+              f"at least {expect.called_s}")
+    if ordered is not None:
+        check("neighbours given orders", not ordered, list(ordered), [])
+    for code in expect.alerts:
+        check(f"announced {code}", code in seen, sorted(seen), code)
+    return Verdict(
+        scenario=scenario,
+        seed=seed,
+        passed=all(c.passed for c in checks),
+        checks=tuple(checks),
+        figures={
+            "arrived": arrived,
+            "contacts": contacts,
+            "time_s": duration_s,
+            "distance_m": sailed_m,
+            "tacks": tacks,
+            "gybes": gybes,
+            "min_clearance_m": clearance if math.isfinite(clearance) else None,
+            "vessel_distances_m": truth.vessels_m,
+            "end_distance_m": end_distance,
+            "silence_s": silence_s,
+            "replans": summary.get("replans"),
+            "promised_risk": summary.get("promised_risk"),
+            "no_go_entries": summary.get("no_go_entries"),
+            "end_reason": summary.get("end_reason"),
+        },
+    )

@@ -1,0 +1,1 @@
+"""The world: wind, boats as physics, the air that radios share."""

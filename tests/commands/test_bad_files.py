@@ -1,0 +1,205 @@
+"""Every command with every file that it reads or writes broken: one line that names the file, and no traceback."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from companion import cli
+from companion.clock import run_virtual
+from companion.commands.run import NOT_THERE
+from sitl import cli as sitl_cli
+from sitl.run import compiled
+from sitl.run.embedded import run_embedded
+from sitl.scene.scenario import ExpectSpec, Scenario, WindSpec
+
+ROOT = Path(__file__).parents[2]
+PROBLEM = ROOT / "bench" / "problems"
+DAMAGES = {
+    "missing": None,
+    "empty": b"",
+    "binary": bytes(range(256)) * 4,
+    "text": b"What is this, and who wrote it?\n",
+    "list": b"[1, 2, {}]\n",
+    "table": b"{}\n",
+    "nulls": b'{"t_s": null, "kind": null, "run": null, "goals": [null], "name": null, "origin": null}\n',
+    "deep": b"[" * 100_000,
+    "nan": b"t_s,frames,lat_deg\nnan,nan,inf\n",
+}
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """A mission with everything that one may name, and a voyage of it."""
+    folder = tmp_path_factory.mktemp("short")
+    (folder / "rock.wkt").write_text("POLYGON ((-1.3102 50.8175, -1.3098 50.8175, -1.3098 50.8177, -1.3102 50.8177, "
+                                     "-1.3102 50.8175))")
+    (folder / "fence.wkt").write_text("POLYGON ((-1.32 50.81, -1.30 50.81, -1.30 50.83, -1.32 50.83, -1.32 50.81))")
+    (folder / "boat.pol").write_text("TWA;4;6;8\n45;2.1;3.0;3.6\n90;2.8;3.4;3.9\n150;2.0;2.9;3.6\n")
+    (folder / "mission.toml").write_text(
+        'name = "short"\n[start]\nlat = 50.8170\nlon = -1.3100\n[[goal]]\nlat = 50.8181\nlon = -1.3100\n'
+        '[area]\nobstacles = ["rock.wkt"]\nfence = "fence.wkt"\nmargin_m = 10.0\n[boat]\npolar = "boat.pol"\n')
+    (folder / "wind.csv").write_text(
+        "t_s,wind_from_deg,wind_speed_ms\n" + "".join(f"{t},{350 + t % 7},5.0\n" for t in range(0, 1500, 2)))
+    (folder / "scenario.toml").write_text(
+        'name = "short"\nmission = "mission.toml"\nlimit_s = 60.0\n[wind]\nmodel = "recorded"\nfile = "wind.csv"\n')
+    shutil.copy(next(PROBLEM.glob("*.json")), folder / "problem.json")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def voyage(short, tmp_path_factory):
+    out = tmp_path_factory.mktemp("voyage") / "v"
+    scenario = Scenario(name="short", mission="mission.toml", limit_s=90.0, wind=WindSpec(tws_mps=5.0),
+                        expect=ExpectSpec())
+    run_virtual(run_embedded(scenario, short / "scenario.toml", 1, out, expansions=2000))
+    return out
+
+
+def ends_in_one_line(capsys, program, argv, name):
+    """Run a command on a broken file: it may do without it, or refuse it in one line that names it."""
+    code = program.main([str(a) for a in argv])
+    err = capsys.readouterr().err
+    progress = (": note: ", "compiling kernels")
+    refusals = [line for line in err.splitlines() if not any(words in line for words in progress)]
+    assert "Traceback" not in err
+    if code != 0:
+        assert code in {1, 2, NOT_THERE}, argv
+        assert len(refusals) <= 1, refusals
+        if refusals:
+            assert Path(name).name in refusals[0], refusals[0]
+            assert len(refusals[0]) < 500
+    return code
+
+
+def broken(folder, name, damage):
+    path = folder / name
+    if damage == "folder":
+        path.unlink(missing_ok=True)
+        path.mkdir()
+    elif DAMAGES[damage] is None:
+        path.unlink(missing_ok=True)
+    else:
+        path.write_bytes(DAMAGES[damage])
+
+
+READS = [
+    (cli, ("mission", "check", "mission.toml"), ("mission.toml", "rock.wkt", "fence.wkt", "boat.pol")),
+    (cli, ("run", "mission.toml", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--state", "state.json"),
+     ("mission.toml", "rock.wkt", "boat.pol")),
+    (cli, ("run", "mission.toml", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--signing-key", "key"), ("key",)),
+    (cli, ("doctor", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--mission", "mission.toml"), ("mission.toml",)),
+    (cli, ("doctor", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--signing-key", "key"), ("key",)),
+    (cli, ("fence", "check", "rock.wkt"), ("rock.wkt",)),
+    (cli, ("fence", "convert", "rock.wkt", "out.kml"), ("rock.wkt",)),
+    (cli, ("mission", "convert", "mission.toml", "out.plan"), ("mission.toml", "rock.wkt")),
+    (cli, ("mission", "new", "new.toml", "--start", "50.817,-1.31", "--goal", "50.8181,-1.31", "--land", "rock.wkt",
+           "--fence", "fence.wkt"), ("rock.wkt", "fence.wkt")),
+    (cli, ("mission", "new", "new.toml", "--from", "drawing.kml"), ("drawing.kml",)),
+    (cli, ("mission", "upload", "drawing.kml", "--link", "tcp:127.0.0.1:1"), ("drawing.kml",)),
+    (cli, ("plan", "problem.json", "--expansions", "50"), ("problem.json",)),
+    (cli, ("wind", "wind.csv", "--estimator", "mean5"), ("wind.csv",)),
+    (cli, ("wind", "wind.tlog", "--estimator", "mean5"), ("wind.tlog",)),
+    (cli, ("wind", "wind.bin", "--estimator", "mean5"), ("wind.bin",)),
+    (sitl_cli, ("run", "scenario.toml", "--out", "v"), ("scenario.toml", "mission.toml", "boat.pol", "wind.csv")),
+    (sitl_cli, ("campaign", "scenario.toml", "--runs", "1", "--workers", "1"), ("scenario.toml", "boat.pol")),
+    (sitl_cli, ("boat", "--polar", "boat.pol", "--port", "0", "--udp", "0"), ("boat.pol",)),
+    (sitl_cli, ("boat", "--wind", "wind.csv", "--port", "0", "--udp", "0"), ("wind.csv",)),
+]
+
+
+@pytest.mark.parametrize("damage", [*DAMAGES, "folder"])
+@pytest.mark.parametrize(("program", "argv", "name"), [(p, a, n) for p, a, names in READS for n in names],
+                         ids=lambda v: "-".join(v[:2]) if isinstance(v, tuple) else v if isinstance(v, str) else "")
+def test_what_is_read(short, tmp_path, monkeypatch, capsys, program, argv, name, damage):
+    shutil.copytree(short, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    broken(tmp_path, name, damage)
+    missing_on_the_boat = argv[0] == "run" and program is cli and damage == "missing"   # the unit tries again
+    assert ends_in_one_line(capsys, program, argv, name) in ({NOT_THERE} if missing_on_the_boat else {1, 2})
+
+
+VOYAGE_FILES = ("voyage.toml", "decisions.jsonl", "track.csv", "area.json", "summary.json", "telemetry.tlog",
+                "mission/mission.toml")
+
+
+@pytest.mark.parametrize("damage", [*DAMAGES, "folder"])
+@pytest.mark.parametrize("name", VOYAGE_FILES)
+@pytest.mark.parametrize("command", ["report", "replay"])
+def test_a_voyage_with_a_broken_file(voyage, tmp_path, capsys, command, name, damage):
+    folder = tmp_path / "v"
+    shutil.copytree(voyage, folder)
+    broken(folder, name, damage)
+    ends_in_one_line(capsys, cli, (command, folder), name)
+
+
+@pytest.mark.parametrize("name", ["area.json", "summary.json"])
+def test_a_value_of_another_kind_is_named(voyage, tmp_path, capsys, name):
+    """Each value of our JSON in turn is made a text, a table, nothing."""
+    folder = tmp_path / "v"
+    shutil.copytree(voyage, folder)
+    data = json.loads((folder / name).read_text())
+    for key in data:
+        for wrong in ("five", {"a": 1}, None, [1]):
+            (folder / name).write_text(json.dumps({**data, key: wrong}))
+            ends_in_one_line(capsys, cli, ("report", folder, "--json"), name)
+
+
+@pytest.mark.parametrize("line", ["not,a,row", "x" * 30, ",".join(["five"] * 18), ",".join(["1e400"] * 18)])
+def test_a_broken_row_is_named(voyage, tmp_path, capsys, line):
+    folder = tmp_path / "v"
+    shutil.copytree(voyage, folder)
+    rows = (folder / "track.csv").read_text().splitlines()
+    (folder / "track.csv").write_text("\n".join([*rows[:5], line, *rows[5:]]) + "\n")
+    for command in ("report", "replay"):
+        ends_in_one_line(capsys, cli, (command, folder), "track.csv")
+
+
+WRITES = [
+    (cli, ("plan", "problem.json", "--expansions", "50", "--out"), "plan.json"),
+    (cli, ("plan", "problem.json", "--expansions", "50", "--plot"), "plan.png"),
+    (cli, ("wind", "wind.csv", "--estimator", "mean5", "--plot"), "wind.png"),
+    (cli, ("wind", "wind.csv", "--estimator", "mean5", "--json"), "wind.json"),
+    (cli, ("mission", "check", "mission.toml", "--no-plan", "--plot"), "m.png"),
+    (cli, ("fence", "check", "rock.wkt", "--plot"), "f.png"),
+    (cli, ("mission", "convert", "mission.toml"), "out.plan"),
+    (cli, ("fence", "convert", "mission.toml"), "out.kml"),
+    (cli, ("mission", "new", "--start", "50.817,-1.31", "--goal", "50.8181,-1.31"), "new.toml"),
+    (cli, ("run", "mission.toml", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--state"), "state.json"),
+    (cli, ("report", "v", "--out"), "v.png"),
+    (cli, ("report", "v", "--track"), "v.gpx"),
+    (sitl_cli, ("campaign", "scenario.toml", "--runs", "1", "--json"), "c.json"),
+    (sitl_cli, ("faults", "--runs", "1", "--json"), "f.json"),
+    (sitl_cli, ("baselines", "--seeds", "1", "--who", "companion", "--out"), "b.jsonl"),
+    (sitl_cli, ("run", "scenario.toml", "--out"), "voyage"),
+]
+
+
+@pytest.mark.parametrize("place", ["a-file/inside", "is-a-folder"])
+@pytest.mark.parametrize(("program", "argv", "name"), WRITES, ids=lambda v: v if isinstance(v, str) else "")
+def test_what_is_written(short, voyage, tmp_path, monkeypatch, capsys, program, argv, name, place):
+    shutil.copytree(short, tmp_path, dirs_exist_ok=True)
+    shutil.copytree(voyage, tmp_path / "v")
+    monkeypatch.chdir(tmp_path)
+    target = Path(name)
+    if place == "is-a-folder":
+        if name == "voyage":
+            return   # a folder is what it wants
+        target.mkdir()
+    else:
+        Path("a-file").write_text("")
+        target = Path("a-file") / name
+    assert ends_in_one_line(capsys, program, (*argv, target), target.parent if "a-file" in str(target) else name) != 0
+
+
+@pytest.mark.parametrize("name", ["mission.toml", "boat.pol", "wind.csv", "rock.wkt"])
+def test_what_cannot_be_sailed_is_told_before_anything_is_compiled(short, tmp_path, monkeypatch, capsys, name):
+    """On a machine that has no kernels yet the refusal came a minute later, behind the compiling's progress."""
+    shutil.copytree(short, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(compiled, "compile_ahead", lambda: pytest.fail("compiled first"))
+    broken(tmp_path, name, "empty")
+    for argv in (("run", "scenario.toml", "--out", "v"), ("campaign", "scenario.toml", "--runs", "1")):
+        if name != "wind.csv" or argv[0] == "run":
+            assert ends_in_one_line(capsys, sitl_cli, argv, name) == 2

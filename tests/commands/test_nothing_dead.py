@@ -1,0 +1,239 @@
+"""No key, option or watchdog without a way to it through the program: what is promised must change something."""
+
+import argparse
+import ast
+import inspect
+import tomllib
+from dataclasses import fields
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion import cli
+from companion.commands.doctor import needs_of
+from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
+from companion.geofence import load_mission
+from companion.geofence.mission.options import tables
+from companion.skipper.step.config import Permissions
+from companion.skipper.watch.watchdogs import TABLE
+from companion.skipper.way.gates import gates_of
+from sitl import cli as sitl_cli
+from sitl.scene.scenario import load_scenario
+from sitl.scene.ships import free_port
+
+# One mission that has every table; the keys are given other values one by one.
+MISSION = """
+name = "m"
+description = "d"
+[start]
+lat = 50.8170000
+lon = -1.3100000
+heading_deg = 90.0
+[[goal]]
+lat = 50.8190
+lon = -1.3100
+radius_m = 20.0
+rounding = "port"
+name = "mark"
+[[goal]]
+lat = 50.8195
+lon = -1.3080
+[[refuge]]
+lat = 50.8172
+lon = -1.3090
+[area]
+obstacles = ["rock.wkt"]
+[operator]
+arm = true
+"""
+ROCK = "POLYGON ((-1.3110 50.8180, -1.3105 50.8180, -1.3105 50.8183, -1.3110 50.8183, -1.3110 50.8180))"
+FENCE = "POLYGON ((-1.32 50.81, -1.30 50.81, -1.30 50.83, -1.32 50.83, -1.32 50.81))"
+POINT = "POINT (-1.3060 50.8175)"
+
+# Every key with another value than the mission's or its default.
+OTHER = {
+    "goal": {"lat": 50.8189, "lon": -1.3099, "radius_m": 30.0, "rounding": "starboard", "name": "other"},
+    "refuge": {"lat": 50.8173, "lon": -1.3091, "radius_m": 25.0, "name": "cove"},
+    "start": {"lat": 50.8171, "lon": -1.3101, "heading_deg": 200.0},
+    "area": {"obstacles": ["point.wkt"], "fence": "fence.wkt", "axis": "latlon", "margin_m": 14.0,
+             "margin_floor_m": 7.0, "point_radius_m": 15.0},
+    "risk": {"delta_s": 0.8, "max_path_risk": 0.3},
+    "boat": {"polar": 2.0, "no_go_half_deg": 50.0, "max_twa_deg": 170.0, "turn_rate_deg_s": 20.0, "tack_loss_s": 6.0,
+             "gybe_loss_s": 3.0, "can_tack": False, "gybe_room_m": 40.0, "length_m": 3.0, "beam_m": 1.5, "motor": True},
+    "autopilot": {"system": 7, "frame": "motor"},
+    "wind": {"estimator": "mean90", "preview_from_deg": 40.0, "preview_speed_mps": 8.0},
+    "operator": {"arm": False, "set_auto": True, "guided": True, "upload_fence": True, "replace_foreign": True},
+    "skipper": {"replan": "forecast", "end": "home", "autopilot_beats": False, "guidance": "field", "station_s": 60.0,
+                "laps": 2, "bandwidth_m": 90.0, "planning_budget_s": 1.0, "expansions": 123, "seed": 7,
+                "min_replan_s": 25.0, "max_replan_s": 700.0, "wind_shift_deg": 30.0, "off_track_m": 45.0,
+                "voyage_timeout_s": 900.0},
+    "traffic": {"feeds": ["udpin:127.0.0.1:10110"], "safe_distance_m": 60.0, "safe_time_s": 80.0,
+                "drop_after_s": 300.0},
+}
+# What does not sail: pictures and previews, and what `companion run` itself takes. Tried below.
+DRAWN = {("start", "heading_deg"), ("wind", "preview_from_deg")}
+RUN = {("skipper", "expansions"), ("skipper", "seed"), ("autopilot", "system")}   # the last: test_whose
+
+
+def folder_with(path):
+    for name, text in (("rock.wkt", ROCK), ("fence.wkt", FENCE), ("point.wkt", POINT)):
+        (path / name).write_text(text)
+    return path
+
+
+def mission(path, table="", key="", value=None):
+    """Return the mission with one key set."""
+    import tomli_w
+
+    raw = tomllib.loads(MISSION)
+    if table == "area" and key in {"axis", "point_radius_m"}:
+        raw["area"]["obstacles"] = ["point.wkt"]
+    if (table, key) == ("area", "axis"):
+        (path / "point.wkt").write_text("POINT (50.8175 -1.3060)")
+    if table:
+        place = raw[table][0] if table in {"goal", "refuge"} else raw.setdefault(table, {})
+        place[key] = value
+    elif key:
+        raw[key] = value
+    (path / "m.toml").write_text(tomli_w.dumps(raw))
+    return load_mission(path / "m.toml")
+
+
+def base_for(path, table, key):
+    if table == "area" and key == "point_radius_m":
+        return mission(path, "area", "obstacles", ["point.wkt"])
+    return mission(path)
+
+
+def sailed(m):
+    """Return what the program sails by, as plain text."""
+    voyage, boat = voyage_of(m), voyage_of(m).boat
+    speeds = [[round(boat.polar.speed_mps(twa, tws), 6) for twa in np.arange(0.6, 3.1, 0.3)] for tws in (3.0, 8.0)]
+    rest = {f.name: getattr(boat, f.name) for f in fields(boat) if f.name != "polar"}
+    estimator = estimator_of(m)
+    return repr((
+        m.name, voyage.frame.origin, voyage.goals, voyage.laps, voyage.refuges, gates_of(voyage),
+        voyage.area.obstacles_wkt(0.0), voyage.area.fence_wkt(0.0), speeds, rest, config_of(m), permissions_of(m),
+        target_limits_of(m), feeds_of(m), type(estimator).__name__, needs_of(m),
+    ))
+
+
+def test_every_key_has_another_value_here():
+    known = {(table, key) for table, keys in tables().items() if table for key in keys}
+    assert {(table, key) for table, keys in OTHER.items() for key in keys} == known
+
+
+@pytest.mark.parametrize(("table", "key"), sorted(
+    {(table, key) for table, keys in OTHER.items() for key in keys} - DRAWN - RUN))
+def test_every_key_changes_what_is_sailed(table, key, tmp_path):
+    folder_with(tmp_path)
+    before = sailed(base_for(tmp_path, table, key))
+    assert sailed(mission(tmp_path, table, key, OTHER[table][key])) != before
+
+
+def test_the_name_is_the_voyages():
+    assert {"name", "description"} <= set(tables()[""])
+
+
+def picture(m, out, *options):
+    assert cli.main(["mission", "check", str(m.path), "--plot", str(out), *options]) == 0
+    return out.read_bytes()
+
+
+def test_what_only_previews_use_changes_the_picture(tmp_path, capsys):
+    folder_with(tmp_path)
+    plain = picture(mission(tmp_path), tmp_path / "a.png", "--no-plan")
+    assert picture(mission(tmp_path, "", "description", "other"), tmp_path / "b.png", "--no-plan") != plain
+    turned = mission(tmp_path, "wind", "preview_from_deg", OTHER["wind"]["preview_from_deg"])
+    assert picture(turned, tmp_path / "c.png", "--no-plan") != plain
+    capsys.readouterr()
+
+
+def test_the_starts_heading_is_that_of_a_simulated_boat(tmp_path):
+    from sitl.run.boats import heading_deg_of
+    from sitl.scene.scenario import Scenario
+
+    folder_with(tmp_path)
+    scenario = Scenario(name="s", mission="m.toml")
+    assert heading_deg_of(scenario, mission(tmp_path)) == 90.0
+    assert heading_deg_of(scenario, mission(tmp_path, "start", "heading_deg", 200.0)) == 200.0
+
+
+def test_effort_and_seed_reach_the_voyage(tmp_path, capsys):
+    """Nobody answers, and what it would have sailed with is in the folder."""
+    folder_with(tmp_path)
+    m = mission(tmp_path, "skipper", "expansions", 123)
+    m.path.write_text(m.path.read_text() + "seed = 7\n" if m.path.read_text().rstrip().endswith("123") else
+                      m.path.read_text().replace("expansions = 123", "expansions = 123\nseed = 7"))
+    code = cli.main(["run", str(m.path), "--link", f"udpin:127.0.0.1:{free_port()}", "--out", str(tmp_path / "v"),
+                     "--wait", "0.1", "--state", str(tmp_path / "s.json")])
+    capsys.readouterr()
+    assert code == 1
+    run = tomllib.loads((tmp_path / "v" / "voyage.toml").read_text())["run"]
+    assert (run["seed"], run["expansions"]) == (7, 123)
+
+
+def test_every_permission_can_be_given(tmp_path):
+    """A permission that no mission gives is a rule that nobody can reach."""
+    import tomli_w
+
+    folder_with(tmp_path)
+    raw = tomllib.loads(MISSION)
+    raw["operator"] = dict.fromkeys(tables()["operator"], True)
+    (tmp_path / "m.toml").write_text(tomli_w.dumps(raw))
+    given = permissions_of(load_mission(tmp_path / "m.toml"))
+    assert {f.name for f in fields(Permissions) if not getattr(given, f.name)} == set()
+
+
+def options_of(parser):
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for sub in action.choices.values():
+                yield from options_of(sub)
+        elif action.dest not in {"help", "version", argparse.SUPPRESS}:
+            yield action.dest
+
+
+def read_names(package):
+    """Return every attribute that the command modules read, and every name given to getattr."""
+    names = set()
+    for path in Path(inspect.getfile(package)).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):
+                names.add(node.attr)
+            elif isinstance(node, ast.Call) and getattr(node.func, "id", "") == "getattr":
+                names |= {a.value for a in node.args if isinstance(a, ast.Constant)}
+    return names
+
+
+@pytest.mark.parametrize(("program", "package"), [
+    (cli.PROGRAM, "companion.commands"), (sitl_cli.PROGRAM, "sitl.commands")])
+def test_every_option_is_read(program, package):
+    read = read_names(import_module(package))
+    unread = {
+        (name, dest) for name in program.commands for dest in options_of(program.parser(name))
+        if dest not in read and dest != "command"
+    }
+    assert unread == set()
+
+
+def test_every_watchdog_is_raised_in_a_scenario():
+    """By the autopilot's own messages: the scenario files say which, and the suites sail them."""
+    told = {}
+    for path in Path("sitl/scenarios").glob("*.toml"):
+        for code in load_scenario(path).expect.alerts:
+            told.setdefault(code, path.stem)
+    assert {dog.name for dog in TABLE} <= set(told)
+
+
+def test_every_failsafe_that_is_answered_is_in_a_scenario():
+    from companion.skipper.step.causes import TABLE as CAUSES
+    from companion.skipper.step.causes import Answer
+
+    told = {code for path in Path("sitl/scenarios").glob("*.toml") for code in load_scenario(path).expect.alerts}
+    answered = {f"{cause.name} failsafe" for cause in CAUSES if cause.answer is not Answer.LEAVE}
+    assert answered - told == set()
+
+

@@ -1,0 +1,83 @@
+"""One validation for who checks a mission and who sails it: what fails or is passed over under way is told before."""
+
+import socket
+from pathlib import Path
+
+import pytest
+
+from companion import cli
+from companion.errors import InputError
+from companion.geofence import load_mission
+from companion.sailable import require_sailable
+from sitl.commands import run as sitl_run
+from sitl.run.embedded import permitted
+from sitl.scene.scenario import load_scenario
+
+MISSIONS = Path(__file__).parents[2] / "missions"
+SCENARIOS = sorted((Path(sitl_run.__file__).parents[1] / "scenarios").glob("*.toml"))
+GOOD = (MISSIONS / "archipelago.toml").read_text()
+BAD = [
+    ("estimator", '[wind]\nestimator = "kalmann"\n',
+     "[wind] estimator: 'kalmann' is no wind estimator; did you mean 'kalman'?"),
+    ("choice", '[skipper]\nguidance = "fields"\n',
+     """[skipper] guidance: 'fields' is none of the choices; write "plan" or "heading" or "field\""""),
+    ("feed", '[traffic]\nfeeds = ["upd:1234"]\n', "[traffic] feeds: 'upd:1234' is not a feed; write udpin:HOST:PORT"),
+    ("floor", "margin_floor_m = 20.0", "[area] margin_floor_m: 20 m is more than margin_m"),
+    ("field", '[skipper]\nguidance = "field"\n', '[skipper] guidance: "field" steers in GUIDED, which nobody allows'),
+    ("heading", '[skipper]\nguidance = "heading"\n', "write guided = true in [operator]"),
+    ("replan", "[skipper]\nmin_replan_s = 60.0\nmax_replan_s = 30.0\n", "[skipper] max_replan_s: 30 s is less than"),
+    ("polar", '[boat]\npolar = "ardurovr"\n', "[boat] polar: there is no polar 'ardurovr'"),
+]
+
+
+def written(folder, change):
+    for name in ("archipelago.wkt", "archipelago-shore.wkt"):
+        (folder / name).write_text((MISSIONS / name).read_text())
+    text = GOOD
+    if change.startswith("margin_floor_m"):
+        text = "\n".join(line for line in text.splitlines() if "margin_floor_m" not in line)
+        text = text.replace("[area]", f"[area]\n{change}")
+    elif change:
+        table = change.splitlines()[0]
+        text = text.replace(table, change.rstrip()) if table in text else f"{text}\n{change}"
+    (folder / "m.toml").write_text(text)
+    return folder / "m.toml"
+
+
+@pytest.mark.parametrize(("what", "change", "words"), BAD, ids=[b[0] for b in BAD])
+def test_check_and_run_refuse_the_same_in_the_same_words(tmp_path, capsys, what, change, words):
+    path = written(tmp_path, change)
+    said = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        link = f"udpin:127.0.0.1:{free.getsockname()[1]}"   # nothing is opened before the mission is believed
+        for argv in (["mission", "check", str(path)], ["run", str(path), "--link", link, "--wait", "0.1"],
+                     ["doctor", "--mission", str(path), "--link", link]):
+            assert cli.main(argv) == 2, argv
+            error = capsys.readouterr().err
+            assert error.count("\n") == 1
+            said.append(error.split(": ", 1)[1])
+    assert words in said[0]
+    assert said[1:] == said[:1] * 2
+
+
+def test_a_good_mission_is_called_in_order(tmp_path, capsys):
+    assert cli.main(["mission", "check", str(written(tmp_path, ""))]) == 0
+    assert "in order" in capsys.readouterr().out
+
+
+def test_a_fence_of_nothing_is_not_uploaded(tmp_path):
+    (tmp_path / "m.toml").write_text("[[goal]]\nlat = 50.0\nlon = 1.0\n[operator]\nupload_fence = true\n")
+    with pytest.raises(InputError, match="no area to make a fence of"):
+        require_sailable(load_mission(tmp_path / "m.toml"))
+
+
+@pytest.mark.parametrize("path", sorted(MISSIONS.glob("*.toml")), ids=lambda p: p.stem)
+def test_every_example_can_be_sailed(path):
+    require_sailable(permitted(load_mission(path), load_scenario(path)))
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
+def test_every_scenario_can_be_sailed(path):
+    scenario = load_scenario(path)
+    require_sailable(permitted(load_mission(scenario.mission_path(path)), scenario))

@@ -1,0 +1,224 @@
+"""The autopilot's fence: contains what it must, stays inside the margin, proved on the items that go up."""
+
+import math
+import pathlib
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import Polygon
+
+from companion.geo.frame import LocalFrame
+from companion.geofence import Area, Circle, Fence, Obstacle, Zone, ZoneKind, load_mission
+from companion.geofence.fence.autopilot_fence import AutopilotFence, FenceStatus, fence_for_autopilot
+from companion.geofence.fence.proof import prove
+from companion.geofence.formats.fence_items import MAX_FENCE_ITEMS, items_to_zones, zones_to_items
+from companion.geofence.formats.rings import Findings
+from companion.geofence.shapes import unwrapped
+from companion.messages import GeoPoint
+from tests.geofence.strategies import QUIET
+
+MISSIONS = sorted((pathlib.Path(__file__).parents[3] / "missions").glob("*.toml"))
+
+
+def ground(shape, frame: LocalFrame, sides: int = 360) -> Polygon:
+    """A zone as it lies on the ground: polygon edges straight in longitude and latitude, cut fine; circles geodesic."""
+    if isinstance(shape, Circle):
+        x, y = frame.en_from_geo(shape.center)
+        t = 2.0 * np.pi * np.arange(sides) / sides
+        return Polygon(np.column_stack([x + shape.radius_m * np.cos(t), y + shape.radius_m * np.sin(t)]))
+    fine = shapely.segmentize(shape, 0.0005)
+    return Polygon(frame.array_en_from_lonlat(unwrapped(np.asarray(fine.exterior.coords)[:, :2])))
+
+
+def check(result: AutopilotFence, area: Area, margin_m: float, origin: GeoPoint) -> None:
+    """The promise, checked in another frame than the code's: azimuthal equidistant metres."""
+    frame = LocalFrame(origin)
+    zones, _ = items_to_zones(result.items, Findings())
+    assert len(result.items) <= MAX_FENCE_ITEMS
+    out = [ground(z.shape, frame) for z in zones if z.kind is ZoneKind.EXCLUSION]
+    inside = [ground(z.shape, frame) for z in zones if z.kind is ZoneKind.INCLUSION]
+    obstacles = [ground(o.shape, frame) for o in area.solids]
+    limits = [ground(z.shape, frame) for z in area.fence.inclusions]
+    keep_in = inside[0] if inside else None
+    closed = shapely.buffer(shapely.union_all(out) if out else Polygon(), 0.02)
+    for obstacle in obstacles:
+        reach = obstacle if keep_in is None else shapely.intersection(obstacle, keep_in)
+        assert shapely.difference(reach, closed).area < 0.02
+    for limit in limits:
+        assert shapely.covers(shapely.buffer(limit, 0.02), shapely.difference(keep_in, closed))
+    slack = 0.02 + 0.002 * margin_m
+    allowed = shapely.union_all([shapely.buffer(o, margin_m + slack, quad_segs=90) for o in obstacles] or [Polygon()])
+    if limits:
+        useful = shapely.buffer(shapely.intersection_all(limits), -margin_m - slack, quad_segs=90)
+        allowed = shapely.union(allowed, shapely.difference(shapely.box(-2e4, -2e4, 2e4, 2e4), useful))
+        here = shapely.points(0.0, 0.0)
+        piece = [p for p in shapely.get_parts(useful) if shapely.covers(p, here)]
+        assert all(shapely.covers(keep_in, p) for p in piece)
+    for zone in out:
+        assert shapely.covers(allowed, zone)
+
+
+@pytest.mark.parametrize("path", MISSIONS, ids=lambda p: p.stem)
+def test_every_example_fits(path):
+    mission = load_mission(path)
+    inside = [mission.start, *(g.point for g in mission.goals)]
+    result = fence_for_autopilot(mission.area, mission.margin_m, inside=inside)
+    if not mission.area.solids and not mission.area.fence.zones:
+        assert result.status is FenceStatus.EMPTY
+        return
+    assert result.status is FenceStatus.OK, result.reason
+    check(result, mission.area, mission.margin_m, mission.origin)
+
+
+@st.composite
+def areas(draw):
+    """Islands round a start, some of them circles, perhaps inside a lake."""
+    lat, lon = draw(st.sampled_from([(50.8, -1.3), (-33.0, 151.2), (0.0, 10.0), (68.0, 15.0), (20.0, 179.9995)]))
+    origin = GeoPoint(lat_deg=lat, lon_deg=lon)
+    frame = LocalFrame(origin)
+    margin_m = draw(st.sampled_from([3.0, 8.0, 12.0, 25.0]))
+    rng = np.random.default_rng(draw(st.integers(0, 10_000)))
+    obstacles = []
+    for i in range(draw(st.integers(0, 9))):
+        angle, far = rng.uniform(0, 2 * math.pi), rng.uniform(120.0, 420.0)
+        x, y = far * math.sin(angle), far * math.cos(angle)
+        if rng.uniform() < 0.25:
+            obstacles.append(Obstacle(shape=Circle(frame.geo_from_en(x, y), float(rng.uniform(4.0, 60.0)))))
+            continue
+        n = int(rng.integers(3, 40))
+        t = 2.0 * math.pi * (np.arange(n) + rng.uniform(0.0, 0.8)) / n
+        r = rng.uniform(8.0, 60.0) * rng.uniform(0.35, 1.0, n)
+        en = np.column_stack([x + r * np.cos(t), y + r * np.sin(t)])
+        own = float(rng.uniform(5.0, 40.0)) if rng.uniform() < 0.2 else None
+        obstacles.append(Obstacle(shape=Polygon(unwrapped(frame.array_lonlat_from_en(en))), name=f"i{i}", margin_m=own))
+    zones = []
+    if draw(st.booleans()):
+        n = int(rng.integers(4, 120))
+        t = 2.0 * math.pi * np.arange(n) / n
+        r = rng.uniform(300.0, 520.0, n) if n < 30 else 400.0 * (1.0 + 0.2 * np.sin(3 * t)) + rng.uniform(0.0, 12.0, n)
+        lake = np.column_stack([r * np.cos(t), r * np.sin(t)])
+        zones.append(Zone(kind=ZoneKind.INCLUSION, shape=Polygon(unwrapped(frame.array_lonlat_from_en(lake)))))
+    elif draw(st.booleans()):
+        zones.append(Zone(kind=ZoneKind.INCLUSION, shape=Circle(frame.geo_from_en(30.0, -20.0), 450.0)))
+    return Area(obstacles=tuple(obstacles), fence=Fence(zones=tuple(zones))), margin_m, origin
+
+
+@settings(**QUIET, max_examples=30)
+@given(areas())
+def test_simplified_zones_hold_the_true_ones_within_the_margin(case):
+    area, margin_m, origin = case
+    result = fence_for_autopilot(area, margin_m, inside=[origin])
+    if result.status is FenceStatus.OK:
+        check(result, area, margin_m if not any(o.margin_m for o in area.solids) else max(
+            margin_m, *(o.margin_m or 0.0 for o in area.solids)), origin)
+        assert 0.0 < result.used_m <= margin_m
+        assert result == fence_for_autopilot(area, margin_m, inside=[origin])
+    else:
+        assert result.reason
+        assert not result.items
+
+
+def test_most_random_areas_do_fit():
+    """The property above would also hold of a function that always refuses."""
+    good = []
+
+    @settings(**QUIET, max_examples=20)
+    @given(areas())
+    def count(case):
+        area, margin_m, origin = case
+        if area.solids or area.fence.zones:
+            good.append(fence_for_autopilot(area, margin_m, inside=[origin]).status is FenceStatus.OK)
+
+    count()
+    assert sum(good) > 0.8 * len(good)
+
+
+ORIGIN = GeoPoint(lat_deg=50.8, lon_deg=-1.3)
+
+
+def island(x, y, radii, name="island") -> Obstacle:
+    t = 2.0 * np.pi * np.arange(len(radii)) / len(radii)
+    en = np.column_stack([x + np.array(radii) * np.cos(t), y + np.array(radii) * np.sin(t)])
+    return Obstacle(shape=Polygon(LocalFrame(ORIGIN).array_lonlat_from_en(en)), name=name)
+
+
+def test_circles_where_they_are_cheaper():
+    round_ones = Area(obstacles=tuple(island(100.0 * i, 200.0, [20.0] * 30, f"r{i}") for i in range(40)))
+    result = fence_for_autopilot(round_ones, 10.0, inside=[ORIGIN])
+    assert result.status is FenceStatus.OK
+    assert len(result.items) == 40
+
+
+def test_thousands_of_vertices_fit():
+    rng = np.random.default_rng(3)
+    t = 2.0 * np.pi * np.arange(3_000) / 3_000
+    radii = 800.0 + 60.0 * np.sin(3.0 * t) + rng.uniform(0.0, 3.0, 3_000)
+    result = fence_for_autopilot(Area(obstacles=(island(0.0, 1200.0, radii),)), 15.0, inside=[ORIGIN])
+    assert result.status is FenceStatus.OK, result.reason
+    assert len(result.items) < 40
+    check(result, Area(obstacles=(island(0.0, 1200.0, radii),)), 15.0, ORIGIN)
+
+
+def test_refusals_say_why():
+    stars = [island(300.0 * (i % 6) - 700.0, 300.0 * (i // 6) + 200.0, [80.0, 20.0] * 5, f"star {i}")
+             for i in range(30)]
+    many = fence_for_autopilot(Area(obstacles=tuple(stars)), 5.0, inside=[ORIGIN])
+    assert many.status is FenceStatus.TOO_MANY_ITEMS
+    assert "autopilot holds 84" in many.reason
+    assert "star" in many.reason
+    wider = fence_for_autopilot(Area(obstacles=tuple(stars)), 60.0, inside=[ORIGIN])
+    assert wider.status is FenceStatus.OK, wider.reason
+    none = fence_for_autopilot(Area(obstacles=tuple(stars)), 0.05, inside=[ORIGIN])
+    assert none.status is FenceStatus.NO_MARGIN
+    on_the_rock = fence_for_autopilot(Area(obstacles=(island(0.0, 0.0, [30.0] * 8),)), 10.0, inside=[ORIGIN])
+    assert on_the_rock.status is FenceStatus.START_ENCLOSED
+    dry = Area(fence=Fence(zones=(Zone(kind=ZoneKind.INCLUSION, shape=island(500.0, 0.0, [50.0] * 8).shape),)))
+    assert fence_for_autopilot(dry, 10.0, inside=[ORIGIN]).status is FenceStatus.NO_WATER
+
+
+def test_a_lake_given_as_land_with_a_hole():
+    outer, inner = island(0.0, 0.0, [900.0] * 24), island(0.0, 0.0, [400.0] * 24)
+    land = Obstacle(shape=Polygon(outer.shape.exterior, [inner.shape.exterior]), name="land")
+    result = fence_for_autopilot(Area(obstacles=(land,)), 15.0, inside=[ORIGIN])
+    assert result.status is FenceStatus.OK, result.reason
+    assert {z.kind for z in result.zones} == {ZoneKind.INCLUSION}
+    assert any("sails inside land" in note for note in result.notes)
+
+
+def test_the_proof_finds_what_is_wrong():
+    """prove() is no rubber stamp: a vertex pulled in, a circle too small, a zone too wide, a start shut out."""
+    area = Area(obstacles=(island(0.0, 200.0, [40.0, 20.0, 40.0, 20.0, 40.0, 20.0]), island(150.0, 150.0, [20.0] * 30)))
+    result = fence_for_autopilot(area, 10.0, inside=[ORIGIN])
+    assert result.status is FenceStatus.OK
+    assert prove(area, result.items, 10.0, inside=[ORIGIN]) == ""
+    frame = LocalFrame(ORIGIN)
+    for zones, words in (
+        (tuple(Zone(kind=z.kind, shape=_scaled(z.shape, 0.9)) for z in result.zones), "do not hold"),
+        (tuple(Zone(kind=z.kind, shape=_scaled(z.shape, 1.6)) for z in result.zones), "beyond the planner's margin"),
+        (result.zones[:1], "do not hold"),
+        ((*result.zones, Zone(kind=ZoneKind.INCLUSION, shape=Circle(frame.geo_from_en(0.0, 300.0), 200.0))),
+         "start would be outside"),
+    ):
+        items, _ = zones_to_items(zones)
+        assert words in prove(area, items, 10.0, inside=[ORIGIN])
+
+
+def _scaled(shape, factor):
+    if isinstance(shape, Circle):
+        return Circle(shape.center, shape.radius_m * factor)
+    return shapely.affinity.scale(shape, factor, factor)
+
+
+def test_many_small_zones_fill_the_storage_before_there_are_84_items():
+    """ArduRover: "Fence exceeds storage size", although every list of 84 items was announced as supported."""
+    from companion.geofence.formats.fence_items import STORAGE_BYTES, storage_bytes
+    from companion.messages import Command, MissionItem
+
+    circles = [MissionItem(command=Command.NAV_FENCE_CIRCLE_EXCLUSION, params=(5.0, 0, 0, 0)) for _ in range(60)]
+    assert storage_bytes(circles) == 5 + 60 * 13 > STORAGE_BYTES
+    polygon = [MissionItem(command=Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION, params=(83.0, 0, 0, 0))] * 83
+    assert storage_bytes(polygon) == 5 + 2 + 83 * 8
+    assert storage_bytes(polygon) <= STORAGE_BYTES

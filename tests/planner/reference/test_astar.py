@@ -1,0 +1,150 @@
+"""AVALON's A*: its grid, its costs one by one, its goal heading, its ships, its memory."""
+
+import math
+
+import numpy as np
+import pytest
+
+from companion.planner import PlanStatus, Problem, plan
+from companion.planner.reference.astar import AstarSettings, grid_of, search_with, ship_discs, steps_of, target_heading
+from companion.planner.solve import Effort
+
+AVALON_TWA = list(range(0, 181, 5))
+AVALON_MPS = [
+    max(0.0, (-0.0048 * a**4 + 0.0335 * a**3 - 0.2460 * a**2 + 0.7465 * a - 0.01109) * 10.0 * 0.514444)
+    for a in map(math.radians, AVALON_TWA)
+]
+
+
+def problem(**change):
+    base = {
+        "id": "t", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 90},
+        "goal": {"x": 0, "y": 800, "radius": 10}, "obstacles": [], "fence": None,
+        "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}},
+        "boat": {"no_go_half_deg": 45, "max_twa_deg": 160, "turn_rate_rad_s": 0.5,
+                 "speed": {"model": "polar", "twa_deg": AVALON_TWA, "v_mps": AVALON_MPS}},
+        "delta_s": 0.5,
+    }
+    return Problem.from_json({**base, **change})
+
+
+def run(p, **settings):
+    outcome = search_with(p, Effort(None, 10**8), AstarSettings(**settings))
+    return outcome, (None if outcome.waypoints_en is None else p.evaluate(outcome.waypoints_en))
+
+
+def test_there_are_24_steps_on_16_headings():
+    step, courses = steps_of(grid_of(problem(), 20.0))
+    assert step.shape == (24, 4)
+    assert len(courses) == 16
+    assert {0.0, 45.0, 90.0, 135.0} <= {round(math.degrees(c), 6) for c in courses}
+    assert sorted(np.bincount(step[:, 2].astype(int)).tolist()) == [1] * 8 + [2] * 8
+
+
+@pytest.mark.parametrize("goal", [(0, 800), (333, 777), (-1000, 5), (5, -1000), (3, 4)])
+def test_start_and_goal_are_nodes_and_the_spacing_is_near_what_was_asked(goal):
+    p = problem(goal={"x": goal[0], "y": goal[1], "radius": 1})
+    grid = grid_of(p, 20.0)
+    assert grid.place(grid.start) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert grid.place(grid.goal) == pytest.approx(goal, abs=5.0)  # a quarter of a cell
+    assert 5.0 <= grid.dx_m < 27.0
+    assert 5.0 <= grid.dy_m < 27.0
+    if min(map(abs, goal)) >= 5.0 or 0 in goal:
+        assert grid.place(grid.goal) == pytest.approx(goal, abs=1e-6)
+
+
+@pytest.mark.parametrize("wind_from", range(0, 360, 30))
+def test_headings_stay_45_to_160_degrees_off_the_wind_and_turns_within_90(wind_from):
+    p = problem(wind={"from_deg": wind_from, "speed_mps": 5, "sigma": {"model": "none"}})
+    outcome, judged = run(p)
+    assert judged is not None
+    assert judged.is_feasible, judged.reasons
+    for i, leg in enumerate(judged.legs):
+        assert 45.0 - 1e-6 <= abs(math.degrees(leg.twa_rad)) <= 160.0 + 1e-6
+        if i:
+            assert abs(math.degrees(leg.turn_rad)) <= 90.0 + 1e-6
+    assert outcome.trace["expanded"] > 0
+
+
+def test_it_is_dijkstra_s_optimum_with_less_work():
+    p = problem(wind={"from_deg": 40, "speed_mps": 5, "sigma": {"model": "none"}},
+                obstacles=["POLYGON((-100 300,150 300,150 450,-100 450,-100 300))"])
+    informed, _ = run(p)
+    blind, _ = run(p, heuristic_mps=None)
+    assert informed.trace["objective"] == pytest.approx(blind.trace["objective"], rel=1e-9)
+    assert informed.trace["expanded"] < blind.trace["expanded"]
+
+
+def test_the_turning_cost_makes_fewer_turns():
+    p = problem(wind={"from_deg": 20, "speed_mps": 5, "sigma": {"model": "none"}},
+                obstacles=["POLYGON((-100 300,150 300,150 450,-100 450,-100 300))"])
+    _, plain = run(p, turn_s_per_rad=0.0)
+    _, smooth = run(p, turn_s_per_rad=8.0)
+    turning = [sum(abs(leg.turn_rad) for leg in judged.legs) for judged in (plain, smooth)]
+    assert turning[1] <= turning[0]
+    assert len(smooth.legs) <= len(plain.legs)
+
+
+def test_the_tack_cost_makes_fewer_tacks_and_the_tunnel_keeps_to_the_line():
+    p = problem()
+    _, plain = run(p, turn_s_per_rad=0.0)
+    _, tacks = run(p, turn_s_per_rad=0.0, tack_s=60.0, gybe_s=60.0)
+    assert tacks.tacks + tacks.gybes <= plain.tacks + plain.gybes
+
+    def widest(judged):
+        return max(abs(leg.to_en[0]) for leg in judged.legs)
+
+    _, tunnel = run(p, turn_s_per_rad=8.0, tunnel_width_m=40.0)
+    _, free = run(p, turn_s_per_rad=8.0)
+    assert widest(tunnel) < widest(free)
+
+
+def test_the_goal_heading_is_the_bearing_turned_out_of_the_wind():
+    _, courses = steps_of(grid_of(problem(), 20.0))
+    every = np.ones(16, dtype=bool)
+    assert courses[target_heading(courses, every, 0.0)] == pytest.approx(0.0)
+    sailable = np.array([abs(math.degrees(c)) >= 45.0 for c in courses])
+    assert abs(math.degrees(courses[target_heading(courses, sailable, math.radians(3.0))])) == pytest.approx(45.0)
+    assert target_heading(courses, np.zeros(16, dtype=bool), 0.0) == -1
+
+
+def test_the_grid_refuses_to_grow_past_its_memory_and_says_what_would_fit():
+    outcome, _ = run(problem(), grid_m=0.01)
+    assert outcome.waypoints_en is None
+    assert outcome.status is PlanStatus.TIMEOUT
+    assert "MB allowed" in outcome.reason
+    fits = float(outcome.reason.split("one of ")[1].split(" m")[0])
+    grid = grid_of(problem(), 1.1 * fits)
+    assert grid.memory_bytes <= AstarSettings().memory_bytes
+
+
+def test_a_ship_is_a_disc_where_it_would_be_met():
+    ship = {"x": -900, "y": 400, "vx": 3.0, "vy": 0.0, "radius_m": 60}
+    p = problem(wind={"from_deg": 90, "speed_mps": 5, "sigma": {"model": "none"}}, targets=[ship])
+    discs = ship_discs(p, AstarSettings())
+    assert len(discs) > 0
+    mean = np.mean(np.interp(np.linspace(45, 160, 60), AVALON_TWA, AVALON_MPS))
+    for x, y, radius in discs:  # eq. 4.7
+        t = (x + 900.0) / 3.0
+        assert abs(t - math.hypot(x, y) / mean) < 20.0
+        assert radius == pytest.approx(60.0)
+    _, judged = run(p)
+    assert judged is not None
+    assert judged.is_feasible, judged.reasons
+    assert len(ship_discs(problem(), AstarSettings())) == 0
+
+
+def test_a_walled_in_goal_ends_with_its_reason():
+    wall = "POLYGON((-60 740,60 740,60 860,-60 860,-60 740),(-40 760,40 760,40 840,-40 840,-40 760))"
+    answer = plan(problem(obstacles=[wall]), algorithm="astar", expansions=10**8)
+    assert answer.status is PlanStatus.TIMEOUT
+    assert "no path on this grid" in answer.reason
+
+
+def test_expansions_are_counted_and_two_runs_agree():
+    a = plan(problem(), algorithm="astar", expansions=500)
+    assert a.expansions <= 500
+    assert not a.has_path
+    b = plan(problem(), algorithm="astar", expansions=10**7)
+    c = plan(problem(), algorithm="astar", expansions=10**7, seed=9)
+    assert np.array_equal(b.waypoints_en, c.waypoints_en)

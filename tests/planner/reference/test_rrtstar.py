@@ -1,0 +1,234 @@
+"""The reference RRT*: Algorithm 1's steering, Algorithm 2's cost, the tree's invariants, CC-RRT*'s bound."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.planner import PlanStatus, Problem, plan
+from companion.planner.reference import rrtstar_kernels as kernels
+from companion.planner.reference.kernels import first_hit, turn_time, wrap
+from companion.planner.reference.kernels import steer as steer_kernel
+from companion.planner.reference.rrtstar import Tree, search
+from companion.planner.reference.world import bounds_of, world_of
+from companion.planner.solve import Effort
+
+BLOCK = "POLYGON((-60 150,60 150,60 220,-60 220,-60 150))"
+AR1 = {"model": "ar1", "sigma0_deg": 2.0, "sigma_inf_deg": 8.0, "rho_hz": 0.036}
+KALMAN = {"model": "kalman", "sigma0_deg": 3.0, "growth_deg_per_sqrt_s": 0.5}
+
+
+def problem(**change):
+    base = {
+        "id": "t", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 0}, "goal": {"x": 0, "y": 400, "radius": 5},
+        "obstacles": [BLOCK], "fence": None, "wind": {"from_deg": 0, "speed_mps": 5, "sigma": AR1},
+        "boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
+                 "speed": {"model": "constant", "v_mps": 1.5}},
+        "delta_s": 0.7,
+    }
+    return Problem.from_json({**base, **change})
+
+
+def wind(from_deg=0.0, sigma=AR1):
+    return {"from_deg": from_deg, "speed_mps": 5, "sigma": sigma}
+
+
+def steer(p, x, y, reach=1e9, heading=0.0, t=0.0, start=(0.0, 0.0)):
+    w = world_of(p)
+    return steer_kernel(*start, heading, t, x, y, reach, w.number, w.no_go_model, w.table, w.polar, w.course)
+
+
+# ------------------------------------------------------------------------------------- Algorithm 1
+def test_outside_the_no_go_zone_it_steers_straight_at_the_target():
+    ok, x, y = steer(problem(wind=wind(sigma={"model": "none"})), 100.0, 20.0)
+    assert ok
+    assert (x, y) == pytest.approx((100.0, 20.0))
+
+
+@pytest.mark.parametrize(("tx", "side"), [(30.0, 1.0), (-30.0, -1.0)])
+def test_inside_it_takes_the_edge_nearer_the_target_to_the_foot_of_the_perpendicular(tx, side):
+    ok, x, y = steer(problem(wind=wind(sigma={"model": "none"})), tx, 100.0)
+    assert ok
+    edge = np.array([side * math.sin(math.pi / 4), math.cos(math.pi / 4)])
+    foot = edge * float(np.dot(edge, [tx, 100.0]))
+    assert (x, y) == pytest.approx(tuple(foot), abs=1e-3)
+
+
+def test_a_target_dead_to_windward_behind_a_wide_zone_cannot_be_approached():
+    wide = problem(boat={"no_go_half_deg": 95, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
+                         "speed": {"model": "constant", "v_mps": 1.5}})
+    ok, _, _ = steer(wide, 0.0, 100.0)
+    assert not ok
+
+
+@given(bearing=st.floats(-math.pi, math.pi), wind_from=st.floats(0.0, 360.0), t=st.floats(0.0, 600.0),
+       sigma=st.sampled_from([AR1, KALMAN, {"model": "none"}]))
+@settings(max_examples=150, deadline=None, derandomize=True)
+def test_whatever_it_steers_keeps_the_widened_zone_to_the_leg_s_end_and_comes_nearer(bearing, wind_from, t, sigma):
+    p = problem(wind=wind(wind_from, sigma), delta_s=0.8, obstacles=[])
+    tx, ty = 120.0 * math.sin(bearing), 120.0 * math.cos(bearing)
+    ok, x, y = steer(p, tx, ty, t=t, heading=bearing)
+    if not ok:
+        return
+    h = math.atan2(x, y)
+    twa = abs(wrap(h - p.wind.twd_from_rad))
+    end = t + turn_time(bearing, h, world_of(p).number) + math.hypot(x, y) / 1.5
+    assert twa >= max(p.no_go_half_rad(t), p.no_go_half_rad(end)) - 1e-6
+    assert math.dist((x, y), (tx, ty)) < 120.0
+
+
+def test_the_deepest_angle_bounds_the_steering_too():
+    p = problem(boat={"no_go_half_deg": 45, "max_twa_deg": 150, "turn_rate_rad_s": 0.5,
+                      "speed": {"model": "constant", "v_mps": 1.5}})
+    ok, x, y = steer(p, 0.0, -100.0)
+    assert ok
+    assert math.degrees(abs(math.atan2(x, y))) == pytest.approx(150.0, abs=1e-3)
+
+
+# ----------------------------------------------------------------------------------- the tree
+@pytest.mark.parametrize("change", [
+    {}, {"wind": wind(sigma=KALMAN)}, {"wind": wind(200.0)},
+    {"boat": {"no_go_half_deg": 40, "max_twa_deg": 160, "turn_rate_rad_s": 0.3, "tack_loss_s": 3.0, "gybe_loss_s": 2.0,
+              "speed": {"model": "polar", "twa_deg": [0, 45, 90, 180], "v_mps": [0, 1.4, 2.0, 1.2]}}},
+    {"current": {"set_deg": 90, "drift_mps": 0.3}},
+    {"targets": [{"x": -200, "y": 300, "vx": 1.0, "vy": 0.0, "radius_m": 30}]},
+])
+def test_every_state_s_time_is_the_scorer_s_time_of_its_path(change):
+    p = problem(**change)
+    tree = Tree(p, world_of(p), seed=3)
+    tree.grow(1500)
+    n = tree.size
+    assert n > 300
+    parent = tree.link[:n, kernels.PARENT]
+    assert parent[0] == -1
+    assert np.all(parent[1:] >= 0)
+    for state in range(1, n, max(1, n // 40)):
+        way = tree.path_to(state)
+        judged = p.evaluate(way)
+        complaints = [r for r in judged.reasons if "goal disc" not in r]
+        assert complaints == []
+        assert judged.time_s == pytest.approx(tree.node[state, kernels.T], rel=2e-3 if "current" in change else 1e-9)
+    children = sum(_children(tree, i) for i in range(n))
+    assert children == n - 1
+
+
+def _children(tree, i):
+    count, child = 0, tree.link[i, kernels.CHILD]
+    while child >= 0:
+        assert tree.link[child, kernels.PARENT] == i
+        count, child = count + 1, tree.link[child, kernels.NEXT]
+    return count
+
+
+def test_more_samples_never_cost_more_and_no_state_gets_slower():
+    p = problem()
+    tree = Tree(p, world_of(p), seed=1)
+    tree.grow(800)
+    before, n = tree.node[: tree.size, kernels.C].copy(), tree.size
+    tree.grow(3000)
+    assert np.all(tree.node[:n, kernels.C] <= before + 1e-6)
+    assert tree.best >= 0
+    assert tree.count[kernels.REWIRED] > 0
+
+
+def test_it_approaches_the_optimum_of_open_water():
+    p = problem(obstacles=[], wind=wind(sigma={"model": "none"}))
+    best = 400.0 / math.cos(math.pi / 4) / 1.5
+    coarse = plan(p, algorithm="rrtstar", expansions=500, seed=0)
+    fine = plan(p, algorithm="rrtstar", expansions=12_000, seed=0)
+    assert best - 5.0 < fine.cost_s <= coarse.cost_s
+    assert fine.cost_s < 1.06 * best
+
+
+def test_one_seed_is_one_plan_and_chunks_do_not_matter():
+    p = problem()
+    a = plan(p, algorithm="rrtstar", expansions=3000, seed=5)
+    b = plan(p, algorithm="rrtstar", expansions=3000, seed=5)
+    c = plan(p, algorithm="rrtstar", expansions=3000, seed=6)
+    assert np.array_equal(a.waypoints_en, b.waypoints_en)
+    assert not np.array_equal(a.waypoints_en, c.waypoints_en)
+    one, many = Tree(p, world_of(p), 5), Tree(p, world_of(p), 5)
+    one.grow(3000)
+    for _ in range(30):
+        many.grow(100)
+    assert np.array_equal(one.node[: one.size], many.node[: many.size])
+
+
+def test_the_tree_grows_past_its_first_arrays(monkeypatch):
+    import companion.planner.reference.rrtstar as module
+
+    p = problem()
+    whole = Tree(p, world_of(p), 2)
+    whole.grow(2000)
+    monkeypatch.setattr(module, "FIRST_CAPACITY", 300)
+    pieces = Tree(p, world_of(p), 2)
+    for _ in range(20):
+        pieces.grow(100)
+    assert np.array_equal(whole.node[: whole.size], pieces.node[: pieces.size])
+
+
+# ----------------------------------------------------------------------------------- collision
+@given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(1, 20), st.floats(0, 6)), min_size=1,
+                max_size=6), st.tuples(*[st.floats(-80, 80)] * 4))
+@settings(max_examples=120, deadline=None, derandomize=True)
+def test_first_hit_is_what_shapely_says(shapes, segment):
+    import shapely
+
+    squares = [shapely.affinity.rotate(shapely.box(x - r, y - r, x + r, y + r), a, use_radians=True)
+               for x, y, r, a in shapes]
+    p = problem(obstacles=[shapely.to_wkt(s, rounding_precision=-1) for s in squares])
+    w = world_of(p)
+    ax, ay, bx, by = segment
+    line = shapely.LineString([(ax, ay), (bx, by)])
+    border = p.solid.buffer(-0.5e-3, join_style="mitre").boundary
+    distance = shapely.distance(border, line)
+    hit = first_hit(ax, ay, bx, by, w.edge, w.cell_first, w.cell_edge, w.grid, w.shape)
+    if distance > 1e-6:
+        assert hit > 1.0
+    elif line.length > 1e-6 and line.crosses(border):
+        assert hit <= 1.0
+        at = line.interpolate(hit, normalized=True)
+        assert shapely.distance(border, at) < 1e-6
+
+
+def test_a_start_in_an_obstacle_is_invalid_and_a_start_in_the_goal_is_there():
+    inside = plan(problem(obstacles=["POLYGON((-9 -9,9 -9,9 9,-9 9,-9 -9))"]), algorithm="rrtstar", expansions=100)
+    assert inside.status is PlanStatus.INVALID
+    there = plan(problem(goal={"x": 1, "y": 1, "radius": 5}), algorithm="rrtstar", expansions=100)
+    assert there.has_path
+    assert there.cost_s == 0.0
+
+
+def test_bounds_are_the_fence_or_half_the_distance_around():
+    assert bounds_of(problem(fence="POLYGON((-300 -100,300 -100,300 500,-300 500,-300 -100))")) == (
+        -300.0, -100.0, 300.0, 500.0)
+    x0, y0, x1, y1 = bounds_of(problem())
+    assert x0 <= -260.0
+    assert x1 >= 260.0
+    assert y0 <= -200.0
+    assert y1 >= 600.0
+
+
+# ----------------------------------------------------------------------------------- CC-RRT*
+def test_the_risk_limit_is_kept_and_costs_time():
+    free = plan(problem(), algorithm="rrtstar", expansions=6000, seed=1)
+    held = plan(problem(risk={"max_path_risk": 0.1}), algorithm="rrtstar", expansions=6000, seed=1)
+    assert held.has_path
+    assert held.risk <= 0.1
+    assert held.cost_s > free.cost_s
+
+
+def test_no_state_of_the_tree_is_above_the_limit():
+    p = problem(risk={"max_path_risk": 0.1})
+    tree = Tree(p, world_of(p), seed=0)
+    tree.grow(2000)
+    assert tree.size > 200
+    assert tree.node[: tree.size, kernels.R].max() <= 0.1
+
+
+def test_an_expansion_is_a_sample_and_the_budget_is_kept():
+    effort = Effort(None, 777)
+    search(problem(), effort, 0)
+    assert effort.used == 777

@@ -1,0 +1,296 @@
+"""Faults drawn from a seed: repeatable, of every kind, and judged by a judge that can say no."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import shapely
+
+from companion.boat import Hull
+from companion.geo.frame import LocalFrame
+from companion.messages import GeoPoint, Mode
+from sitl.campaigns.fault_draw import draw
+from sitl.campaigns.fault_watch import EXCUSES, REACTION_S, RESUME_S, Watch, mission_key, operator_spans
+from sitl.campaigns.faults import BASE, run_faults, sail_faults, sail_seed
+from sitl.scene.scenario import EPOCH_S, EventSpec, load_scenario
+from sitl.trouble.forgeries import forgery_named
+
+SEEDS = Path(__file__).parent / "seeds"
+ROCK = shapely.box(10.0, -5.0, 20.0, 5.0)
+
+
+def sail_kept(seed):
+    return sail_faults(load_scenario(SEEDS / f"{seed}.toml"), seed, SEEDS / f"{seed}.toml")
+
+
+def test_a_seed_draws_the_same_faults_and_another_seed_others():
+    base = load_scenario(BASE)
+    assert draw(5, base) == draw(5, base)
+    assert draw(5, base) != draw(6, base)
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    base = load_scenario(BASE)
+    return [draw(seed, base) for seed in range(400)]
+
+
+def test_every_kind_of_fault_is_drawn_and_within_the_voyage(drawn):
+    events = [e for scenario in drawn for e in scenario.events]
+    assert {e.kind for e in events} == {
+        "link_quality", "link_cut", "link_half", "vane", "compass", "gps_jump", "gps_lost", "wind_shift", "wind_speed",
+        "current", "crew", "kill_planner", "planner_hang", "kill_companion", "disk", "reboot", "mode", "arm",
+        "foreign_mission", "battery", "radio_lost", "station", "knockdown", "neighbour", "spoof",
+    }
+    assert all(0.0 <= e.at_s < scenario.limit_s for scenario in drawn for e in scenario.events)
+    assert {e.state for e in events if e.kind == "vane"} == {"frozen", "offset", "spikes"}
+    assert {e.state for e in events if e.kind == "disk"} == {"full", "sick", "read_only"}
+    assert {e.state for e in events if e.kind == "link_half"} == {"unheard", "deaf"}
+    assert {e.saved for e in events if e.kind == "kill_companion"} == {"kept", "lost", "torn", "old"}
+    assert min(e.clock_step_s for e in events) == -EPOCH_S
+    assert max(abs(e.clock_step_s) for e in events if e.clock_step_s > -EPOCH_S) > 3600.0
+    assert any(e.noise > 0.0 for e in events)
+    assert {e.listens for e in events if e.kind == "spoof"} == {False, True}
+    assert all(forgery_named(e.forgery) for e in events if e.kind == "spoof")
+    assert all(0.1 <= e.drift_mps <= 0.8 for e in events if e.kind == "current")
+
+
+def test_every_failsafe_of_the_autopilot_is_drawn_with_its_actions_and_without_the_permission(drawn):
+    def actions(name):
+        return {s.parameters[name] for s in drawn if name in s.parameters}
+
+    for name in ("FENCE_ACTION", "FS_ACTION"):
+        assert actions(name) == {0.0, 1.0, 2.0, 3.0, 4.0}, name
+    assert actions("BATT_FS_LOW_ACT") >= {0.0, 1.0, 2.0, 6.0}
+    assert actions("BATT_FS_CRT_ACT") >= {1.0, 2.0, 5.0}
+    assert actions("FS_THR_ENABLE") == actions("FS_GCS_ENABLE") == actions("FS_CRASH_CHECK") == {1.0, 2.0}
+    assert {s.set_auto for s in drawn} == {False, True}
+
+
+def test_what_takes_long_is_rare_and_leaves_the_voyage_time(drawn):
+    """A voyage that ends in the middle of half an hour's calm proves nothing; a campaign of them takes a day."""
+    long = [(s, e) for s in drawn for e in s.events
+            if e.kind in {"wind_speed", "link_cut"} and (e.for_s or 0.0) > 300.0]
+    assert all(s.limit_s >= e.at_s + e.for_s for s, e in long)
+    assert max(e.for_s for _, e in long if e.kind == "wind_speed") > 1200.0
+    assert max(e.for_s for _, e in long if e.kind == "link_cut") > 2400.0
+    assert len(long) < 0.06 * len(drawn)
+    assert {round(s.wind.tws_mps) for s in drawn} == set(range(2, 13))
+
+
+@pytest.mark.parametrize("seed", [17, 5])
+def test_a_voyage_with_faults_repeats_exactly(seed, tmp_path):
+    first, second = sail_seed(seed, keep=tmp_path / "a"), sail_seed(seed, keep=tmp_path / "b")
+    for record in (first, second):
+        del record["cpu_s"]
+    assert first == second
+    assert first["passed"], first
+    for name in ("telemetry.tlog", "track.csv"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+# What the campaign found: a mission written one by one over a bad link (233), sails set on a position that had just
+# jumped (362), a position that jumped back and was not believed in time (475), an upload left half done (602); since
+# hulls and floors are judged, legs too short for the autopilot to follow (304) and a jump into a rock that LOITER was
+# not allowed to wait out (673); and in the campaign a planner that hung and cost the margin (83), a contact in a gust
+# (548), a corridor wider than the margin (808).
+# They are kept as they were drawn: the draw has changed since.
+@pytest.mark.parametrize("seed", [233, 304, 362, 475, 602, 673])
+def test_a_seed_that_failed_once_does_not_again(seed):
+    record = sail_kept(seed)
+    assert record["passed"], record
+    assert record["arrived"]
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", [83, 548, 808])
+def test_nor_does_one_of_those_that_came_too_near(seed):
+    record = sail_kept(seed)
+    assert record["passed"], record
+    assert record["clearance_m"] > 6.0
+
+
+def test_what_comes_below_the_floor_in_ordinary_weather_fails(tmp_path):
+    """The rocks with a floor as high as the margin: nobody sails his plan to the metre."""
+    for name in ("rocks.toml", "rocks.wkt"):
+        text = (BASE.parents[3] / "missions" / name).read_text()
+        (tmp_path / name).write_text(text.replace("margin_floor_m = 6.0", "margin_floor_m = 12.0"))
+    base = tmp_path / "s.toml"
+    kept = (SEEDS / "9.toml").read_text()          # a gust, long after the rocks
+    base.write_text(kept.replace("../../../missions/rocks.toml", "rocks.toml"))
+    record = sail_faults(load_scenario(base), 9, base)
+    assert record["weather_only"]
+    assert not record["passed"]
+    assert record["faults"] == [
+        f"{record['clearance_m']:.1f} m clear at {record['clearance_t_s']:.0f} s, in ordinary weather"]
+
+
+@dataclass
+class Ghost:
+    """What the watch reads of an autopilot."""
+
+    watch: Watch
+    t_s: float = 0.0
+    items: list = field(default_factory=list)
+    link: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(is_up=True))
+
+    def at(self, east, north, *, believed=None, mode=Mode.AUTO, for_s=0.25, is_armed=True, fails=False,
+           stopped_by="", tws_mps=5.0, current_en_mps=(0.0, 0.0)):
+        geo = self.watch.frame.geo_from_en
+        point, seen = geo(east, north), geo(*(believed or (east, north)))
+        pilot = SimpleNamespace(
+            truth=SimpleNamespace(position=point, heading_rad=0.0, is_armed=is_armed, mode=mode,
+                                  tws_mps=tws_mps, twd_from_rad=0.0),
+            failsafe=SimpleNamespace(is_active=fails, stopped_by=stopped_by), ekf_ready=not fails,
+            chart=SimpleNamespace(point=lambda _: seen),
+            vehicle=SimpleNamespace(position=None, current_en_mps=current_en_mps),
+            helm=SimpleNamespace(mission=SimpleNamespace(items=[None, *self.items])),
+        )
+        for _ in range(round(for_s / 0.25)):
+            self.watch.truth(self.t_s, pilot, self.link)
+            self.t_s += 0.25
+
+
+@pytest.fixture
+def ghost():
+    watch = Watch(solid=ROCK, hull=Hull(), frame=LocalFrame(GeoPoint(lat_deg=50.8, lon_deg=-1.3)))
+    watch.lives = [(0.0, 1000.0)]
+    return Ghost(watch)
+
+
+def item(command, x, y):
+    return SimpleNamespace(command=command, x=x, y=y)
+
+
+def excuses(ghost):
+    return [excuse for _, excuse in ghost.watch.contacts()]
+
+
+def touch(ghost, clear_s=RESUME_S + 1.0, **how):
+    """Go into the rock ``how``, out again, and wait."""
+    ghost.at(15.0, 0.0, **how)
+    ghost.at(30.0, 0.0, for_s=clear_s)
+
+
+def test_a_contact_is_excused_only_by_what_nobody_could_help(ghost):
+    ghost.at(0.0, 0.0)
+    touch(ghost)
+    touch(ghost, believed=(40.0, 0.0), clear_s=REACTION_S - 2.0)
+    touch(ghost)                                       # right again, but only just
+    touch(ghost, believed=(12.0, 0.0))                 # wrong, but in the rock by its own belief
+    touch(ghost, mode=Mode.HOLD)                       # stopped, and free to be sailed
+    touch(ghost, mode=Mode.HOLD, fails=True, clear_s=RESUME_S - 2.0)
+    touch(ghost)                                       # just let go by the failsafe
+    touch(ghost, mode=Mode.MANUAL, is_armed=False, fails=True)
+    ghost.watch.operator_s = [(ghost.t_s, ghost.t_s + 20.0)]
+    touch(ghost, mode=Mode.MANUAL, clear_s=20.0 + REACTION_S - 1.0)
+    touch(ghost)                                       # just given back
+    touch(ghost)
+    assert excuses(ghost) == [
+        "unexcused", "false position", "false position", "unexcused", "unexcused", "autopilot refuses",
+        "autopilot refuses", "autopilot refuses", "operator", "operator", "unexcused",
+    ]
+    assert set(excuses(ghost)) < {*EXCUSES, "unexcused"}
+    assert ghost.watch.clearance_m()[0] == 0.0
+
+
+def test_a_corner_that_is_cut_between_two_looks_is_a_contact(ghost):
+    ghost.at(9.5, 4.0)
+    ghost.at(10.5, 5.5)
+    assert excuses(ghost) == ["unexcused"]
+
+
+def test_a_boat_that_was_stopped_is_excused_while_nobody_reaches_it(ghost):
+    ghost.at(0.0, 0.0)
+    ghost.link.is_up = False
+    touch(ghost)                                       # under way: the mission on board must be safe
+    touch(ghost, mode=Mode.HOLD)
+    ghost.link.is_up = True
+    ghost.watch.lives = [(0.0, ghost.t_s)]
+    ghost.at(30.0, 0.0)
+    touch(ghost, mode=Mode.HOLD)
+    ghost.watch.lives.append((ghost.t_s, 1000.0))
+    touch(ghost, mode=Mode.HOLD)
+    assert excuses(ghost) == ["unexcused", "cut off", "cut off", "unexcused"]
+
+
+def test_what_a_failsafe_stopped_is_told_from_what_was_stopped_by_nobody(ghost):
+    ghost.at(0.0, 0.0)
+    touch(ghost, mode=Mode.HOLD, stopped_by="action")
+    touch(ghost, mode=Mode.HOLD, stopped_by="crash", clear_s=REACTION_S - 1.0)
+    touch(ghost)                                       # just given back
+    touch(ghost, stopped_by="action")                  # in AUTO: it was ended
+    assert excuses(ghost) == ["failsafe", "crash", "crash", "unexcused"]
+    assert len(ghost.watch.reach().stopped_s) == 2
+
+
+@pytest.mark.parametrize(("carried_s", "called_s", "tws_mps", "excuse"), [
+    (400.0, 250.0, 0.0, "drift"),           # two minutes and a half before
+    (400.0, 300.0, 0.0, "unexcused"),       # too late for a crew
+    (400.0, None, 0.0, "unexcused"),
+    (90.0, 345.0, 0.0, "drift"),            # there was no more time, and it was said within a minute of its beginning
+    (90.0, 375.0, 0.0, "unexcused"),
+    (400.0, 250.0, 5.0, "unexcused"),       # there was wind to sail by
+])
+def test_a_drift_ashore_is_excused_where_the_crew_was_called_in_time(ghost, carried_s, called_s, tws_mps, excuse):
+    ghost.at(0.0, 0.0, for_s=400.0 - carried_s)
+    ghost.at(0.0, 0.0, for_s=carried_s, tws_mps=tws_mps, current_en_mps=(0.3, 0.0))
+    ghost.watch.called_s = [] if called_s is None else [called_s]
+    touch(ghost, tws_mps=tws_mps, current_en_mps=(0.3, 0.0))
+    assert excuses(ghost) == [excuse]
+
+
+def test_when_a_person_had_the_boat():
+    def mode(at_s, name):
+        return EventSpec(at_s=at_s, kind="mode", mode=name)
+
+    events = [mode(10.0, "HOLD"), mode(15.0, "RTL"), mode(20.0, "AUTO"), mode(30.0, "AUTO"), mode(40.0, "LOITER"),
+              EventSpec(at_s=12.0, kind="reboot")]
+    assert operator_spans(events, 60.0) == [(10.0, 20.0), (40.0, 60.0)]
+    assert operator_spans(events[:4], 60.0) == [(10.0, 20.0)]
+
+
+def test_what_is_on_board_is_whole_or_a_beginning_that_ends_at_a_waypoint_of_its_own(ghost):
+    a = [item(16, 1, 1), item(16, 2, 2), item(16, 3, 3), item(17, 4, 4)]
+    b = [item(16, 1, 1), item(16, 6, 6), item(16, 7, 7), item(17, 8, 8)]
+    stranger = [item(16, 9, 9)]
+    ghost.watch.ours = {mission_key((i.command, i.x, i.y) for i in m) for m in (a, b)}
+    ghost.watch.foreign = {mission_key((i.command, i.x, i.y) for i in stranger)}
+    for items in ([], a[:2], a, [*a, b[2]], [a[0], item(17, 1, 1), *b[2:]], [a[0], item(17, 2, 2)], b, stranger):
+        ghost.items = items
+        ghost.at(0.0, 0.0, is_armed=items not in ([], a[:2]), for_s=5.0)
+        assert ghost.watch.mixture_s() == 0.0, items
+    assert 9.0 < ghost.watch.held_back_s() < 10.0
+    ghost.link.is_up = False
+    for items in ([a[0], *b[1:2], *a[2:]], a[:2], [item(17, 9, 9)], [*a[:3], *b[3:]], [a[0], item(17, 10, 10)]):
+        ghost.items = items
+        ghost.watch.missions.clear()
+        ghost.watch.armed.clear()
+        ghost.watch.t_s.clear()
+        ghost.at(0.0, 0.0)
+        assert ghost.watch.mixture_s() > 0.0, items
+
+
+@pytest.mark.parametrize(("for_s", "then", "is_mixture"), [
+    (0.5, [item(16, 9, 9)], False), (3.0, [item(16, 9, 9)], True), (0.5, [item(16, 1, 1), item(17, 4, 4)], True)])
+def test_what_a_stranger_s_upload_leaves_on_board_for_a_moment_is_his(ghost, for_s, then, is_mixture):
+    """Seeds 744 and 949: his count had cut our mission to its first item, his own item was not written yet."""
+    ours = [item(16, 1, 1), item(16, 2, 2), item(17, 4, 4)]
+    ghost.watch.ours = {mission_key((i.command, i.x, i.y) for i in ours)}
+    ghost.watch.foreign = {((16, 9, 9),)}
+    for items, span_s in ((ours, 5.0), (ours[:1], for_s), (then, 5.0)):
+        ghost.items = items
+        ghost.at(0.0, 0.0, for_s=span_s)
+    assert (ghost.watch.mixture_s() > 0.0) == is_mixture
+
+
+def test_silence_counts_within_a_life_only(ghost):
+    ghost.watch.lives = [(0.0, 10.0), (50.0, 70.0)]
+    assert ghost.watch.silence_s([1.0, 2.0, 9.0, 51.0, 66.0, 69.0]) == 15.0
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+def test_a_thousand_voyages_with_faults(tmp_path):
+    assert run_faults(runs=1000, json_path=tmp_path / "faults.json") == 0

@@ -1,0 +1,51 @@
+"""Scenario files: bad ones are one line that names file, place and remedy; all of ours load."""
+
+from pathlib import Path
+
+import pytest
+
+from companion.errors import InputError
+from sitl.scene.scenario import load_scenario
+from sitl.scene.weather import scenario_wind
+
+OURS = sorted(Path("sitl/scenarios").glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", OURS, ids=lambda p: p.stem)
+def test_our_scenarios_load_and_their_weather_repeats(path):
+    scenario = load_scenario(path)
+    assert scenario.name == path.stem
+    assert scenario.title
+    a, b = scenario_wind(scenario, path, 3), scenario_wind(scenario, path, 3)
+    assert [a.at(t) for t in (0.0, 100.0, 50.0)] == [b.at(t) for t in (0.0, 100.0, 50.0)]
+
+
+@pytest.mark.parametrize(("text", "place", "words"), [
+    ("name = 'x'", "", "mission"),
+    ("name='x'\nmission='no.toml'", "mission", "there is no file"),
+    ("name='x'\nmission='m.toml'\nlimitt_s=3", "", "limit_s"),
+    ("name='x'\nmission='m.toml'\n[wind]\nmodel='gale'", "wind.model", "gale"),
+    ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='kraken'", "events", "kraken"),
+    ("name=", "", "TOML"),
+])
+def test_bad_scenarios(tmp_path, text, place, words):
+    path = tmp_path / "s.toml"
+    path.write_text(text)
+    (tmp_path / "m.toml").write_text("")
+    with pytest.raises(InputError) as caught:
+        load_scenario(path)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith(str(path))
+    assert place in line
+    assert words in line
+
+
+def test_a_missing_file_is_one_line(tmp_path):
+    with pytest.raises(InputError, match=r"none\.toml"):
+        load_scenario(tmp_path / "none.toml")
+
+
+def test_a_mission_is_a_scenario():
+    scenario = load_scenario(Path("missions/open-water.toml"))
+    assert scenario.mission == "open-water.toml"

@@ -1,0 +1,114 @@
+"""Missions: the splice keeps what is being sailed, the end is safe, ours is told from foreign."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import box
+
+from companion.messages import Command, MissionItem
+from companion.skipper.step.config import SafeEnd, SkipperConfig
+from companion.skipper.step.route import (
+    Tail,
+    common_prefix,
+    effective,
+    ends_safely,
+    is_mixture,
+    is_same_mission,
+    loiter_place,
+    splice,
+)
+from companion.skipper.step.saved import Persisted
+from companion.skipper.step.state import Route
+from tests.skipper.world import voyage
+
+CONFIG = SkipperConfig()
+FACTS = Route(plan_id=1, plan_t_s=0.0, plan_twd_from_rad=0.0, plan_tws_mps=5.0, plan_half_width_rad=0.1, margin_m=15.0,
+              delta_s=0.95)
+POINTS = st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), min_size=1, max_size=8)
+CHECK = settings(max_examples=60, deadline=None, derandomize=True)
+
+
+def route(points, old=None, keep=0, gate=0, made=None, config=CONFIG):
+    return splice(made or voyage(), config, old, keep=keep, tail=Tail(start_en=(0.0, 0.0), points_en=tuple(points),
+                  gate=gate), twd_from_rad=0.3, facts=FACTS)
+
+
+@CHECK
+@given(POINTS, POINTS, st.integers(0, 7))
+def test_splice_keeps_the_prefix_and_ends_safely(first, second, keep):
+    old = route(first)
+    keep = min(keep, len(old.items) - 1)
+    new = route(second, old=old, keep=keep, gate=1)
+    assert new.items[:keep] == old.items[:keep]
+    assert common_prefix(old.items, new.items) >= keep
+    assert ends_safely(new.items)
+    assert sum(item.command == Command.NAV_LOITER_UNLIM for item in new.items) == 1
+    assert len(new.items) == keep + len(second) + 1
+    assert len(new.items) == len(new.points_en_m) == len(new.leg_from_en_m) == len(new.gate_of)
+    assert new.gate_of[-2] == 1
+    # Each new leg begins where the one before ends.
+    assert all(new.leg_from_en_m[n] == new.points_en_m[n - 1] for n in range(keep + 1, len(new.items)))
+
+
+@CHECK
+@given(POINTS, POINTS, st.integers(0, 9))
+def test_a_mixture_is_ours_and_no_other_mission_is(first, second, cut):
+    old, new = route(first).items, route(second).items
+    cut = min(cut, len(new))
+    mixed = (*new[:cut], *old[cut:len(new)])
+    assert is_mixture(mixed, old, new)
+    stranger = MissionItem(command=16, lat_e7=123, lon_e7=456)
+    assert not is_mixture((*mixed[:-1], stranger), old, new)
+    assert not is_same_mission((*new[:-1], stranger), new)
+
+
+def test_an_old_tail_behind_the_end_is_dead():
+    items = route([(0, 100), (50, 200)]).items
+    tail = (MissionItem(command=16, lat_e7=1, lon_e7=2),)
+    assert effective((*items, *tail)) == items
+    assert is_same_mission((*items, *tail), items)
+    assert not ends_safely(tail)
+
+
+@pytest.mark.parametrize("end", list(SafeEnd))
+def test_every_mission_ends_in_a_loiter_and_none_in_rtl(end):
+    made = route([(0, 100)], config=replace(CONFIG, safe_end=end))
+    assert made.items[-1].command == Command.NAV_LOITER_UNLIM
+    assert ends_safely(made.items)
+
+
+def test_the_loiter_has_room_all_round_and_to_leeward():
+    # A lee shore 20 m south of the goal with wind from north: loiter farther off.
+    made = voyage(obstacles=(box(-500, 50, 500, 80),))
+    place, room = loiter_place(made, CONFIG, (0.0, 100.0), 0.0)
+    assert room >= CONFIG.loiter_radius_m
+    assert place[1] > 110.0
+    there, _ = loiter_place(voyage(), CONFIG, (0.0, 100.0), 0.0)
+    assert there == (0.0, 100.0)
+
+
+@CHECK
+@given(POINTS, POINTS, st.integers(0, 5), st.booleans())
+def test_persisted_survives_json(first, second, gate, sailing):
+    saved = Persisted(voyage="test", gate=gate, sailing=sailing, route=route(first), pending=route(second))
+    assert Persisted.from_dict(json.loads(json.dumps(saved.to_dict()))) == saved
+
+
+@pytest.mark.parametrize("damage", [
+    {}, {"format": 1}, {"format": 99}, {"format": 1, "voyage": "x", "gate": "many", "sailing": 1, "route": None},
+    {"format": 1, "voyage": "x", "gate": 0, "sailing": True, "route": {"items": [[1]]}, "pending": None},
+    {"format": 1, "voyage": "x", "gate": 0, "sailing": True, "route": 7, "pending": None},
+])
+def test_damaged_state_is_refused_in_one_way(damage):
+    with pytest.raises(ValueError, match=r"."):
+        Persisted.from_dict(damage)
+
+
+def test_lists_of_different_length_are_damage():
+    data = Persisted(voyage="v", gate=0, sailing=True, route=route([(1, 1)]), pending=None).to_dict()
+    data["route"]["points"].pop()
+    with pytest.raises(ValueError, match="differ"):
+        Persisted.from_dict(data)

@@ -1,0 +1,89 @@
+"""When the skipper leaves a beat to the autopilot, and when an upload may make its leg begin anew."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from shapely.geometry import box
+
+from companion.skipper.planning.autopilot_beats import (
+    OVERSHOOT_S,
+    is_left_to_beat,
+    may_restart_leg,
+    problem_beat,
+    room_m,
+)
+from companion.skipper.step.state import Phase, Route
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.voyage import Goal
+from tests.skipper.world import World, skipper, voyage
+
+GOAL = Goal(en_m=(0.0, 400.0), radius_m=6.0, name="the goal")
+NORTH = ((0.0, 0.0), (0.0, 300.0))
+
+
+def turn(*obstacles, at=(0.0, 0.0), xtrack_m=10.0, irons=(), **config) -> Turn:
+    """Return a turn on a leg to the north in a northerly of 5 m/s, the boat at ``at``."""
+    made = voyage(GOAL, obstacles=obstacles)
+    world = World(skipper=skipper(made, **config), position=at, corridor=xtrack_m)
+    route = Route(
+        items=(), points_en_m=(), plan_id=1, plan_t_s=0.0, plan_twd_from_rad=0.0, plan_tws_mps=5.0,
+        plan_half_width_rad=0.0, margin_m=15.0, delta_s=0.9)
+    state = replace(world.state, route=route, irons_s=irons)
+    out = Turn(world.skipper.voyage, world.skipper.config, state, world.snapshot())
+    out.leg = lambda: NORTH  # type: ignore[method-assign]
+    return out
+
+
+def test_the_room_is_corridor_overshoot_and_floor():
+    now = turn()
+    speed = now.voyage.boat.polar.speed_mps(now.no_go_half_rad, 5.0)
+    assert room_m(now) == pytest.approx(10.0 + OVERSHOOT_S * speed + now.config.margin_floor_m)
+    part = problem_beat(now, 15.0)
+    assert part is not None
+    assert part["clearance_m"] == pytest.approx(room_m(now) - 15.0)
+    assert problem_beat(now, 100.0)["clearance_m"] == 0.0
+    assert part["corridor_m"] == 10.0
+
+
+def test_no_corridor_no_permission_or_failed_tacks_leave_no_beat():
+    assert room_m(turn(xtrack_m=0.0)) is None
+    assert room_m(turn(xtrack_m=80.0)) is None
+    assert room_m(turn(autopilot_beats=False)) is None
+    assert room_m(turn(irons=(0.0, 0.5))) is None
+    assert problem_beat(turn(xtrack_m=0.0), 15.0) is None
+    unknown = turn()
+    unknown.snapshot = replace(unknown.snapshot, limits=None)
+    assert room_m(unknown) is None
+
+
+def test_a_rock_in_the_corridor_keeps_the_beat_from_the_autopilot():
+    need = room_m(turn())
+    assert need is not None
+    assert is_left_to_beat(turn(), *NORTH)
+    assert is_left_to_beat(turn(box(need + 0.5, 100, need + 20, 120)), *NORTH)
+    assert not is_left_to_beat(turn(box(need - 0.5, 100, need + 20, 120)), *NORTH)
+
+
+def test_an_upload_waits_while_the_corridor_would_move_onto_a_rock():
+    need = room_m(turn())
+    assert need is not None
+    rock = box(need + 1.0, 100, need + 20.0, 120)
+    assert may_restart_leg(turn(rock, at=(0.0, 90.0)))          # on the line: the leg stays what it was
+    assert not may_restart_leg(turn(rock, at=(8.0, 90.0)))      # from here the corridor would reach the rock
+    assert may_restart_leg(turn(rock, at=(-8.0, 90.0)))         # and here it moves away from it
+    assert may_restart_leg(turn(at=(8.0, 90.0)))
+
+
+def sailed_s(beats: bool) -> float:
+    """Return how long a voyage upwind in open water takes."""
+    world = World(skipper=skipper(voyage(GOAL), autopilot_beats=beats), expansions=1500, sigma=0.12,
+                  wind=lambda t: (0.15 * math.sin(t / 40.0), 5.0))
+    assert world.run(1500, lambda w: w.state.phase is Phase.DONE)
+    return world.t
+
+
+def test_in_open_water_leaving_the_beat_to_the_autopilot_is_faster():
+    assert sailed_s(True) < 0.95 * sailed_s(False)

@@ -1,0 +1,165 @@
+"""Legs and waypoint advance (Büsser's double conditions), manoeuvres, gates."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import box
+
+from companion.geo.angles import difference_rad
+from companion.skipper.way.gates import Approach, again, bearing_on, gates_of, is_on_wrong_side
+from companion.skipper.way.geometry import (
+    along_m,
+    bearing_rad,
+    cross_track_m,
+    distance_m,
+    is_past,
+    leg_distance_m,
+    moved,
+    waypoint_done,
+)
+from companion.skipper.way.manoeuvre import bear_away_rad, gybe_round, is_tack
+from companion.skipper.way.voyage import Goal, Side
+from tests.skipper.world import area, voyage
+
+COORD = st.floats(-1000.0, 1000.0)
+POINT = st.tuples(COORD, COORD)
+ANGLE = st.floats(-math.pi, math.pi)
+CHECK = settings(max_examples=100, deadline=None, derandomize=True)
+
+
+@CHECK
+@given(POINT, POINT, POINT, ANGLE)
+def test_along_and_across_turn_with_the_leg(p, a, b, turn):
+    if distance_m(a, b) < 1.0:
+        return
+
+    def rotated(q):
+        return (q[0] * math.cos(turn) + q[1] * math.sin(turn), q[1] * math.cos(turn) - q[0] * math.sin(turn))
+
+    assert math.isclose(cross_track_m(p, a, b), cross_track_m(rotated(p), rotated(a), rotated(b)), abs_tol=1e-6)
+    assert math.isclose(along_m(p, a, b), along_m(rotated(p), rotated(a), rotated(b)), abs_tol=1e-6)
+    assert leg_distance_m(p, a, b) >= abs(cross_track_m(p, a, b)) - 1e-6
+    assert math.isclose(math.hypot(along_m(p, a, b), cross_track_m(p, a, b)), distance_m(p, a), rel_tol=1e-9)
+
+
+@CHECK
+@given(POINT, ANGLE, st.floats(0.1, 500.0))
+def test_moved_goes_where_bearing_says(a, heading, by):
+    b = moved(a, heading, by)
+    assert math.isclose(distance_m(a, b), by, rel_tol=1e-9)
+    assert abs(difference_rad(bearing_rad(a, b), heading)) < 1e-6
+
+
+@pytest.mark.parametrize(("boat", "after", "done"), [
+    ((0.0, 101.0), None, True),               # past the perpendicular, within the grid size
+    ((0.0, 99.0), None, False),               # before it, no next leg to be near to
+    ((30.0, 101.0), None, False),             # past, but farther than the grid size
+    ((2.0, 98.0), (100.0, 95.0), True),       # within 3 m of the next leg
+    ((-8.0, 95.0), (100.0, 100.0), False),    # far from the next leg
+])
+def test_double_conditions(boat, after, done):
+    assert waypoint_done(boat, (0.0, 0.0), (0.0, 100.0), after, grid_m=20.0, manoeuvre_m=3.0) is done
+    assert is_past(boat, (0.0, 0.0), (0.0, 100.0)) is (boat[1] > 100.0)
+
+
+@CHECK
+@given(ANGLE, st.floats(0.9, 1.5), st.booleans())
+def test_gybe_round_turns_the_other_way_and_never_through_the_wind(twd, twa, port):
+    side = 1.0 if port else -1.0
+    before, after = twd - side * twa, twd + side * twa
+    assert is_tack(before, after, twd)
+    start = (0.0, 0.0)
+    corner = moved(start, before, 100.0)
+    end = moved(corner, after, 100.0)
+    path = [start, *gybe_round(start, [corner, end], twd_from_rad=twd, radius_m=8.0, area=area(), floor_m=5.0)]
+    assert len(path) == 6
+    courses = [bearing_rad(a, b) for a, b in pairwise(path)]
+    for one, two in pairwise(courses):
+        assert not is_tack(one, two, twd)
+
+
+def test_gybe_round_needs_room():
+    start, corner, end = (0.0, 0.0), (-70.0, 70.0), (0.0, 140.0)
+    rock = box(-100.0, 40.0, -80.0, 72.0)
+    out = gybe_round(start, [corner, end], twd_from_rad=0.0, radius_m=8.0, area=area(rock), floor_m=8.0)
+    assert out == (corner, end)
+
+
+def test_bear_away_takes_the_clear_side():
+    # Wind from north, nose a little to starboard of it: nearer to fall off to starboard, unless a rock lies there.
+    assert bear_away_rad((0, 0), 0.1, 0.0, area()) > 0.0
+    assert bear_away_rad((0, 0), 0.1, 0.0, area(box(5.0, -50.0, 50.0, 50.0))) < 0.0
+
+
+def turned_round(buoy, *track):
+    """The boat's bearing from the buoy, counted on along the track."""
+    return sum(difference_rad(bearing_rad(buoy, b), bearing_rad(buoy, a)) for a, b in pairwise(track))
+
+
+@pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
+@pytest.mark.parametrize("turned", range(0, 360, 45))
+def test_gates_go_round_each_buoy_on_the_right_hand(side, turned):
+    angle = math.radians(turned)
+    hand = 1.0 if side is Side.PORT else -1.0
+    places = [(0.0, 200.0), (-150.0 * hand, 100.0), (0.0, 0.0)]
+    places = [(e * math.cos(angle) + n * math.sin(angle), n * math.cos(angle) - e * math.sin(angle)) for e, n in places]
+    made = voyage(*(Goal(en_m=p, side=side) for p in places), laps=2)
+    gates = gates_of(made, (Approach(goal=0, en_m=places[2]),))
+    for goal, place in enumerate(places * 2):
+        mine = [g for g in gates if g.goal == goal]
+        assert [g.ends_goal for g in mine] == [False] * (len(mine) - 1) + [True]
+        assert all(math.isclose(distance_m(g.en_m, place), 12.0) for g in mine)
+        before = (places * 2)[goal - 1]
+        bearing = 0.0
+        for there, gate in zip([before, *(g.en_m for g in mine)], mine, strict=False):
+            bearing = bearing_on(gate, gate.en_m, bearing_on(gate, there, bearing))
+            assert bearing == pytest.approx(gate.bearing_rad)
+            assert not is_on_wrong_side(gate, bearing)
+            assert is_on_wrong_side(gate, bearing + hand * 2.0 * math.pi)
+        if goal < 5:
+            turn = -hand * turned_round(place, before, *(g.en_m for g in mine), (places * 2)[goal + 1])
+            assert math.pi / 2.0 < turn < 2.0 * math.pi   # a string along this track touches the buoy
+
+
+@pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
+@pytest.mark.parametrize("out", range(0, 360, 30))
+@pytest.mark.parametrize("at", [0, -1])
+def test_a_buoy_left_on_the_wrong_side_is_rounded_from_there(side, out, at):
+    """What was turned the wrong way and the second approach make the rounding that was asked for."""
+    hand = 1.0 if side is Side.PORT else -1.0
+    start, buoy, after = (0.0, 0.0), (0.0, 200.0), moved((0.0, 200.0), math.radians(out), 150.0)
+    made = voyage(Goal(en_m=buoy, side=side), Goal(en_m=after))
+    first = [g for g in gates_of(made, (Approach(goal=0, en_m=start),)) if g.goal == 0]
+    wrong = first[at].bearing_rad + hand * 2.0 * math.pi
+    assert is_on_wrong_side(first[at], wrong)
+    second = [g for g in gates_of(made, (again(first[at], first[at].en_m, wrong),)) if g.goal == 0]
+    gone = wrong + turned_round(buoy, first[at].en_m, *(g.en_m for g in second))
+    want = first[-1].bearing_rad
+    if len(first) == 1:   # passed in the middle of its small bend; a round from there ends at the bend's end
+        want -= hand * 0.5 * first[0].turn_rad
+    assert gone == pytest.approx(want)
+    bearing = 0.0
+    for gate in second:
+        bearing = bearing_on(gate, gate.en_m, bearing)
+        assert bearing == pytest.approx(gate.bearing_rad)
+
+
+def test_a_buoy_that_is_the_whole_course_is_rounded_each_lap():
+    made = voyage(Goal(en_m=(0.0, 200.0), side=Side.PORT), laps=3)
+    gates = gates_of(made, (Approach(goal=0, en_m=(0.0, 0.0)),))
+    turn = turned_round((0.0, 200.0), (0.0, 0.0), *(g.en_m for g in gates))
+    assert turn == pytest.approx(-math.pi / 2.0 - 2.0 * 2.0 * math.pi)
+
+
+def test_barrier_closes_the_wrong_side():
+    import shapely
+    from shapely.geometry import LineString
+
+    made = voyage(Goal(en_m=(0.0, 200.0), side=Side.PORT), Goal(en_m=(-150.0, 100.0)))
+    gate = gates_of(made, (Approach(goal=0, en_m=(0.0, 0.0)),))[0]
+    closed = shapely.union_all([shapely.from_wkt(w) for w in gate.keep_out])
+    assert closed.intersects(LineString([(0.0, 0.0), (-40.0, 200.0), (0.0, 240.0)]))   # leaves it to starboard
+    assert not closed.intersects(LineString([(0.0, 0.0), (40.0, 200.0), (0.0, 240.0)]))

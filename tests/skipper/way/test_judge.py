@@ -1,0 +1,173 @@
+"""Is a path still good, what will the autopilot make of a closed leg, and the problem that is handed to the planner."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import box
+
+from companion.boat import Boat, ardurover_sitl
+from companion.planner import Problem, plan
+from companion.skipper.planning.ladder import rungs
+from companion.skipper.planning.problem import Aim, Start, aim_at, problem_dict, repaired, wind_part
+from companion.skipper.step.config import SkipperConfig
+from companion.skipper.way.gates import gates_of
+from companion.skipper.way.judge import half_width_rad, judge, predicted_beat
+from companion.skipper.way.voyage import Goal
+from tests.skipper.world import area, forecast, voyage
+
+BOAT = Boat(polar=ardurover_sitl())
+NO_GO = math.radians(45.0)
+CHECK = settings(max_examples=60, deadline=None, derandomize=True)
+
+
+def verdict(path, twd=0.0, **more):
+    return judge(path, boat=BOAT, no_go_half_rad=NO_GO, twd_from_rad=twd, tws_mps=5.0, area=more.pop("area", area()),
+                 **more)
+
+
+def test_a_leg_into_the_wind_is_not_sound_and_a_reach_is():
+    assert not verdict([(0, 0), (0, 100)]).is_sound(0.0)
+    reach = verdict([(0, 0), (100, 0)])
+    assert reach.is_sound(1000.0)
+    assert reach.time_s == pytest.approx(100.0 / BOAT.polar.speed_mps(math.pi / 2, 5.0), rel=1e-6)
+
+
+def test_a_forecast_narrows_what_is_sound():
+    path = [(0, 0), (100, 80)]     # TWA 51 degrees
+    assert verdict(path).is_sound(0.0)
+    wide = forecast(0.0, 0.0, sigma_rad=0.2)
+    assert not verdict(path, forecast=wide, level=0.9).is_sound(0.0)
+
+
+def test_clearance_counts():
+    rock = area(box(40, 5, 60, 20))
+    assert verdict([(0, 0), (100, 0)], area=rock).clearance_m == pytest.approx(5.0)
+    assert not verdict([(0, 0), (100, 0)], area=rock).is_sound(8.0)
+
+
+@CHECK
+@given(st.floats(-math.pi, math.pi), st.floats(-0.6, 0.6), st.floats(20.0, 300.0))
+def test_predicted_beat_stays_off_the_wind_and_turns_with_it(twd, off, length):
+    target = (length * math.sin(twd + off), length * math.cos(twd + off))
+    heading = twd - NO_GO
+    drift = predicted_beat((0.0, 0.0), heading, (0.0, 0.0), target, twd_from_rad=twd, no_go_half_rad=NO_GO,
+                           corridor_m=10.0, area=area())
+    first, second = drift.path[0], drift.path[1]
+    course = math.atan2(second[0] - first[0], second[1] - first[1])
+    assert math.isclose(abs(math.remainder(course - twd, 2 * math.pi)), NO_GO, abs_tol=1e-6)
+    assert drift.off_leg_m <= 10.0 + length / 40.0 + 1.0
+
+
+@CHECK
+@given(st.floats(0.01, 0.6), st.floats(0.0, 3000.0))
+def test_half_width_grows_with_the_level(sigma, horizon):
+    table = forecast(0.0, 0.0, sigma_rad=sigma)
+    widths = [half_width_rad(table, horizon, level) for level in (0.1, 0.5, 0.8, 0.9, 0.95, 0.99)]
+    assert widths == sorted(widths)
+    assert widths[4] == pytest.approx(1.96 * sigma, rel=1e-6)
+
+
+def test_wind_part_carries_a_swing_as_width():
+    table = forecast(0.0, 0.0, sigma_rad=0.05)
+    still = wind_part(table, after_s=0.0, length_s=120.0, delta_s=0.95)
+    swing = np.array(table.mean_twd_from_rad)
+    swing[:3] = 0.3
+    turned = table.__class__(**{f: getattr(table, f) for f in table.__slots__} | {"mean_twd_from_rad": swing})
+    wide = wind_part(turned, after_s=0.0, length_s=120.0, delta_s=0.95)
+    assert wide["sigma"]["half_width_deg"][0] > still["sigma"]["half_width_deg"][0] + 5.0
+    assert 0.0 < wide["from_deg"] < 17.2
+
+
+@pytest.mark.parametrize("after", [0.0, 7.0, 45.0, 5000.0])
+def test_problem_is_one_that_the_planner_reads(after):
+    made = voyage(Goal(en_m=(0.0, 400.0), radius_m=6.0, bandwidth_m=80.0), obstacles=(box(-40, 120, 30, 160),),
+                  limits=box(-300, -100, 300, 600))
+    gate = gates_of(made)[0]
+    data = problem_dict(made, gate, start=Start(en_m=(0.0, 0.0), heading_rad=1.0, after_s=after),
+                        aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0), forecast=forecast(0.0, 0.2), margin_m=15.0,
+                        delta_s=0.95, no_go_half_rad=math.radians(47.0))
+    problem = Problem.from_json(data)
+    assert problem.defect is None
+    assert problem.boat.no_go_half_rad == pytest.approx(math.radians(47.0))
+    # The band bounds the plan, and the margin is in the obstacles.
+    assert problem.fence is not None
+    assert problem.fence.bounds[0] >= -80.1
+    assert problem.obstacles[0].area > box(-40, 120, 30, 160).area
+    assert list(problem.wind.sigma.horizon_s) == sorted(set(problem.wind.sigma.horizon_s))
+
+
+def test_a_start_inside_the_margin_is_led_out():
+    made = voyage(obstacles=(box(-50, -50, 50, -4),))
+    start = Start(en_m=(0.0, 0.0), heading_rad=0.0)
+    out = repaired(made, start, margin_m=15.0, floor_m=8.0, twd_from_rad=0.0)
+    assert out.lead_in
+    assert made.area.clearance_m([out.en_m])[0] >= 15.0
+    assert "from an obstacle" in out.text
+    assert repaired(made, start, margin_m=3.0, floor_m=2.0, twd_from_rad=0.0) is start
+
+
+@pytest.mark.parametrize("limits", [None, box(-300, -5, 300, 900)])
+def test_a_start_between_floor_and_margin_gets_a_notch(limits):
+    made = voyage(Goal(en_m=(0.0, 300.0), radius_m=6.0), obstacles=(box(-50, -50, 50, 30),), limits=limits)
+    start = Start(en_m=(0.0, 40.0), heading_rad=0.0)
+    out = repaired(made, start, margin_m=15.0, floor_m=8.0, twd_from_rad=math.pi)
+    assert out.en_m == start.en_m
+    assert not out.lead_in
+    assert out.notch_m > 5.0
+    gate = gates_of(made)[0]
+    problem = Problem.from_json(problem_dict(
+        made, gate, start=out, aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0), forecast=forecast(0.0, math.pi),
+        margin_m=15.0, delta_s=0.95, no_go_half_rad=math.radians(47.0), floor_m=8.0))
+    answer = plan(problem, expansions=500)
+    assert answer.has_path
+    assert made.area.path_clearance_m(answer.waypoints_en) >= 8.0
+
+
+def test_a_start_inside_the_obstacle_is_led_out_too():
+    made = voyage(obstacles=(box(-50, -50, 50, 10),))
+    out = repaired(
+        made, Start(en_m=(0.0, 0.0), heading_rad=0.0), margin_m=15.0, floor_m=8.0, twd_from_rad=math.pi)
+    assert made.area.clearance_m([out.en_m])[0] >= 15.0
+
+
+def test_the_local_plan_covers_the_next_miles_only():
+    made = voyage(Goal(en_m=(0.0, 50_000.0), radius_m=50.0))
+    config = SkipperConfig()
+    aim = aim_at(made, config, gates_of(made), 0, (0.0, 0.0))
+    assert aim.gate == -1
+    assert math.hypot(*aim.en_m) <= config.horizon_m + 1.0
+    assert aim_at(made, config, gates_of(made), 0, (0.0, 46_000.0)).gate == 0
+
+
+def test_the_ladder_never_goes_below_the_floor_and_never_repeats_itself():
+    steps = rungs(SkipperConfig())
+    assert steps[0].name == ""
+    assert len({(s.margin_m, s.delta_s, s.nearer_goal) for s in steps}) == len(steps)
+    assert min(s.margin_m for s in steps) == SkipperConfig().margin_floor_m
+    assert [s.delta_s for s in steps] == sorted((s.delta_s for s in steps), reverse=True)
+    tight = rungs(SkipperConfig(margin_m=5.0, margin_floor_m=8.0))
+    assert all(s.margin_m == 5.0 for s in tight)
+
+
+def test_a_limit_on_the_paths_risk_reaches_the_problem_and_is_given_up_before_delta_s():
+    steps = rungs(SkipperConfig(max_path_risk=0.2))
+    given_up = next(n for n, s in enumerate(steps) if s.max_path_risk is None)
+    assert all(s.max_path_risk == 0.2 for s in steps[:given_up])
+    assert "not bounded" in steps[given_up].name
+    assert steps[given_up].delta_s == SkipperConfig().delta_s
+    assert all(s.max_path_risk is None for s in steps[given_up:])
+    made = voyage(Goal(en_m=(0.0, 400.0), radius_m=6.0))
+    config = SkipperConfig(max_path_risk=0.2)
+    start, gates = Start(en_m=(0.0, 0.0), heading_rad=0.8), gates_of(made)
+    aim = aim_at(made, config, gates, 0, start.en_m)
+    problem = Problem.from_json(problem_dict(
+        made, gates[0], start=start, aim=aim, forecast=forecast(0.0, 0.0, sigma_rad=0.1), margin_m=15.0, delta_s=0.9,
+        no_go_half_rad=NO_GO, max_path_risk=0.2))
+    assert problem.risk is not None
+    answer = plan(problem, expansions=8000)
+    assert answer.has_path
+    assert answer.risk is not None
+    assert answer.risk <= 0.2

@@ -1,0 +1,136 @@
+"""Pictures and reports: every mark in the legend, no legend over a curve, drifting told from sailing, words, tracks."""
+
+import json
+import shutil
+import time
+from pathlib import Path
+
+import gpxpy
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from companion import cli
+from companion.clock import run_virtual
+from companion.commands import output
+from companion.geofence import read
+from companion.planner import Problem, plan
+from companion.plots import chart, mission, voyage
+from companion.plots import plan as plan_picture
+from companion.telemetry.folder.reading import read_voyage
+from sitl.run.embedded import run_embedded
+from sitl.scene.scenario import ExpectSpec, Scenario, WindSpec
+
+ROOT = Path(__file__).parents[2]
+MISSIONS = ROOT / "missions"
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Keep the figures that would be saved and closed."""
+    kept = []
+
+    def keep(figure, path):
+        figure.canvas.draw()
+        kept.append(figure)
+
+    for module in (mission, voyage, plan_picture):
+        monkeypatch.setattr(module, "save", keep)
+    yield kept
+    for figure in kept:
+        plt.close(figure)
+
+
+@pytest.fixture(scope="module")
+def sailed(tmp_path_factory):
+    out = tmp_path_factory.mktemp("pictures") / "v"
+    scenario = Scenario(name="open-water", mission="open-water.toml", limit_s=150.0, wind=WindSpec(sd_deg=2.0),
+                        expect=ExpectSpec())
+    run_virtual(run_embedded(scenario, MISSIONS / "scenario.toml", 1, out, expansions=2000))
+    return out
+
+
+def words(figure):
+    """Return everything that is written in a figure, and what its legends name."""
+    legends = [a.get_legend() for a in figure.axes if a.get_legend()] + list(figure.legends)
+    said = [t.get_text() for a in figure.axes for t in a.texts]
+    return {t.get_text() for legend in legends for t in legend.get_texts()}, said, legends
+
+
+def test_the_voyages_picture(sailed, drawn, tmp_path):
+    # Somebody had the boat for half a minute: that is no sailing.
+    folder = tmp_path / "v"
+    shutil.copytree(sailed, folder)
+    lines = (folder / "track.csv").read_text().splitlines()
+    lines[80:110] = [line.replace(",AUTO,", ",HOLD,") for line in lines[80:110]]
+    (folder / "track.csv").write_text("\n".join(lines) + "\n")
+    voyage.plot_voyage(read_voyage(folder), tmp_path / "v.png")
+    names, said, _ = words(drawn[0])
+    assert {"first plan", "sailed on port tack", "adrift, or in other hands", "goal and its radius", "first position",
+            "last position", "no-go zone"} <= names
+    assert "Windward mark" in said
+    assert any(text.endswith(" m") for text in said)   # the scale
+    title = drawn[0].get_suptitle()
+    assert "9 June 2026, 10:13 UTC" in title
+    assert "50°49.02' N 1°18.60' W" in title
+
+
+def test_no_legend_lies_over_a_curve(sailed, drawn, tmp_path):
+    voyage.plot_voyage(read_voyage(sailed), tmp_path / "v.png")
+    problem = Problem.from_json(str(ROOT / "bench" / "problems" / "four-beat-60.json"))
+    plan_picture.save_plan(problem, plan(problem, expansions=500), tmp_path / "p.png")
+    for figure in drawn:
+        for axes in figure.axes:
+            legend = axes.get_legend()
+            assert legend is not None
+            assert not legend.get_window_extent().overlaps(axes.get_window_extent().padded(-2.0))
+
+
+def test_the_missions_picture_names_its_goals_and_marks(drawn, tmp_path, capsys):
+    assert cli.main(["mission", "check", str(MISSIONS / "buoy-course.toml"), "--plot", str(tmp_path / "m.png"),
+                     "--no-plan"]) == 0
+    assert cli.main(["fence", "check", str(MISSIONS / "buoy-course.toml"), "--plot", str(tmp_path / "f.png")]) == 0
+    for figure, wanted in zip(drawn, ("mark to leave to port", "goal"), strict=True):
+        names, said, _ = words(figure)
+        assert {"start", wanted} <= names
+        assert any("Windward" in text for text in said)
+        assert "50°49." in figure.get_suptitle()
+
+
+def test_the_report_tells_the_voyage_and_writes_its_track(sailed, tmp_path, capsys):
+    tracks = [tmp_path / f"t.{kind}" for kind in ("gpx", "kml", "geojson")]
+    options = [part for track in tracks for part in ("--track", str(track))]
+    assert cli.main(["report", str(sailed), "--out", str(tmp_path / "v.png"), *options]) == 0
+    out = capsys.readouterr().out
+    figures = json.loads((sailed / "summary.json").read_text())
+    assert f"{figures['distance_m']:.0f} m, with" in out
+    assert "9 June 2026" in out
+    assert "None" not in out
+    c = read_voyage(sailed).columns
+    known = np.isfinite(c["lat_deg"])
+    for track in tracks:
+        found = read(track).tracks[0]
+        assert len(found.points) == known.sum()
+        assert found.points[-1].lat_deg == pytest.approx(c["lat_deg"][known][-1], abs=1e-7)
+    times = gpxpy.parse(tracks[0].read_text()).tracks[0].segments[0].points
+    assert (times[-1].time - times[0].time).total_seconds() == pytest.approx(
+        c["t_s"][known][-1] - c["t_s"][known][0], abs=0.01)
+    assert cli.main(["report", str(sailed), "--track", str(tracks[0])]) == 2   # not without --force
+    assert cli.main(["report", str(sailed), "--track", str(tmp_path / "t.wkt")]) == 1
+
+
+def test_what_takes_long_says_why(monkeypatch, capsys):
+    monkeypatch.setattr(output, "PATIENCE_S", 0.02)
+    with output.patience("drawing"):
+        time.sleep(0.2)
+    assert "note: drawing; the first time" in capsys.readouterr().err
+    with output.patience("drawing"):
+        pass
+    time.sleep(0.05)
+    assert capsys.readouterr().err == ""
+
+
+def test_places_and_dates_in_words():
+    assert chart.place_words(-33.85, 151.26) == "33°51.00' S 151°15.60' E"
+    assert chart.place_words(0.999999, -0.5) == "1°00.00' N 0°30.00' W"
+    assert chart.date_words("nonsense") == ""

@@ -1,0 +1,97 @@
+"""What a voyage shows on a console: nothing that was said is lost, nothing that stands is cut."""
+
+import io
+import os
+import re
+import shutil
+from dataclasses import replace
+
+import pytest
+
+from companion.fold import Step
+from companion.messages import Mode
+from companion.skipper import Skipper
+from companion.skipper.step.actions import Announce, Severity
+from companion.skipper.step.config import SkipperConfig
+from companion.telemetry.progress import ProgressLine, left_behind
+from tests.skipper.world import World, voyage
+
+LONG = "waiting for permission to upload the plan that is ready, which [operator] upload = true would give, or a person"
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+    def screen(self):
+        """Return the lines that a terminal shows: it knows \\r, \\n, cursor up and erase below."""
+        lines, row, column = [""], 0, 0
+        for part in re.findall(r"\x1b\[\d*[AJ]|[\r\n]|[^\x1b\r\n]+", self.getvalue()):
+            if part == "\r":
+                column = 0
+            elif part == "\n":
+                row, column = row + 1, 0
+                lines += [""] * (row + 1 - len(lines))
+            elif part.endswith("A") and part.startswith("\x1b"):
+                row -= int(part[2:-1])
+            elif part.endswith("J") and part.startswith("\x1b"):
+                lines[row:] = [lines[row][:column]]
+            else:
+                lines[row] = lines[row][:column] + part + lines[row][column + len(part):]
+                column += len(part)
+        return lines
+
+
+@pytest.fixture
+def steps():
+    """Three steps of a boat that waits, with something said in the second."""
+    world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
+    world.run(3)
+    out = []
+    for n in range(3):
+        said = (Announce(severity=Severity.WARNING, code="x", text="the fence is not in force"),) if n == 1 else ()
+        snapshot = replace(world.snapshot(), t_s=float(n))
+        out.append(Step(snapshot=snapshot, state=_with(world.state, why=LONG), actions=said))
+    return out
+
+
+def _with(state, **changes):
+    return replace(state, sailing=False, **changes)
+
+
+def test_at_80_columns_the_sentence_is_whole_and_what_was_said_stays(steps, monkeypatch):
+    """It was cut to "waiting for permissi", and announcements were never printed (issue 13, point 6)."""
+    monkeypatch.setattr(shutil, "get_terminal_size", lambda fallback: os.terminal_size((80, 24)))
+    terminal = Terminal()
+    with ProgressLine(terminal) as progress:
+        for step in steps:
+            progress.show(None, step)
+    lines = terminal.screen()
+    assert all(len(line) < 80 for line in lines)
+    text = " ".join(line.strip() for line in lines)
+    assert text.count(LONG) == 1
+    assert text.count("WARNING: the fence is not in force") == 1
+    assert text.index("WARNING") < text.index(LONG)
+
+
+def test_without_a_terminal_what_is_said_is_a_line_at_once(steps):
+    stream = io.StringIO()
+    with ProgressLine(stream, epoch_s=3600.0) as progress:
+        for step in steps:
+            progress.show(None, step)
+    lines = stream.getvalue().splitlines()
+    assert re.fullmatch(r"01:00:\d\d WARNING: the fence is not in force", lines[1])
+    assert lines[0].endswith(LONG)
+    assert len(lines) == 2
+
+
+def test_what_is_left_behind_is_said_with_where_she_will_end():
+    world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
+    assert "disarmed" in left_behind(Step(snapshot=world.snapshot(), state=world.state, actions=()))
+    world.run(60)
+    step = Step(snapshot=world.snapshot(), state=world.state, actions=())
+    assert step.snapshot.autopilot.mode is Mode.AUTO
+    end = world.state.route.items[-1].point
+    assert re.fullmatch(
+        rf"the boat sails on in AUTO: \d+ items to go, the last a loiter at {end.lat_deg:.5f}, {end.lon_deg:.5f}",
+        left_behind(step))

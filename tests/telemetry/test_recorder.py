@@ -1,0 +1,183 @@
+"""The voyage folder: what is written survives a torn last line and a sick disk; whole files are whole or absent."""
+
+import contextlib
+import errno
+import json
+import math
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.disk import Disk
+from companion.errors import JobError
+from companion.telemetry.folder import recorder as module
+from companion.telemetry.folder.names import DECISIONS, TLOG
+from companion.telemetry.folder.recorder import TRACK_COLUMNS, Recorder, jsonable, read_jsonl
+
+
+def test_records_survive_a_torn_last_line(tmp_path):
+    with Recorder(tmp_path / "v") as recorder:
+        for k in range(5):
+            recorder.decision({"kind": "test", "k": k})
+    path = tmp_path / "v" / DECISIONS
+    path.write_bytes(path.read_bytes()[:-4])
+    assert [r["k"] for r in read_jsonl(path)] == [0, 1, 2, 3]
+
+
+def test_damage_in_the_middle_is_not_a_torn_line(tmp_path):
+    path = tmp_path / DECISIONS
+    path.write_bytes(b'{"k":1}\n{"k":\n{"k":3}\n')
+    with pytest.raises(JobError, match="line 2"):
+        read_jsonl(path)
+
+
+def test_a_second_run_appends_and_has_one_header(tmp_path):
+    for _ in range(2):
+        with Recorder(tmp_path) as recorder:
+            recorder.track(["1.0", *[None] * (len(TRACK_COLUMNS) - 1)])
+    lines = (tmp_path / "track.csv").read_text().splitlines()
+    assert lines[0].split(",") == list(TRACK_COLUMNS)
+    assert len(lines) == 3
+    assert all(line.count(",") == len(TRACK_COLUMNS) - 1 for line in lines)
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A real file system of 600 kB."""
+    folder = tmp_path / "small"
+    folder.mkdir()
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", folder], capture_output=True, check=False)
+    if done.returncode != 0:
+        pytest.skip(f"no file system can be mounted here: {done.stderr.decode().strip()}")
+    yield folder
+    subprocess.run(["umount", "-l", folder], check=True)
+
+
+STAMPS = {"t_s": 99.0, "utc": "then"}
+
+
+def row(t_s):
+    return [repr(t_s), *[None] * (len(TRACK_COLUMNS) - 1)]
+
+
+def test_a_real_full_disk_pauses_all_records_leaves_none_torn_and_takes_them_up_again(small):
+    with Recorder(small / "v") as recorder:
+        recorder.track(row(1.0))
+        filler = small / "filler"
+        with filler.open("wb") as file, contextlib.suppress(OSError):
+            file.write(bytes(1 << 20))
+        for k in range(300):
+            recorder.decision({"k": k, "text": 100 * "x"})
+        assert recorder.trouble == os.strerror(errno.ENOSPC)
+        kept = [r["k"] for r in read_jsonl(small / "v" / DECISIONS)]
+        assert kept == list(range(len(kept)))      # not one torn line among them
+        assert 0 < recorder.dropped == 300 - len(kept)
+        recorder.frame(b"12345678")                # none of them tells of what another lacks
+        assert (small / "v" / TLOG).stat().st_size == 0
+        recorder.tend(STAMPS)
+        assert recorder.trouble
+        filler.unlink()
+        recorder.tend(STAMPS)
+        assert recorder.trouble == ""
+        recorder.decision({"k": "again"})
+    *_, gap, last = read_jsonl(small / "v" / DECISIONS)
+    assert gap == {**STAMPS, "kind": "gap", "since_s": 1.0, "dropped": 301 - len(kept), "why": gap["why"]}
+    assert last == {"k": "again"}
+
+
+def test_records_stop_before_the_disk_is_full_and_the_state_still_finds_room(small):
+    with Recorder(small / "v") as recorder:
+        room = Disk().room(small)
+        assert 0 < room.reserve_bytes < 100_000
+        (small / "filler").write_bytes(bytes(room.free_bytes - room.reserve_bytes + 5000))
+        recorder.tend(STAMPS)
+        assert "kept for the state" in recorder.trouble
+        recorder.decision({"kind": "x"})
+        assert read_jsonl(small / "v" / DECISIONS) == []
+        Disk().replace(small / "state.json", 20_000 * b"x")
+        recorder.summary({"arrived": True})        # the last chance: it may use the reserve
+        assert (small / "v" / "summary.json").exists()
+
+
+def test_a_failed_whole_file_leaves_the_old_one_and_no_rubbish(small):
+    path = small / "state.json"
+    Disk().replace(path, b"old")
+    with pytest.raises(OSError, match="No space"):
+        Disk().replace(path, bytes(1 << 20))
+    assert path.read_bytes() == b"old"
+    assert [p.name for p in small.iterdir()] == ["state.json"]
+
+
+def test_a_read_only_disk_is_no_end_and_what_is_written_once_comes_when_it_can(small):
+    (small / "v").mkdir()
+    subprocess.run(["mount", "-o", "remount,ro", small], check=True)
+    with Recorder(small / "v") as recorder:
+        assert recorder.trouble == os.strerror(errno.EROFS)
+        recorder.voyage({"name": "n"})
+        recorder.whole("mission/mission.toml", b"m")
+        recorder.decision({"kind": "start"})
+        recorder.summary({"arrived": False})
+        recorder.tend(STAMPS)
+        assert recorder.trouble == os.strerror(errno.EROFS)
+        subprocess.run(["mount", "-o", "remount,rw", small], check=True)
+        recorder.tend(STAMPS)
+        assert recorder.trouble == ""
+    assert (small / "v" / "mission" / "mission.toml").read_bytes() == b"m"
+    assert (small / "v" / "voyage.toml").read_text() == 'name = "n"\n'
+    assert [r["kind"] for r in read_jsonl(small / "v" / DECISIONS)] == ["gap"]
+
+
+def test_the_kernel_says_full_in_the_middle_of_a_write():
+    """/dev/full takes the opening and no byte."""
+    fd = Disk().open_to_append(Path("/dev/full"))
+    with pytest.raises(OSError, match="No space"):
+        Disk().append(fd, b"x")
+    os.close(fd)
+
+
+def test_two_companions_do_not_record_into_one_folder(tmp_path):
+    with Recorder(tmp_path / "v"), pytest.raises(JobError, match="another companion is recording"), \
+            Recorder(tmp_path / "v"):
+        pass
+    with Recorder(tmp_path / "v") as recorder:
+        assert recorder.trouble == ""
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(JobError, match="cannot write the voyage"), Recorder(tmp_path / "file" / "v"):
+        pass
+
+
+def test_json_holds_no_nan():
+    value = jsonable({"a": math.nan, "b": np.array([1.0, math.inf]), "c": (1, np.float64(2.5))})
+    assert json.loads(json.dumps(value, allow_nan=False)) == {"a": None, "b": [1.0, None], "c": [1, 2.5]}
+
+
+def test_files_are_bounded_over_restarts_and_what_is_left_out_is_counted(tmp_path, monkeypatch):
+    monkeypatch.setitem(module.MAX_BYTES, DECISIONS, 100)
+    monkeypatch.setitem(module.MAX_BYTES, TLOG, 20)
+    dropped = 0
+    for _ in range(3):
+        with Recorder(tmp_path) as recorder:
+            for k in range(10):
+                recorder.decision({"k": k})
+                recorder.frame(b"12345678")
+            dropped += recorder.dropped
+    assert (tmp_path / DECISIONS).stat().st_size <= 100
+    assert (tmp_path / TLOG).stat().st_size == 16
+    assert len(read_jsonl(tmp_path / DECISIONS)) + 2 + dropped == 60
+
+
+def test_a_torn_line_is_cut_off_a_long_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "TAIL_BYTES", 64)
+    path = tmp_path / DECISIONS
+    whole = b"".join(b'{"k":%d}\n' % k for k in range(100))
+    path.write_bytes(whole + b'{"k":1')
+    with Recorder(tmp_path):
+        pass
+    assert path.read_bytes() == whole
