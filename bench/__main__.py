@@ -29,6 +29,7 @@ import shapely
 
 from bench.ompl_planners import PLANNERS as OMPL
 from companion.planner import ALGORITHMS, Problem, plan
+from companion.planner.problem.evaluate import evaluate
 
 HERE = Path(__file__).resolve().parent
 OURS = tuple(ALGORITHMS)
@@ -60,7 +61,7 @@ def run_one(path, problem, planner, budget_s, seed):
         way = json.loads(lines[-1]) if done.returncode == 0 and lines else None
     except subprocess.TimeoutExpired:
         pass
-    judged = problem.evaluate(way) if way else None
+    judged = evaluate(problem, way) if way else None
     good = judged is not None and judged.is_feasible
     return {"status": "found" if good else "timeout", "cost_s": judged.time_s if good else None, "bound_s": None,
             "first_s": None, "elapsed_s": time.perf_counter() - began}

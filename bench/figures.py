@@ -19,6 +19,8 @@ from pathlib import Path
 
 import matplotlib as mpl
 
+from companion.planner.problem.evaluate import evaluate
+
 mpl.use("Agg")
 
 import matplotlib.pyplot as plt
@@ -27,10 +29,10 @@ from PIL import Image
 
 from companion.boat import MPS_PER_KNOT, Boat, avalon
 from companion.planner import Problem, plan
+from companion.planner.effort import Effort
 from companion.planner.plan import Plan, PlanStatus
 from companion.planner.reference.astar import AstarSettings, search_with
 from companion.planner.risk.wind import simulate_entries
-from companion.planner.solve import Effort
 from companion.plots.plan import draw_plan
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "figures"
@@ -137,7 +139,7 @@ def sail(p, **settings):
     outcome = search_with(p, Effort(60.0, None), AstarSettings(grid_m=20.0, **settings))
     if outcome.waypoints_en is None:
         return Plan(status=PlanStatus.TIMEOUT, reason=outcome.reason, waypoints_en=np.empty((0, 2))), outcome
-    judged = p.evaluate(outcome.waypoints_en)
+    judged = evaluate(p, outcome.waypoints_en)
     return Plan(status=PlanStatus.FOUND, reason="", waypoints_en=outcome.waypoints_en, legs=judged.legs,
                 cost_s=judged.time_s, algorithm="astar"), outcome
 
@@ -182,7 +184,7 @@ def busser_5_4():
 # ------------------------------------------------------------------------------------------- risk
 def risk():
     base = Problem.from_json(Path(__file__).resolve().parent / "problems" / "trap-beat.json")
-    from companion.planner.problem.value import RiskLimit
+    from companion.planner.problem.parts import RiskLimit
 
     limits = [0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01]
     promised, share, cost = [], [], []

@@ -24,7 +24,7 @@ def sail(folder):
 
     from companion.clock import run_virtual
     from companion.geo.segments import PolygonIndex
-    from companion.planner.warm import warm
+    from companion.planner.solve import warm
     from companion.wind.estimators.forecaster import compile_kernels
     from sitl.run.embedded import run_embedded
     from sitl.scene.scenario import load_scenario

@@ -26,7 +26,8 @@ from pathlib import Path
 import numpy as np
 
 from companion.planner import Problem, plan
-from companion.planner.problem.value import RiskLimit
+from companion.planner.problem.defects import defect_of
+from companion.planner.problem.parts import RiskLimit
 from companion.planner.risk.wind import with_risk
 
 HERE = Path(__file__).resolve().parent
@@ -84,7 +85,7 @@ def sail(problem, answer, *, winds, step_s, seed):
 
 def check(path, limit, args):
     problem = Problem.from_json(path)
-    if problem.wind.sigma.model == "none" or problem.defect is not None:
+    if problem.wind.sigma.model == "none" or defect_of(problem) is not None:
         return None
     if limit is not None:
         tau_s = problem.risk.correlation_time_s if problem.risk else 60.0

@@ -20,7 +20,8 @@ import numpy as np
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from companion.planner import Problem, plan
-from companion.planner.problem.value import BoatLimits, RiskLimit, Sigma, Target, Wind
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.parts import BoatLimits, RiskLimit, Sigma, Target, Wind
 from companion.planner.risk.wind import path_risk, simulate_entries
 from companion.traffic import Vessel
 from companion.traffic.occupancy import Keep, planning_discs
@@ -118,7 +119,7 @@ def main():
         for name, ships in SCENES.items():
             p = problem(ships, keep)
             limited = replace(p, risk=RiskLimit(max_path_risk=0.01))
-            ways = {"straight": p.evaluate([(0.0, 0.0), (900.0, 0.0)]).legs,
+            ways = {"straight": evaluate(p, [(0.0, 0.0), (900.0, 0.0)]).legs,
                     "planned": plan(p, expansions=4000, seed=1).legs,
                     "limit 1 %": plan(limited, expansions=40_000, seed=1).legs}
             for way, legs in ways.items():

@@ -80,8 +80,8 @@ def run(args: argparse.Namespace) -> int:
     from companion.clock import run as run_loop
     from companion.doctor.findings import Level
     from companion.geofence import load_mission
+    from companion.mavlink.transports.endpoints import open_link
     from companion.mavlink.transports.signing import SigningStore
-    from companion.mavlink.transports.transport import open_link
     from companion.sailable import require_sailable
 
     mission = require_sailable(load_mission(args.mission)) if args.mission is not None else None
@@ -123,7 +123,7 @@ def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> 
     from companion.clock import run as run_loop
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
-    from companion.mavlink.transports.transport import open_link
+    from companion.mavlink.transports.endpoints import open_link
     from companion.mavlink.trust.reception import TOOL_COMPONENT, LinkIdentity
 
     async def ask() -> AutopilotLimits:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.arguments import number, place, system_id
+from companion.commands.mission_preview import preview, preview_options, read_mission_file
 from companion.commands.output import force_option, print_findings, print_losses, refuse_existing, write_files
 from companion.errors import InputError
 
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
 def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
-    from companion.commands.mission import preview_options
-
     new = verbs.add_parser("new", help="make a mission TOML with its area files")
     new.add_argument("out", metavar="OUT.toml")
     new.add_argument("--from", dest="source", metavar="FILE", help="a drawing: .plan, .waypoints, GPX, KML, GeoJSON")
@@ -74,7 +73,6 @@ def run(args: argparse.Namespace) -> int:
     """Make the mission; return the exit code."""
     from dataclasses import replace
 
-    from companion.commands.mission import preview, read_mission_file
     from companion.geofence import Document, ZoneKind, read
     from companion.geofence.mission.files import mission_files
 

@@ -14,6 +14,7 @@ from companion.arguments import number, out_file, picture, whole, wind
 from companion.commands.output import patience
 from companion.errors import InputError
 from companion.planner.courses import courses
+from companion.planner.problem.evaluate import evaluate
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def _answer(problem: Problem, args: argparse.Namespace) -> tuple[Problem, Plan]:
 
 def _sail_through(args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
     """Return the problems and plans of a mission from goal to goal, to the first that has no path."""
-    from companion.commands.mission import leg_problem
+    from companion.commands.mission_preview import leg_problem
     from companion.geofence import load_mission
     from companion.sailable import require_sailable
 
@@ -161,7 +162,7 @@ def describe(problem: Problem, answer: Plan) -> str:
             lines.append(answer.why.text)
         return "\n".join(lines)
     length = sum(leg.length_m for leg in answer.legs)
-    judged = problem.evaluate(answer.waypoints_en)
+    judged = evaluate(problem, answer.waypoints_en)
     gap = f", {100.0 * answer.gap:.1f} % above the bound of {answer.lower_bound_s:.1f} s" if math.isfinite(answer.gap) \
         else ""
     lines += [

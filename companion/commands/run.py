@@ -103,7 +103,7 @@ def _outliving_the_terminal() -> Iterator[None]:
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     from companion.clock import run as run_loop
     from companion.geofence import load_mission
-    from companion.mavlink.transports.transport import open_link
+    from companion.mavlink.transports.endpoints import open_link
     from companion.sailable import require_sailable
     from companion.telemetry.folder.shelf import DEFAULT_BUDGET_BYTES, Shelf
     from companion.traffic.feeds import parse_feed

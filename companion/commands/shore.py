@@ -50,7 +50,7 @@ def find_system(link: str, timeout_s: float, system: int | None) -> int:
     """
     from companion.clock import run
     from companion.mavlink.link import Link
-    from companion.mavlink.transports.transport import open_link
+    from companion.mavlink.transports.endpoints import open_link
     from companion.mavlink.trust.reception import LinkIdentity
 
     async def listen() -> int:

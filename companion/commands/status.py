@@ -48,7 +48,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
-    from companion.mavlink.transports.transport import open_link
+    from companion.mavlink.transports.endpoints import open_link
 
     return run_loop(_watch(args, open_link(args.link)))
 

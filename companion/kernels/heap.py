@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from companion.kernels.jit import kernel
-from companion.planner.search.kernels import Floats, Ints
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
 
 
 @kernel

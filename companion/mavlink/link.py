@@ -22,9 +22,9 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s
 from companion.errors import LinkError
+from companion.mavlink.rates import RateKeeper
 from companion.mavlink.transfers.commands import CommandAnswer, CommandSend
 from companion.mavlink.transfers.machines import Machine, Outcome, Party, ResultT_co
-from companion.mavlink.transfers.rates import RateKeeper
 from companion.mavlink.transports.signing import TICKS_PER_S, SigningStore
 from companion.mavlink.transports.transport import Transport, TransportState
 from companion.mavlink.trust.census import LISTEN_S, OtherCompanion, Speaker, listed

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import PlanStatus
 from companion.planner.problem.beat import beaten
-from companion.planner.problem.value import Beat, Problem
+from companion.planner.problem.defects import defect_of
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.parts import Beat
+from companion.planner.problem.value import Problem
 from companion.planner.search.bound import cut_off, lower_bound_s
 from companion.planner.search.world import make_world
-from companion.planner.solve import Effort, Outcome, Search
 
 BOUND_TESTS = 40_000   # of visibility, for the bound of both kinds of path, when there is effort left
 BEAT_SHARE = 0.3       # of the effort, for the path with beats: an easier search, and often the end of it
@@ -30,10 +33,10 @@ def with_beats(search: Search, beat: Beat) -> Search:
 
         # Where the fence leaves no corridor there is nothing to search.
         beating, beating_s = Outcome(waypoints_en=None), math.inf
-        if straight.defect is None:
+        if defect_of(straight) is None:
             beating = search(straight, effort.part(BEAT_SHARE), seed)
         if beating.waypoints_en is not None:
-            judged = problem.evaluate(beating.waypoints_en)
+            judged = evaluate(problem, beating.waypoints_en)
             beating_s = judged.time_s if judged.is_feasible else math.inf
         if math.isfinite(beating_s) and beating_s <= lower_bound_s(closed):
             return bounded(replace(beating, lower_bound_s=math.inf))
@@ -46,7 +49,7 @@ def with_beats(search: Search, beat: Beat) -> Search:
             return sailing
         if sailing.waypoints_en is None:
             return bounded(replace(beating, lower_bound_s=math.inf))
-        if beating_s < problem.evaluate(sailing.waypoints_en).time_s:
+        if beating_s < evaluate(problem, sailing.waypoints_en).time_s:
             return bounded(replace(beating, lower_bound_s=math.inf))
         return bounded(sailing)
 

@@ -8,19 +8,20 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from companion.clock import effort_s
 from companion.errors import InputError
+from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import Plan, PlanStatus, Why
-from companion.planner.problem.evaluate import clearances
+from companion.planner.problem.defects import defect_of
+from companion.planner.problem.evaluate import clearances, evaluate
+from companion.planner.problem.sharing import resolved
 from companion.planner.problem.value import Problem
+from companion.planner.warm import warm_problems
 
 DEFAULT_BUDGET_S = 1.0
 OPTIMAL_GAP = 1e-3
@@ -34,93 +35,6 @@ ALGORITHMS: Mapping[str, tuple[str, str]] = {
 
 
 _loaded: set[str] = set()
-
-
-class Effort:
-    """What a search may spend: expansions, or seconds, or both (then the seconds are only a backstop).
-
-    Algorithms call ``spend`` with what they did and stop when ``is_over``. ``fraction`` is the share used of the
-    limit that decides (expansions when given), so a schedule made from it does not depend on the machine when
-    there is an expansion budget.
-    """
-
-    def __init__(self, budget_s: float | None, expansions: int | None) -> None:
-        self.limit = expansions
-        self.budget_s = math.inf if budget_s is None else budget_s
-        self.used = 0
-        self.first_s: float | None = None
-        self._began_s = effort_s()
-
-    def spend(self, expansions: int) -> None:
-        """Count work done."""
-        self.used += expansions
-
-    @property
-    def elapsed_s(self) -> float:
-        """Computing time since the plan began [s]."""
-        return effort_s() - self._began_s
-
-    @property
-    def fraction(self) -> float:
-        """Share of the deciding limit used, 0..1 and beyond."""
-        if self.limit is not None:
-            return self.used / max(1, self.limit)
-        return self.elapsed_s / self.budget_s if self.budget_s > 0.0 else 1.0
-
-    @property
-    def is_over(self) -> bool:
-        """Must the search stop now?"""
-        if self.limit is not None and self.used >= self.limit:
-            return True
-        return math.isfinite(self.budget_s) and self.elapsed_s >= self.budget_s
-
-    @property
-    def remaining_s(self) -> float:
-        """Computing time left [s]; inf without a budget in seconds."""
-        return self.budget_s - self.elapsed_s
-
-    def part(self, share: float) -> Effort:
-        """Return an effort that ends when ``share`` of this one's limits is spent; what it spends counts here."""
-        return _Part(self, share)
-
-    def remaining(self, chunk: int) -> int:
-        """Return how much of a chunk of expansions is left."""
-        return chunk if self.limit is None else max(0, min(chunk, self.limit - self.used))
-
-    def found(self) -> None:
-        """Note the moment of the first path."""
-        if self.first_s is None:
-            self.first_s = self.elapsed_s
-
-
-class _Part(Effort):
-    def __init__(self, whole: Effort, share: float) -> None:
-        super().__init__(
-            None if math.isinf(whole.budget_s) else share * whole.remaining_s,
-            None if whole.limit is None else max(1, int(share * (whole.limit - whole.used))))
-        self._whole = whole
-
-    def spend(self, expansions: int) -> None:
-        super().spend(expansions)
-        self._whole.spend(expansions)
-
-    def found(self) -> None:
-        super().found()
-        self._whole.found()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
-    """What an algorithm hands back: waypoints or None, a bound it proved, and for a failure what it knows."""
-
-    waypoints_en: NDArray[np.float64] | None
-    lower_bound_s: float = 0.0
-    status: PlanStatus | None = None
-    reason: str = ""
-    trace: Mapping[str, Any] = field(default_factory=dict)
-
-
-Search = Callable[[Problem, Effort, int], Outcome]
 
 
 def plan(
@@ -154,12 +68,12 @@ def plan(
         raise InputError("plan", "expansions", f"{expansions} is not positive", "give a count")
     if budget_s is None and expansions is None:
         budget_s = DEFAULT_BUDGET_S
-    _load(algorithm)
+    warm(algorithm)
     effort = Effort(budget_s, expansions)
-    empty = Plan(status=PlanStatus.INVALID, reason=problem.defect or "", waypoints_en=np.empty((0, 2)),
+    empty = Plan(status=PlanStatus.INVALID, reason=defect_of(problem) or "", waypoints_en=np.empty((0, 2)),
                  algorithm=algorithm, seed=seed, elapsed_s=effort.elapsed_s)
-    if problem.defect is not None:
-        return replace(empty, why=Why(text=f"Cannot be planned: {problem.defect}."))
+    if defect_of(problem) is not None:
+        return replace(empty, why=Why(text=f"Cannot be planned: {defect_of(problem)}."))
     try:
         # Numbers that overflow or underflow on the way (1e-180 m in a WKT) end as inf or NaN, which no check passes.
         with np.errstate(all="ignore"):
@@ -169,13 +83,12 @@ def plan(
         return replace(empty, reason=reason, elapsed_s=effort.elapsed_s, why=Why(text=reason))
 
 
-def _load(algorithm: str) -> None:
-    """Compile or load an algorithm's kernels once in a process, before the budget starts to count."""
+def warm(algorithm: str = "auto") -> None:
+    """Compile or load an algorithm's kernels once in a process, before a budget starts to count."""
     if algorithm not in _loaded:
         _loaded.add(algorithm)
-        from companion.planner.warm import warm
-
-        warm(algorithm)
+        for problem in warm_problems():
+            plan(problem, expansions=20_000 if algorithm == "auto" else 2000, algorithm=algorithm)
 
 
 def _solved(problem: Problem, effort: Effort, empty: Plan) -> Plan:
@@ -184,7 +97,7 @@ def _solved(problem: Problem, effort: Effort, empty: Plan) -> Plan:
     from companion.planner.risk.wind import keep_limit, search_within, with_risk
 
     def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
-        return search(problem.resolved, effort, seed)
+        return search(resolved(problem), effort, seed)
 
     if problem.beat is not None and problem.boat.can_tack and empty.algorithm == "auto":
         from companion.planner.beat_search import with_beats
@@ -208,7 +121,7 @@ def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> 
         reason = outcome.reason or "the effort ended before a path was found; none was proved impossible"
         bound = math.inf if status is PlanStatus.INFEASIBLE else outcome.lower_bound_s
         return replace(spent, status=status, reason=reason, lower_bound_s=bound, why=Why(text=reason))
-    judged = problem.evaluate(outcome.waypoints_en)
+    judged = evaluate(problem, outcome.waypoints_en)
     if not judged.is_feasible:
         reason = "the search's path did not pass the exact check: " + judged.reasons[0]
         return replace(spent, status=PlanStatus.TIMEOUT, reason=reason, why=Why(text=reason))

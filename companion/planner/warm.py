@@ -1,15 +1,14 @@
-"""Compile or load every kernel, so that the first real plan is as quick as the next."""
+"""What is planned once so that every kernel is compiled or loaded, and the first real plan is as quick as the next."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from companion.planner.problem.value import Problem
-from companion.planner.solve import plan
 
 
-def warm(algorithm: str = "auto") -> None:
-    """Plan two small problems: round an obstacle with uncertain wind and a vessel, by gybes alone, and by tacks."""
+def warm_problems() -> tuple[Problem, Problem]:
+    """Return two small ones: round an obstacle with uncertain wind and a vessel, by gybes alone, and by tacks."""
     base: dict[str, Any] = {
         "id": "warm", "title": "warm", "start": {"x": 0, "y": 0, "heading_deg": 10},
         "goal": {"x": 5, "y": 120, "radius": 4}, "obstacles": ["POLYGON ((-15 40, 15 40, 15 60, -15 60, -15 40))"],
@@ -22,5 +21,4 @@ def warm(algorithm: str = "auto") -> None:
             "vessel": 1, "x": 500, "y": 500, "course_deg": 0, "keep_m": 1, "along_m": 1, "across_m": 1, "sigma_m": 1}}],
     }
     tacks = base["boat"] | {"can_tack": True, "tack_loss_s": 2.0}
-    for problem in (base, base | {"boat": tacks, "fence": None, "targets": []}):
-        plan(Problem.from_json(problem), expansions=20_000 if algorithm == "auto" else 2000, algorithm=algorithm)
+    return Problem.from_json(base), Problem.from_json(base | {"boat": tacks, "fence": None, "targets": []})

@@ -232,7 +232,7 @@ def serve() -> None:
     with contextlib.suppress(OSError):
         os.nice(5)
 
-    from companion.planner.warm import warm
+    from companion.planner.solve import warm
 
     with _Pulse(sink) as pulse:
         prepare(("companion",), say=pulse.say)

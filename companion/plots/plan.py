@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
+from companion.planner.problem.sharing import resolved
+
 mpl.use("Agg")
 
 import matplotlib.pyplot as plt
@@ -73,7 +75,7 @@ def draw_plan(axes: Axes, problem: Problem, plan: Plan, *, title: str | None = N
     axes.plot(*problem.goal_en, "o", color=GOAL, ms=8, mec="black", mew=0.6, zorder=7, ls="",
               label="goal and its radius")
     draw_wind(axes, problem)
-    for k, target in enumerate(problem.resolved.targets):
+    for k, target in enumerate(resolved(problem).targets):
         axes.plot([], [], color="#7a3fa0", ls="--", label=None if k else "vessel, and where it is in a minute")
         axes.add_patch(Circle((target.x_m, target.y_m), target.radius_m, fc="none", ec="#7a3fa0", ls="--", zorder=4))
         axes.annotate("", (target.x_m + 60.0 * target.vx_mps, target.y_m + 60.0 * target.vy_mps),

@@ -29,9 +29,9 @@ from companion.skipper.planning.ladder import rungs
 from companion.skipper.step.actions import Action, CancelPlan, Severity
 from companion.skipper.step.causes import PERSON
 from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.saved import Persisted, saved_of
+from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import OperatorWish, Snapshot
-from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState
+from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState, saved_of
 from companion.skipper.step.turn import Turn
 from companion.skipper.watch.lookout import look_out
 from companion.skipper.watch.stopped import speak_of_stop

@@ -14,7 +14,8 @@ from typing import Any
 
 from companion.clock import now_s
 from companion.errors import LinkError
-from companion.mavlink.transports.transport import LinkName, Transport, open_link, parse_link
+from companion.mavlink.transports.endpoints import open_link
+from companion.mavlink.transports.transport import LinkName, Transport, parse_link
 from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.config import Truth
 from sitl.autopilot.links import LOOP_S

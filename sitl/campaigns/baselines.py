@@ -28,7 +28,7 @@ from companion.geofence.fence.autopilot_fence import FenceStatus, fence_for_auto
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
 from companion.mavlink.transfers.machines import Outcome
-from companion.mavlink.transports.transport import open_link
+from companion.mavlink.transports.endpoints import open_link
 from companion.mavlink.trust.reception import LinkIdentity
 from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
 from sitl.ardurover.program import require

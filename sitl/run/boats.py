@@ -21,7 +21,7 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transports.transport import open_link
+from companion.mavlink.transports.endpoints import open_link
 from companion.mavlink.trust.reception import LinkIdentity
 from companion.mavlink.wire.streams import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint

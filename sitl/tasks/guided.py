@@ -31,7 +31,7 @@ from companion.field.values import RESEND_S, Habits, Situation
 from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Facade
 from companion.mavlink.link import Link
-from companion.mavlink.transports.transport import open_link
+from companion.mavlink.transports.endpoints import open_link
 from companion.messages import Command, MissionItem, Mode, VehicleState, WindSample, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, Truth, serve
 from sitl.scene.scores import station_score

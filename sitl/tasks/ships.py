@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 from companion.geo.frame import LocalFrame
 from companion.messages import AisReport, GeoPoint
 from companion.planner import Plan, Problem, plan
-from companion.planner.problem.value import BoatLimits, Sigma, Wind
-from companion.planner.risk.vessels import VESSELS_SHARE
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.parts import BoatLimits, Sigma, Wind
+from companion.planner.problem.value import VESSELS_SHARE
 from companion.skipper.planning.vessels import (
     ALIKE_S,
     GIVE_UP_RISK,
@@ -213,7 +214,7 @@ class Voyage:
         if self._planned and t_s - self._planned[-1] < MIN_INTERVAL_S:
             return
         if self._way is not None:
-            legs = self._problem(()).evaluate(np.vstack([np.asarray(self._en), self._way[1:]])).legs
+            legs = evaluate(self._problem(()), np.vstack([np.asarray(self._en), self._way[1:]])).legs
             conflicts = pressing(check_legs(legs, self._discs(picture.vessels, t_s, tail_factor(GIVE_UP_RISK))))
             self._unsafe += bool(conflicts)
             since = t_s - self._planned[-1] if self._planned else math.inf
@@ -241,7 +242,7 @@ class Voyage:
 
     def _next(self, way: NDArray[np.float64]) -> list[tuple[float, float]]:
         """Return the next five minutes of a way."""
-        return soon(self._problem(()).evaluate(way).legs, ALIKE_S)
+        return soon(evaluate(self._problem(()), way).legs, ALIKE_S)
 
     def _advance(self, seconds: float) -> None:
         """Sail along the plan; without one, hold the heading slowly."""

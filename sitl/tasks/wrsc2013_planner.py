@@ -14,7 +14,8 @@ from companion.field.guidance import LastResort, helm
 from companion.field.values import GuidanceState, Habits, Situation
 from companion.geo.frame import LocalFrame
 from companion.planner import Problem, plan
-from companion.planner.problem.value import BoatLimits, Sigma, Target, Wind
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.parts import BoatLimits, Sigma, Target, Wind
 from companion.traffic import Vessel, check_legs, decide, planning_discs
 from companion.traffic.occupancy import Disc
 from companion.traffic.plans import Conflict, Decision
@@ -132,7 +133,7 @@ class PlanSkipper(FieldSkipper):
         verdict = Decision.REPLAN
         if self._way is not None and self._goal is not None:
             rest = np.vstack([np.asarray(seen.en_m), self._way[1:]])
-            legs = problem_for(seen, habits, self._goal, ()).evaluate(rest).legs
+            legs = evaluate(problem_for(seen, habits, self._goal, ()), rest).legs
             conflicts = check_legs(legs, discs)
             verdict = decide(conflicts, since_replan_s=seen.t_s - self._planned_s)
         if self._way is None and seen.t_s - self._planned_s < RETRY_S:

@@ -10,7 +10,7 @@ import contextlib
 from types import TracebackType
 from typing import Self
 
-from companion.mavlink.transports.transport import open_link
+from companion.mavlink.transports.endpoints import open_link
 from sitl.autopilot import Impairment, MemoryLink
 from sitl.autopilot.memory import FrameStream
 from sitl.scene.scenario import EventSpec

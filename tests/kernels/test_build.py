@@ -32,7 +32,7 @@ class Listener(event.Listener):
         pass
 
 event.register("numba:compile", Listener())
-from companion.planner.warm import warm
+from companion.planner.solve import warm
 from companion.wind.estimators.forecaster import compile_kernels
 from sitl.autopilot import kernel
 warm()

@@ -9,7 +9,7 @@ from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.transfers.machines import Outcome
-from companion.mavlink.transports.transport import open_link
+from companion.mavlink.transports.endpoints import open_link
 from companion.mavlink.trust.reception import LinkIdentity
 from companion.mavlink.wire.items import first_difference, mission_hash, sailed
 from companion.mavlink.wire.status import StatusReader

@@ -13,8 +13,8 @@ from companion.errors import LinkError
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.transfers.machines import Outcome
+from companion.mavlink.transports.endpoints import open_link
 from companion.mavlink.transports.signing import EPOCH_S, SigningStore
-from companion.mavlink.transports.transport import open_link
 from companion.mavlink.trust.reception import LinkIdentity
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.frames import Codec, Drop, SigningState

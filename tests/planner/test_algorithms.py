@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from companion.planner import ALGORITHMS, PlanStatus, Problem, plan
+from companion.planner.problem.evaluate import evaluate
 
 PROBLEMS = Path(__file__).resolve().parents[2] / "bench" / "problems"
 # For each: expansions that suffice; with them the tests do not depend on how busy the machine is.
@@ -28,7 +29,7 @@ def test_each_finds_a_path_that_the_scorer_passes(algorithm, name):
     p = fixture(name)
     answer = run(p, algorithm)
     assert answer.has_path, answer.reason
-    judged = p.evaluate(answer.waypoints_en)
+    judged = evaluate(p, answer.waypoints_en)
     assert judged.is_feasible, judged.reasons
     assert answer.cost_s == pytest.approx(judged.time_s)
     assert answer.lower_bound_s <= answer.cost_s
@@ -114,6 +115,6 @@ def test_bad_input_is_a_plan_or_a_reason_within_the_budget(algorithm, name):
     answer = plan(p, algorithm=algorithm, expansions=2000 if algorithm == "rrtstar" else 200_000)
     assert answer.reason
     if answer.has_path:
-        assert p.evaluate(answer.waypoints_en).is_feasible
+        assert evaluate(p, answer.waypoints_en).is_feasible
     if name == "polar of zeros":
         assert answer.status is PlanStatus.INVALID

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.problem import shore as shores
+from companion.planner.problem.evaluate import evaluate
 from companion.planner.search.kernels import is_free
 from companion.planner.search.world import make_world
 from tests.planner.problems import POLAR, box, random_problems, simple
@@ -84,7 +85,7 @@ def test_strange_but_sailable(change):
     raw = simple(**change)
     answer = plan(Problem.from_json(raw), expansions=6_000)
     assert answer.has_path, answer.reason
-    assert Problem.from_json(raw).evaluate(answer.waypoints_en).is_feasible
+    assert evaluate(Problem.from_json(raw), answer.waypoints_en).is_feasible
 
 
 @pytest.mark.parametrize(("goal_y", "obstacles"), [
@@ -181,5 +182,5 @@ def test_anything_ends_in_a_status_with_a_reason(raw, algorithm):
     answer = plan(p, expansions=400, budget_s=2.0, algorithm=algorithm)
     assert answer.reason
     if answer.has_path:
-        assert p.evaluate(answer.waypoints_en).is_feasible
+        assert evaluate(p, answer.waypoints_en).is_feasible
         assert math.isfinite(answer.cost_s)

@@ -7,6 +7,7 @@ import pytest
 
 from companion import cli
 from companion.planner import Problem
+from companion.planner.problem.evaluate import evaluate
 
 GOOD = {
     "id": "pond", "title": "Across the pond", "start": {"x": 0, "y": 0, "heading_deg": 0},
@@ -46,7 +47,7 @@ def test_it_prints_a_summary_and_writes_a_plan_that_scores(capsys, file, tmp_pat
     assert str(out_file) in out
     written = json.loads(out_file.read_text(encoding="utf-8"))
     assert all(len(w) == 2 for w in written["waypoints"])
-    judged = Problem.from_json(file()).evaluate(written["waypoints"])
+    judged = evaluate(Problem.from_json(file()), written["waypoints"])
     assert judged.is_feasible, judged.reasons
     assert judged.time_s == pytest.approx(written["cost_s"])
     assert written["risk"] is not None

@@ -14,6 +14,7 @@ from companion.commands.plan import describe
 from companion.planner import Problem, plan
 from companion.planner.courses import BEND_RAD, courses
 from companion.planner.explain import explain, with_clearance
+from companion.planner.problem.evaluate import evaluate
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 GROWING = {
@@ -41,7 +42,7 @@ def bent():
         way.append((way[-1][0] + 1e-4 * side, way[-1][1] + 1e-4))
     answer = plan(problem, expansions=500)
     points = np.array(way)
-    return problem, with_clearance(problem, replace(answer, legs=problem.evaluate(points).legs, waypoints_en=points))
+    return problem, with_clearance(problem, replace(answer, legs=evaluate(problem, points).legs, waypoints_en=points))
 
 
 def test_many_legs_are_few_courses(bent):

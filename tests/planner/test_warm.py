@@ -8,7 +8,7 @@ from tests.planner.problems import CONSTANT, POLAR, box
 PROGRAM = """
 from numba.core.dispatcher import Dispatcher
 from companion.planner import Problem, plan
-from companion.planner.warm import warm
+from companion.planner.solve import warm
 from tests.planner.problems import simple
 
 warm()

@@ -6,7 +6,7 @@ import random
 import pytest
 
 from companion.messages import Mode, StatusText
-from companion.skipper.step.route import ends_safely, is_same_mission
+from companion.skipper.step.missions import ends_safely, is_same_mission
 from companion.skipper.step.snapshot import OperatorWish, UploadResult, WindHealth
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import moved

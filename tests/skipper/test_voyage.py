@@ -15,7 +15,7 @@ from companion.planner import PlanStatus
 from companion.planner.worker import failed
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
-from companion.skipper.step.route import effective, ends_safely, is_same_mission
+from companion.skipper.step.missions import effective, ends_safely, is_same_mission
 from companion.skipper.step.snapshot import AutopilotRebooted, OperatorWish, UploadResult, WindHealth
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved

@@ -348,7 +348,7 @@ class World:
 
 def check_invariants(before, after, snapshot, actions) -> None:
     """What must hold in every step of every test."""
-    from companion.skipper.step.route import ends_safely
+    from companion.skipper.step.missions import ends_safely
     from companion.skipper.step.state import Phase
     from companion.skipper.step.turn import permitted
 

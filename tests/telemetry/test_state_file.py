@@ -13,8 +13,8 @@ from companion.clock import run, run_virtual
 from companion.disk import Disk
 from companion.messages import MissionItem, Mode
 from companion.skipper.board.mark import marked
+from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.state import Route
 from companion.telemetry import state_file
 from companion.telemetry.state_file import StateFile
 from sitl.trouble.sick_disk import SickDisk

@@ -22,6 +22,7 @@ from companion.mavlink.transports.transport import (
     Transport,
     TransportState,
     TransportStats,
+    parse_link,
 )
 
 BACKOFF_BASE_S = 0.25
@@ -287,8 +288,13 @@ class _Datagrams(asyncio.DatagramProtocol):
         self._owner.refused(exc)
 
 
-def make_endpoint(link: LinkName, seed: int) -> Transport:
-    """Return the closed transport of ``link``."""
+def open_link(text: str, *, seed: int = 0) -> Transport:
+    """Return the (still closed) transport of a LINK text; ``seed`` drives the jitter of reconnection.
+
+    Raises:
+        InputError: the text is not a LINK.
+    """
+    link = parse_link(text)
     return DatagramEndpoint(link) if link.kind in {"udpin", "udpout"} else StreamEndpoint(link, seed)
 
 

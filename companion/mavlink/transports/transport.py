@@ -130,14 +130,3 @@ def parse_link(text: str) -> LinkName:
     if not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
         raise bad(f"{port!r} is not a port from 1 to 65535")
     return LinkName(text, _KINDS[kind], host=host.strip("[]"), port=int(port))
-
-
-def open_link(text: str, *, seed: int = 0) -> Transport:
-    """Return the (still closed) transport of a LINK text; ``seed`` drives the jitter of reconnection.
-
-    Raises:
-        InputError: the text is not a LINK.
-    """
-    from companion.mavlink.transports.endpoints import make_endpoint
-
-    return make_endpoint(parse_link(text), seed)

@@ -11,15 +11,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
 from companion.geo.angles import wrap_pi
-
-if TYPE_CHECKING:
-    from companion.planner.problem.value import Beat, Problem
+from companion.planner.problem.parts import Beat
+from companion.planner.problem.value import Problem
 
 ANGLES = 46   # nodes of the beaten speed inside the zone: a degree apart at 45 degrees
 

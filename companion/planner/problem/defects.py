@@ -8,7 +8,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.planner.problem.value import LEAST_MPS, Problem
+from companion.planner.problem.parts import LEAST_MPS
+from companion.planner.problem.value import Problem
 
 
 def _coordinates(p: Problem) -> NDArray[np.float64]:

@@ -16,12 +16,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.planner.plan import Leg
 from companion.planner.problem.beat import beat_s, is_clear
-from companion.planner.problem.value import CLEAR_TURN_RAD, NO_GO_SLACK_RAD, Problem
+from companion.planner.problem.parts import CLEAR_TURN_RAD, NO_GO_SLACK_RAD
+from companion.planner.problem.sharing import resolved
+from companion.planner.problem.shore import shore_of
+from companion.planner.problem.value import Problem
 
 START_SLACK_M = 0.01
 GOAL_SLACK_M = 1e-6
@@ -46,9 +49,9 @@ class Evaluation:
 
 def endpoint_error(p: Problem) -> str | None:
     """Return why no plan can exist on inspection of the endpoints, or None."""
-    if p.shore.hits(shapely.Point(p.start_en)):
+    if shore_of(p).hits(shapely.Point(p.start_en)):
         return "start is inside an obstacle or outside the fence"
-    if p.shore.hits(shapely.Point(p.goal_en)):
+    if shore_of(p).hits(shapely.Point(p.goal_en)):
         return "goal is inside an obstacle or outside the fence"
     return None
 
@@ -80,10 +83,11 @@ def ground_track(p: Problem, dx_m: float, dy_m: float, t_s: float = 0.0) -> tupl
     return solve_heading(p, course, t_s)
 
 
-def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
+def evaluate(problem: Problem, waypoints_en: ArrayLike) -> Evaluation:
     """Walk the path (n, 2); agrees with the format's definition where no extension is used."""
+    p = resolved(problem)
     reasons: list[str] = []
-    points = [(float(x), float(y)) for x, y in waypoints_en.reshape(-1, 2)]
+    points = [(float(x), float(y)) for x, y in np.asarray(waypoints_en, dtype=np.float64).reshape(-1, 2)]
     if not points or not all(math.isfinite(c) for q in points for c in q):
         text = "non-finite waypoint" if points else "no path"
         return Evaluation(is_feasible=False, reasons=(text,), time_s=math.inf, sail_s=0.0, turn_s=0.0, length_m=0.0,
@@ -147,7 +151,7 @@ def evaluate(p: Problem, waypoints_en: NDArray[np.float64]) -> Evaluation:
                            f"{math.degrees(p.boat.max_twa_rad):.1f} deg")
         if not math.isfinite(t1):
             reasons.append(f"leg {i}: the boat makes no way on it")
-        if p.shore.hits(shapely.LineString([a, b])):
+        if shore_of(p).hits(shapely.LineString([a, b])):
             reasons.append(f"leg {i}: collides with an obstacle or the fence")
         hit = target_hit(p, a, a, t - spent, t)
         hit = target_hit(p, a, b, t, t1, 0.0 if beat is None else beat.corridor_m) if hit is None else hit
@@ -170,7 +174,7 @@ def clearances(p: Problem, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
     """Return the legs with ``clearance_m`` filled in: the distance to the nearest obstacle or fence line."""
     if not legs:
         return legs
-    nearest = p.shore.clearances_m(np.asarray([shapely.LineString([leg.from_en, leg.to_en]) for leg in legs]))
+    nearest = shore_of(p).clearances_m(np.asarray([shapely.LineString([leg.from_en, leg.to_en]) for leg in legs]))
     if nearest is None:
         return legs
     return tuple(replace(leg, clearance_m=float(d)) for leg, d in zip(legs, nearest, strict=True))

@@ -7,18 +7,17 @@ among them, and what is solid about a leg depends only on what is near it: in a 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import lru_cache
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from companion.planner.problem.value import Problem
+from companion.planner.problem.parts import TOUCH_M
+from companion.planner.problem.value import Problem
 
 LARGE = 1_000
 """Vertices above which the union of everything is not made."""
-TOUCH_M = 1e-3
 _REACH_M = 0.05
 _CORRIDOR_M = 0.5
 
@@ -68,3 +67,9 @@ class Shore:
         if self._line is not None and not self._line.is_empty:
             nearest = np.minimum(nearest, shapely.distance(self._line, lines))
         return nearest if len(self._parts) or self._line is not None else None
+
+
+@lru_cache(maxsize=8)   # by identity; an index of thousands of shapes is made once for a search
+def shore_of(problem: Problem) -> Shore:
+    """Return the exact test of legs against all that is solid in the problem."""
+    return Shore(problem)

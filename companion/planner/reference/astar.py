@@ -26,13 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.geo.angles import difference_rad, heading_of, wrap_pi
+from companion.planner.effort import Effort, Outcome
 from companion.planner.plan import PlanStatus
 from companion.planner.problem.evaluate import endpoint_error, ground_track
-from companion.planner.problem.value import Problem, Target
+from companion.planner.problem.parts import Target
+from companion.planner.problem.value import Problem
 from companion.planner.reference import astar_kernels as kernels
 from companion.planner.reference.rrtstar import simple_bound_s
 from companion.planner.reference.world import bounds_of, world_of
-from companion.planner.solve import Effort, Outcome
 
 KNOT_MPS = 1852.0 / 3600.0
 CELLS_ACROSS = 40        # of the default grid, start to goal: 20 m for the 800 m legs that AVALON was tested on

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from companion.kernels.jit import kernel
-from companion.planner.problem.value import CLEAR_TURN_RAD
+from companion.planner.problem.parts import CLEAR_TURN_RAD
 
 TWO_PI = 2.0 * math.pi
 EDGE_PAD = 1e-6     # of a heading laid on the edge of the no-go zone [rad]: below the judge's slack

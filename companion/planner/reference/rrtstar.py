@@ -26,13 +26,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi
+from companion.planner.effort import Effort, Outcome
 from companion.planner.plan import PlanStatus
 from companion.planner.problem.evaluate import endpoint_error
 from companion.planner.problem.value import Problem
 from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.reference.world import World, bounds_of, world_of
 from companion.planner.risk.wind import PROMISE_FACTOR, process_of
-from companion.planner.solve import Effort, Outcome
 
 GOAL_BIAS = 0.05       # OMPL's default
 REACH_SHARE = 0.2      # of the search box's diagonal: OMPL's default range

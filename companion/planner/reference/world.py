@@ -14,7 +14,8 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi
-from companion.planner.problem.value import TOUCH_M, Problem
+from companion.planner.problem.parts import TOUCH_M
+from companion.planner.problem.value import Problem
 
 NO_GO_NONE, NO_GO_KALMAN, NO_GO_AR1, NO_GO_TABLE = 0, 1, 2, 3
 _COURSES = 1441  # of the table of headings in a current: a quarter of a degree

@@ -1,14 +1,4 @@
-"""Uncertain vessels in a problem: the share of the promise that they get, their discs, and a path's risk from them.
-
-A ``Target`` with a ``spread`` is the prediction of a vessel, not a region: how far to keep away follows from what is
-promised. One promise, 1 - delta_s at each instant, covers the wind and the vessels, by the union bound (Boole):
-
-    1 - delta_s = (1 - wind_delta_s) + vessels_part
-
-with ``vessels_part`` split evenly over the vessels in force (Luders, Kothari and How 2010 split theirs evenly over
-obstacles). The wind's part widens the no-go zone (Wolsieffer 2020, eq. 15), a vessel's part r makes its disc hulls,
-clearance and Phi^-1(1 - r) sigma wide: a boat outside it is met with probability r at most (``tail_factor``). Without
-uncertain targets all of it is the wind's, as the problem's format has it.
+"""A path's risk from uncertain vessels: how often it is expected to enter the disc of hulls and clearance of any.
 
 Over a whole path a vessel's error is one draw, not one at each instant: a ship that is late is late all the way. The
 risk is the expected number of entries into its disc of hulls and clearance, first inside or later (Rice's formula,
@@ -19,24 +9,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.planner.plan import Leg
+from companion.planner.problem.parts import Target
+from companion.planner.problem.sharing import uncertain
+from companion.planner.problem.value import Problem
 from companion.planner.risk import vessel_kernels as kernels
 
 if TYPE_CHECKING:
-    from companion.planner.problem.value import Problem, Target
     from companion.traffic.occupancy import Spread
 
-VESSELS_SHARE = 0.1
-"""Of 1 - delta_s, given to vessels where the problem does not say: a zone a few percent wider costs less than discs."""
 PROMISE_FACTOR = 1.15
 """What is promised over what is computed: simulated futures scatter, and bends of a predicted track are chords."""
-LEAST_PART = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,43 +41,6 @@ class VesselRisk:
     worst_instant: float = 0.0
     by_name: tuple[tuple[str, float], ...] = ()
     legs: tuple[float, ...] = ()
-
-
-def uncertain(targets: Sequence[Target]) -> tuple[tuple[Target, Spread], ...]:
-    """Return the targets that are predictions, with their spreads."""
-    return tuple((t, t.spread) for t in targets if t.spread is not None)
-
-
-def vessel_count(targets: Sequence[Target]) -> int:
-    """Return how many uncertain vessels are in force."""
-    return len({spread.vessel for _, spread in uncertain(targets)})
-
-
-def part_of(problem: Problem) -> float:
-    """Return the vessels' part of 1 - delta_s, 0 without uncertain vessels."""
-    if vessel_count(problem.targets) == 0:
-        return 0.0
-    whole = 1.0 - problem.delta_s
-    return VESSELS_SHARE * whole if problem.vessels_part is None else problem.vessels_part
-
-
-def sigmas_for(part: float, vessels: int) -> float:
-    """Return how many standard deviations a disc is wide when ``vessels`` share ``part``; 0 without vessels."""
-    if vessels == 0:
-        return 0.0
-    from companion.traffic.predict import tail_factor
-
-    return tail_factor(min(0.5, max(part / vessels, LEAST_PART)))
-
-
-def sized(targets: Sequence[Target], sigmas: float) -> tuple[Target, ...]:
-    """Return the targets as regions: the uncertain ones with ``sigmas`` standard deviations added to their radius."""
-    return tuple(
-        t if t.spread is None else replace(
-            t, radius_m=t.radius_m + sigmas * t.spread.sigma_m, growth_mps=t.growth_mps + sigmas * t.spread.sigma_mps,
-            spread=None)
-        for t in targets
-    )
 
 
 def vessel_risk(problem: Problem, legs: Sequence[Leg]) -> VesselRisk:

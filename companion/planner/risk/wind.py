@@ -25,19 +25,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi
+from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.sharing import LEAST_PART, sigmas_for, vessel_count
 from companion.planner.problem.value import Problem
 from companion.planner.risk import wind_kernels as kernels
-from companion.planner.risk.vessels import LEAST_PART, VesselRisk, part_of, sigmas_for, vessel_count, vessel_risk
-
-if TYPE_CHECKING:
-    from companion.planner.solve import Effort, Outcome, Search
+from companion.planner.risk.vessels import VesselRisk, vessel_risk
 
 PROMISE_FACTOR = 1.15
 """What is promised over what is computed: a simulation of 2,000 winds scatters by a tenth at a share of 5 %."""
@@ -191,7 +191,7 @@ def with_risk(problem: Problem, plan: Plan) -> Plan:
 
 def with_parts(why: Why, problem: Problem, risk: PathRisk) -> Why:
     """Return the words and data of a plan with what its promise is made of."""
-    part = part_of(problem)
+    part = problem.vessels_share
     named = ", ".join(f"{name} {100.0 * value:.2g} %" for name, value in risk.vessels.by_name[:3])
     text = (f"Risk of the whole path {100.0 * risk.total:.2g} %: wind {100.0 * risk.wind:.2g} %, vessels "
             f"{100.0 * risk.vessels.total:.2g} % ({named}). At each instant {100.0 * (1.0 - problem.delta_s):.2g} %: "
@@ -246,8 +246,6 @@ def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -
     no-go zone is widened by e more standard deviations, the least e whose plan keeps the limit is bisected, and the
     cheapest plan that keeps it is handed back. The bound of the first search, without the limit, stays a bound.
     """
-    from companion.planner.solve import Effort, Outcome
-
     limit = problem.risk.max_path_risk if problem.risk is not None else 1.0
     best: Outcome | None = None
     best_s, least, bound_s = math.inf, 1.0, 0.0
@@ -268,7 +266,7 @@ def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -
             bound_s = max(bound_s, outcome.lower_bound_s)
         if turn == 0 and outcome.waypoints_en is None:
             return outcome  # what fails without the limit fails with it
-        judged = None if outcome.waypoints_en is None else problem.evaluate(outcome.waypoints_en)
+        judged = None if outcome.waypoints_en is None else evaluate(problem, outcome.waypoints_en)
         promised = path_risk(problem, judged.legs).total if judged is not None and judged.is_feasible else math.inf
         least = min(least, promised)
         if promised <= limit and judged is not None:
@@ -331,6 +329,6 @@ def _shared(problem: Problem, wind_delta_s: float, extra: float) -> Problem:
     if not problem.is_shared:
         return replace(problem, delta_s=wind_delta_s)
     count = vessel_count(problem.targets)
-    k = sigmas_for(part_of(problem), count) + extra
+    k = sigmas_for(problem.vessels_share, count) + extra
     part = count * max(0.5 * math.erfc(k / math.sqrt(2.0)), LEAST_PART)
     return replace(problem, delta_s=wind_delta_s - part, vessels_part=part)

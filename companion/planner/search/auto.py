@@ -13,8 +13,10 @@ import math
 import numpy as np
 import shapely
 
+from companion.planner.effort import Effort, Outcome
 from companion.planner.plan import PlanStatus
 from companion.planner.problem.evaluate import target_hit
+from companion.planner.problem.shore import shore_of
 from companion.planner.problem.value import Problem
 from companion.planner.search.bound import Bound, cut_off, no_course
 from companion.planner.search.gauge import make_gauge
@@ -22,7 +24,6 @@ from companion.planner.search.kernels import Floats
 from companion.planner.search.searcher import FINE_FROM, Searcher
 from companion.planner.search.tacks import check_path
 from companion.planner.search.world import World, make_world
-from companion.planner.solve import Effort, Outcome
 
 _LADDER = ((400, 2), (1_600, 2), (6_000, 2), (24_000, 2), (100_000, 2), (400_000, 2), (1_600_000, 2))
 _LATTICES = ((6_000, 3), (2_500, 3), (24_000, 2), (12_000, 3), (40_000, 3), (100_000, 2), (60_000, 3), (160_000, 2),
@@ -75,7 +76,7 @@ def _endpoint_in_solid(world: World) -> str | None:
     """Return which endpoint no path can have, or None."""
     p = world.problem
     for name, en in (("start", p.start_en), ("goal", p.goal_en)):
-        if not world.is_open(en) and p.shore.hits(shapely.Point(en)):
+        if not world.is_open(en) and shore_of(p).hits(shapely.Point(en)):
             return f"{name} is inside an obstacle or outside the fence"
     return None
 
@@ -121,7 +122,7 @@ def _lattices(s: Searcher) -> str | None:
 
 def _improve(s: Searcher) -> None:
     """Anneal the candidates and look for others until the effort ends."""
-    if not s.world.problem.shore.is_large:
+    if not shore_of(s.world.problem).is_large:
         _ = s.world.problem.eval_solid  # made now, so that the exact check at the end takes no time then
     has_solid = len(s.world.grid.edges) > 0
     lattices = list(_LATTICES) if has_solid else []

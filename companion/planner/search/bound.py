@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from companion.planner.problem.value import NO_GO_SLACK_RAD, TOUCH_M, Problem
+from companion.planner.problem.parts import NO_GO_SLACK_RAD, TOUCH_M
+from companion.planner.problem.value import Problem
 from companion.planner.search.gauge import Gauge, make_gauge, velocities
 from companion.planner.search.kernels import Floats
 from companion.planner.search.visibility import circle_cuts, geodesics, graph_nodes

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from companion.kernels.jit import kernel
-from companion.planner.problem.value import NO_GO_SLACK_RAD, Problem
+from companion.planner.problem.parts import NO_GO_SLACK_RAD
+from companion.planner.problem.value import Problem
 from companion.planner.search.kernels import Floats
 
 _SAMPLES = 1800

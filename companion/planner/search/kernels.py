@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.kernels.jit import kernel
-from companion.planner.problem.value import CLEAR_TURN_RAD
+from companion.planner.problem.parts import CLEAR_TURN_RAD
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.kernels.xorshift import uniform
+from companion.planner.effort import Effort
 from companion.planner.search.anneal import anneal, timetable
 from companion.planner.search.bound import Bound
 from companion.planner.search.drifting import run_drift
@@ -20,7 +21,6 @@ from companion.planner.search.rounds import fitted, rounded
 from companion.planner.search.tacks import check_path, follow, zigzag
 from companion.planner.search.visibility import crossings, geodesics, graph_nodes
 from companion.planner.search.world import World
-from companion.planner.solve import Effort
 
 LEG_PRICE = 8e-5
 """What a leg must save, as a share of the path's time, while ways are compared; at the end the problem's share counts.

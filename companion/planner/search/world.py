@@ -10,7 +10,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.planner.problem.value import TOUCH_M, Problem
+from companion.planner.problem.parts import TOUCH_M
+from companion.planner.problem.value import Problem
 from companion.planner.search.kernels import Boat, Floats, Grid, rasterise
 
 SKIN_M = 3e-4

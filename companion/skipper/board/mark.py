@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.messages import Command, MissionItem
-from companion.skipper.step.route import effective
+from companion.skipper.step.missions import effective
 
 _PLACE = struct.Struct("<Hii")
 # Altitudes from 1 cm to 41 m; a list of two items bears ours by chance once in 16 million.

@@ -14,10 +14,11 @@ from companion.messages import Command, MissionItem, Mode
 from companion.skipper.board.mark import are_marked, marked
 from companion.skipper.step.actions import ReadMission, Severity
 from companion.skipper.step.causes import STOPPING
-from companion.skipper.step.route import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
-from companion.skipper.step.saved import Persisted, saved_of
+from companion.skipper.step.missions import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
+from companion.skipper.step.route import Route
+from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import OperatorWish
-from companion.skipper.step.state import Phase, Route
+from companion.skipper.step.state import Phase, saved_of
 from companion.skipper.step.turn import Turn
 
 REMEDY = "it is not resumed; waiting for [operator] replace_foreign, or an order, to allow its replacement"

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 from companion.skipper.board.mark import marked
 from companion.skipper.step.actions import Change, Severity, UploadMission
-from companion.skipper.step.route import common_prefix, stopgap
+from companion.skipper.step.missions import common_prefix, stopgap
+from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import UploadOutcome, UploadResult
-from companion.skipper.step.state import PendingUpload, Retry, Route
+from companion.skipper.step.state import PendingUpload, Retry
 from companion.skipper.step.turn import Turn
 
 

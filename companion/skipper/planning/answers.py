@@ -8,14 +8,17 @@ import numpy as np
 import shapely
 
 from companion.planner import Plan, PlanStatus, Problem
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.sharing import resolved
 from companion.skipper.board.uploads import upload
 from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
 from companion.skipper.planning.not_found import asks_again, not_found
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step.actions import Change, ReplanReason, Severity
-from companion.skipper.step.route import Tail, splice
+from companion.skipper.step.missions import Tail, splice
+from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import PlanOutcome
-from companion.skipper.step.state import PendingPlan, Phase, Retry, Route
+from companion.skipper.step.state import PendingPlan, Phase, Retry
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.corners import LEAST_LEG_S, Quality, spread
 from companion.skipper.way.geometry import distance_m
@@ -93,7 +96,7 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
         return False
     problem = pending.problem
     # A vessel that the old route was planned clear of need not be kept so far from; it is held against its own discs.
-    old = replace(problem.resolved, targets=()).evaluate(np.asarray([pending.start_en_m, *points]))
+    old = evaluate(replace(resolved(problem), targets=()), np.asarray([pending.start_en_m, *points]))
     gain = old.time_s - plan.cost_s
     if not old.is_feasible:
         return False
@@ -168,7 +171,7 @@ def _followed(turn: Turn, pending: PendingPlan, path: list[PointEn]) -> list[Poi
     def quality(way: list[PointEn]) -> Quality:
         clearance_m = area.path_clearance_m(way)
         if not pending.lead_in:
-            judged = pending.problem.evaluate(np.asarray(way))
+            judged = evaluate(pending.problem, np.asarray(way))
             if judged.is_feasible:
                 return Quality(is_feasible=True, is_sailable=True, clearance_m=clearance_m, time_s=judged.time_s)
         seen = judge(
@@ -203,7 +206,7 @@ def simplified(problem: Problem, points: list[PointEn]) -> list[PointEn]:
     """
     if len(points) < 3 or len(points) > SIMPLIFIED_AT_MOST:
         return points
-    whole = problem.evaluate(np.asarray(points))
+    whole = evaluate(problem, np.asarray(points))
     if not whole.is_feasible:
         return points
     allowed_s = whole.time_s * (1.0 + SPARE_SHARE) + SPARE_S
@@ -211,7 +214,7 @@ def simplified(problem: Problem, points: list[PointEn]) -> list[PointEn]:
     n = 1
     while n < len(kept) - 1:
         shorter = kept[:n] + kept[n + 1:]
-        judged = problem.evaluate(np.asarray(shorter))
+        judged = evaluate(problem, np.asarray(shorter))
         if judged.is_feasible and judged.time_s <= allowed_s:
             kept = shorter
         else:

@@ -14,7 +14,7 @@ from companion.skipper.planning.ladder import Rung, rungs
 from companion.skipper.planning.problem import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.planning.vessels import shares
 from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan, Severity
-from companion.skipper.step.route import path_length_m
+from companion.skipper.step.missions import path_length_m
 from companion.skipper.step.state import PendingPlan
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate

@@ -11,7 +11,7 @@ from companion.skipper.planning.autopilot_beats import room_m
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step.actions import Severity
-from companion.skipper.step.route import loiter_place
+from companion.skipper.step.missions import loiter_place
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.judge import judge

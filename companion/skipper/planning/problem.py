@@ -18,7 +18,6 @@ from shapely.geometry import LineString, Polygon
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.messages import WindForecast
 from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.snapshot import Snapshot
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.judge import half_width_rad, mean_twd_rad
@@ -55,26 +54,6 @@ class Aim:
     en_m: PointEn
     radius_m: float
     gate: int
-
-
-def wind_now(snapshot: Snapshot) -> tuple[float, float] | None:
-    """Return the wind to judge the present by: (from where [rad], how fast [m/s]), None when nothing is known."""
-    wind = snapshot.wind
-    if wind.present_twd_from_rad is not None and wind.present_tws_mps is not None:
-        return wind.present_twd_from_rad, wind.present_tws_mps
-    if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
-        return wind.mean_twd_from_rad, wind.mean_tws_mps
-    if wind.forecast is not None:
-        return float(wind.forecast.mean_twd_from_rad[0]), float(wind.forecast.mean_tws_mps[0])
-    return None
-
-
-def wind_mean(snapshot: Snapshot) -> tuple[float, float] | None:
-    """Return the 90 s mean wind, or what there is of it."""
-    wind = snapshot.wind
-    if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
-        return wind.mean_twd_from_rad, wind.mean_tws_mps
-    return wind_now(snapshot)
 
 
 def wind_part(forecast: WindForecast, *, after_s: float, length_s: float, delta_s: float) -> dict[str, Any]:

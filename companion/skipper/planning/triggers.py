@@ -11,9 +11,10 @@ from companion.skipper.planning.errands import HOME, Errand, Kind, errand, homew
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import Guidance, ReplanPolicy
-from companion.skipper.step.route import NO_PLAN, path_length_m
+from companion.skipper.step.missions import NO_PLAN, path_length_m
+from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import OperatorWish
-from companion.skipper.step.state import Phase, Route
+from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m

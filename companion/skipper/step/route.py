@@ -1,208 +1,36 @@
-"""Missions: from planned waypoints to items, the splice into the mission that sails, and the safe end.
-
-Index i of a route is mission item seq i + 1 (home is item 0 and belongs to the autopilot). Numbering is fixed: a
-replan keeps the items up to the present target, so "same index" means the same place to the autopilot whatever
-happens in the middle of the transfer.
-"""
+"""The route: the mission that is sailed, point by point, and what was promised when it was planned."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
-import numpy as np
-
-from companion.geo.angles import difference_rad
-from companion.messages import Command, MissionItem, waypoint
-from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.state import Route
-from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from companion.skipper.way.voyage import PointEn, Voyage
-
-ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
+from companion.messages import MissionItem
+from companion.skipper.way.voyage import PointEn
 
 
-def effective(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """Return the items that can ever be sailed: up to the first that ends a mission.
-
-    What follows it is an old tail that a shorter upload left behind.
-    """
-    for i, item in enumerate(items):
-        if item.command in ENDS:
-            return tuple(items[: i + 1])
-    return tuple(items)
-
-
-def fingerprint(items: Sequence[MissionItem]) -> tuple[tuple[int, int, int], ...]:
-    """Return what two missions must share to be the same to the boat: command and place of each item."""
-    return tuple((item.command, item.lat_e7, item.lon_e7) for item in effective(items))
-
-
-def is_same_mission(a: Sequence[MissionItem], b: Sequence[MissionItem]) -> bool:
-    """Return whether the boat would sail both alike."""
-    return fingerprint(a) == fingerprint(b)
-
-
-def is_mixture(items: Sequence[MissionItem], old: Sequence[MissionItem], new: Sequence[MissionItem]) -> bool:
-    """Return whether every item is ours, from one of two missions at its index: an upload that was cut short."""
-    ours = [{(m.command, m.lat_e7, m.lon_e7) for m in pair} for pair in _by_index(old, new)]
-    return len(items) <= len(ours) and all(
-        (m.command, m.lat_e7, m.lon_e7) in ours[i] for i, m in enumerate(items)
-    )
-
-
-def _by_index(old: Sequence[MissionItem], new: Sequence[MissionItem]) -> list[list[MissionItem]]:
-    return [list(old[i:i + 1]) + list(new[i:i + 1]) for i in range(max(len(old), len(new)))]
-
-
-def ends_safely(items: Sequence[MissionItem]) -> bool:
-    """Return whether the mission's last sailed item is one that ends it."""
-    whole = effective(items)
-    return bool(whole) and whole[-1].command in ENDS
-
-
-# ------------------------------------------------------------------------------------------ safe end
-LEEWARD_ROOM_M = 40.0   # a boat with eased sails drifts this far before somebody looks
-RINGS_M = (0.0, 15.0, 30.0, 50.0, 80.0, 120.0)
-DIRECTIONS = 16
-
-
-def loiter_place(
-    voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float,
-) -> tuple[PointEn, float]:
-    """Return where to loiter after ``end_en`` and the room there [m].
-
-    The first place with ``loiter_radius_m`` all round and to leeward, looked for in growing rings that a straight
-    line reaches; without one, the roomiest found. A line that the wind has closed is one that the autopilot beats
-    about: it needs the room of that corridor as well.
-    """
-    corridor_m = config.tack_corridor_m if config.tack_corridor_m > 0.0 else math.inf
-    best, best_room = end_en, -math.inf
-    leeward = twd_from_rad + math.pi
-    for ring_m in RINGS_M:
-        count = 1 if ring_m == 0.0 else DIRECTIONS
-        for n in range(count):
-            place = moved(end_en, 2.0 * math.pi * n / DIRECTIONS, ring_m)
-            if ring_m > 0.0:
-                closed = abs(difference_rad(twd_from_rad, bearing_rad(end_en, place))) < config.no_go_half_rad
-                needed_m = config.margin_floor_m + (corridor_m if closed else 0.0)
-                if voyage.area.path_clearance_m([end_en, place]) < needed_m:
-                    continue
-            down = [moved(place, leeward, s * LEEWARD_ROOM_M) for s in (0.0, 0.25, 0.5, 0.75, 1.0)]
-            clearance = voyage.area.clearance_m(np.asarray(down))
-            # Drifting out of the end of the leeward strip is slow: there half the room is enough.
-            room = float(min(clearance[0], np.min(clearance[1:] + 0.5 * config.loiter_radius_m)))
-            if room >= config.loiter_radius_m:
-                return place, room
-            if room > best_room + 1.0:
-                best, best_room = place, room
-    return best, best_room
-
-
-def end_item(
-    voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float,
-) -> tuple[MissionItem, PointEn]:
-    """Return the loiter that ends the mission and where it is."""
-    place, _ = loiter_place(voyage, config, end_en, twd_from_rad)
-    return waypoint(voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM), place
-
-
-# ------------------------------------------------------------------------------------------- splice
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tail:
-    """New waypoints: where they begin (not an item), the points, and the gate that the last one completes."""
+class Route:
+    """The mission that sails: its items and what each is for. Index i has seq i + 1.
 
-    start_en: PointEn
-    points_en: tuple[PointEn, ...]
-    gate: int                  # -1: the last point completes nothing (a nearer goal, the local plan's horizon)
-
-
-def splice(
-    voyage: Voyage, config: SkipperConfig, old: Route | None, *, keep: int, tail: Tail, twd_from_rad: float,
-    facts: Route,
-) -> Route:
-    """Return the route that keeps the first ``keep`` items of ``old`` and continues with ``tail`` and a safe end.
-
-    ``facts`` carries the plan's figures (identity, wind, margin, risk); its lists are ignored.
+    ``points_en_m[i]`` is where item i is (for the safe end: where it ends), ``leg_from_en_m[i]`` where the planned
+    leg to it begins, ``gate_of[i]`` the gate (see ``companion.skipper.way.gates``) that reaching it completes, or -1.
     """
-    kept = old if keep > 0 else None
-    items = list(kept.items[:keep]) if kept else []
-    points = list(kept.points_en_m[:keep]) if kept else []
-    starts = list(kept.leg_from_en_m[:keep]) if kept else []
-    gates = list(kept.gate_of[:keep]) if kept else []
-    start = tail.start_en
-    for n, point in enumerate(tail.points_en):
-        items.append(waypoint(voyage.frame.geo_from_en(*point)))
-        points.append(point)
-        starts.append(start)
-        gates.append(tail.gate if n == len(tail.points_en) - 1 else -1)
-        start = point
-    item, place = end_item(voyage, config, start, twd_from_rad)
-    items.append(item)
-    points.append(place)
-    starts.append(start)
-    gates.append(-1)
-    return replace(
-        facts, items=tuple(items), points_en_m=tuple(points), leg_from_en_m=tuple(starts), gate_of=tuple(gates),
-    )
 
-
-# ----------------------------------------------------------------------------------------- transfer
-HELD_BACK = "held back"   # the rung of a route that ends in a stopgap
-NO_PLAN = -1              # the plan of a route that was found on board: ours, and nobody knows what for
-
-
-def stopgap(route: Route, keep: int, index: int) -> MissionItem | None:
-    """Return what stands behind the first ``keep`` items while what follows is being replaced; None: nothing can.
-
-    A loiter where the boat is going anyway: at its present target (``index``) when that is replaced, else at the last
-    waypoint that stays. An item that ends the mission stays what it is.
-    """
-    if keep >= len(route.items):
-        return None
-    if route.items[keep].command in ENDS:
-        return route.items[keep]
-    place = min(index, len(route.items) - 1) if index >= keep else keep - 1
-    return replace(route.items[place], command=Command.NAV_LOITER_UNLIM)
-
-
-def held_back(items: Sequence[MissionItem], route: Route) -> Route | None:
-    """Return the beginning of ``route`` that is on board behind a stopgap; None when ``items`` are something else.
-
-    It ends in a loiter at one of the route's own waypoints: whole and safe, and not yet the way to the goal.
-    """
-    whole = fingerprint(items)
-    n = len(whole) - 1
-    if n < 0 or whole[-1][0] != Command.NAV_LOITER_UNLIM or whole[:n] != fingerprint(route.items)[:n]:
-        return None
-    for item, point in zip(route.items, route.points_en_m, strict=True):
-        if (item.lat_e7, item.lon_e7) == whole[-1][1:]:
-            return replace(
-                route, items=(*route.items[:n], items[n]), points_en_m=(*route.points_en_m[:n], point),
-                leg_from_en_m=(*route.leg_from_en_m[:n], route.leg_from_en_m[min(n, len(route.items) - 1)]),
-                gate_of=(*route.gate_of[:n], -1), rung=HELD_BACK, risk=None, cost_s=None, bound_for="",
-                why="an upload was cut short: the mission ends in a loiter on the way",
-            )
-    return None
-
-
-def remaining_points(route: Route, index: int) -> tuple[PointEn, ...]:
-    """Return the waypoints after item ``index``, without the safe end."""
-    return route.points_en_m[index + 1:-1]
-
-
-def common_prefix(a: Sequence[MissionItem], b: Sequence[MissionItem]) -> int:
-    """Return how many leading items are identical."""
-    n = 0
-    for x, y in zip(a, b, strict=False):
-        if (x.command, x.lat_e7, x.lon_e7) != (y.command, y.lat_e7, y.lon_e7):
-            break
-        n += 1
-    return n
-
-
-def path_length_m(points: Sequence[PointEn]) -> float:
-    """Return the length of a polyline [m]."""
-    return sum(distance_m(a, b) for a, b in pairwise(points))
+    items: tuple[MissionItem, ...] = ()
+    points_en_m: tuple[PointEn, ...] = ()
+    leg_from_en_m: tuple[PointEn, ...] = ()
+    gate_of: tuple[int, ...] = ()
+    plan_id: int
+    plan_t_s: float                    # when the plan was asked for
+    plan_twd_from_rad: float           # mean wind that the plan used
+    plan_tws_mps: float
+    plan_half_width_rad: float         # half width of the forecast's interval at config.wind_change_level
+    margin_m: float
+    delta_s: float
+    rung: str = ""                     # the step of the ladder it was found on; empty: as configured
+    risk: float | None = None          # of the whole path, wind and vessels
+    vessel_risk: float = 0.0           # the vessels' part of it
+    vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
+    cost_s: float | None = None
+    why: str = ""
+    bound_for: str = ""                # the errand that its end serves; empty: the goals

@@ -8,7 +8,7 @@ from typing import Any
 
 from companion.mavlink.wire.items import mission_hash
 from companion.messages import MissionItem, Mode
-from companion.skipper.step.state import Route, SkipperState
+from companion.skipper.step.route import Route
 from companion.skipper.way.gates import Approach
 
 FORMAT = 1
@@ -94,17 +94,6 @@ class Persisted:
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
-
-
-def saved_of(state: SkipperState, voyage: str) -> Persisted:
-    """Return what of a state survives a kill."""
-    return Persisted(
-        voyage=voyage, gate=state.gate, sailing=state.sailing, route=state.route,
-        pending=state.pending_upload.route if state.pending_upload is not None else None,
-        unsure=state.unsure_route, own_mode=state.own_mode, motor=state.adrift.motor,
-        under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived, uid=state.uid, system=state.system,
-        approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
-    )
 
 
 def _route_to_dict(route: Route | None) -> dict[str, Any] | None:

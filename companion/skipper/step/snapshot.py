@@ -172,3 +172,23 @@ class Snapshot:
     traffic: TrafficPicture | None = None  # None: no vessel was ever heard
     events: tuple[Event, ...] = ()
     outcomes: tuple[Outcome, ...] = ()
+
+
+def wind_now(snapshot: Snapshot) -> tuple[float, float] | None:
+    """Return the wind to judge the present by: (from where [rad], how fast [m/s]), None when nothing is known."""
+    wind = snapshot.wind
+    if wind.present_twd_from_rad is not None and wind.present_tws_mps is not None:
+        return wind.present_twd_from_rad, wind.present_tws_mps
+    if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
+        return wind.mean_twd_from_rad, wind.mean_tws_mps
+    if wind.forecast is not None:
+        return float(wind.forecast.mean_twd_from_rad[0]), float(wind.forecast.mean_tws_mps[0])
+    return None
+
+
+def wind_mean(snapshot: Snapshot) -> tuple[float, float] | None:
+    """Return the 90 s mean wind, or what there is of it."""
+    wind = snapshot.wind
+    if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
+        return wind.mean_twd_from_rad, wind.mean_tws_mps
+    return wind_now(snapshot)

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from companion.field.guidance import LastResort
 from companion.field.station import StationState
 from companion.field.values import GuidanceState
 from companion.messages import MissionItem, Mode
 from companion.skipper.step.actions import ReplanReason
+from companion.skipper.step.route import Route
+from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import OperatorWish
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Assessment
-
-if TYPE_CHECKING:
-    from companion.skipper.step.saved import Persisted  # which is made of routes
 
 
 class Phase(enum.Enum):
@@ -33,34 +33,6 @@ class Phase(enum.Enum):
     HOLDING = "holding"                            # nothing found or something wrong: in a safe item, waiting
     OPERATOR = "operator"                          # somebody else has the boat
     DONE = "done"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Route:
-    """The mission that sails: its items and what each is for. Index i has seq i + 1.
-
-    ``points_en_m[i]`` is where item i is (for the safe end: where it ends), ``leg_from_en_m[i]`` where the planned
-    leg to it begins, ``gate_of[i]`` the gate (see ``companion.skipper.way.gates``) that reaching it completes, or -1.
-    """
-
-    items: tuple[MissionItem, ...] = ()
-    points_en_m: tuple[PointEn, ...] = ()
-    leg_from_en_m: tuple[PointEn, ...] = ()
-    gate_of: tuple[int, ...] = ()
-    plan_id: int
-    plan_t_s: float                    # when the plan was asked for
-    plan_twd_from_rad: float           # mean wind that the plan used
-    plan_tws_mps: float
-    plan_half_width_rad: float         # half width of the forecast's interval at config.wind_change_level
-    margin_m: float
-    delta_s: float
-    rung: str = ""                     # the step of the ladder it was found on; empty: as configured
-    risk: float | None = None          # of the whole path, wind and vessels
-    vessel_risk: float = 0.0           # the vessels' part of it
-    vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
-    cost_s: float | None = None
-    why: str = ""
-    bound_for: str = ""                # the errand that its end serves; empty: the goals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -260,3 +232,14 @@ class SkipperState:
     reached: tuple[int, ...] = ()                  # goals reached, in order
     missed: int = 0                                # buoys passed on the wrong side and sailed again
     wants: tuple[str, ...] = ()                    # what is missing, in words
+
+
+def saved_of(state: SkipperState, voyage: str) -> Persisted:
+    """Return what of a state survives a kill."""
+    return Persisted(
+        voyage=voyage, gate=state.gate, sailing=state.sailing, route=state.route,
+        pending=state.pending_upload.route if state.pending_upload is not None else None,
+        unsure=state.unsure_route, own_mode=state.own_mode, motor=state.adrift.motor,
+        under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived, uid=state.uid, system=state.system,
+        approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
+    )

@@ -12,7 +12,6 @@ from typing import Any
 
 from companion.mavlink.wire.fixes import LEAP_M, MEMORY_S, leap_m
 from companion.messages import AutopilotStatus, Mode
-from companion.skipper.planning.problem import wind_mean, wind_now
 from companion.skipper.step.actions import (
     Action,
     Announce,
@@ -28,9 +27,10 @@ from companion.skipper.step.actions import (
 )
 from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.config import Guidance, Permissions, SkipperConfig
-from companion.skipper.step.route import ends_safely
-from companion.skipper.step.snapshot import Snapshot
-from companion.skipper.step.state import Phase, Retry, Route, SkipperState
+from companion.skipper.step.missions import ends_safely
+from companion.skipper.step.route import Route
+from companion.skipper.step.snapshot import Snapshot, wind_mean, wind_now
+from companion.skipper.step.state import Phase, Retry, SkipperState
 from companion.skipper.way.gates import Approach, Gate, gates_of
 from companion.skipper.way.voyage import PointEn, Voyage
 

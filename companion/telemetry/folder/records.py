@@ -13,7 +13,6 @@ from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.mavlink.wire.items import mission_hash
 from companion.messages import AisReport, GeoPoint
-from companion.planner.risk.vessels import part_of
 from companion.skipper.step.actions import Action, RequestPlan, SteerHeading, UploadFence, UploadMission
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import Outcome, PlanOutcome, ReadOutcome, Snapshot
@@ -65,7 +64,7 @@ def _vessels(problem: Any) -> dict[str, Any]:
     """Return whose discs a plan keeps out of, and how its promise at each instant is shared out."""
     return {
         "vessels": sorted({t.name for t in problem.targets}),
-        "instant": {"wind": 1.0 - problem.wind_delta_s, "vessels": part_of(problem)},
+        "instant": {"wind": 1.0 - problem.wind_delta_s, "vessels": problem.vessels_share},
     }
 
 

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from companion.errors import InputError
 from companion.planner import Plan, PlanStatus, Problem, plan
 from companion.planner.problem.beat import beat_s, beaten
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.json_write import to_dict
 from companion.planner.risk.wind import path_risk, simulate_entries
 
 BEAT = {"no_go_half_deg": 45.0, "corridor_m": 10.0, "clearance_m": 8.0, "tack_s": 1.8}
@@ -57,19 +59,19 @@ def test_a_beaten_leg_is_never_forced_into_the_zone() -> None:
 
 def test_a_leg_upwind_needs_its_corridor_clear() -> None:
     line = [[0.0, 0.0], [0.0, 400.0]]
-    assert problem().evaluate(line).is_feasible
-    assert not problem(beat=None).evaluate(line).is_feasible
+    assert evaluate(problem(), line).is_feasible
+    assert not evaluate(problem(beat=None), line).is_feasible
     near = "POLYGON ((7.5 100, 60 100, 60 150, 7.5 150, 7.5 100))"      # 7.5 m off the line, 8 m are asked for
     clear = "POLYGON ((8.5 100, 60 100, 60 150, 8.5 150, 8.5 100))"
-    assert any("no-go zone" in text for text in problem(obstacles=[near]).evaluate(line).reasons)
-    assert problem(obstacles=[clear]).evaluate(line).is_feasible
+    assert any("no-go zone" in text for text in evaluate(problem(obstacles=[near]), line).reasons)
+    assert evaluate(problem(obstacles=[clear]), line).is_feasible
 
 
 def test_a_vessel_is_kept_clear_of_by_the_corridor_too() -> None:
     line = [[0.0, 0.0], [0.0, 400.0]]
     vessel = {"x": 25.0, "y": 200.0, "radius_m": 20.0}    # 5 m off the line; 10 m are sailed to each side
-    assert not problem(targets=[vessel]).evaluate(line).is_feasible
-    assert problem(targets=[vessel | {"x": 31.0}]).evaluate(line).is_feasible
+    assert not evaluate(problem(targets=[vessel]), line).is_feasible
+    assert evaluate(problem(targets=[vessel | {"x": 31.0}]), line).is_feasible
 
 
 def test_round_a_block_its_plan_stays_clear() -> None:
@@ -119,11 +121,11 @@ def test_no_plan_is_below_its_bound(
     answer = solve(p, expansions=1500)
     assert answer.status.has_path
     assert answer.lower_bound_s <= answer.cost_s + 1e-9
-    judged = p.evaluate(answer.waypoints_en)
+    judged = evaluate(p, answer.waypoints_en)
     assert judged.is_feasible
     assert judged.time_s == pytest.approx(answer.cost_s)
     # The straight line, where it may be sailed, is a path like any other.
-    line = p.evaluate([p.start_en, p.goal_en])
+    line = evaluate(p, [p.start_en, p.goal_en])
     assert not line.is_feasible or line.time_s >= answer.lower_bound_s - 1e-9
 
 
@@ -141,7 +143,7 @@ def test_the_problem_of_a_beating_boat_goes_straight_everywhere() -> None:
 
 def test_json_keeps_the_beat_and_refuses_nonsense() -> None:
     p = problem()
-    assert Problem.from_json(p.to_dict()).beat == p.beat
+    assert Problem.from_json(to_dict(p)).beat == p.beat
     with pytest.raises(InputError, match="beat"):
         problem(beat=BEAT | {"corridor_m": "ten"})
     for bad in ({"corridor_m": 0.0}, {"no_go_half_deg": 90.0}, {"clearance_m": -1.0}, {"tack_s": float("nan")}):

@@ -15,12 +15,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.planner import Problem
+from companion.planner.problem.evaluate import evaluate
 from tests.planner.problems import FOLDER, box, load, random_problems, simple
 
 
 def test_one_tack_by_hand():
     p = Problem.from_json(simple(goal={"x": 0, "y": 100, "radius": 0}))
-    e = p.evaluate([[0, 0], [50, 50], [0, 100]])
+    e = evaluate(p, [[0, 0], [50, 50], [0, 100]])
     assert e.is_feasible
     assert e.tacks == 1
     assert e.gybes == 0
@@ -31,29 +32,29 @@ def test_one_tack_by_hand():
 
 def test_what_breaks_a_rule_is_named():
     p = Problem.from_json(simple(obstacles=[box(20, 40, 80, 60)], fence=box(-60, -10, 90, 120)))
-    assert "no-go" in p.evaluate([[0, 0], [0, 99]]).reasons[0]
-    assert any("collides" in r for r in p.evaluate([[0, 0], [50, 50], [0, 100]]).reasons)
-    assert any("collides" in r for r in p.evaluate([[0, 0], [-70, 70], [0, 100]]).reasons)
-    assert "last waypoint" in p.evaluate([[0, 0], [50, 10]]).reasons[0]
-    assert "first waypoint" in p.evaluate([[1, 0], [-50, 50], [0, 100]]).reasons[0]
-    assert p.evaluate([[0, 0], [-50, 50], [0, 100]]).is_feasible
-    assert p.evaluate(np.empty((0, 2))).reasons == ("no path",)
+    assert "no-go" in evaluate(p, [[0, 0], [0, 99]]).reasons[0]
+    assert any("collides" in r for r in evaluate(p, [[0, 0], [50, 50], [0, 100]]).reasons)
+    assert any("collides" in r for r in evaluate(p, [[0, 0], [-70, 70], [0, 100]]).reasons)
+    assert "last waypoint" in evaluate(p, [[0, 0], [50, 10]]).reasons[0]
+    assert "first waypoint" in evaluate(p, [[1, 0], [-50, 50], [0, 100]]).reasons[0]
+    assert evaluate(p, [[0, 0], [-50, 50], [0, 100]]).is_feasible
+    assert evaluate(p, np.empty((0, 2))).reasons == ("no path",)
 
 
 def test_late_legs_meet_a_wider_zone():
     sigma = {"model": "kalman", "sigma0_deg": 0, "growth_deg_per_sqrt_s": 1.0}
     p = Problem.from_json(simple(delta_s=0.8, wind={"from_deg": 0, "sigma": sigma}))
-    assert not p.evaluate([[0, 0], [50, 50], [0, 100]]).is_feasible
-    e = p.evaluate([[0, 0], [80, 50], [0, 100]])
+    assert not evaluate(p, [[0, 0], [50, 50], [0, 100]]).is_feasible
+    e = evaluate(p, [[0, 0], [80, 50], [0, 100]])
     assert e.is_feasible
     assert e.legs[1].no_go_half_rad > e.legs[0].no_go_half_rad > p.boat.no_go_half_rad
 
 
 def test_touching_is_allowed_and_a_millimetre_more_is_not():
     p = Problem.from_json(simple(goal={"x": 0, "y": -100, "radius": 1}, obstacles=[box(0, -80, 50, -20)]))
-    assert p.evaluate([[0, 0], [0, -100]]).is_feasible
+    assert evaluate(p, [[0, 0], [0, -100]]).is_feasible
     inside = Problem.from_json(simple(goal={"x": 0, "y": -100, "radius": 1}, obstacles=[box(-0.003, -80, 50, -20)]))
-    assert not inside.evaluate([[0, 0], [0, -100]]).is_feasible
+    assert not evaluate(inside, [[0, 0], [0, -100]]).is_feasible
 
 
 def test_a_moving_target_is_met_only_at_its_time():
@@ -63,13 +64,13 @@ def test_a_moving_target_is_met_only_at_its_time():
 
     turn = math.pi / 0.5
     meet = -1.5 * (60 - turn)                       # where the boat is when the target crosses its track
-    assert not crossing(meet).evaluate([[0, 0], [0, -150]]).is_feasible
-    assert crossing(meet - 40).evaluate([[0, 0], [0, -150]]).is_feasible
+    assert not evaluate(crossing(meet), [[0, 0], [0, -150]]).is_feasible
+    assert evaluate(crossing(meet - 40), [[0, 0], [0, -150]]).is_feasible
 
 
 def test_a_current_sets_the_boat_and_its_heading_holds_against_it():
     p = Problem.from_json(simple(goal={"x": 0, "y": -150, "radius": 1}, current={"set_deg": 90, "drift_mps": 0.5}))
-    leg = p.evaluate([[0, 0], [0, -150]]).legs[0]
+    leg = evaluate(p, [[0, 0], [0, -150]]).legs[0]
     assert leg.speed_mps == pytest.approx(math.sqrt(1.5**2 - 0.5**2))
     assert leg.heading_rad == pytest.approx(math.pi + math.asin(0.5 / 1.5))
 
@@ -78,9 +79,9 @@ def test_losses_are_paid_once_per_manoeuvre():
     boat = simple()["boat"] | {"tack_loss_s": 7.0, "gybe_loss_s": 3.0}
     with_loss, without = Problem.from_json(simple(boat=boat)), Problem.from_json(simple())
     tack = [[0, 0], [50, 50], [0, 100]]
-    assert with_loss.evaluate(tack).time_s == pytest.approx(without.evaluate(tack).time_s + 7.0)
+    assert evaluate(with_loss, tack).time_s == pytest.approx(evaluate(without, tack).time_s + 7.0)
     gybe = [[0, 0], [30, -40], [0, -80]]
-    assert with_loss.evaluate(gybe).time_s == pytest.approx(without.evaluate(gybe).time_s + 3.0)
+    assert evaluate(with_loss, gybe).time_s == pytest.approx(evaluate(without, gybe).time_s + 3.0)
 
 
 # ------------------------------------------------------------------------ against the definition
@@ -103,7 +104,7 @@ def definition():
 def test_agrees_with_the_definition_on_random_paths(raw, middle):
     scorer = definition()
     path = [[0.0, 0.0], *map(list, middle), [raw["goal"]["x"], raw["goal"]["y"]]]
-    ours, theirs = Problem.from_json(raw).evaluate(path), scorer.evaluate(scorer.Problem.from_dict(raw), path)
+    ours, theirs = evaluate(Problem.from_json(raw), path), scorer.evaluate(scorer.Problem.from_dict(raw), path)
     assert ours.is_feasible == theirs["feasible"]
     assert ours.time_s == pytest.approx(theirs["time_s"], rel=1e-12)
     assert len(ours.reasons) == len(theirs["reasons"])
@@ -132,5 +133,5 @@ def test_a_leg_with_the_wind_over_the_starboard_side_has_a_positive_twa():
         "boat": {"no_go_half_deg": 40, "max_twa_deg": 180, "turn_rate_rad_s": 1,
                  "speed": {"model": "constant", "v_mps": 1}},
     })
-    assert math.degrees(p.evaluate([[0, 0], [-100, 100]]).legs[0].twa_rad) == pytest.approx(45.0)
-    assert math.degrees(p.evaluate([[0, 0], [100, 100]]).legs[0].twa_rad) == pytest.approx(-45.0)
+    assert math.degrees(evaluate(p, [[0, 0], [-100, 100]]).legs[0].twa_rad) == pytest.approx(45.0)
+    assert math.degrees(evaluate(p, [[0, 0], [100, 100]]).legs[0].twa_rad) == pytest.approx(-45.0)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from companion.planner import PlanStatus, Problem, plan
+from companion.planner.effort import Effort
+from companion.planner.problem.evaluate import evaluate
 from companion.planner.reference.astar import AstarSettings, grid_of, search_with, ship_discs, steps_of, target_heading
-from companion.planner.solve import Effort
 
 AVALON_TWA = list(range(0, 181, 5))
 AVALON_MPS = [
@@ -30,7 +31,7 @@ def problem(**change):
 
 def run(p, **settings):
     outcome = search_with(p, Effort(None, 10**8), AstarSettings(**settings))
-    return outcome, (None if outcome.waypoints_en is None else p.evaluate(outcome.waypoints_en))
+    return outcome, (None if outcome.waypoints_en is None else evaluate(p, outcome.waypoints_en))
 
 
 def test_there_are_24_steps_on_16_headings():

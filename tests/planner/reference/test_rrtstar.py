@@ -8,12 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
+from companion.planner.effort import Effort
+from companion.planner.problem.evaluate import evaluate
 from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.reference.kernels import first_hit, turn_time, wrap
 from companion.planner.reference.kernels import steer as steer_kernel
 from companion.planner.reference.rrtstar import Tree, search
 from companion.planner.reference.world import bounds_of, world_of
-from companion.planner.solve import Effort
 
 BLOCK = "POLYGON((-60 150,60 150,60 220,-60 220,-60 150))"
 AR1 = {"model": "ar1", "sigma0_deg": 2.0, "sigma_inf_deg": 8.0, "rho_hz": 0.036}
@@ -106,7 +107,7 @@ def test_every_state_s_time_is_the_scorer_s_time_of_its_path(change):
     assert np.all(parent[1:] >= 0)
     for state in range(1, n, max(1, n // 40)):
         way = tree.path_to(state)
-        judged = p.evaluate(way)
+        judged = evaluate(p, way)
         complaints = [r for r in judged.reasons if "goal disc" not in r]
         assert complaints == []
         assert judged.time_s == pytest.approx(tree.node[state, kernels.T], rel=2e-3 if "current" in change else 1e-9)

@@ -11,9 +11,12 @@ from hypothesis import strategies as st
 from bench.vessels import SCENES, holds, keep_of, met, problem, ship
 from companion.planner import Plan, Problem, plan
 from companion.planner.explain import explain
-from companion.planner.problem.value import RiskLimit, Target
+from companion.planner.problem.defects import defect_of
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.json_write import to_dict
+from companion.planner.problem.parts import RiskLimit, Target
+from companion.planner.problem.sharing import resolved, sigmas_for
 from companion.planner.risk import vessel_kernels as kernels
-from companion.planner.risk.vessels import part_of, sigmas_for
 from companion.planner.risk.wind import path_risk, simulate_entries
 from companion.traffic.predict import tail_factor
 
@@ -23,7 +26,7 @@ from companion.traffic.predict import tail_factor
 def test_what_is_promised_of_vessels_is_true_of_their_futures(name, clearance_m):
     ships, keep = SCENES[name], keep_of(clearance_m)
     p = problem(ships, keep)
-    straight = p.evaluate([(0.0, 0.0), (900.0, 0.0)])
+    straight = evaluate(p, [(0.0, 0.0), (900.0, 0.0)])
     found = plan(p, expansions=2000, seed=1)
     assert found.legs
     for legs in (straight.legs, found.legs) if clearance_m == 0.0 else (found.legs,):
@@ -38,7 +41,7 @@ def test_the_promise_binds_and_holds_beside_a_ship_that_crosses(off_m):
     """Behind a ship by a set distance: promises of a per cent to a half, where a third is worth asking for."""
     ships, keep = (ship((450.0 + off_m, 1125.0), 180.0, 5.0),), keep_of()
     p = problem(ships, keep)
-    legs = p.evaluate([(0.0, 0.0), (900.0, 0.0)]).legs
+    legs = evaluate(p, [(0.0, 0.0), (900.0, 0.0)]).legs
     promised = path_risk(p, legs).vessels.total
     assert promised > 0.01
     assert holds(promised, float(np.mean(met(ships, legs, keep))))
@@ -50,7 +53,7 @@ def test_wind_and_vessels_together_are_within_the_promise(off_m):
     ships, keep = (ship((450.0 + off_m, 1125.0), 180.0, 5.0),), keep_of()
     p = problem(ships, keep)
     p = replace(p, wind=replace(p.wind, twd_from_rad=math.radians(28.0)))
-    legs = p.evaluate([(0.0, 0.0), (900.0, 0.0)]).legs
+    legs = evaluate(p, [(0.0, 0.0), (900.0, 0.0)]).legs
     risk = path_risk(p, legs)
     assert risk.wind > 0.01
     assert risk.vessels.total > 0.01
@@ -63,18 +66,18 @@ def test_at_no_instant_is_more_risked_than_the_vessels_were_given(name):
     p = problem(SCENES[name], keep_of(20.0))
     found = plan(p, expansions=2000, seed=1)
     assert found.legs
-    assert path_risk(p, found).vessels.worst_instant <= part_of(p) + 1e-6
+    assert path_risk(p, found).vessels.worst_instant <= p.vessels_share + 1e-6
 
 
 # ---------------------------------------------------------------------------------------- the shares
 def test_the_parts_add_up_to_the_promise():
     p = problem(SCENES["two"], keep_of(), delta_s=0.9)
-    assert part_of(p) == pytest.approx(0.01)
-    assert (1.0 - p.wind_delta_s) + part_of(p) == pytest.approx(0.1)
+    assert p.vessels_share == pytest.approx(0.01)
+    assert (1.0 - p.wind_delta_s) + p.vessels_share == pytest.approx(0.1)
     assert p.k_delta > replace(p, targets=()).k_delta
-    assert p.resolved.delta_s == p.wind_delta_s
+    assert resolved(p).delta_s == p.wind_delta_s
     k = tail_factor(0.005)                                  # two vessels, half of it each
-    for target, disc in zip(p.targets, p.resolved.targets, strict=True):
+    for target, disc in zip(p.targets, resolved(p).targets, strict=True):
         assert disc.spread is None
         assert disc.radius_m == pytest.approx(target.radius_m + k * target.spread.sigma_m)
         assert disc.growth_mps == pytest.approx(target.growth_mps + k * target.spread.sigma_mps)
@@ -82,9 +85,9 @@ def test_the_parts_add_up_to_the_promise():
 
 def test_without_uncertain_vessels_all_of_it_is_the_winds():
     certain = problem((), keep_of(), targets=(Target(x_m=450.0, y_m=0.0, radius_m=30.0),))
-    assert certain.resolved is certain
+    assert resolved(certain) is certain
     assert certain.wind_delta_s == certain.delta_s
-    assert part_of(certain) == 0.0
+    assert certain.vessels_share == 0.0
     found = plan(certain, expansions=1000, seed=1)
     assert found.vessel_risk == 0.0
     assert path_risk(certain, found).total == path_risk(certain, found).wind
@@ -92,18 +95,18 @@ def test_without_uncertain_vessels_all_of_it_is_the_winds():
 
 @pytest.mark.parametrize("part", [0.0, 0.31, -0.1, math.nan])
 def test_a_part_that_is_not_within_the_promise_is_refused(part):
-    assert problem(SCENES["crossing"], keep_of(), vessels_part=part).defect
+    assert defect_of(problem(SCENES["crossing"], keep_of(), vessels_part=part))
 
 
 def test_a_spread_that_is_not_finite_is_refused():
     p = problem(SCENES["two"], keep_of())
     first = replace(p.targets[0], spread=replace(p.targets[0].spread, along_m=math.nan))
-    assert "targets" in replace(p, targets=(first, *p.targets[1:])).defect
+    assert "targets" in defect_of(replace(p, targets=(first, *p.targets[1:])))
 
 
 def test_the_json_form_keeps_spread_and_part():
     p = problem(SCENES["two"], keep_of(), vessels_part=0.02)
-    again = Problem.from_json(p.to_dict())
+    again = Problem.from_json(to_dict(p))
     assert again.vessels_part == 0.02
     for a, b in zip(p.targets, again.targets, strict=True):
         assert b.spread.numbers == pytest.approx(a.spread.numbers)

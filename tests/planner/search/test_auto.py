@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
+from companion.planner.problem.evaluate import evaluate
 from companion.planner.search.anneal import anneal
 from companion.planner.search.gauge import make_gauge
 from companion.planner.search.kernels import is_free
@@ -32,7 +33,7 @@ def test_the_whole_set(path):
     expected = p.extra["expect"]
     if expected == "path":
         assert answer.has_path, answer.reason
-        judged = p.evaluate(answer.waypoints_en)
+        judged = evaluate(p, answer.waypoints_en)
         assert judged.is_feasible, judged.reasons
         assert judged.time_s == answer.cost_s
         assert answer.lower_bound_s <= answer.cost_s
@@ -45,7 +46,7 @@ def test_the_whole_set(path):
 
 @pytest.mark.parametrize("name", sorted(BEST))
 def test_the_best_known_paths_are_feasible(name):
-    judged = load(name).evaluate(BEST[name]["waypoints"])
+    judged = evaluate(load(name), BEST[name]["waypoints"])
     assert judged.is_feasible, judged.reasons
     assert judged.time_s == pytest.approx(BEST[name]["time_s"], abs=1e-3)
 
@@ -64,7 +65,7 @@ def test_any_problem_ends_in_a_status_and_a_path_passes_the_scorer(raw, seed):
     answer = plan(p, expansions=6_000, seed=seed)
     assert answer.reason
     if answer.has_path:
-        assert p.evaluate(answer.waypoints_en).is_feasible
+        assert evaluate(p, answer.waypoints_en).is_feasible
         assert answer.waypoints_en[0].tolist() == [0.0, 0.0]
         assert answer.legs[-1].end_s == answer.cost_s
     else:
@@ -77,7 +78,7 @@ def test_goes_behind_a_moving_target():
     p = Problem.from_json(raw)
     answer = plan(p, expansions=60_000)
     assert answer.has_path
-    assert not any("target" in r for r in p.evaluate(answer.waypoints_en).reasons)
+    assert not any("target" in r for r in evaluate(p, answer.waypoints_en).reasons)
     alone = plan(Problem.from_json(raw | {"targets": []}), expansions=60_000)
     assert answer.cost_s > alone.cost_s
 
@@ -151,7 +152,7 @@ def test_the_lattice_beats_without_rounding():
     p = Problem.from_json(simple(goal={"x": 0, "y": 100, "radius": 0.5}, boat=boat))
     world, gauge = make_world(p), make_gauge(p)
     found = run_lattice(world, gauge, cells=900, reach=2, half_rad=math.radians(37), box=(-80, -20, 80, 120))
-    best = p.evaluate([[0, 0], [50 * math.tan(math.radians(37)), 50], [0, 99.5]]).time_s
+    best = evaluate(p, [[0, 0], [50 * math.tan(math.radians(37)), 50], [0, 99.5]]).time_s
     assert found.cost_s <= best * 1.002
 
 
@@ -160,7 +161,7 @@ def test_the_lattice_beats_without_rounding():
 def test_annealing_keeps_a_path_feasible_and_never_makes_it_worse(raw, seed):
     p = Problem.from_json(raw)
     world, gauge = make_world(p), make_gauge(p)
-    if p.evaluate([[0, 0]]).reasons[-1].startswith(("start", "goal")) or not gauge.can_move:
+    if evaluate(p, [[0, 0]]).reasons[-1].startswith(("start", "goal")) or not gauge.can_move:
         return
     found = run_lattice(world, gauge, cells=1_500, reach=2, half_rad=max(world.boat.up, p.no_go_half_rad(300.0)),
                         box=(-300, -300, 400, 400))

@@ -10,11 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
+from companion.planner.effort import Effort
+from companion.planner.problem.evaluate import evaluate
 from companion.planner.search.bound import Bound, cut_off
 from companion.planner.search.gauge import disc_time, make_gauge
 from companion.planner.search.searcher import Searcher
 from companion.planner.search.world import make_world
-from companion.planner.solve import Effort
 from tests.planner.problems import POLAR, box, load, random_problems, simple
 
 
@@ -38,7 +39,7 @@ def searched(raw, turns=6):
 @given(random_problems())
 def test_never_above_a_feasible_plan(raw):
     p = Problem.from_json(raw)
-    if p.evaluate([[0, 0]]).reasons[-1].startswith(("start", "goal")):
+    if evaluate(p, [[0, 0]]).reasons[-1].startswith(("start", "goal")):
         return
     if not make_gauge(p).can_move:
         return
@@ -46,7 +47,7 @@ def test_never_above_a_feasible_plan(raw):
     if s.best is None:
         return
     waypoints = s.world.to_en(s.best.points)
-    judged = p.evaluate(waypoints)
+    judged = evaluate(p, waypoints)
     assert judged.is_feasible, judged.reasons
     assert judged.time_s == pytest.approx(s.best.cost_s, abs=1e-6)
     assert bound.value_s <= judged.time_s + 1e-9
@@ -62,7 +63,7 @@ def test_the_late_metric_sees_obstacles_in_a_closing_wind():
     before = bound.value_s
     bound.sharpen_late(475.0, 40_000)
     assert bound.value_s > 1.01 * before
-    assert bound.value_s < p.evaluate(plan(p, expansions=20_000).waypoints_en).time_s
+    assert bound.value_s < evaluate(p, plan(p, expansions=20_000).waypoints_en).time_s
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)

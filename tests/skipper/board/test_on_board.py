@@ -7,7 +7,7 @@ import pytest
 from companion.messages import MissionItem, Mode, StatusText
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import ALL_PERMITTED, DRY_RUN
-from companion.skipper.step.route import is_same_mission
+from companion.skipper.step.missions import is_same_mission
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import UploadResult
 from companion.skipper.step.state import Phase

@@ -10,7 +10,7 @@ from shapely.geometry import box
 
 from companion.messages import Command, MissionItem
 from companion.skipper.step.config import SafeEnd, SkipperConfig
-from companion.skipper.step.route import (
+from companion.skipper.step.missions import (
     Tail,
     common_prefix,
     effective,
@@ -20,8 +20,8 @@ from companion.skipper.step.route import (
     loiter_place,
     splice,
 )
+from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.state import Route
 from tests.skipper.world import voyage
 
 CONFIG = SkipperConfig()

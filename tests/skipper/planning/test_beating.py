@@ -15,7 +15,8 @@ from companion.skipper.planning.autopilot_beats import (
     problem_beat,
     room_m,
 )
-from companion.skipper.step.state import Phase, Route
+from companion.skipper.step.route import Route
+from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.voyage import Goal
 from tests.skipper.world import World, skipper, voyage

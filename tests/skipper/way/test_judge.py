@@ -10,6 +10,7 @@ from shapely.geometry import box
 
 from companion.boat import Boat, ardurover_sitl
 from companion.planner import Problem, plan
+from companion.planner.problem.defects import defect_of
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.problem import Aim, Start, aim_at, problem_dict, repaired, wind_part
 from companion.skipper.step.config import SkipperConfig
@@ -90,7 +91,7 @@ def test_problem_is_one_that_the_planner_reads(after):
                         aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0), forecast=forecast(0.0, 0.2), margin_m=15.0,
                         delta_s=0.95, no_go_half_rad=math.radians(47.0))
     problem = Problem.from_json(data)
-    assert problem.defect is None
+    assert defect_of(problem) is None
     assert problem.boat.no_go_half_rad == pytest.approx(math.radians(47.0))
     # The band bounds the plan, and the margin is in the obstacles.
     assert problem.fence is not None

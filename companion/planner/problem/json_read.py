@@ -1,22 +1,23 @@
-"""The problem's JSON form (docs/problem-format.md): degrees and WKT outside, radians and geometry inside."""
+"""Reads a problem's JSON form (docs/problem-format.md): degrees and WKT outside, radians and geometry inside."""
 
 from __future__ import annotations
 
 import itertools
+import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import shapely
 
 from companion.errors import InputError
-from companion.planner.problem.value import (
+from companion.planner.problem.parts import (
     SIGMA_MODELS,
     Beat,
     BoatLimits,
     Current,
-    Problem,
     RiskLimit,
     Sigma,
     Target,
@@ -30,7 +31,6 @@ T = TypeVar("T")
 _NAN = re.compile(r"\bnan\b", re.IGNORECASE)
 
 
-# ---------------------------------------------------------------------------------------------- reading
 class _Reader:
     """Typed access to one JSON object that names the place of what is wrong."""
 
@@ -126,8 +126,28 @@ def _polygon(text: Any, source: str, place: str) -> shapely.Geometry:
     return geometry
 
 
-def parse(raw: Mapping[str, Any], source: str) -> Problem:
-    """Return the problem in a parsed JSON object; ``source`` names it in errors."""
+def read_fields(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of the problem in a JSON file or an already parsed mapping: those of ``Problem``, by name.
+
+    Raises:
+        InputError: the file cannot be read, a field is missing or not of its type, a WKT does not parse.
+
+    """
+    if isinstance(source, Mapping):
+        return _fields(source, str(source.get("id", "problem")))
+    path = Path(source)
+    try:
+        raw = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(str(path), "", f"cannot be read ({error.strerror})", "name a problem file") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(str(path), "", f"is not JSON ({error})", "see docs/problem-format.md") from error
+    if not isinstance(raw, Mapping):
+        raise InputError(str(path), "", "is not a JSON object", "see docs/problem-format.md")
+    return _fields(raw, str(path))
+
+
+def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
     top = _Reader(raw, source, "")
     start, goal, wind, boat = (top.child(k) for k in ("start", "goal", "wind", "boat"))
     obstacles = raw.get("obstacles") or []
@@ -141,7 +161,7 @@ def parse(raw: Mapping[str, Any], source: str) -> Problem:
     twa, mps = _parse_speed(boat.child("speed"))
     known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
              "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat"}
-    return Problem(
+    fields: dict[str, Any] = dict(  # noqa: C408, the names of Problem's fields
         id=top.text("id", ""),
         title=top.text("title", ""),
         notes=top.text("notes", ""),
@@ -174,10 +194,10 @@ def parse(raw: Mapping[str, Any], source: str) -> Problem:
         vessels_part=_parse_allocation(top.child("allocation")) if raw.get("allocation") is not None else None,
         risk=_parse_risk(_Reader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,
         clearance_floor_m=top.number("clearance_floor_m", 0.0),
-        leg_saving=top.number("leg_saving", Problem.leg_saving),
         beat=_parse_beat(top.child("beat")) if raw.get("beat") is not None else None,
         extra={k: v for k, v in raw.items() if k not in known},
     )
+    return fields | ({"leg_saving": top.number("leg_saving")} if "leg_saving" in raw else {})
 
 
 def _parse_speed(speed: _Reader) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -262,85 +282,3 @@ def _parse_beat(beat: _Reader) -> Beat:
     return Beat(
         no_go_half_rad=math.radians(beat.number("no_go_half_deg")), corridor_m=beat.number("corridor_m"),
         clearance_m=beat.number("clearance_m"), tack_s=beat.number("tack_s", 0.0))
-
-
-# ---------------------------------------------------------------------------------------------- writing
-def _wkt(geometry: shapely.Geometry) -> str:
-    """Return WKT with every digit (shapely's own writer rounds the last): reading it gives the same numbers."""
-    if geometry.is_empty:
-        return "POLYGON EMPTY"
-
-    def rings(polygon: shapely.Geometry) -> str:
-        loops = (polygon.exterior, *polygon.interiors)
-        return "(" + ", ".join("(" + ", ".join(f"{x!r} {y!r}" for x, y in shapely.get_coordinates(r).tolist()) + ")"
-                               for r in loops) + ")"
-
-    if geometry.geom_type == "Polygon":
-        return "POLYGON " + rings(geometry)
-    return "MULTIPOLYGON (" + ", ".join(rings(g) for g in geometry.geoms) + ")"
-
-
-def _spread_dict(s: Spread) -> dict[str, Any]:
-    return {
-        "vessel": s.vessel, "x": s.x_m, "y": s.y_m, "course_deg": math.degrees(s.course_rad), "keep_m": s.keep_m,
-        "along_m": s.along_m, "along_mps": s.along_mps, "across_m": s.across_m, "across_mps": s.across_mps,
-        "own_mps": s.own_mps, "sigma_m": s.sigma_m, "sigma_mps": s.sigma_mps,
-    }
-
-
-def unparse(p: Problem) -> dict[str, Any]:
-    """Return the JSON object of a problem."""
-    deg = math.degrees
-    s = p.wind.sigma
-    sigma: dict[str, Any] = {"model": s.model}
-    if s.model == "kalman":
-        sigma |= {"sigma0_deg": deg(s.sigma0_rad), "growth_deg_per_sqrt_s": deg(s.growth_rad_per_sqrt_s)}
-    elif s.model == "ar1":
-        sigma |= {"sigma0_deg": deg(s.sigma0_rad), "sigma_inf_deg": deg(s.sigma_inf_rad), "rho_hz": s.rho_hz}
-    elif s.model == "forecast":
-        sigma |= {"horizon_s": list(s.horizon_s), "sigma_deg": [deg(x) for x in s.sigma_rad]}
-        if s.half_width_rad is not None:
-            sigma["half_width_deg"] = [deg(x) for x in s.half_width_rad]
-    out: dict[str, Any] = {
-        "id": p.id, "title": p.title,
-        "start": {"x": p.start_en[0], "y": p.start_en[1], "heading_deg": deg(p.start_heading_rad)},
-        "goal": {"x": p.goal_en[0], "y": p.goal_en[1], "radius": p.goal_radius_m},
-        "obstacles": [_wkt(g) for g in p.obstacles],
-        "fence": None if p.fence is None else _wkt(p.fence),
-        "wind": {"from_deg": deg(p.wind.twd_from_rad), "speed_mps": p.wind.tws_mps, "sigma": sigma},
-        "boat": {
-            "no_go_half_deg": deg(p.boat.no_go_half_rad), "max_twa_deg": deg(p.boat.max_twa_rad),
-            "turn_rate_rad_s": p.boat.turn_rate_radps,
-            "speed": {"model": "polar", "twa_deg": [deg(a) for a in p.boat.polar_twa_rad],
-                      "v_mps": list(p.boat.polar_mps)},
-            **({"tack_loss_s": p.boat.tack_loss_s} if p.boat.tack_loss_s else {}),
-            **({"gybe_loss_s": p.boat.gybe_loss_s} if p.boat.gybe_loss_s else {}),
-            **({} if p.boat.can_tack else {"can_tack": False}),
-            **({} if p.boat.gybe_room_m is None else {"gybe_room_m": p.boat.gybe_room_m}),
-        },
-        "delta_s": p.delta_s,
-    }
-    if p.notes:
-        out["notes"] = p.notes
-    if p.current.drift_mps:
-        out["current"] = {"set_deg": deg(p.current.set_rad), "drift_mps": p.current.drift_mps}
-    if p.targets:
-        out["targets"] = [
-            {"x": t.x_m, "y": t.y_m, "vx": t.vx_mps, "vy": t.vy_mps, "radius_m": t.radius_m,
-             "growth_mps": t.growth_mps, "from_s": t.from_s, "name": t.name,
-             **({"until_s": t.until_s} if math.isfinite(t.until_s) else {}),
-             **({"spread": _spread_dict(t.spread)} if t.spread is not None else {})}
-            for t in p.targets
-        ]
-    if p.vessels_part is not None:
-        out["allocation"] = {"vessels": p.vessels_part}
-    if p.risk is not None:
-        out["risk"] = {"max_path_risk": p.risk.max_path_risk, "correlation_time_s": p.risk.correlation_time_s}
-    if p.clearance_floor_m:
-        out["clearance_floor_m"] = p.clearance_floor_m
-    if p.leg_saving != Problem.leg_saving:
-        out["leg_saving"] = p.leg_saving
-    if p.beat is not None:
-        out["beat"] = {"no_go_half_deg": deg(p.beat.no_go_half_rad), "corridor_m": p.beat.corridor_m,
-                       "clearance_m": p.beat.clearance_m, "tack_s": p.beat.tack_s}
-    return out | dict(p.extra)

@@ -1,0 +1,162 @@
+"""The parts of a planning problem as values: the wind and its uncertainty, the boat, currents, moving discs, limits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from companion.traffic.occupancy import Spread
+
+TOUCH_M = 1e-3
+"""A path may be this deep in an obstacle [m]: numerical slack for touching."""
+NO_GO_SLACK_RAD = math.radians(0.01)
+"""A leg may be this far inside the no-go zone [rad]: numerical slack."""
+
+LEAST_MPS = 1e-6
+"""A boat that is never faster than this [m/s] cannot move."""
+CLEAR_TURN_RAD = math.radians(10.0)
+"""A boat that cannot tack turns through dead down wind only where that is the shorter way by twice this [rad]."""
+ROUND_RADII = 5.0
+"""Turning radii in the leg of a round: from close-hauled to dead down wind and on, 2 tan(135°/2) of them."""
+
+SIGMA_MODELS = ("none", "kalman", "ar1", "forecast")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sigma:
+    """How uncertain the wind direction is, t seconds from now.
+
+    ``none``: 0. ``kalman``: s² = sigma0² + growth² t. ``ar1``: s² = sigma_inf² + (sigma0² - sigma_inf²) e^(-2 rho t).
+    ``forecast``: a table over ``horizon_s``, linear between and flat beyond; where ``half_width_rad`` is given it
+    is the widening of the no-go zone itself (the half width of the central interval that the direction keeps with
+    probability 2 delta_s - 1) and k sigma is not used.
+    """
+
+    model: str = "none"
+    sigma0_rad: float = 0.0
+    growth_rad_per_sqrt_s: float = 0.0
+    sigma_inf_rad: float = 0.0
+    rho_hz: float = 0.0
+    horizon_s: tuple[float, ...] = ()
+    sigma_rad: tuple[float, ...] = ()
+    half_width_rad: tuple[float, ...] | None = None
+
+    def at(self, t_s: float) -> float:
+        """Return sigma [rad] at ``t_s`` >= 0 from now."""
+        if self.model == "kalman":
+            return math.sqrt(self.sigma0_rad**2 + self.growth_rad_per_sqrt_s**2 * t_s)
+        if self.model == "ar1":
+            v0, vi = self.sigma0_rad**2, self.sigma_inf_rad**2
+            return math.sqrt(vi + (v0 - vi) * math.exp(-2.0 * self.rho_hz * t_s))
+        if self.model == "forecast":
+            return float(np.interp(t_s, self.horizon_s, self.sigma_rad))
+        return 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wind:
+    """The wind: from where [rad, true], how fast [m/s or None], how sure. A polar is already at this speed."""
+
+    twd_from_rad: float
+    tws_mps: float | None = None
+    sigma: Sigma = Sigma()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoatLimits:
+    """What the boat can do: no-go half angle, deepest angle, turn rate, speed by |TWA| (linear between nodes).
+
+    ``can_tack`` False: no turn goes through the wind's eye, so the boat gybes round. ``gybe_room_m`` is the leg that
+    turning round the long way needs; None: five turning radii at full speed.
+    """
+
+    no_go_half_rad: float
+    max_twa_rad: float = math.pi
+    turn_rate_radps: float
+    polar_twa_rad: tuple[float, ...]
+    polar_mps: tuple[float, ...]
+    tack_loss_s: float = 0.0
+    gybe_loss_s: float = 0.0
+    can_tack: bool = True
+    gybe_room_m: float | None = None
+
+    @property
+    def room_m(self) -> float:
+        """Length [m] that a leg needs to let the boat turn on by more than half a circle in all.
+
+        0 where it makes no difference: a boat that tacks and gybes without loss always turns the shorter way.
+        """
+        if self.can_tack and self.tack_loss_s == 0.0 and self.gybe_loss_s == 0.0:
+            return 0.0
+        if self.gybe_room_m is not None:
+            return self.gybe_room_m
+        return ROUND_RADII * max(self.polar_mps) / self.turn_rate_radps
+
+    @property
+    def most_turn_rad(self) -> float:
+        """How far the boat may turn [rad] between two legs of that length; the first turn of all is free of it."""
+        return math.pi if self.can_tack else math.pi - CLEAR_TURN_RAD
+
+    def speed_mps(self, twa_rad: float) -> float:
+        """Return the speed [m/s] at the true wind angle."""
+        return float(np.interp(abs(twa_rad), self.polar_twa_rad, self.polar_mps))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Current:
+    """A constant current over the ground, towards ``set_rad`` at ``drift_mps``.
+
+    The wind is then the wind on the water, headings are through the water and legs are over the ground.
+    """
+
+    set_rad: float = 0.0
+    drift_mps: float = 0.0
+
+
+NO_CURRENT = Current()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """A moving disc to keep out of: at (x + vx t, y + vy t), radius ``radius_m + growth_mps t``, in its window.
+
+    With a ``spread`` it is a vessel's prediction: the radius is that without any doubt, and how much doubt is added
+    follows from the promise (``companion.planner.risk.vessels``).
+    """
+
+    x_m: float
+    y_m: float
+    vx_mps: float = 0.0
+    vy_mps: float = 0.0
+    radius_m: float
+    growth_mps: float = 0.0
+    from_s: float = 0.0
+    until_s: float = math.inf
+    name: str = ""
+    spread: Spread | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RiskLimit:
+    """Bound on the accumulated risk of the whole path, and the wind's correlation time it assumes."""
+
+    max_path_risk: float
+    correlation_time_s: float = 60.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beat:
+    """What the autopilot makes of a leg inside its no-go zone (``companion.planner.problem.beat``).
+
+    It sails at ``no_go_half_rad`` off the wind and tacks ``corridor_m`` (above 0) off the line, in ``tack_s`` each.
+    A leg is left to it only where nothing solid is within ``clearance_m`` (0 or more) of the line.
+    """
+
+    no_go_half_rad: float
+    corridor_m: float
+    clearance_m: float
+    tack_s: float = 0.0
