@@ -23,7 +23,7 @@ from companion.skipper.planning.not_found import hold
 from companion.skipper.planning.triggers import find_trigger, is_buoy
 from companion.skipper.planning.vessels import near
 from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
-from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.causes import HOMEWARD, STOPPING
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.snapshot import OperatorWish
 from companion.skipper.step.state import Phase
@@ -96,6 +96,10 @@ def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
     if why or repair(turn):
         turn.phase(Phase.HOLDING, why or "waiting for the mission to be put right before sailing on")
         return
+    if _goes_on_at_once(turn):
+        hand_back(turn)
+        turn.phase(Phase.HOLDING, "the way on board is clear: waiting for AUTO, a new plan follows under way")
+        return
     bound = errand(turn)
     if bound is not None and not bound.has_place and not is_at_rest(turn):
         _stay(turn, bound)
@@ -110,6 +114,20 @@ def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
     else:
         hand_back(turn)
         turn.phase(Phase.HOLDING, "waiting for the autopilot to take AUTO: sailing on")
+
+
+def _goes_on_at_once(turn: Turn) -> bool:
+    """Return whether she is sailed home by the autopilot, straight, while the way on board is clear from here.
+
+    RTL and SmartRTL turn her, at full speed, towards whatever lies between her and home, in the three seconds or more
+    that a plan and its upload take; AUTO takes one, and a plan made under way begins where she will be.
+    """
+    boat, state = turn.boat_en, turn.state
+    if state.own_mode not in HOMEWARD or boat is None or state.pending_upload is not None or _is_outside(turn):
+        return False
+    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
+    ahead = turn.ahead()
+    return bool(ahead) and turn.voyage.area.path_clearance_m([boat, *ahead]) >= floor_m
 
 
 def _is_outside(turn: Turn) -> bool:

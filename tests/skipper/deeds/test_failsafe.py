@@ -315,3 +315,31 @@ def test_a_boat_that_was_never_sailed_is_no_stop():
     world.run(120)
     assert world.state.stop is None
     assert drifts(world) == []
+
+
+@pytest.mark.parametrize("mode", [Mode.RTL, Mode.SMART_RTL])
+@pytest.mark.parametrize("shown", [{"fence_breached": True}, {"battery_failed": True}])
+def test_sailed_home_straight_she_is_back_in_auto_before_any_plan(mode, shown):
+    """RTL turns her at full speed towards whatever lies between her and home; a plan takes three seconds."""
+    world = under_way()
+    stop(world, mode, **shown)
+    world.drift_mps = 0.0
+    before = len(world.actions)
+    world.run(1)
+    asked = [a for _, a in world.actions[before:] if isinstance(a, (act.SetMode, act.RequestPlan))]
+    assert [type(a) for a in asked] == [act.SetMode]
+    assert asked[0].mode is Mode.AUTO
+    assert world.run(3, lambda w: w.mode is Mode.AUTO)
+    world.run(3)
+    assert any(isinstance(a, act.RequestPlan) for _, a in world.actions[before:])   # and then from where she is
+
+
+def test_sailed_home_where_the_way_on_board_is_shut_a_plan_comes_first():
+    world = under_way(goals=(Goal(en_m=(0.0, 200.0), radius_m=8.0),), obstacles=(ISLAND,))
+    world.position = (0.0, 70.0)   # swept to where the island stands before her
+    stop(world, Mode.RTL, fence_breached=True)
+    before = len(world.actions)
+    world.run(2)
+    asked = [a for _, a in world.actions[before:] if isinstance(a, (act.SetMode, act.RequestPlan))]
+    assert asked
+    assert isinstance(asked[0], act.RequestPlan)
