@@ -172,8 +172,8 @@ def run_faults(
     for record in in_processes(sail_one, range(first_seed, first_seed + runs), workers):
         records.append(record)
         if not record["passed"]:
-            print(f"\rFAILED seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(record['events'])})",
-                  flush=True)
+            drawn = record["events"] + [f"{name} {value:g}" for name, value in record["parameters"].items()]
+            print(f"\rFAILED seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})", flush=True)
         left_s = (time.perf_counter() - began_s) / len(records) * (runs - len(records))
         failed = sum(not r["passed"] for r in records)
         sys.stderr.write(f"\r{len(records)}/{runs} sailed, {failed} failed, {left_s:.0f} s left   ")
