@@ -3,7 +3,7 @@
 Pure: parameters, version, lists and message rates in, findings out. ``companion doctor`` reads them from an
 autopilot, prints the findings, and sets parameters only when told to. Names are ArduPilot's; where 4.7 renamed a
 parameter both names are understood. SIM_ parameters are never looked at. Here is what concerns sailing: boat, wind,
-navigation; ``checks_safety`` has the rest.
+navigation; ``safety`` has the rest.
 """
 
 from __future__ import annotations

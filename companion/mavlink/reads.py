@@ -17,7 +17,7 @@ READS: Mapping[str, tuple[str, ...]] = {
     "ATTITUDE": ("assembler", "wind"),
     "GLOBAL_POSITION_INT": ("assembler",),
     "WIND": ("assembler", "wind"),
-    "NAMED_VALUE_FLOAT": ("assembler", "link", "status_wire", "wind"),
+    "NAMED_VALUE_FLOAT": ("assembler", "link", "status", "wind"),
     "MISSION_CURRENT": ("assembler",),
     "MISSION_ITEM_REACHED": ("assembler", "fold"),
     "NAV_CONTROLLER_OUTPUT": ("assembler",),
@@ -41,8 +41,8 @@ READS: Mapping[str, tuple[str, ...]] = {
     "MISSION_REQUEST_INT": _LISTS,
     "MISSION_ACK": _LISTS,
     "FILE_TRANSFER_PROTOCOL": ("ftp",),
-    "TUNNEL": ("status_wire",),
-    "WIND_COV": ("status_wire",),
+    "TUNNEL": ("status",),
+    "WIND_COV": ("status",),
 }
 # Read only by who listens ashore, from the companion's own component.
 ASHORE = frozenset({"TUNNEL", "WIND_COV"})
