@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         with ProgressLine(sys.stdout) as progress:
             verdict = run_virtual(run_embedded(
-                scenario, args.scenario, args.seed, folder, on_step=lambda step: progress.show(None, step)))
+                scenario, args.scenario, args.seed, folder, on_status=progress.show))
         draw(folder)
     print_verdict(verdict)
     print(folder)
