@@ -156,6 +156,8 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
     end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
     text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {counted(summary['tacks'], 'tack')}, "
     text += counted(summary["replans"], "replan")
+    if summary["arrived"] and not summary["plans"] and not summary["uploads"]:
+        text += "; no plan was needed: she was there, or on her way there, when this began"
     if not summary["arrived"] and summary["left_behind"]:
         text += f"\n{summary['left_behind']}"
     if summary["records_dropped"]:
