@@ -350,7 +350,8 @@ class CompanionStatus:
     """What the companion says of itself over the radio; the shore reads it with ``companion status``.
 
     Seen from the companion ``t_s`` is its own time; ages and distances are those at ``t_s``. ``promised_risk`` is the
-    plan's probability of not staying clear [0..1]; ``next_tack_s`` is the time until the next planned tack.
+    plan's probability of not staying clear [0..1]; ``next_tack_s`` is the time until the next tack, planned or the
+    autopilot's own.
     """
 
     t_s: float

@@ -17,6 +17,15 @@ def counted(number: int, word: str, plural: str = "") -> str:
     return f"{number} {word if number == 1 else plural or word + 's'}"
 
 
+def file_name(name: str) -> str:
+    """Return a name that a person gave as part of a file's.
+
+    >>> file_name("Lake / north"), file_name("../")
+    ('Lake-north', 'voyage')
+    """
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "voyage"
+
+
 def choices(kind: Any, path: str) -> tuple[str, ...]:
     """Return the words that an option may be: of the struct ``kind``, at msgspec's path (``$.skipper.end``)."""
     for key in re.findall(r"\.(\w+)", path):

@@ -314,7 +314,7 @@ class _Shell:
         return {
             "mission": self.mission.name,
             "arrived": state.arrived,
-            "arrived_before": self._arrived_before and not state.sailing,
+            "arrived_before": self._arrived_before and not self.log.figures.uploads,
             **self.log.figures.to_dict(),
             "goals_reached": min(goals, len(state.reached)),
             "goals": goals,

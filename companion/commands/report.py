@@ -11,6 +11,8 @@ from companion.arguments import out_file, picture
 from companion.commands.output import force_option, patience, write_out
 from companion.words import counted
 
+TRACKS = (".gpx", ".kml", ".kmz", ".geojson")   # the formats that hold a track
+
 if TYPE_CHECKING:
     from companion.geofence import Document
     from companion.telemetry.folder.reading import VoyageRecord
@@ -25,7 +27,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("voyage", type=Path, metavar="VOYAGE_DIR", help="the folder that `companion run` left")
     parser.add_argument("--out", type=picture, metavar="FILE", help="the picture (default: voyage.png in the folder)")
     parser.add_argument("--track", type=out_file, action="append", default=[], metavar="FILE",
-                        help="write the track as .gpx, .kml, .kmz or .geojson; may be given more than once")
+                        help=f"write the track as {', '.join(TRACKS)}; may be given more than once")
     force_option(parser)
     parser.add_argument("--json", action="store_true", help="print summary.json and draw nothing")
     parser.set_defaults(run=run)
@@ -39,11 +41,11 @@ def run(args: argparse.Namespace) -> int:
     from companion.telemetry.folder.reading import read_voyage
 
     for path in args.track:
-        format_of(path)
+        format_of(path, TRACKS)
     record = read_voyage(args.voyage)
     for path in args.track:
         write_out(write(track_of(record), path), str(path), lossy=False, force=args.force,
-                  remedy="write .gpx, .kml, .kmz or .geojson")
+                  remedy=f"write {', '.join(TRACKS)}")
     if args.json:
         print(json.dumps(record.figures, indent=1))
         return 0

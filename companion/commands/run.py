@@ -6,7 +6,6 @@ import argparse
 import asyncio
 import contextlib
 import os
-import re
 import secrets
 import signal
 import sys
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from companion.arguments import number, system_id, whole
 from companion.program import INTERRUPTED
-from companion.words import counted
+from companion.words import counted, file_name
 
 if TYPE_CHECKING:
     from companion.planner.worker import PlannerWorker
@@ -115,7 +114,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
         err.write(f"companion run: note: {finding}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
     transport = open_link(args.link, seed=seed)
-    name = re.sub(r"[^A-Za-z0-9_-]+", "-", mission.name).strip("-") or "voyage"
+    name = file_name(mission.name)
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{name}"
     state_path = args.state or (folder.parent / f"{name}.state.json")
     signing = _signing(args.signing_key)
@@ -156,6 +155,8 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
     end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
     text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {counted(summary['tacks'], 'tack')}, "
     text += counted(summary["replans"], "replan")
+    if summary["arrived"] and not summary["plans"] and not summary["uploads"]:
+        text += "; no plan was needed: she was there, or on her way there, when this began"
     if not summary["arrived"] and summary["left_behind"]:
         text += f"\n{summary['left_behind']}"
     if summary["records_dropped"]:

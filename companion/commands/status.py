@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from companion.arguments import number, system_id
+from companion.words import counted
 
 EXIT_NO_LINK, EXIT_STALE, EXIT_ALARM = 3, 4, 5
 # States of the skipper that somebody ashore should look at.
@@ -219,6 +220,7 @@ def _write_text(d: dict[str, Any], units: str) -> None:
 
     w, wind, plan, goal, pilot = d["waypoint"], d["wind"], d["plan"], d["goal"], d["autopilot"]
     armed = {None: "?", True: "ARMED", False: "disarmed"}[pilot["armed"]]
+    replans = "- replans" if plan["replans"] is None else counted(plan["replans"], "replan")
     safe = None if plan["promised_risk"] is None else 1.0 - plan["promised_risk"]
     print(f"{d['state'].upper()}  {pilot['mode'] or '?'} {armed}  (age {d['age_s']:.1f} s)  {d['alert']['text']}")
     print(f"  WP {show(w['seq'])}/{show(w['count'])} {show(w['distance_m'])} m  xt {show(w['cross_track_m'], '+.1f')} m"
@@ -227,7 +229,7 @@ def _write_text(d: dict[str, Any], units: str) -> None:
     print(f"  TWD {show(wind['twd_deg'], '03.0f')}±{show(wind['sigma_deg'])}°"
           f"  TWS {show(wind['tws_mps'], '.1f', factor)} {unit}  (age {show(wind['age_s'], '.1f')} s)"
           f" | P(safe) {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
-          f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {show(plan['replans'])} replans")
+          f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {replans}")
     if d["traffic"] is not None:
         print(f"  {traffic_line(d['traffic'])}")
     link = d["link"]

@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from companion.disk import reason
 from companion.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,7 +24,8 @@ def save(figure: Figure, path: str | Path) -> None:
     try:
         figure.savefig(path, dpi=DPI)
     except (OSError, ValueError) as error:
-        raise InputError("--plot", str(path), f"cannot be written ({error})", "name a .png in a folder") from None
+        why = reason(error) if isinstance(error, OSError) else str(error)
+        raise InputError(str(path), "", f"cannot be written ({why})", "name a .png elsewhere") from None
     finally:
         plt.close(figure)
 

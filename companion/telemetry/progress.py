@@ -11,11 +11,11 @@ import shutil
 import textwrap
 from datetime import UTC, datetime
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Protocol, Self
 
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
-from companion.messages import Mode
+from companion.messages import CompanionStatus, Mode
 from companion.skipper.step.actions import Announce, Severity
 from companion.skipper.step.state import Phase
 from companion.telemetry.folder.records import sigma_ahead_rad
@@ -66,10 +66,10 @@ class ProgressLine:
             self._stream.write("\n")
             self._stream.flush()
 
-    def show(self, status: Any, step: Step) -> None:
+    def show(self, status: CompanionStatus, step: Step) -> None:
         """Show one step."""
-        text = progress_text(step, getattr(status, "next_tack_s", None))
-        if getattr(status, "alert_code", "") == DISK:
+        text = progress_text(step, status.next_tack_s)
+        if status.alert_code == DISK:
             text += f" | {status.alert_text}"
         said = [self._said(step.snapshot.t_s, a) for a in step.actions
                 if isinstance(a, Announce) and a.severity <= LOUD]
@@ -103,7 +103,7 @@ def wrapped(lines: list[str], columns: int) -> list[str]:
     return [part for line in lines for part in textwrap.wrap(line, max(20, columns), subsequent_indent="    ") or [""]]
 
 
-def progress_text(step: Step, next_tack_s: float | None = None) -> str:
+def progress_text(step: Step, next_tack_s: float | None) -> str:
     """Return the line: state, waypoint, wind mean and spread, next tack, cross-track, risk."""
     snapshot, state = step.snapshot, step.state
     autopilot, wind, route = snapshot.autopilot, snapshot.wind, state.route

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.boat import AutopilotLimits
+from companion.boat.polar import Polar
 from companion.fold import Step
 from companion.geo.angles import difference_rad, heading_of, wrap_two_pi
 from companion.messages import Command, CompanionStatus, TrafficStatus
@@ -24,6 +25,8 @@ from companion.traffic.feeds import AisFeed
 TACKING_S = 4.0
 # Below this speed the time to a waypoint says nothing [m/s].
 MIN_SPEED_MPS = 0.2
+# A boat that makes less than this part of her polar's speed is gathering way, out of a tack: she will soon make it.
+GATHERING_WAY = 0.8
 
 
 def companion_status(
@@ -53,7 +56,7 @@ def companion_status(
         twd_sigma_rad=sigma_ahead_rad(snapshot),
         tws_mps=wind.mean_tws_mps,
         tws_sigma_mps=tws_sigma,
-        next_tack_s=next_tack_s(step),
+        next_tack_s=next_tack_s(step, voyage.boat.polar),
         promised_risk=None if route is None else risk_of(route),
         plan_id=None if route is None else route.plan_id,
         plan_age_s=None if route is None else max(0.0, snapshot.t_s - route.plan_t_s),
@@ -98,41 +101,44 @@ def risk_of(route: Route) -> float:
     return 1.0 - route.delta_s
 
 
-def next_tack_s(step: Step) -> float | None:
+def next_tack_s(step: Step, polar: Polar) -> float | None:
     """Return the time until the next tack [s], planned or the autopilot's own; None: there is none, or no way on.
 
-    On a leg inside its no-go zone the autopilot beats: it tacks at the edge of its corridor, or where the other tack
-    fetches the waypoint. The end of a mission, a loiter, is no course.
+    On a leg inside its no-go zone the autopilot beats: it keeps the tack that it comes on until the edge of its
+    corridor, or until the other tack fetches the waypoint. The end of a mission, a loiter, is no course. Legs ahead
+    are sailed at the polar's speed, this one at the boat's own, once she has way on.
     """
     route, snapshot = step.state.route, step.snapshot
-    vehicle, here = snapshot.vehicle, snapshot.position_en_m
-    wind_rad = snapshot.wind.present_twd_from_rad
-    wind_rad = snapshot.wind.mean_twd_from_rad if wind_rad is None else wind_rad
-    if route is None or wind_rad is None or vehicle is None or here is None or vehicle.speed_mps < MIN_SPEED_MPS:
+    vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
+    wind_rad = wind.mean_twd_from_rad if wind.present_twd_from_rad is None else wind.present_twd_from_rad
+    tws_mps = wind.mean_tws_mps if wind.present_tws_mps is None else wind.present_tws_mps
+    if route is None or wind_rad is None or tws_mps is None or vehicle is None or here is None or (
+            vehicle.speed_mps < MIN_SPEED_MPS):
         return None
     limits = snapshot.limits or AutopilotLimits()
-    begin = step.state.index
+    no_go_rad, begin = limits.sail_no_go_angle_rad, step.state.index
     legs = [
         (start, end) for item, start, end in zip(
             route.items[begin:], route.leg_from_en_m[begin:], route.points_en_m[begin:], strict=True)
         if item.command == Command.NAV_WAYPOINT
     ]
-    if not legs:
-        return None
     side = difference_rad(wind_rad, vehicle.heading_rad) > 0.0
-    to_sail = [(here, legs[0][1]), *legs[1:]]
-    distance_m = 0.0
-    for number, (start, end) in enumerate(to_sail):
+    time_s = 0.0
+    for number, leg in enumerate(legs):
+        start, end = (here, leg[1]) if number == 0 else leg
         off_rad = difference_rad(wind_rad, heading_of(end[0] - start[0], end[1] - start[1]))
-        if abs(off_rad) < limits.sail_no_go_angle_rad:
-            if number == 0:
-                return _own_tack_s(here, vehicle.velocity_en_mps, legs[0], wind_rad, side=side, limits=limits)
-            board_m = limits.sail_xtrack_max_m / math.sin(limits.sail_no_go_angle_rad)
-            return (distance_m + min(board_m, math.dist(start, end))) / vehicle.speed_mps
-        if number and (off_rad > 0.0) != side and abs(off_rad) < math.pi / 2.0:
-            return distance_m / vehicle.speed_mps
+        is_closed = abs(off_rad) < no_go_rad
+        if number and not is_closed and (off_rad > 0.0) != side and abs(off_rad) < math.pi / 2.0:
+            return time_s
+        speed_mps = max(MIN_SPEED_MPS, polar.speed_mps(max(abs(off_rad), no_go_rad), tws_mps))
+        has_way = number == 0 and vehicle.speed_mps > GATHERING_WAY * speed_mps
+        if is_closed:
+            close_rad = wind_rad - no_go_rad if side else wind_rad + no_go_rad
+            velocity_en = vehicle.velocity_en_mps if has_way else moved((0.0, 0.0), close_rad, speed_mps)
+            own_s = _own_tack_s(start, velocity_en, leg, wind_rad, side=side, limits=limits)
+            return None if own_s is None else time_s + own_s
         side = off_rad > 0.0
-        distance_m += math.dist(start, end)
+        time_s += math.dist(start, end) / (vehicle.speed_mps if has_way else speed_mps)
     return None
 
 

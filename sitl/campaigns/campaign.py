@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from companion.words import file_name
 from sitl.campaigns.pool import in_processes
 
 FAILURES = Path("campaign-failures")
@@ -36,7 +37,7 @@ def sail_one(job: Job) -> dict[str, Any]:
 
     began = time.perf_counter()
     scenario = load_scenario(job.scenario)
-    place = job.keep / f"{scenario.name}-{job.seed:04d}" if job.keep else None
+    place = job.keep / f"{file_name(scenario.name)}-{job.seed:04d}" if job.keep else None
     with tempfile.TemporaryDirectory(prefix="voyage-") as scratch:
         folder = place or Path(scratch) / "voyage"
         if place is not None:
@@ -47,7 +48,7 @@ def sail_one(job: Job) -> dict[str, Any]:
             verdict = {"scenario": scenario.name, "seed": job.seed, "passed": False, "checks": [
                 {"name": "no unhandled error", "passed": False, "figure": repr(error), "required": []}], "figures": {}}
         if not verdict["passed"] and place is None:
-            kept = FAILURES / f"{scenario.name}-{job.seed:04d}"
+            kept = FAILURES / f"{file_name(scenario.name)}-{job.seed:04d}"
             shutil.rmtree(kept, ignore_errors=True)
             if folder.is_dir():
                 kept.parent.mkdir(exist_ok=True)

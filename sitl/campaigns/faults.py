@@ -25,6 +25,7 @@ import msgspec
 
 from companion.errors import InputError
 from companion.fold import Step
+from companion.messages import CompanionStatus
 from sitl.campaigns.counterfactual import avoidable
 from sitl.campaigns.fault_draw import draw, draw_planner
 from sitl.campaigns.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
@@ -130,7 +131,7 @@ def _sail(
             watch.foreign.add(mission_key([(item.command, item.lat_e7, item.lon_e7)]))
     status_s: list[float] = []
 
-    def on_step(step: Step) -> None:
+    def on_status(_: CompanionStatus, step: Step) -> None:
         if step.state.why:
             status_s.append(step.snapshot.t_s)
         watch.step(step)
@@ -141,8 +142,8 @@ def _sail(
     with tempfile.TemporaryDirectory(prefix="faults-") as scratch:
         folder = keep if keep is not None else Path(scratch) / "voyage"
         try:
-            voyage = run_embedded(scenario, base, seed, folder, on_step=on_step, expansions=EXPANSIONS, observer=watch,
-                                  worker_pace=worker_pace)
+            voyage = run_embedded(scenario, base, seed, folder, on_status=on_status, expansions=EXPANSIONS,
+                                  observer=watch, worker_pace=worker_pace)
             verdict = run_virtual(voyage) if worker_pace is None else run_from_zero(voyage, worker_pace)
             figures = verdict.figures
             seen = {check.name: check.figure for check in verdict.checks}

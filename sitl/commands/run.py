@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.arguments import number, out_folder, whole
-from companion.words import counted
+from companion.words import counted, file_name
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from sitl.scene.weather import scenario_wind
 
     scenario = load_scenario(args.scenario)
-    folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{scenario.name}"
+    folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{file_name(scenario.name)}"
     if (folder / DECISIONS).exists():
         raise InputError("--out", str(folder), "holds a voyage already, which this one would resume",
                          "name another folder, or remove that one")
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         with ProgressLine(sys.stdout) as progress:
             verdict = run_virtual(run_embedded(
-                scenario, args.scenario, args.seed, folder, on_step=lambda step: progress.show(None, step)))
+                scenario, args.scenario, args.seed, folder, on_status=progress.show))
         draw(folder)
     print_verdict(verdict)
     print(folder)

@@ -10,7 +10,7 @@ import contextlib
 import json
 import math
 import traceback
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from companion.app.options import SailOptions, at_once
-from companion.app.sail import sail
+from companion.app.sail import OnStatus, sail
 from companion.clock import now_s
 from companion.compose import boat_of
 from companion.disk import Disk
@@ -27,7 +27,7 @@ from companion.errors import LinkError
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission, load_mission
-from companion.messages import Mode
+from companion.messages import CompanionStatus, Mode
 from companion.sailable import require_sailable
 from companion.skipper.deeds.adrift import CALL
 from companion.skipper.step.actions import Announce
@@ -50,7 +50,6 @@ EXPANSIONS = 15_000
 # A companion that ended for want of an autopilot is started again after this long, as its service does [s].
 SERVICE_RESTART_S = 5.0
 
-OnStep = Callable[[Step], None]
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -114,7 +113,7 @@ def with_radio(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
 
 
 async def run_embedded(
-    scenario: Scenario, source: Path, seed: int, folder: Path, *, on_step: OnStep | None = None,
+    scenario: Scenario, source: Path, seed: int, folder: Path, *, on_status: OnStatus | None = None,
     expansions: int | None = EXPANSIONS, observer: Observer | None = None, worker_pace: float | None = None,
 ) -> Verdict:
     """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json.
@@ -148,7 +147,7 @@ async def run_embedded(
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
             *(asyncio.create_task(happen(world, e), name=f"event {e.kind}") for e in scenario.events),
         ]
-        await _sail_and_restart(world, scenario, mission, seed, folder, on_step, expansions, worker_pace)
+        await _sail_and_restart(world, scenario, mission, seed, folder, on_status, expansions, worker_pace)
         for task in side_tasks:
             task.cancel()
         for task in side_tasks:
@@ -168,7 +167,7 @@ async def run_embedded(
 
 
 async def _sail_and_restart(
-    world: World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_step: OnStep | None,
+    world: World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_status: OnStatus | None,
     expansions: int | None, worker_pace: float | None,
 ) -> None:
     """Run the companion; kill it where the scenario says, and start it again."""
@@ -181,13 +180,13 @@ async def _sail_and_restart(
         exit_on_arrival=scenario.exit_on_arrival, dry_run=scenario.dry_run,
     )
 
-    def on_status(status: Any, step: Step) -> None:  # noqa: ARG001 - the interface has both
+    def look(status: CompanionStatus, step: Step) -> None:
         world.status_s.append(step.snapshot.t_s)
         if any(isinstance(action, Announce) and action.code == CALL for action in step.actions):
             world.called.set()
             world.called_at_s.append(step.snapshot.t_s)
-        if on_step is not None:
-            on_step(step)
+        if on_status is not None:
+            on_status(status, step)
 
     while True:
         left_s = deadline_s - now_s()
@@ -198,7 +197,7 @@ async def _sail_and_restart(
         planner = world.planner = FragilePlanner() if worker_pace is None else MortalPlanner()
         task = asyncio.create_task(
             _one_life(planner, sail(mission, world.heard_by(), planner, folder, replace(options, limit_s=left_s),
-                                    on_status=on_status)),
+                                    on_status=look)),
             name="companion",
         )
         kill = kills.pop(0) if kills else None

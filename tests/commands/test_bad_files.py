@@ -1,14 +1,18 @@
 """Every command with every file that it reads or writes broken: one line that names the file, and no traceback."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 
 from companion import cli
 from companion.clock import run_virtual
 from companion.commands.run import NOT_THERE
+from companion.errors import InputError
+from companion.plots.chart import save
 from sitl import cli as sitl_cli
 from sitl.run import compiled
 from sitl.run.embedded import run_embedded
@@ -203,3 +207,25 @@ def test_what_cannot_be_sailed_is_told_before_anything_is_compiled(short, tmp_pa
     for argv in (("run", "scenario.toml", "--out", "v"), ("campaign", "scenario.toml", "--runs", "1")):
         if name != "wind.csv" or argv[0] == "run":
             assert ends_in_one_line(capsys, sitl_cli, argv, name) == 2
+
+
+def test_a_mission_whose_name_is_a_path_stays_in_the_voyages_folder(short, tmp_path, monkeypatch):
+    """Its voyage was written beside them."""
+    shutil.copytree(short, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    scenario = Path("scenario.toml").read_text()
+    Path("scenario.toml").write_text(re.sub(r'name = "\w+"', 'name = "a/../../b"', scenario, count=1))
+    before = set(Path().iterdir())
+    sitl_cli.main(["run", "scenario.toml"])
+    assert {p.name for p in set(Path().iterdir()) - before} == {"voyages"}
+    assert [p.name[17:] for p in Path("voyages").iterdir()] == ["a-b"]
+
+
+def test_a_picture_or_track_that_cannot_be_written_is_named_with_what_would_do(voyage, tmp_path, capsys):
+    """`report --out` spoke of --plot, and `--track` offered formats that hold no track."""
+    figure = plt.figure()
+    with pytest.raises(InputError) as refused:
+        save(figure, tmp_path / "gone" / "x.png")
+    assert str(refused.value).endswith("x.png: cannot be written (No such file or directory); name a .png elsewhere")
+    assert cli.main(["report", str(voyage), "--track", str(tmp_path / "day.wkt")]) == 2
+    assert capsys.readouterr().err.strip().endswith("use .gpx, .kml, .kmz, .geojson")

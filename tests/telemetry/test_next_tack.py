@@ -10,7 +10,6 @@ from companion.clock import run_virtual
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.step.state import Phase
-from companion.telemetry.status import next_tack_s
 from sitl.run.embedded import run_embedded
 from sitl.scene.scenario import ExpectSpec, Scenario, WindSpec
 
@@ -21,17 +20,17 @@ def sailed(tmp_path, *, from_deg, sd_deg=0.1, mission="open-water.toml"):
     """Return (t_s, shown, on starboard tack) of each step under way, and the times of the tacks sailed."""
     shown = []
 
-    def see(step):
+    def see(status, step):
         snapshot = step.snapshot
         if (snapshot.autopilot is None or snapshot.autopilot.mode is not Mode.AUTO or not snapshot.autopilot.is_armed
                 or step.state.phase is Phase.DONE or snapshot.vehicle is None or snapshot.vehicle.speed_mps < 1.0):
             return
         off_rad = difference_rad(snapshot.wind.present_twd_from_rad, snapshot.vehicle.heading_rad)
-        shown.append((snapshot.t_s, next_tack_s(step), off_rad > 0.0))
+        shown.append((snapshot.t_s, status.next_tack_s, off_rad > 0.0))
 
     scenario = Scenario(name="tacks", mission=mission, limit_s=500.0, expect=ExpectSpec(),
                         wind=WindSpec(tws_mps=5.0, from_deg=from_deg, sd_deg=sd_deg))
-    run_virtual(run_embedded(scenario, MISSIONS / "scenario.toml", 1, tmp_path / "v", expansions=3000, on_step=see))
+    run_virtual(run_embedded(scenario, MISSIONS / "scenario.toml", 1, tmp_path / "v", expansions=3000, on_status=see))
     tacks = [b[0] for a, b in itertools.pairwise(shown) if a[2] != b[2]]
     return shown, tacks
 
@@ -42,10 +41,10 @@ def test_the_autopilots_own_beats_are_foreseen(tmp_path):
     errors = []
     for before, after in itertools.pairwise(tacks):
         # from when the boat has way again on the new board until the autopilot has the next waypoint, 5 m before it
-        board = [(t, s) for t, s, _ in shown if before + 6.0 < t < after - 3.0]
+        board = [(t, s) for t, s, _ in shown if before + 3.0 < t < after - 3.0]
         assert all(s is not None for _, s in board)
         errors += [abs(t + s - after) for t, s in board]
-    assert statistics.median(errors) < 5.0      # boards of 25 s, on which she still gathers way
+    assert statistics.median(errors) < 2.0
     assert max(s for t, s, _ in shown if s is not None and t > tacks[0]) < 60.0
 
 

@@ -9,13 +9,14 @@ from dataclasses import replace
 import pytest
 
 from companion.fold import Step
-from companion.messages import Mode
+from companion.messages import CompanionStatus, Mode
 from companion.skipper import Skipper
 from companion.skipper.step.actions import Announce, Severity
 from companion.skipper.step.config import SkipperConfig
 from companion.telemetry.progress import ProgressLine, left_behind
 from tests.skipper.world import World, voyage
 
+STATUS = CompanionStatus(t_s=0.0, state="waiting")
 LONG = "waiting for permission to upload the plan that is ready, which [operator] upload = true would give, or a person"
 
 
@@ -65,7 +66,7 @@ def test_at_80_columns_the_sentence_is_whole_and_what_was_said_stays(steps, monk
     terminal = Terminal()
     with ProgressLine(terminal) as progress:
         for step in steps:
-            progress.show(None, step)
+            progress.show(STATUS, step)
     lines = terminal.screen()
     assert all(len(line) < 80 for line in lines)
     text = " ".join(line.strip() for line in lines)
@@ -78,7 +79,7 @@ def test_without_a_terminal_what_is_said_is_a_line_at_once(steps):
     stream = io.StringIO()
     with ProgressLine(stream, epoch_s=3600.0) as progress:
         for step in steps:
-            progress.show(None, step)
+            progress.show(STATUS, step)
     lines = stream.getvalue().splitlines()
     assert re.fullmatch(r"01:00:\d\d WARNING: the fence is not in force", lines[1])
     assert lines[0].endswith(LONG)

@@ -76,9 +76,9 @@ def short(tmp_path_factory):
     return folder
 
 
-def sail(short, out, *events, limit_s=600.0):
+def sail(short, out, *events, limit_s=600.0, exit_on_arrival=True):
     scenario = Scenario(name="reach", mission="mission.toml", limit_s=limit_s, events=events,
-                        wind=WindSpec(sd_deg=6.0),
+                        wind=WindSpec(sd_deg=6.0), exit_on_arrival=exit_on_arrival,
                         expect=ExpectSpec(min_clearance_m=2.0))
     shore = Shore()
     verdict = run_virtual(run_embedded(scenario, short / "scenario.toml", 1, out, expansions=4000, observer=shore))
@@ -191,3 +191,14 @@ POLAR = """TWA\\TWS;4;6;10
 135;1.7;2.1;2.4
 180;1.3;1.7;2.1
 """
+
+
+def test_started_again_beside_the_boat_in_her_loiter_it_says_so_too(short, tmp_path):
+    """On the same boat it took its own list over and said "all 0 goals reached", "arrived; 2 s" and 0."""
+    verdict, _ = sail(short, tmp_path, EventSpec(at_s=150.0, kind="kill_companion", restart_after_s=4.0),
+                      limit_s=180.0, exit_on_arrival=False)
+    assert verdict.passed, verdict.checks
+    again = json.loads((tmp_path / "summary.json").read_bytes())
+    assert (again["arrived"], again["arrived_before"], again["uploads"]) == (True, True, 0)
+    assert again["end_why"].startswith("the goal is reached before this start")
+    assert last_words("reach", again)[0] == 2

@@ -34,12 +34,12 @@ def resident_bytes():
 def test_endurance_a_day_without_a_human(tmp_path):
     seen = []
 
-    def look(step):
+    def look(_, step):
         if step.snapshot.t_s >= SETTLED_S + EVERY_S * len(seen):
             gc.collect()
             seen.append((step.snapshot.t_s, len(gc.get_objects()), resident_bytes()))
 
-    verdict = run_virtual(run_embedded(load_scenario(SCENARIO), SCENARIO, 1, tmp_path, on_step=look))
+    verdict = run_virtual(run_embedded(load_scenario(SCENARIO), SCENARIO, 1, tmp_path, on_status=look))
     sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
     print(f"t s, objects, bytes: {seen[0]} to {seen[-1]}; files: {sizes}")   # shown by pytest -rA
     assert verdict.passed, verdict.checks

@@ -10,6 +10,7 @@ from shapely.geometry import Polygon
 from companion.geofence.document import Document
 from companion.geofence.findings import Code, Finding, Severity
 from companion.geofence.shapes import CIRCLE_SIDES, Circle, Zone, ZoneKind, drawn
+from companion.words import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +43,13 @@ class Losses(list[Finding]):
         """Append one loss."""
         self.append(Finding(severity=severity, code=Code.NOT_CARRIED, place="", text=text, remedy=remedy))
 
-    def drop(self, what: str, count: int, *, severity: Severity = Severity.WARNING, remedy: str = "") -> None:
-        """Say that ``count`` things are not carried."""
+    def drop(
+        self, what: str, count: int, *, severity: Severity = Severity.WARNING, why: str = "", remedy: str = "",
+    ) -> None:
+        """Say that ``count`` things, ``what`` in the singular, are not carried."""
         if count:
-            self.add(severity, f"{count} {what} not carried by this format", remedy)
+            lost = f"{counted(count, what)} {'is' if count == 1 else 'are'} not carried by this format"
+            self.add(severity, f"{lost} ({why})" if why else lost, remedy)
 
 
 def leave_out(losses: Losses, document: Document, carried: Iterable[str]) -> None:
@@ -59,16 +63,16 @@ def leave_out(losses: Losses, document: Document, carried: Iterable[str]) -> Non
         losses.append(Finding(severity=Severity.ERROR, code=Code.EMPTY, place="",
                               text=f"would hold nothing: the source has no {words}"))
     if "zones" not in kept:
-        losses.drop("zones are", len(document.zones), severity=Severity.ERROR)
+        losses.drop("zone", len(document.zones), severity=Severity.ERROR)
     if "marks" not in kept:
-        losses.drop("point and line obstacles are", len(document.marks), severity=Severity.ERROR,
+        losses.drop("point or line obstacle", len(document.marks), severity=Severity.ERROR,
                     remedy="say --point-radius M to draw them")
     if "items" not in kept:
-        losses.drop("mission items are", len(document.items))
+        losses.drop("mission item", len(document.items))
     if "rally" not in kept:
-        losses.drop("rally points are", len(document.rally))
+        losses.drop("rally point", len(document.rally))
     if "tracks" not in kept:
-        losses.drop("tracks are", len(document.tracks))
+        losses.drop("track", len(document.tracks))
     if "return" not in kept and document.return_point is not None:
         losses.add(Severity.WARNING, "the fence's return point is not carried by this format")
     if "home" not in kept and document.home is not None:

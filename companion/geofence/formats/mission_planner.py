@@ -125,7 +125,7 @@ def write_fen(document: Document) -> Written:
     leave_out(losses, document, {"zones", "return"})
     inside = [z for z in without_holes(document.zones, losses) if z.kind is ZoneKind.INCLUSION]
     others = len(without_holes(document.zones, Losses())) - min(1, len(inside))
-    losses.drop("zones are (a .fen holds one keep-in ring)", others, severity=Severity.ERROR)
+    losses.drop("zone", others, severity=Severity.ERROR, why="a .fen holds one keep-in ring")
     lines = ["#saved by companion (Mission Planner fence: return point, then the ring)"]
     if inside:
         polygon = as_polygon(inside[0], losses)
@@ -145,7 +145,7 @@ def write_poly(document: Document) -> Written:
     losses = Losses()
     leave_out(losses, document, {"zones"})
     zones = without_holes(document.zones, losses)
-    losses.drop("zones are (a .poly holds one ring)", max(0, len(zones) - 1), severity=Severity.ERROR)
+    losses.drop("zone", max(0, len(zones) - 1), severity=Severity.ERROR, why="a .poly holds one ring")
     lines = ["#saved by companion (Mission Planner polygon)"]
     if zones:
         ring = ring_of(as_polygon(zones[0], losses))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -125,12 +125,12 @@ def sniff(data: bytes, source: str, extension: str = "") -> str:
     raise InputError(source, "line 1", f"starts with {head.splitlines()[0][:40]!r}: not {known}")
 
 
-def format_of(path: str | Path) -> str:
-    """Return the format that a file name asks for. Raises InputError for an unknown extension."""
+def format_of(path: str | Path, among: Sequence[str] = tuple(EXTENSIONS)) -> str:
+    """Return the format that a file name asks for. Raises InputError for an extension that is not ``among`` those."""
     suffix = Path(path).suffix.lower()
-    if suffix not in EXTENSIONS:
-        raise InputError(str(path), "", f"{suffix or 'no extension'!r} is not a format that can be written",
-                         "use " + ", ".join(EXTENSIONS))
+    if suffix not in among:
+        raise InputError(str(path), "", f"{suffix or 'no extension'!r} is not a format that this can be written in",
+                         "use " + ", ".join(among))
     return EXTENSIONS[suffix]
 
 

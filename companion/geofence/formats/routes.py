@@ -31,7 +31,7 @@ def route_of(document: Document, losses: Losses) -> list[RoutePoint]:
         if item.command != Command.NAV_WAYPOINT or any(item.params) or item.frame != 3 or not item.autocontinue:
             plain += 1
         out.append((item.point, item.alt_m, name))
-    losses.drop("mission commands without a place are", placeless)
+    losses.drop("placeless mission command", placeless)
     if plain:
         losses.add(Severity.WARNING, f"{plain} mission items become plain waypoints in this format")
     return out

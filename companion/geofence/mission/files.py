@@ -96,7 +96,7 @@ def mission_files(
         file_name, written = _area_file(limits, f"{stem}-fence")
         files[file_name], fence_name = written.data, file_name
     if document.tracks:
-        losses.drop("tracks are", len(document.tracks))
+        losses.drop("track", len(document.tracks))
     defaults = AreaOptions()
     margin = margin_m if margin_m is not None else defaults.margin_m
     options = MissionOptions(
@@ -123,7 +123,7 @@ def _goals(document: Document, losses: Losses) -> list[GoalOptions]:
             continue
         out.append(GoalOptions(lat=item.lat_e7 / 1e7, lon=item.lon_e7 / 1e7, name=name))
         other += item.command != Command.NAV_WAYPOINT
-    losses.drop("mission commands are (a mission TOML holds goals)", other)
+    losses.drop("mission command", other, why="a mission TOML holds goals")
     return out
 
 

@@ -57,7 +57,10 @@ def rest(turn: Turn) -> None:
         home = f"; not home: {trouble}" if trouble else "; home" if turn.state.home_reached else ""
         route = turn.state.route
         end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
-        _end(turn, f"all {len(turn.state.reached)} goals reached{home}{end}", arrived=not trouble)
+        goals = len(turn.voyage.legs)
+        reached = "the goal is reached" if goals == 1 else f"all {goals} goals reached"
+        before = " before this start" if turn.state.arrived else ""
+        _end(turn, f"{reached}{before}{home}{end}", arrived=not trouble)
         return
     stopped = turn.state.own_mode in STOPPING and turn.autopilot is not None and (
         turn.autopilot.mode is turn.state.own_mode)

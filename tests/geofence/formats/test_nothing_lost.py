@@ -152,7 +152,7 @@ def test_point_obstacles_are_drawn_when_their_radius_is_given(capsys, tmp_path, 
     assert code == 1
     if name == "rocks.fen":   # one keep-in ring, whatever the radius
         return
-    assert "2 point and line obstacles are not carried by this format; say --point-radius M to draw them" in out
+    assert "2 point or line obstacles are not carried by this format; say --point-radius M to draw them" in out
     assert run(capsys, "fence", "convert", rocks, tmp_path / name, "--point-radius", "15")[0] == 0
     zones = read(tmp_path / name).zones
     assert [z.kind for z in zones] == [ZoneKind.EXCLUSION] * 2
