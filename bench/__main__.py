@@ -29,7 +29,7 @@ import shapely
 
 from bench.ompl_planners import PLANNERS as OMPL
 from companion.planner import ALGORITHMS, Problem, plan
-from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem import evaluate
 
 HERE = Path(__file__).resolve().parent
 OURS = tuple(ALGORITHMS)

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem import evaluate
 
 mpl.use("Agg")
 
@@ -32,7 +32,7 @@ from companion.planner import Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.plan import Plan, PlanStatus
 from companion.planner.reference.astar import AstarSettings, search_with
-from companion.planner.risk.wind import simulate_entries
+from companion.planner.risk import simulate_entries
 from companion.plots.plan import draw_plan
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "figures"
@@ -184,7 +184,7 @@ def busser_5_4():
 # ------------------------------------------------------------------------------------------- risk
 def risk():
     base = Problem.from_json(Path(__file__).resolve().parent / "problems" / "trap-beat.json")
-    from companion.planner.problem.parts import RiskLimit
+    from companion.planner.problem import RiskLimit
 
     limits = [0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01]
     promised, share, cost = [], [], []

@@ -25,9 +25,9 @@ def sail(folder):
     from companion.clock import run_virtual
     from companion.geo.segments import PolygonIndex
     from companion.planner.solve import warm
-    from companion.wind.estimators.forecaster import compile_kernels
+    from companion.wind.estimators import compile_kernels
     from sitl.run.embedded import run_embedded
-    from sitl.scene.scenario import load_scenario
+    from sitl.scene import load_scenario
 
     warm()
     compile_kernels()

@@ -25,7 +25,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.geofence import read
-from companion.geofence.formats.text import MAX_BYTES, MAX_POSITIONS
+from companion.geofence.formats import MAX_BYTES, MAX_POSITIONS
 
 POINTS = (10_000, 50_000, 100_000, 500_000)
 ORIGIN = (-1.31, 50.81)  # longitude, latitude

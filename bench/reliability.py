@@ -26,9 +26,8 @@ from pathlib import Path
 import numpy as np
 
 from companion.planner import Problem, plan
-from companion.planner.problem.defects import defect_of
-from companion.planner.problem.parts import RiskLimit
-from companion.planner.risk.wind import with_risk
+from companion.planner.problem import RiskLimit, defect_of
+from companion.planner.risk import with_risk
 
 HERE = Path(__file__).resolve().parent
 LIMITS = (None, 0.20, 0.05)

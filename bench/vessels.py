@@ -20,9 +20,8 @@ import numpy as np
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from companion.planner import Problem, plan
-from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.parts import BoatLimits, RiskLimit, Sigma, Target, Wind
-from companion.planner.risk.wind import path_risk, simulate_entries
+from companion.planner.problem import BoatLimits, RiskLimit, Sigma, Target, Wind, evaluate
+from companion.planner.risk import path_risk, simulate_entries
 from companion.traffic import Vessel
 from companion.traffic.occupancy import Keep, planning_discs
 from companion.traffic.predict import manoeuvre_s2, motion_of, predict

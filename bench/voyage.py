@@ -19,7 +19,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from sitl.scene.ships import free_port
+from sitl.scene import free_port
 
 SCENARIO = Path("sitl/scenarios/demo.toml")
 MISSION = Path("missions/archipelago.toml")
@@ -90,7 +90,7 @@ def live(seconds: float) -> dict[str, float]:
 def virtual() -> dict[str, float]:
     from companion.clock import run_virtual
     from sitl.run.embedded import run_embedded
-    from sitl.scene.scenario import load_scenario
+    from sitl.scene import load_scenario
 
     scenario = load_scenario(SCENARIO)
     ratios = []

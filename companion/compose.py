@@ -9,8 +9,8 @@ from typing import Any
 from companion.boat import Boat, Hull, Polar, ardurover_sitl, constant, read_polar
 from companion.errors import InputError
 from companion.geofence import Mission
-from companion.skipper.step.config import Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
-from companion.skipper.way.voyage import Goal, Refuge, Side, Voyage
+from companion.skipper.step import Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.way import Goal, Refuge, Side, Voyage
 from companion.traffic import TargetLimits
 from companion.traffic.feeds import parse_feed
 from companion.wind import Estimator, make

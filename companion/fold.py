@@ -12,12 +12,17 @@ from dataclasses import dataclass, replace
 
 from companion.boat import AutopilotLimits
 from companion.geo.angles import wrap_pi
-from companion.mavlink.trust.identity import GAP_S, UID_EVERY_S, Identity
-from companion.mavlink.trust.witness import Witness
-from companion.mavlink.wire.assembler import VehicleAssembler
-from companion.mavlink.wire.codec import AUTOPILOT_COMPONENT, autopilot_version, is_autopilot_heartbeat
-from companion.mavlink.wire.frames import Drop, Message
-from companion.mavlink.wire.parameter_ranges import RANGES, believable
+from companion.mavlink.trust import GAP_S, UID_EVERY_S, Identity, Witness
+from companion.mavlink.wire import (
+    AUTOPILOT_COMPONENT,
+    RANGES,
+    Drop,
+    Message,
+    VehicleAssembler,
+    autopilot_version,
+    believable,
+    is_autopilot_heartbeat,
+)
 from companion.messages import (
     AisReport,
     ApparentWind,
@@ -28,23 +33,23 @@ from companion.messages import (
     WindSample,
 )
 from companion.skipper import Skipper
-from companion.skipper.step.actions import Action
-from companion.skipper.step.config import Permissions
-from companion.skipper.step.saved import Persisted
-from companion.skipper.step.snapshot import (
+from companion.skipper.step import (
+    Action,
     AutopilotRebooted,
     Disbelieved,
     Event,
     MissionOnBoard,
     ModeChanged,
     Outcome,
+    Permissions,
+    Persisted,
     ReadOutcome,
+    SkipperState,
     Snapshot,
     WaypointReached,
     WindHealth,
     WindView,
 )
-from companion.skipper.step.state import SkipperState
 from companion.traffic import TargetLimits, Targets
 from companion.wind import Estimator, Verdict, WindRoom, make
 

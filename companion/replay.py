@@ -18,26 +18,36 @@ from companion.compose import config_of, estimator_of, target_limits_of, voyage_
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.tlog import read_tlog
-from companion.mavlink.trust.reception import OWN_COMPONENT
-from companion.mavlink.wire.frames import Codec, Message
+from companion.mavlink.trust import OWN_COMPONENT
+from companion.mavlink.wire import Codec, Message
 from companion.messages import MissionItem
 from companion.planner import Plan
 from companion.skipper import Skipper
-from companion.skipper.step.config import Permissions
-from companion.skipper.step.saved import Persisted
-from companion.skipper.step.snapshot import (
+from companion.skipper.step import (
     CommandOutcome,
     CommandResult,
     Outcome,
+    Permissions,
+    Persisted,
     PlanOutcome,
     ReadOutcome,
     UploadOutcome,
     UploadResult,
 )
-from companion.telemetry.folder.names import DECISIONS, TLOG, TRACK, VOYAGE
-from companion.telemetry.folder.reading import believed, read_decisions, read_description, read_rows, require_files
-from companion.telemetry.folder.recorder import jsonable
-from companion.telemetry.folder.records import action_record, ais_of
+from companion.telemetry.folder import (
+    DECISIONS,
+    TLOG,
+    TRACK,
+    VOYAGE,
+    action_record,
+    ais_of,
+    believed,
+    jsonable,
+    read_decisions,
+    read_description,
+    read_rows,
+    require_files,
+)
 from companion.wind import WindRoom
 
 TOLERANCE = 1e-6

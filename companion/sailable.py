@@ -5,7 +5,7 @@ from __future__ import annotations
 from companion.compose import config_of, estimator_of, feeds_of, target_limits_of, voyage_of
 from companion.errors import InputError
 from companion.geofence import Mission
-from companion.geofence.mission.options import AreaOptions
+from companion.geofence.mission import AreaOptions
 
 
 def require_sailable(mission: Mission) -> Mission:

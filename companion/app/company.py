@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from companion.errors import LinkError
 from companion.mavlink.link import Link
-from companion.mavlink.trust.census import LISTEN_S, type_words, yields_to
-from companion.mavlink.trust.reception import OWN_COMPONENT
+from companion.mavlink.trust import LISTEN_S, OWN_COMPONENT, type_words, yields_to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,32 +16,30 @@ from typing import Any, Protocol
 
 from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.transfers.commands import CommandAnswer
-from companion.mavlink.transfers.machines import Outcome as WireOutcome
+from companion.mavlink.transfers import CommandAnswer
+from companion.mavlink.transfers import Outcome as WireOutcome
 from companion.planner import Plan, Problem
-from companion.skipper.step.actions import (
+from companion.skipper.step import (
     Action,
     Announce,
     Arm,
     CancelPlan,
+    CommandOutcome,
+    CommandResult,
+    Outcome,
+    PlanOutcome,
     ReadMission,
+    ReadOutcome,
     RequestPlan,
     RunMotor,
     SetCurrent,
     SetMode,
+    SkipperConfig,
     SteerHeading,
     StopOrders,
     Tack,
     UploadFence,
     UploadMission,
-)
-from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.snapshot import (
-    CommandOutcome,
-    CommandResult,
-    Outcome,
-    PlanOutcome,
-    ReadOutcome,
     UploadOutcome,
     UploadResult,
 )

@@ -10,11 +10,11 @@ from typing import Any
 from companion.clock import now_s
 from companion.fold import VoyageFold
 from companion.geofence import Mission
-from companion.geofence.fence.autopilot_fence import FenceStatus, fence_for_autopilot
+from companion.geofence.fence import FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.transfers.commands import CommandAnswer
-from companion.mavlink.wire.parameter_ranges import RANGES
-from companion.skipper.step.actions import Severity
+from companion.mavlink.transfers import CommandAnswer
+from companion.mavlink.wire import RANGES
+from companion.skipper.step import Severity
 
 LOOK_S = 1.0
 # A parameter that is not answered is asked for again after this long [s].

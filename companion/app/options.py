@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from companion.disk import Disk
-from companion.mavlink.transports.signing import SigningStore
-from companion.telemetry.folder.shelf import Shelf
+from companion.mavlink.transports import SigningStore
+from companion.telemetry.folder import Shelf
 
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
 

@@ -25,18 +25,13 @@ from companion.fold import Step, VoyageFold
 from companion.geofence import Mission
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transports.transport import Transport
-from companion.mavlink.trust.link_stats import LinkStats
-from companion.mavlink.trust.reception import LinkIdentity
-from companion.mavlink.wire.frames import Drop
+from companion.mavlink.transports import Transport
+from companion.mavlink.trust import LinkIdentity, LinkStats
+from companion.mavlink.wire import Drop
 from companion.messages import CompanionStatus
 from companion.skipper import Skipper
-from companion.skipper.step.actions import Severity
-from companion.skipper.step.state import Phase
-from companion.telemetry.folder.logbook import Logbook
-from companion.telemetry.folder.names import STATE
-from companion.telemetry.folder.recorder import Recorder
-from companion.telemetry.folder.records import ais_record, outcome_record
+from companion.skipper.step import Phase, Severity
+from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, outcome_record
 from companion.telemetry.progress import DISK, left_behind
 from companion.telemetry.radio import Radio
 from companion.telemetry.state_file import StateFile

@@ -18,11 +18,10 @@ from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.boat import AutopilotLimits
-    from companion.doctor.findings import Examined, Finding, Needs
+    from companion.doctor import Examined, Finding, Needs
     from companion.geofence import Mission
     from companion.mavlink.autopilot import Autopilot
-    from companion.mavlink.transports.signing import SigningStore
-    from companion.mavlink.transports.transport import Transport
+    from companion.mavlink.transports import SigningStore, Transport
 
 LISTEN_S = 6.0   # long enough for messages of once a second to show their rate
 
@@ -78,10 +77,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
-    from companion.doctor.findings import Level
+    from companion.doctor import Level
     from companion.geofence import load_mission
-    from companion.mavlink.transports.endpoints import open_link
-    from companion.mavlink.transports.signing import SigningStore
+    from companion.mavlink.transports import SigningStore, open_link
     from companion.sailable import require_sailable
 
     mission = require_sailable(load_mission(args.mission)) if args.mission is not None else None
@@ -100,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
 
 def needs_of(mission: Mission | None) -> Needs:
     """Return what a voyage needs of the autopilot."""
-    from companion.doctor.findings import Needs
+    from companion.doctor import Needs
 
     if mission is None:
         return Needs()
@@ -123,8 +121,8 @@ def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> 
     from companion.clock import run as run_loop
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
-    from companion.mavlink.transports.endpoints import open_link
-    from companion.mavlink.trust.reception import TOOL_COMPONENT, LinkIdentity
+    from companion.mavlink.transports import open_link
+    from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
 
     async def ask() -> AutopilotLimits:
         own = LinkIdentity(component=TOOL_COMPONENT)
@@ -147,10 +145,10 @@ async def diagnose(
     Raises:
         LinkError: no autopilot was heard, none whose signatures fit the key, several and none named, or no rover.
     """
-    from companion.doctor.checks import examine
+    from companion.doctor import examine
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
-    from companion.mavlink.trust.reception import TOOL_COMPONENT, LinkIdentity
+    from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
 
     # Beside a companion that sails: by its ids the two would take each other for a second one.
     own = LinkIdentity(component=TOOL_COMPONENT)
@@ -165,8 +163,7 @@ async def diagnose(
 async def read(autopilot: Autopilot, listen_s: float = LISTEN_S, *, has_key: bool = False) -> Examined:
     """Read parameters, version, mission and fence, and count messages for ``listen_s``."""
     from companion.clock import now_s
-    from companion.doctor.findings import Examined
-    from companion.doctor.safety import RATES_HZ
+    from companion.doctor import RATES_HZ, Examined
 
     counts = dict.fromkeys(RATES_HZ, 0)
 
@@ -202,7 +199,7 @@ async def read(autopilot: Autopilot, listen_s: float = LISTEN_S, *, has_key: boo
 
 async def _apply(autopilot: Autopilot, findings: Sequence[Finding]) -> tuple[Change, ...]:
     """Set what warnings and errors want, worst first, each parameter once, and read it back."""
-    from companion.doctor.findings import Level
+    from companion.doctor import Level
 
     changes: dict[str, Change] = {}
     for finding in findings:
@@ -239,7 +236,7 @@ def as_json(findings: Sequence[Finding], changes: Sequence[Change]) -> dict[str,
 
 def as_text(findings: Sequence[Finding], changes: Sequence[Change], *, applied: bool) -> str:
     """Return the findings as lines for a person, worst first."""
-    from companion.doctor.findings import Level
+    from companion.doctor import Level
 
     lines = []
     for f in findings:

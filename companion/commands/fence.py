@@ -23,7 +23,7 @@ from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.geofence import Area, Document
-    from companion.geofence.fence.autopilot_fence import AutopilotFence
+    from companion.geofence.fence import AutopilotFence
     from companion.messages import GeoPoint
 
 _EPILOG = """\
@@ -122,8 +122,7 @@ def place_options(parser: argparse.ArgumentParser) -> None:
 def read_input(args: argparse.Namespace) -> Document:
     """Return the document that the arguments name."""
     from companion.geofence import ZoneKind, read
-    from companion.geofence.mission.files import document_of
-    from companion.geofence.mission.mission import load_mission
+    from companion.geofence.mission import document_of, load_mission
 
     if Path(args.file).suffix.lower() == ".toml":
         return document_of(load_mission(args.file))
@@ -132,14 +131,14 @@ def read_input(args: argparse.Namespace) -> Document:
 
 def point_radius_m(args: argparse.Namespace) -> float:
     """Return the radius of an obstacle without area [m]: the argument, or what a mission file takes by default."""
-    from companion.geofence.mission.options import AreaOptions
+    from companion.geofence.mission import AreaOptions
 
     return AreaOptions().point_radius_m if args.point_radius is None else float(args.point_radius)
 
 
 def places(args: argparse.Namespace) -> tuple[GeoPoint | None, tuple[GeoPoint, ...], float | None]:
     """Return start, goals and margin of the arguments, or of a mission TOML."""
-    from companion.geofence.mission.mission import load_mission
+    from companion.geofence.mission import load_mission
 
     start, goals, margin_m = args.start, tuple(args.goal), args.margin
     if Path(args.file).suffix.lower() == ".toml":
@@ -165,7 +164,7 @@ def grown_marks(document: Document, point_radius_m: float) -> Document:
     from dataclasses import replace
 
     from companion.geofence import ZoneKind
-    from companion.geofence.mission.files import zones_only
+    from companion.geofence.mission import zones_only
 
     return replace(document, zones=zones_only(document, point_radius_m),
                    marks=tuple(m for m in document.marks if m.kind is not ZoneKind.EXCLUSION))
@@ -179,7 +178,7 @@ def _check(args: argparse.Namespace) -> int:
     wind_deg = args.wind_from
     names: list[str] = []
     if Path(args.file).suffix.lower() == ".toml":
-        from companion.geofence.mission.mission import load_mission
+        from companion.geofence.mission import load_mission
 
         mission = load_mission(args.file)
         wind_deg = mission.wind.preview_from_deg if wind_deg is None else wind_deg
@@ -204,7 +203,7 @@ def _check(args: argparse.Namespace) -> int:
 
 def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
     """Return the autopilot's fence for the arguments. Raises JobError with the reason when there is none."""
-    from companion.geofence.fence.autopilot_fence import FenceStatus, fence_for_autopilot
+    from companion.geofence.fence import FenceStatus, fence_for_autopilot
 
     start, goals, margin_m = places(args)
     if start is None or margin_m is None:
@@ -221,7 +220,7 @@ def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
 
 def _convert(args: argparse.Namespace) -> int:
     from companion.geofence import Document, read
-    from companion.geofence.formats.registry import write
+    from companion.geofence.formats import write
 
     document = read_input(args)
     if not args.repair:
@@ -238,8 +237,8 @@ def _convert(args: argparse.Namespace) -> int:
 
 def _upload(args: argparse.Namespace) -> int:
     from companion.commands.shore import Shore, upload_and_compare
-    from companion.geofence.formats.fence_items import MAX_FENCE_ITEMS, STORAGE_BYTES, storage_bytes, zones_to_items
-    from companion.geofence.mission.files import zones_only
+    from companion.geofence.formats import MAX_FENCE_ITEMS, STORAGE_BYTES, storage_bytes, zones_to_items
+    from companion.geofence.mission import zones_only
     from companion.messages import MissionType
 
     document = read_input(args).require_clean()
@@ -273,10 +272,8 @@ def _upload(args: argparse.Namespace) -> int:
 
 def _download(args: argparse.Namespace) -> int:
     from companion.commands.shore import Shore, download_list
-    from companion.geofence.formats.fence_items import items_to_zones
-    from companion.geofence.formats.registry import format_of, write
-    from companion.geofence.formats.rings import Findings
-    from companion.mavlink.wire.items import mission_hash
+    from companion.geofence.formats import Findings, format_of, items_to_zones, write
+    from companion.mavlink.wire import mission_hash
     from companion.messages import MissionType
 
     format_of(args.out)

@@ -83,7 +83,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def _check(args: argparse.Namespace) -> int:
     from companion.geofence.check import Conditions, check_area
-    from companion.geofence.mission.mission import load_mission
+    from companion.geofence.mission import load_mission
 
     if Path(args.file).suffix.lower() != ".toml":
         document = read_mission_file(args.file)
@@ -129,9 +129,8 @@ def _only(document: Document, part: str) -> Document:
 def _convert(args: argparse.Namespace) -> int:
     from companion.commands.fence import grown_marks
     from companion.geofence import read
-    from companion.geofence.formats.registry import write
-    from companion.geofence.mission.files import goal_losses, mission_files
-    from companion.geofence.mission.mission import load_mission
+    from companion.geofence.formats import write
+    from companion.geofence.mission import goal_losses, load_mission, mission_files
 
     document = read_mission_file(args.file)
     print_findings(document.findings, args.file)
@@ -176,8 +175,8 @@ def _upload(args: argparse.Namespace) -> int:
 def _download(args: argparse.Namespace) -> int:
     from companion.commands.shore import Shore, download_list
     from companion.geofence import Document
-    from companion.geofence.formats.registry import format_of, write
-    from companion.mavlink.wire.items import mission_hash
+    from companion.geofence.formats import format_of, write
+    from companion.mavlink.wire import mission_hash
     from companion.messages import MissionType
 
     format_of(args.out)

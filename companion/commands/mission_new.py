@@ -15,7 +15,7 @@ from companion.errors import InputError
 if TYPE_CHECKING:
     from companion.boat import ProposedMargin
     from companion.geofence import Mission
-    from companion.geofence.mission.files import MissionFiles
+    from companion.geofence.mission import MissionFiles
 
 
 def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -48,7 +48,7 @@ def _proposed_margin(args: argparse.Namespace) -> ProposedMargin | None:
     if args.margin is not None:
         return None
     from companion.boat import AutopilotLimits, Boat, ardurover_sitl, proposed_margin
-    from companion.geofence.mission.options import WindOptions
+    from companion.geofence.mission import WindOptions
 
     if args.link is not None:
         from companion.commands.doctor import limits_at
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from companion.geofence import Document, ZoneKind, read
-    from companion.geofence.mission.files import mission_files
+    from companion.geofence.mission import mission_files
 
     out = Path(args.out)
     if out.suffix.lower() != ".toml":
@@ -111,7 +111,7 @@ def write_mission(made: MissionFiles, out: Path, *, force: bool) -> Mission:
     """
     from dataclasses import replace
 
-    from companion.geofence.mission.mission import load_mission
+    from companion.geofence.mission import load_mission
 
     print_losses(made.losses, str(out))
     files = {str(out): made.toml, **{str(out.parent / name): data for name, data in made.files.items()}}

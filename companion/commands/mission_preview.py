@@ -70,7 +70,7 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
     Home is taken to be the start: the autopilot's is where it was armed.
     """
     from companion.planner import plan
-    from companion.skipper.planning.errands import HOME_RADIUS_M
+    from companion.skipper.planning import HOME_RADIUS_M
 
     if mission.start is None:
         return []
@@ -116,9 +116,8 @@ def leg_problem(
 def read_mission_file(path: str) -> Document:
     """Return what a mission TOML or a drawing holds, with its only line as the route. Raises InputError."""
     from companion.geofence import read
-    from companion.geofence.formats.routes import lines_as_route
-    from companion.geofence.mission.files import document_of
-    from companion.geofence.mission.mission import load_mission
+    from companion.geofence.formats import lines_as_route
+    from companion.geofence.mission import document_of, load_mission
 
     if Path(path).suffix.lower() == ".toml":
         return document_of(load_mission(path))

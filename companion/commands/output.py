@@ -19,7 +19,7 @@ PATIENCE_S = 3.0
 
 if TYPE_CHECKING:
     from companion.geofence import Document, Finding
-    from companion.geofence.formats.losses import Written
+    from companion.geofence.formats import Written
 
 
 def print_findings(findings: tuple[Finding, ...], source: str) -> bool:

@@ -14,7 +14,7 @@ from companion.arguments import number, out_file, picture, whole, wind
 from companion.commands.output import patience
 from companion.errors import InputError
 from companion.planner.courses import courses
-from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem import evaluate
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def _sail_through(args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
 def _completed(problem: Problem, answer: Plan) -> Plan:
     """Return the plan with risk and clearance, computed here if the planner left them open."""
     from companion.planner.explain import with_clearance
-    from companion.planner.risk.wind import with_risk
+    from companion.planner.risk import with_risk
 
     if answer.has_path and answer.risk is None:
         answer = with_risk(problem, answer)
@@ -215,7 +215,7 @@ def _range(begin: float, end: float) -> str:
 def _risk_text(problem: Problem, answer: Plan) -> str:
     if problem.wind.sigma.model == "none" and not problem.is_shared:
         return "risk: none, the wind is taken as certain"
-    from companion.planner.risk.wind import path_risk
+    from companion.planner.risk import path_risk
 
     risk = path_risk(problem, answer)
     if problem.is_shared:

@@ -15,7 +15,7 @@ TRACKS = (".gpx", ".kml", ".kmz", ".geojson")   # the formats that hold a track
 
 if TYPE_CHECKING:
     from companion.geofence import Document
-    from companion.telemetry.folder.reading import VoyageRecord
+    from companion.telemetry.folder import VoyageRecord
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -35,10 +35,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.geofence.formats.registry import format_of, write
+    from companion.geofence.formats import format_of, write
     from companion.plots.voyage import plot_voyage
-    from companion.telemetry.folder.names import PICTURE
-    from companion.telemetry.folder.reading import read_voyage
+    from companion.telemetry.folder import PICTURE, read_voyage
 
     for path in args.track:
         format_of(path, TRACKS)

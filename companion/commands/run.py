@@ -102,9 +102,9 @@ def _outliving_the_terminal() -> Iterator[None]:
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     from companion.clock import run as run_loop
     from companion.geofence import load_mission
-    from companion.mavlink.transports.endpoints import open_link
+    from companion.mavlink.transports import open_link
     from companion.sailable import require_sailable
-    from companion.telemetry.folder.shelf import DEFAULT_BUDGET_BYTES, Shelf
+    from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
     from companion.traffic.feeds import parse_feed
 
     for name in args.feed:
@@ -275,7 +275,7 @@ async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, m
 def _signing(path: Path | None) -> Any:
     if path is None:
         return None
-    from companion.mavlink.transports.signing import SigningStore
+    from companion.mavlink.transports import SigningStore
 
     return SigningStore(path, time.time())
 
@@ -284,8 +284,7 @@ def _report(folder: Path, err: Console) -> None:
     """Draw the voyage; a picture that fails must not hide how the voyage ended."""
     try:
         from companion.plots.voyage import plot_voyage
-        from companion.telemetry.folder.names import PICTURE
-        from companion.telemetry.folder.reading import read_voyage
+        from companion.telemetry.folder import PICTURE, read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:

@@ -31,7 +31,7 @@ def mavsdk_url(link: str) -> str:
     >>> mavsdk_url("tcp:127.0.0.1:5760")
     'tcpout://127.0.0.1:5760'
     """
-    from companion.mavlink.transports.transport import parse_link
+    from companion.mavlink.transports import parse_link
 
     name = parse_link(link)
     if name.kind == "serial":
@@ -50,8 +50,8 @@ def find_system(link: str, timeout_s: float, system: int | None) -> int:
     """
     from companion.clock import run
     from companion.mavlink.link import Link
-    from companion.mavlink.transports.endpoints import open_link
-    from companion.mavlink.trust.reception import LinkIdentity
+    from companion.mavlink.transports import open_link
+    from companion.mavlink.trust import LinkIdentity
 
     async def listen() -> int:
         own = LinkIdentity(system=255, component=190)
@@ -356,7 +356,7 @@ def upload_and_compare(
     shore: Shore, kind: MissionType, items: Sequence[MissionItem], *, home: GeoPoint | None = None,
 ) -> str:
     """Write a list, read it back, compare, and return its hash. Raises TransferError where they differ."""
-    from companion.mavlink.wire.items import first_difference, mission_hash
+    from companion.mavlink.wire import first_difference, mission_hash
 
     name = _NAMES[kind]
     with progress_bar(f"{name} upload") as on_progress:

@@ -49,7 +49,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
-    from companion.mavlink.transports.endpoints import open_link
+    from companion.mavlink.transports import open_link
 
     return run_loop(_watch(args, open_link(args.link)))
 
@@ -58,9 +58,8 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
     from companion.clock import now_s
     from companion.errors import LinkError
     from companion.mavlink.link import Link
-    from companion.mavlink.trust.reception import LinkIdentity
-    from companion.mavlink.wire.assembler import VehicleAssembler
-    from companion.mavlink.wire.status import StatusReader
+    from companion.mavlink.trust import LinkIdentity
+    from companion.mavlink.wire import StatusReader, VehicleAssembler
 
     reader, vehicle = StatusReader(), VehicleAssembler()
     heard = asyncio.Event()

@@ -18,9 +18,7 @@ from companion.arguments import out_file, picture
 from companion.errors import InputError
 
 if TYPE_CHECKING:
-    from companion.wind.study.ar1 import Ar1Fit
-    from companion.wind.study.records import Record
-    from companion.wind.study.score import HorizonScore, Score
+    from companion.wind.study import Ar1Fit, HorizonScore, Record, Score
 
 _EPILOG = """\
 examples:
@@ -60,8 +58,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def run(args: argparse.Namespace) -> int:
     """Score, print, write and draw; return the exit code."""
-    from companion.wind.estimators.catalogue import NAMES, make
-    from companion.wind.study.ar1 import fit
+    from companion.wind.estimators import NAMES, make
+    from companion.wind.study import fit
 
     names = list(NAMES) if args.estimator == "all" else [args.estimator]
     for name in names:
@@ -82,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     for record, found, ar1 in zip(records, scores, fits, strict=True):
         _print_record(record, found[:len(names)], ar1)
     if len(records) > 1:
-        from companion.wind.study.score import average
+        from companion.wind.study import average
 
         print(f"mean of {len(records)} records")
         _print_table([(name, list(average([s[i] for s in scores]))) for i, name in enumerate(names)])
@@ -98,8 +96,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _score(record: Record, name: str, advance: Any) -> Score:
-    from companion.wind.estimators.catalogue import make
-    from companion.wind.study.score import score
+    from companion.wind.estimators import make
+    from companion.wind.study import score
 
     done = 0
 
@@ -144,7 +142,7 @@ def read_record(path: Path) -> Record:
 
     Raises InputError when the file cannot be read or holds no wind.
     """
-    from companion.wind.study.records import parse_csv
+    from companion.wind.study import parse_csv
 
     if not path.is_file():
         raise InputError(str(path), "", "no such file", "name a CSV, tlog or .bin")
@@ -161,7 +159,7 @@ def _read_log(path: Path) -> Record:
     """Return WIND of a tlog or .bin; a reading is ``turning`` within 10 s of a heading change of 25 deg in 10 s."""
     from pymavlink import mavutil
 
-    from companion.wind.study.records import Record
+    from companion.wind.study import Record
 
     rows: list[tuple[float, float, float]] = []
     headings: list[tuple[float, float]] = []
@@ -258,7 +256,7 @@ def _print_table(rows: Sequence[tuple[str, Sequence[HorizonScore]]]) -> None:
 
 
 def _document(record: Record, found: Sequence[Score], ar1: Ar1Fit) -> dict[str, Any]:
-    from companion.wind.study.score import SCORED_LEVELS
+    from companion.wind.study import SCORED_LEVELS
 
     return {
         "record": record.name, "readings": len(record), "duration_s": record.duration_s,
@@ -280,7 +278,7 @@ def _document(record: Record, found: Sequence[Score], ar1: Ar1Fit) -> dict[str, 
 
 def _print_cost(record: Record, names: Sequence[str]) -> None:
     """Time every estimator over the record; the Kalman filter of filterpy is timed in the same run, as the unit."""
-    from companion.wind.estimators.catalogue import make
+    from companion.wind.estimators import make
 
     rows = min(len(record), 5000)
     cost: dict[str, tuple[float, float]] = {}

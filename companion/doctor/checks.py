@@ -18,7 +18,7 @@ from companion.boat import (
 )
 from companion.doctor.findings import Examined, Finding, Level, Needs, Report
 from companion.doctor.safety import failsafes, fence, identity, mission, signing, streams, version
-from companion.mavlink.wire.parameter_ranges import believable
+from companion.mavlink.wire import believable
 
 
 def examine(seen: Examined, needs: Needs) -> tuple[Finding, ...]:

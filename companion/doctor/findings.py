@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from companion.boat import Hull
-from companion.mavlink.transfers.params import lookup
+from companion.mavlink.transfers import lookup
 from companion.messages import MissionItem
 
 

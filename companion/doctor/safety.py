@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from companion.doctor.findings import Examined, Level, Needs, Report
-from companion.skipper.step.missions import ends_safely
+from companion.skipper.step import ends_safely
 
 FENCE_ITEMS = 84             # what every board holds (672 bytes of storage, 8 each)
 CIRCLE_BIT = 2               # FENCE_TYPE: the circle around home

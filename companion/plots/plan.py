@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
-from companion.planner.problem.sharing import resolved
+from companion.planner.problem import resolved
 
 mpl.use("Agg")
 

@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.plots.chart import date_words, legend_above, legend_below, place_words, save, scale_bar
-from companion.telemetry.folder.reading import Chart, RecordedPlan, VoyageRecord
+from companion.telemetry.folder import Chart, RecordedPlan, VoyageRecord
 from companion.words import counted
 
 PORT_RED, STARBOARD_GREEN, WIND_BLUE, PLAN_GREY = "#b3261e", "#1b7f3b", "#1f5fa8", "#5b6472"

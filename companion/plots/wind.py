@@ -27,8 +27,7 @@ from companion.plots.chart import save
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from companion.wind.study.records import Record
-    from companion.wind.study.score import Score
+    from companion.wind.study import Record, Score
 
 Array = NDArray[np.float64]
 

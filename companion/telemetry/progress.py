@@ -16,8 +16,7 @@ from typing import Protocol, Self
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.messages import CompanionStatus, Mode
-from companion.skipper.step.actions import Announce, Severity
-from companion.skipper.step.state import Phase
+from companion.skipper.step import Announce, Phase, Severity
 from companion.telemetry.folder.records import sigma_ahead_rad
 
 # Without a terminal a line is written this often [s of the voyage], and whenever the phase changes.

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.messages import CompanionStatus
-from companion.skipper.step.actions import Severity
+from companion.skipper.step import Severity
 from companion.telemetry.folder.logbook import Logbook
 from companion.traffic.listening import Feeds
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from companion.clock import now_s
 from companion.disk import Disk, reason
-from companion.skipper.step.saved import Persisted
+from companion.skipper.step import Persisted
 
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
 

@@ -11,11 +11,8 @@ from companion.boat.polar import Polar
 from companion.fold import Step
 from companion.geo.angles import difference_rad, heading_of, wrap_two_pi
 from companion.messages import Command, CompanionStatus, TrafficStatus
-from companion.skipper.step.actions import Announce, Severity
-from companion.skipper.step.route import Route
-from companion.skipper.step.state import Phase
-from companion.skipper.way.geometry import cross_track_m, moved
-from companion.skipper.way.voyage import PointEn, Voyage
+from companion.skipper.step import Announce, Phase, Route, Severity
+from companion.skipper.way import PointEn, Voyage, cross_track_m, moved
 from companion.telemetry.folder.records import sigma_ahead_rad
 from companion.telemetry.folder.summary import VoyageFigures
 from companion.traffic import TrafficCounts

@@ -23,10 +23,10 @@ from companion.clock import now_s
 from companion.errors import JobError, LinkError
 from companion.geo.angles import wrap_two_pi
 from companion.geo.frame import LocalFrame
-from companion.mavlink.transports.endpoints import open_link
+from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint, Mode
 from sitl.autopilot.config import Truth
-from sitl.world.wind import Wind
+from sitl.world import Wind
 
 DEFAULTS = Path(__file__).with_name("sailboat.parm")
 MOTOR = "-motor"      # of a model: the hull with an auxiliary motor

@@ -24,24 +24,20 @@ from companion.clock import now_s, run, run_virtual
 from companion.compose import boat_of
 from companion.errors import JobError, LinkError
 from companion.geofence import Mission, load_mission
-from companion.geofence.fence.autopilot_fence import FenceStatus, fence_for_autopilot
+from companion.geofence.fence import FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
-from companion.mavlink.transfers.machines import Outcome
-from companion.mavlink.transports.endpoints import open_link
-from companion.mavlink.trust.reception import LinkIdentity
+from companion.mavlink.transfers import Outcome
+from companion.mavlink.transports import open_link
+from companion.mavlink.trust import LinkIdentity
 from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
-from sitl.ardurover.program import require
-from sitl.ardurover.simulation import ArduRover
+from sitl.ardurover import ArduRover, require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.config import Truth as Now
 from sitl.run.embedded import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.run.live import run_live
-from sitl.scene.hull import own_polar
-from sitl.scene.scenario import load_scenario
-from sitl.scene.verdict import Truth, Verdict, count_tacks
-from sitl.scene.weather import scenario_wind
-from sitl.world.wind import Wind
+from sitl.scene import Truth, Verdict, count_tacks, load_scenario, own_polar, scenario_wind
+from sitl.world import Wind
 
 # Measured to be its best (ArduPilot 4.7): margins that a tacking boat needs, the fence itself without action.
 DIJKSTRA = {

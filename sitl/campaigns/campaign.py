@@ -33,7 +33,7 @@ def sail_one(job: Job) -> dict[str, Any]:
     """Sail one seed; return its verdict as a record. Runs in a worker process."""
     from companion.clock import run_virtual
     from sitl.run.embedded import run_embedded
-    from sitl.scene.scenario import load_scenario
+    from sitl.scene import load_scenario
 
     began = time.perf_counter()
     scenario = load_scenario(job.scenario)
@@ -63,7 +63,7 @@ def run_campaign(
     """Run and print; return the exit code."""
     from sitl.run.compiled import compile_ahead
     from sitl.run.embedded import mission_of
-    from sitl.scene.scenario import load_scenario
+    from sitl.scene import load_scenario
 
     loaded = [load_scenario(path) for path in scenarios]
     for scenario, path in zip(loaded, scenarios, strict=True):

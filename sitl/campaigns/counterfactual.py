@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import msgspec
 
 from companion.messages import Mode
-from sitl.scene.scenario import EventSpec, Scenario
+from sitl.scene import EventSpec, Scenario
 
 # What stands behind an excuse, as kinds of events.
 CAUSES: dict[str, frozenset[str]] = {

@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 
 from sitl.campaigns.fault_lots import FIRST_S, Lot, Maker, length
-from sitl.scene.scenario import EventSpec
+from sitl.scene import EventSpec
 
 _ACTIONS = (0.0, 1.0, 2.0, 3.0, 4.0)
 LOW_V, CRITICAL_V = 10.8, 10.0

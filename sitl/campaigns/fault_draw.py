@@ -8,7 +8,7 @@ import msgspec
 
 from sitl.campaigns.failsafe_lots import FAILSAFES, unattended
 from sitl.campaigns.fault_lots import LOTS, PLANNER, SINGLE, Lot, Maker
-from sitl.scene.scenario import EventSpec, ExpectSpec, Scenario, WindSpec
+from sitl.scene import EventSpec, ExpectSpec, Scenario, WindSpec
 
 _MAKERS, _WEIGHTS = zip(*LOTS, *SINGLE, *FAILSAFES, strict=True)
 _ONCE = frozenset(maker for maker, _ in (*SINGLE, *FAILSAFES))

@@ -50,13 +50,11 @@ from companion.boat import Hull
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.messages import Command, Mode
-from companion.skipper.deeds.adrift import CALL
-from companion.skipper.step.actions import Announce, UploadMission
+from companion.skipper.deeds import CALL
+from companion.skipper.step import Announce, UploadMission
 from sitl.autopilot import Autopilot, MemoryLink
 from sitl.campaigns.counterfactual import Reach
-from sitl.scene.clearance import HullTrack
-from sitl.scene.scenario import EventSpec
-from sitl.scene.verdict import CALL_HOLDS_S
+from sitl.scene import CALL_HOLDS_S, EventSpec, HullTrack
 
 MAX_SILENCE_S = 10.0
 FALSE_M = 1.0

@@ -30,7 +30,7 @@ from sitl.campaigns.counterfactual import avoidable
 from sitl.campaigns.fault_draw import draw, draw_planner
 from sitl.campaigns.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
 from sitl.campaigns.pool import in_processes
-from sitl.scene.scenario import EventSpec, Scenario, is_all_ordinary, load_scenario
+from sitl.scene import EventSpec, Scenario, is_all_ordinary, load_scenario
 
 BASE = Path(__file__).parents[1] / "scenarios" / "faults" / "rocks.toml"
 # Effort of one plan: the voyage is short and its water simple.

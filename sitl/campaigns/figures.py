@@ -15,7 +15,7 @@ from typing import Any
 from companion.errors import JobError, LinkError
 from sitl.campaigns.baselines import sail_alone, sail_ardurover, sail_companion, sail_companion_ardurover
 from sitl.campaigns.pool import in_processes
-from sitl.scene.scenario import load_scenario
+from sitl.scene import load_scenario
 
 HERE = Path(__file__).parents[1] / "scenarios"
 SCENARIOS = (

@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from sitl.campaigns.figures import SCENARIOS, run_baselines
     from sitl.run.compiled import compile_ahead
-    from sitl.scene.scenario import load_scenario
+    from sitl.scene import load_scenario
 
     for path in args.scenarios or ():
         load_scenario(path)

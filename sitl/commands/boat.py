@@ -62,10 +62,10 @@ def run(args: argparse.Namespace) -> int:
     from companion import clock
     from companion.boat import read_polar
     from companion.errors import LinkError
-    from companion.mavlink.transports.transport import parse_link
+    from companion.mavlink.transports import parse_link
     from sitl.autopilot import Autopilot, AutopilotConfig, serve
     from sitl.autopilot.parameters import check_parameters
-    from sitl.world.wind import parse_wind
+    from sitl.world import parse_wind
 
     parameters: dict[str, float] = {}
     for text in args.param:

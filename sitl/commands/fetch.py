@@ -12,7 +12,7 @@ from companion.errors import JobError
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command."""
-    from sitl.ardurover.program import URL, fetched_path
+    from sitl.ardurover import URL, fetched_path
 
     parser = subparsers.add_parser(
         "fetch", help=summary, description=f"{summary}, for Linux on x86-64, from {URL}",
@@ -27,7 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def run(args: argparse.Namespace) -> int:
     """Download, check, put in place."""
-    from sitl.ardurover.program import fetch, fetched_path
+    from sitl.ardurover import fetch, fetched_path
 
     target = args.to or fetched_path()
     try:

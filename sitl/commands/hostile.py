@@ -57,7 +57,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.mavlink.reads import ASHORE, READS
-    from sitl.trouble.forgeries import FORGERIES
+    from sitl.trouble import FORGERIES
 
     if args.list:
         for forgery in FORGERIES:
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _measure(document: Path | None) -> int:
     """Measure all forgeries and print, or write, the table."""
-    from sitl.trouble.hostile import HOSTILITIES, measure, rows, written
+    from sitl.trouble import HOSTILITIES, measure, rows, written
 
     try:
         text = None if document is None else document.read_text(encoding="utf-8")
@@ -99,9 +99,8 @@ def _stand_between(args: argparse.Namespace) -> int:
     """Forge on a live link."""
     from companion.clock import run as run_loop
     from companion.mavlink.reads import READS
-    from companion.mavlink.transports.transport import parse_link
-    from sitl.trouble.forgeries import FORGERIES
-    from sitl.trouble.man_in_the_middle import Middle, Plan
+    from companion.mavlink.transports import parse_link
+    from sitl.trouble import FORGERIES, Middle, Plan
 
     for option, value, low, high in (("--rate", args.rate, 0.0, MAX_RATE_HZ), ("--count", args.count, 0, MAX_COUNT),
                                      ("--for", args.for_s, 0.0, MAX_S)):

@@ -37,13 +37,11 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run_virtual
     from companion.errors import InputError
-    from companion.telemetry.folder.names import DECISIONS
+    from companion.telemetry.folder import DECISIONS
     from companion.telemetry.progress import ProgressLine
     from sitl.run.compiled import compile_ahead
     from sitl.run.embedded import mission_of, run_embedded
-    from sitl.scene.hull import own_polar
-    from sitl.scene.scenario import load_scenario
-    from sitl.scene.weather import scenario_wind
+    from sitl.scene import load_scenario, own_polar, scenario_wind
 
     scenario = load_scenario(args.scenario)
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{file_name(scenario.name)}"
@@ -77,8 +75,7 @@ def draw(folder: Path) -> None:
     """Draw the voyage; a picture that fails must not hide the verdict."""
     try:
         from companion.plots.voyage import plot_voyage
-        from companion.telemetry.folder.names import PICTURE
-        from companion.telemetry.folder.reading import read_voyage
+        from companion.telemetry.folder import PICTURE, read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:

@@ -21,15 +21,13 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transports.endpoints import open_link
-from companion.mavlink.trust.reception import LinkIdentity
-from companion.mavlink.wire.streams import Stream
+from companion.mavlink.transports import open_link
+from companion.mavlink.trust import LinkIdentity
+from companion.mavlink.wire import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
-from sitl.ardurover.program import require
-from sitl.ardurover.simulation import MOTOR, ArduRover
-from sitl.scene.scenario import EventSpec, Scenario
-from sitl.scene.ships import free_port
-from sitl.world.wind import Wind
+from sitl.ardurover import MOTOR, ArduRover, require
+from sitl.scene import EventSpec, Scenario, free_port
+from sitl.world import Wind
 
 # A warm simulated autopilot has been up for a minute when its simulation starts [s].
 WARM_BOOT_S = 60.0

@@ -29,18 +29,12 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission, load_mission
 from companion.messages import CompanionStatus, Mode
 from companion.sailable import require_sailable
-from companion.skipper.deeds.adrift import CALL
-from companion.skipper.step.actions import Announce
-from companion.telemetry.folder.names import STATE, VERDICT
+from companion.skipper.deeds import CALL
+from companion.skipper.step import Announce
+from companion.telemetry.folder import STATE, VERDICT
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.scene.hull import own_polar
-from sitl.scene.others import Others
-from sitl.scene.scenario import EPOCH_S, Scenario, is_all_ordinary
-from sitl.scene.ships import free_port
-from sitl.scene.verdict import Verdict, judge
-from sitl.scene.weather import scenario_wind
-from sitl.trouble.befalls import Observer, World, channel, happen
-from sitl.trouble.fragile import FragilePlanner, MortalPlanner
+from sitl.scene import EPOCH_S, Others, Scenario, Verdict, free_port, is_all_ordinary, judge, own_polar, scenario_wind
+from sitl.trouble import FragilePlanner, MortalPlanner, Observer, World, channel, happen
 
 TRUTH_EVERY_S = 0.25
 MAX_TRUTH_SAMPLES = 20_000

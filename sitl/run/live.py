@@ -21,16 +21,23 @@ from companion.disk import Disk
 from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
-from companion.telemetry.folder.names import DECISIONS, VERDICT
+from companion.telemetry.folder import DECISIONS, VERDICT
 from sitl.run.boats import Boat, RealBoat, SimulatedBoat
 from sitl.run.embedded import TRUTH_EVERY_S, ends_of, marks_of, solid_of
-from sitl.scene.others import TRAFFIC, Others
-from sitl.scene.scenario import EventSpec, Scenario, is_all_ordinary
-from sitl.scene.ships import Motion, free_port
-from sitl.scene.verdict import Truth, Verdict, judge
-from sitl.scene.weather import scenario_wind
-from sitl.trouble.befalls import break_vane
-from sitl.trouble.relay import LINK_EVENTS, Relay, befall
+from sitl.scene import (
+    TRAFFIC,
+    EventSpec,
+    Motion,
+    Others,
+    Scenario,
+    Truth,
+    Verdict,
+    free_port,
+    is_all_ordinary,
+    judge,
+    scenario_wind,
+)
+from sitl.trouble import LINK_EVENTS, Relay, befall, break_vane
 
 COMPANION_STOP_S = 20.0
 # What befalls the companion's process or its link, and what the wind is made of.

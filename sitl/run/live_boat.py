@@ -14,9 +14,7 @@ from pathlib import Path
 from companion.clock import run
 from companion.geofence import load_mission
 from sitl.autopilot import Autopilot, AutopilotConfig, serve
-from sitl.scene.hull import own_polar
-from sitl.scene.scenario import load_scenario
-from sitl.scene.weather import scenario_wind
+from sitl.scene import load_scenario, own_polar, scenario_wind
 
 
 def main() -> int:

@@ -30,7 +30,7 @@ from sitl.scene.ships import (
     ship_of,
 )
 from sitl.scene.verdict import Truth
-from sitl.world.wind import Wind
+from sitl.world import Wind
 
 TRAFFIC = frozenset({"vessel", "intruder", "second_boat"})
 OUR_LENGTH_M = 2.0    # what the second boat takes ours for

@@ -15,9 +15,8 @@ from companion.field.values import GuidanceState, Obstacle
 from companion.geo.frame import LocalFrame
 from sitl.autopilot import Vessel
 from sitl.scene.scenario import EventSpec
-from sitl.world.afloat import LENGTH_M as VAIMOS_M
-from sitl.world.afloat import Afloat, habits_for
-from sitl.world.wind import Wind
+from sitl.world import LENGTH_M as VAIMOS_M
+from sitl.world import Afloat, Wind, habits_for
 
 # The size that the companion assumes of a class A vessel: the autopilot passes no sizes on.
 SHIP_M = 100.0

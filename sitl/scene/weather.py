@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from sitl.scene.scenario import Scenario
-from sitl.world.wind import AR1, Constant, Event, Recorded, Scripted, Wind
+from sitl.world import AR1, Constant, Event, Recorded, Scripted, Wind
 
 
 def scenario_wind(scenario: Scenario, source: Path, seed: int) -> Wind:

@@ -1,1 +1,13 @@
 """Trouble: what is made to go wrong, with links, sensors, disks, processes and people."""
+
+from sitl.trouble.befalls import Observer, World, break_vane, channel, happen
+from sitl.trouble.forgeries import FORGERIES
+from sitl.trouble.fragile import FragilePlanner, MortalPlanner
+from sitl.trouble.hostile import HOSTILITIES, measure, rows, written
+from sitl.trouble.man_in_the_middle import Middle, Plan
+from sitl.trouble.relay import LINK_EVENTS, Relay, befall
+
+__all__ = [
+    "FORGERIES", "HOSTILITIES", "LINK_EVENTS", "FragilePlanner", "Middle", "MortalPlanner", "Observer", "Plan", "Relay",
+    "World", "befall", "break_vane", "channel", "happen", "measure", "rows", "written",
+]

@@ -15,22 +15,18 @@ from companion.clock import now_s
 from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
-from companion.mavlink.transports.transport import Transport
-from companion.mavlink.trust.reception import LinkIdentity
+from companion.mavlink.transports import Transport
+from companion.mavlink.trust import LinkIdentity
 from companion.messages import GeoPoint, MissionItem, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryLink, VaneFault, VaneState, serve
 from sitl.autopilot.memory import MemoryEnd
-from sitl.scene.others import TRAFFIC, Others
-from sitl.scene.scenario import EventSpec
-from sitl.scene.ships import Motion
-from sitl.scene.verdict import Truth
+from sitl.scene import TRAFFIC, EventSpec, Motion, Others, Truth
 from sitl.trouble.failsafes import FAILURES, PERSONS, play
 from sitl.trouble.forgeries import Forger, forgery_named
 from sitl.trouble.fragile import FragilePlanner, MortalPlanner
 from sitl.trouble.relay import LINK_EVENTS, befall
 from sitl.trouble.sick_disk import SickDisk
-from sitl.world.air import Air
-from sitl.world.wind import Wind
+from sitl.world import Air, Wind
 
 
 class Observer(Protocol):

@@ -11,7 +11,7 @@ from companion.clock import now_s
 from companion.messages import Mode
 from sitl.autopilot import Autopilot
 from sitl.autopilot.memory import MemoryEnd
-from sitl.scene.scenario import EventSpec
+from sitl.scene import EventSpec
 
 BEAT_S = 1.0
 PERSONS = frozenset({"mode", "arm", "disarm", "set_current"})

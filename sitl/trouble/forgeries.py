@@ -10,7 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.wire.frames import Codec
+from companion.mavlink.wire import Codec
 
 AUTOPILOT, COMPANION, OTHER = 1, 191, 100
 OFF_E7 = 27_000   # 300 m of latitude

@@ -22,18 +22,17 @@ from companion.fold import Step
 from companion.geo.angles import difference_rad
 from companion.geofence import load_mission
 from companion.mavlink.reads import READS
-from companion.mavlink.transports.signing import SigningStore
+from companion.mavlink.transports import SigningStore
 from companion.messages import GeoPoint
-from companion.skipper.deeds.failsafe import TOLD_S
+from companion.skipper.deeds import TOLD_S
+from companion.skipper.step import Phase
 from companion.skipper.step import actions as act
-from companion.skipper.step.state import Phase
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.scene.scenario import EPOCH_S
+from sitl.scene import EPOCH_S
 from sitl.trouble.forgeries import FORGERIES, Forger, Forgery
 from sitl.trouble.fragile import FragilePlanner
 from sitl.trouble.signer import SignedEnd, Signer
-from sitl.world.air import Air
-from sitl.world.wind import AR1
+from sitl.world import AR1, Air
 
 BEGIN, END = "<!-- made by `sitl hostile --document docs/mavlink.md` -->", "<!-- end of the table -->"
 BURST_S = 2.0

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.clock import now_s
-from companion.mavlink.transports.endpoints import open_link
-from companion.mavlink.transports.signing import EPOCH_S, TICKS_PER_S, read_key
-from companion.mavlink.transports.transport import Transport
+from companion.mavlink.transports import EPOCH_S, TICKS_PER_S, Transport, open_link, read_key
 from sitl.trouble.forgeries import Forger, Forgery
 from sitl.trouble.signer import SignedEnd, Signer
 

@@ -10,11 +10,10 @@ import contextlib
 from types import TracebackType
 from typing import Self
 
-from companion.mavlink.transports.endpoints import open_link
+from companion.mavlink.transports import open_link
 from sitl.autopilot import Impairment, MemoryLink
 from sitl.autopilot.memory import FrameStream
-from sitl.scene.scenario import EventSpec
-from sitl.scene.ships import free_port
+from sitl.scene import EventSpec, free_port
 from sitl.trouble.false_vane import FalseVane
 
 LINK_EVENTS = frozenset({"link_cut", "link_half", "link_quality"})

@@ -10,7 +10,7 @@ from typing import Final
 
 from companion.clock import now_s
 from companion.disk import Disk, Room
-from companion.telemetry.folder.names import STATE
+from companion.telemetry.folder import STATE
 
 STATES: Final = {"full": errno.ENOSPC, "sick": errno.EIO, "read_only": errno.EROFS, "ok": 0}
 KEPT = 600   # earlier contents of the saved state, which changes once a second at most

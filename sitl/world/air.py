@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from companion.mavlink.transports.transport import OnBytes, Transport, TransportState, TransportStats
+from companion.mavlink.transports import OnBytes, Transport, TransportState, TransportStats
 
 
 class Air:

@@ -1,1 +1,12 @@
 """The planning problem: the value, its JSON, what is wrong with it, and the exact scorer of paths."""
+
+from companion.planner.problem.defects import defect_of
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.parts import BoatLimits, RiskLimit, Sigma, Target, Wind
+from companion.planner.problem.sharing import resolved, sigmas_for, vessel_count
+from companion.planner.problem.value import VESSELS_SHARE
+
+__all__ = [
+    "VESSELS_SHARE", "BoatLimits", "RiskLimit", "Sigma", "Target", "Wind", "defect_of", "evaluate", "resolved",
+    "sigmas_for", "vessel_count",
+]

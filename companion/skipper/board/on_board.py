@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from companion.mavlink.wire.items import mission_hash
+from companion.mavlink.wire import mission_hash
 from companion.messages import Command, MissionItem, Mode
 from companion.skipper.board.mark import are_marked, marked
 from companion.skipper.step.actions import ReadMission, Severity

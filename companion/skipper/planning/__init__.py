@@ -1,1 +1,16 @@
 """Planning under way: why, from where, with which step of the ladder, and what is done with the answer."""
+
+from companion.skipper.planning.errands import HOME_RADIUS_M
+from companion.skipper.planning.vessels import (
+    ALIKE_S,
+    GIVE_UP_RISK,
+    HORIZON_S,
+    OWN_TIMING_MPS,
+    PART_BY_RUNG,
+    SETTLED_M,
+    soon,
+)
+
+__all__ = [
+    "ALIKE_S", "GIVE_UP_RISK", "HOME_RADIUS_M", "HORIZON_S", "OWN_TIMING_MPS", "PART_BY_RUNG", "SETTLED_M", "soon",
+]

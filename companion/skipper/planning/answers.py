@@ -8,8 +8,7 @@ import numpy as np
 import shapely
 
 from companion.planner import Plan, PlanStatus, Problem
-from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.sharing import resolved
+from companion.planner.problem import evaluate, resolved
 from companion.skipper.board.uploads import upload
 from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
 from companion.skipper.planning.not_found import asks_again, not_found

@@ -14,9 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from companion.geo.angles import difference_rad
-from companion.planner.problem.parts import Target
-from companion.planner.problem.sharing import sigmas_for, vessel_count
-from companion.planner.problem.value import VESSELS_SHARE
+from companion.planner.problem import VESSELS_SHARE, Target, sigmas_for, vessel_count
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import LOST_MPS

@@ -1,1 +1,51 @@
 """One step: what the skipper sees, remembers, may do and asks for, and the step in the making."""
+
+from companion.skipper.step.actions import (
+    Action,
+    Announce,
+    Arm,
+    CancelPlan,
+    ReadMission,
+    RequestPlan,
+    RunMotor,
+    SetCurrent,
+    SetMode,
+    Severity,
+    SteerHeading,
+    StopOrders,
+    Tack,
+    UploadFence,
+    UploadMission,
+)
+from companion.skipper.step.config import Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.step.missions import ends_safely
+from companion.skipper.step.route import Route
+from companion.skipper.step.saved import Persisted
+from companion.skipper.step.snapshot import (
+    AutopilotRebooted,
+    CommandOutcome,
+    CommandResult,
+    Disbelieved,
+    Event,
+    MissionOnBoard,
+    ModeChanged,
+    Outcome,
+    PlanOutcome,
+    ReadOutcome,
+    Snapshot,
+    UploadOutcome,
+    UploadResult,
+    WaypointReached,
+    WindHealth,
+    WindView,
+)
+from companion.skipper.step.state import Phase, SkipperState
+
+__all__ = [
+    "Action", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome", "CommandResult", "Disbelieved",
+    "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome", "Permissions", "Persisted", "Phase", "PlanOutcome",
+    "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd", "SetCurrent",
+    "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot", "SteerHeading", "StopOrders", "Tack",
+    "UploadFence", "UploadMission", "UploadOutcome", "UploadResult", "WaypointReached", "WindHealth", "WindView",
+    "ends_safely",
+]

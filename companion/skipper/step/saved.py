@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from companion.mavlink.wire.items import mission_hash
+from companion.mavlink.wire import mission_hash
 from companion.messages import MissionItem, Mode
 from companion.skipper.step.route import Route
 from companion.skipper.way.gates import Approach

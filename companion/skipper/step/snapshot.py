@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from companion.boat import AutopilotLimits
-from companion.mavlink.trust.identity import Identity
+from companion.mavlink.trust import Identity
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
 from companion.skipper.step.config import DRY_RUN, Permissions
 from companion.skipper.way.voyage import PointEn

@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from companion.mavlink.wire.fixes import LEAP_M, MEMORY_S, leap_m
+from companion.mavlink.wire import LEAP_M, MEMORY_S, leap_m
 from companion.messages import AutopilotStatus, Mode
 from companion.skipper.step.actions import (
     Action,

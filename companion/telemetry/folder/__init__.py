@@ -1,1 +1,24 @@
 """The folder that a voyage leaves: what is written while it is sailed, and read again."""
+
+from companion.telemetry.folder.logbook import Logbook
+from companion.telemetry.folder.names import DECISIONS, PICTURE, STATE, TLOG, TRACK, VERDICT, VOYAGE
+from companion.telemetry.folder.reading import (
+    Chart,
+    RecordedPlan,
+    VoyageRecord,
+    believed,
+    read_decisions,
+    read_description,
+    read_rows,
+    read_voyage,
+    require_files,
+)
+from companion.telemetry.folder.recorder import Recorder, jsonable
+from companion.telemetry.folder.records import action_record, ais_of, ais_record, outcome_record
+from companion.telemetry.folder.shelf import DEFAULT_BUDGET_BYTES, Shelf
+
+__all__ = [
+    "DECISIONS", "DEFAULT_BUDGET_BYTES", "PICTURE", "STATE", "TLOG", "TRACK", "VERDICT", "VOYAGE", "Chart", "Logbook",
+    "RecordedPlan", "Recorder", "Shelf", "VoyageRecord", "action_record", "ais_of", "ais_record", "believed",
+    "jsonable", "outcome_record", "read_decisions", "read_description", "read_rows", "read_voyage", "require_files",
+]

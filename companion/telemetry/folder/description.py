@@ -9,8 +9,8 @@ from typing import Any
 
 from companion import __version__
 from companion.geofence import Mission
-from companion.skipper.step.config import Permissions
-from companion.skipper.way.voyage import Voyage
+from companion.skipper.step import Permissions
+from companion.skipper.way import Voyage
 
 
 def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str, Any]:

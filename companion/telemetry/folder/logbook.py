@@ -11,9 +11,8 @@ from companion.clock import now_s
 from companion.fold import Step
 from companion.geofence import Mission
 from companion.mavlink.tlog import stamp
-from companion.skipper.step.config import Permissions, SkipperConfig
-from companion.skipper.step.saved import Persisted
-from companion.skipper.way.voyage import Voyage
+from companion.skipper.step import Permissions, Persisted, SkipperConfig
+from companion.skipper.way import Voyage
 from companion.telemetry.folder.copies import write_copies
 from companion.telemetry.folder.description import chart_record, voyage_record
 from companion.telemetry.folder.names import AREA

@@ -11,11 +11,20 @@ from typing import Any
 
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
-from companion.mavlink.wire.items import mission_hash
+from companion.mavlink.wire import mission_hash
 from companion.messages import AisReport, GeoPoint
-from companion.skipper.step.actions import Action, RequestPlan, SteerHeading, UploadFence, UploadMission
-from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.snapshot import Outcome, PlanOutcome, ReadOutcome, Snapshot
+from companion.skipper.step import (
+    Action,
+    Outcome,
+    PlanOutcome,
+    ReadOutcome,
+    RequestPlan,
+    SkipperConfig,
+    Snapshot,
+    SteerHeading,
+    UploadFence,
+    UploadMission,
+)
 from companion.telemetry.folder.recorder import jsonable
 
 # The no-go zone's half angle is recorded at these times after a plan was made [s].

@@ -9,7 +9,7 @@ from typing import Any
 from companion.fold import Step
 from companion.geo.angles import wrap_pi
 from companion.messages import Mode
-from companion.skipper.step.actions import Announce, RequestPlan, UploadMission
+from companion.skipper.step import Announce, RequestPlan, UploadMission
 from companion.traffic import TrafficCounts
 
 # Inside the no-go zone for longer than a tack takes [s] is an entry, not a tack.

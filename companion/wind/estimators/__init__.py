@@ -1,1 +1,6 @@
 """The estimators: one interface, Büsser's, Wolsieffer's and the default forecaster, by name."""
+
+from companion.wind.estimators.catalogue import NAMES, make
+from companion.wind.estimators.forecaster import compile_kernels
+
+__all__ = ["NAMES", "compile_kernels", "make"]

@@ -1,0 +1,48 @@
+"""The house: no hall of modules, every room says what it owns, and who is outside a sub-room comes in by its face."""
+
+import ast
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+MOST = 15   # modules in a folder, its __init__ aside
+CODE = sorted(p for top in ("companion", "sitl") for p in (ROOT / top).rglob("*.py"))
+ROOMS = sorted({p.parent for p in CODE})
+
+
+def name_of(path):
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def imported(path):
+    return [n.module for n in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            if isinstance(n, ast.ImportFrom) and n.module is not None]
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=name_of)
+def test_a_room_says_what_it_owns_and_is_no_hall(room):
+    first = ast.get_docstring(ast.parse((room / "__init__.py").read_text(encoding="utf-8")))
+    assert first
+    assert first.splitlines()[0].endswith(".")
+    assert len([p for p in room.glob("*.py") if p.name != "__init__.py"]) <= MOST
+
+
+def test_tests_have_no_halls_either():
+    halls = Counter(p.parent for p in (ROOT / "tests").rglob("test_*.py"))
+    assert {str(folder): count for folder, count in halls.items() if count > MOST} == {}
+
+
+def test_a_sub_room_is_entered_by_its_face():
+    """From another room; a room's own sub-rooms are neighbours, and know each other's modules."""
+    sub_rooms = [room for room in ROOMS if len(room.relative_to(ROOT).parts) == 3 or room.parent == ROOT / "sitl"]
+    faced = [name_of(room) for room in sub_rooms if "__all__" in (room / "__init__.py").read_text(encoding="utf-8")]
+    around = {name: name.rpartition(".")[0] if name.count(".") == 2 else name for name in faced}
+    wrong = [
+        (name_of(path), module) for path in CODE for module in imported(path) for name in faced
+        if module.startswith(f"{name}.") and not name_of(path).startswith((f"{around[name]}.", f"{name}."))
+        and name_of(path) != around[name]
+    ]
+    assert wrong == []
+    assert len(faced) > 15
