@@ -15,23 +15,23 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.messages import Mode
-from sitl.autopilot import kernel as k
-from sitl.autopilot.chart import Chart
+from sitl.autopilot.boat import kernel as k
+from sitl.autopilot.boat.chart import Chart
 from sitl.autopilot.config import EKF_READY_S, INVALID_RESULT, AutopilotConfig, GpsFault, Truth, VaneFault
-from sitl.autopilot.failsafe import Failsafe
-from sitl.autopilot.fence import CHECK_S, Fence
-from sitl.autopilot.ftp import FtpServer
-from sitl.autopilot.helm import Helm
-from sitl.autopilot.links import LOOP_S, Link
-from sitl.autopilot.parameter_server import ParameterServer
-from sitl.autopilot.parameters import Parameters
-from sitl.autopilot.ports import Ports
-from sitl.autopilot.radio import Radio
-from sitl.autopilot.storage import Storage
-from sitl.autopilot.telemetry import BUILDERS, POSITION_MODES
-from sitl.autopilot.traffic import Traffic, Vessel
-from sitl.autopilot.transfer import TransferServer
-from sitl.autopilot.vehicle import Vehicle
+from sitl.autopilot.pilot.failsafe import Failsafe
+from sitl.autopilot.pilot.fence import CHECK_S, Fence
+from sitl.autopilot.protocol.ftp import FtpServer
+from sitl.autopilot.pilot.helm import Helm
+from sitl.autopilot.links.link import LOOP_S, Link
+from sitl.autopilot.protocol.parameter_server import ParameterServer
+from sitl.autopilot.boat.parameters import Parameters
+from sitl.autopilot.protocol.ports import Ports
+from sitl.autopilot.pilot.radio import Radio
+from sitl.autopilot.pilot.storage import Storage
+from sitl.autopilot.protocol.telemetry import BUILDERS, POSITION_MODES
+from sitl.autopilot.protocol.ais_list import Traffic, Vessel
+from sitl.autopilot.protocol.transfer import TransferServer
+from sitl.autopilot.boat.vehicle import Vehicle
 from sitl.world.wind import Constant, Wind
 
 WARM_BOOT_S = 60.0

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from companion.errors import LinkError
     from companion.mavlink.transports.transport import parse_link
     from sitl.autopilot import Autopilot, AutopilotConfig, serve
-    from sitl.autopilot.parameters import check_parameters
+    from sitl.autopilot.boat.parameters import check_parameters
     from sitl.world.wind import parse_wind
 
     parameters: dict[str, float] = {}

@@ -19,7 +19,7 @@ from companion.mavlink.transports.transport import Transport
 from companion.mavlink.trust.reception import LinkIdentity
 from companion.messages import GeoPoint, MissionItem, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryLink, VaneFault, VaneState, serve
-from sitl.autopilot.memory import MemoryEnd
+from sitl.autopilot.links.memory import MemoryEnd
 from sitl.scene.others import TRAFFIC, Others
 from sitl.scene.scenario import EventSpec
 from sitl.scene.ships import Motion

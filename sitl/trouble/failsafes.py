@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.clock import now_s
 from companion.messages import Mode
 from sitl.autopilot import Autopilot
-from sitl.autopilot.memory import MemoryEnd
+from sitl.autopilot.links.memory import MemoryEnd
 from sitl.scene.scenario import EventSpec
 
 BEAT_S = 1.0

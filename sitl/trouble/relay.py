@@ -12,7 +12,7 @@ from typing import Self
 
 from companion.mavlink.transports.endpoints import open_link
 from sitl.autopilot import Impairment, MemoryLink
-from sitl.autopilot.memory import FrameStream
+from sitl.autopilot.links.memory import FrameStream
 from sitl.scene.scenario import EventSpec
 from sitl.scene.ships import free_port
 from sitl.trouble.false_vane import FalseVane

@@ -18,7 +18,7 @@ from companion.mavlink.wire.status import StatusReader
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
-from sitl.autopilot.memory import Impairment
+from sitl.autopilot.links.memory import Impairment
 from sitl.world.wind import Constant
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)

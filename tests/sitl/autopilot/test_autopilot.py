@@ -370,7 +370,7 @@ def test_clearance_agrees_with_shapely(seed: int, east: float, north: float, *, 
     from shapely import Point
     from shapely import Polygon as Shape
 
-    from sitl.autopilot.fence import Polygon
+    from sitl.autopilot.pilot.fence import Polygon
 
     rng = np.random.default_rng(seed)
     angles = np.sort(rng.uniform(0.0, 2.0 * math.pi, 9))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot.items import FENCE, MISSION, Item
+from sitl.autopilot.pilot.items import FENCE, MISSION, Item
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot

@@ -15,8 +15,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
 from sitl.autopilot.config import GpsFault
-from sitl.autopilot.ekf import Ekf
-from sitl.autopilot.telemetry import POSITION_MODES
+from sitl.autopilot.pilot.ekf import Ekf
+from sitl.autopilot.protocol.telemetry import POSITION_MODES
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot.items import FENCE, MAX_FENCE, MAX_MISSION, MAX_RALLY, MISSION, RALLY, Item, item_from_message
+from sitl.autopilot.pilot.items import FENCE, MAX_FENCE, MAX_MISSION, MAX_RALLY, MISSION, RALLY, Item, item_from_message
 
 REPEAT_S = 1.0
 TIMEOUT_S = 8.0

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot.items import Item
+from sitl.autopilot.pilot.items import Item
 
 CHECK_S = 0.1
 TYPE_CIRCLE, TYPE_POLYGON = 2, 4

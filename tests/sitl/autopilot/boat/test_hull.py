@@ -7,9 +7,9 @@ import pytest
 
 from companion.boat import Polar, constant
 from companion.boat.polar import MPS_PER_KNOT
-from sitl.autopilot import kernel as k
-from sitl.autopilot.parameters import Parameters
-from sitl.autopilot.vehicle import Vehicle
+from sitl.autopilot.boat import kernel as k
+from sitl.autopilot.boat.parameters import Parameters
+from sitl.autopilot.boat.vehicle import Vehicle
 from sitl.scene.hull import own_polar
 from sitl.world.wind import Constant
 

@@ -5,62 +5,18 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.boat import Polar
 from companion.geo.angles import wrap_pi, wrap_two_pi
-from sitl.autopilot import kernel as k
-from sitl.autopilot.parameters import Parameters
+from sitl.autopilot.boat import kernel as k
+from sitl.autopilot.boat.parameters import Parameters
+from sitl.autopilot.boat.sail import polar_table
+from sitl.autopilot.boat.settings import fill
 from sitl.world.wind import Wind
 
 LOOP_S = k.LOOP_S
 _WIND_LOOPS = 5
 _NONE = np.empty(0)
-
-# Setting of the kernel, name of the parameter, factor to the kernel's unit.
-_SETTINGS: tuple[tuple[int, str, float], ...] = (
-    (k.P_NOGO, "SAIL_NO_GO_ANGLE", math.pi / 180.0),
-    (k.P_XTRACK_MAX, "SAIL_XTRACK_MAX", 1.0),
-    (k.P_IDEAL, "SAIL_ANGLE_IDEAL", math.pi / 180.0),
-    (k.P_SAIL_MIN, "SAIL_ANGLE_MIN", math.pi / 180.0),
-    (k.P_SAIL_MAX, "SAIL_ANGLE_MAX", math.pi / 180.0),
-    (k.P_LOITER_RADIUS, "SAIL_LOIT_RADIUS", 1.0),
-    (k.P_WP_RADIUS, "WP_RADIUS", 1.0),
-    (k.P_WP_SPEED, "WP_SPEED", 1.0),
-    (k.P_PIVOT_RATE, "WP_PIVOT_RATE", math.pi / 180.0),
-    (k.P_ANG_P, "ATC_STR_ANG_P", 1.0),
-    (k.P_RATE_P, "ATC_STR_RAT_P", 1.0),
-    (k.P_RATE_I, "ATC_STR_RAT_I", 1.0),
-    (k.P_RATE_FF, "ATC_STR_RAT_FF", 1.0),
-    (k.P_RATE_MAX, "ATC_STR_RAT_MAX", math.pi / 180.0),
-    (k.P_RATE_ACC, "ATC_STR_ACC_MAX", math.pi / 180.0),
-    (k.P_SCALE_BASE, "MOT_SPD_SCA_BASE", 1.0),
-    (k.P_POS_P, "PSC_POS_P", 1.0),
-    (k.P_VEL_P, "PSC_VEL_P", 1.0),
-    (k.P_ACCEL, "ATC_ACCEL_MAX", 1.0),
-    (k.P_TURN_MAX_G, "ATC_TURN_MAX_G", 1.0),
-    (k.P_DIR_FILT, "WNDVN_DIR_FILT", 1.0),
-    (k.P_SPD_FILT, "WNDVN_SPEED_FILT", 1.0),
-    (k.P_TRUE_FILT, "WNDVN_TRUE_FILT", 1.0),
-    (k.P_WIND_TC, "SIM_WIND_TC", 1.0),
-    (k.P_VANE, "WNDVN_TYPE", 1.0),
-    (k.P_SPEED_SENSOR, "WNDVN_SPEED_TYPE", 1.0),
-    (k.P_SPEED_MIN, "WNDVN_SPEED_MIN", 1.0),
-    (k.P_VANE_OFFSET, "WNDVN_DIR_OFS", math.pi / 180.0),
-    (k.P_TURN_RADIUS, "TURN_RADIUS", 1.0),
-)
-
-
-def _table(polar: Polar) -> NDArray[np.float64]:
-    """Return a polar as the kernel looks it up: by whole degrees, and steps of wind up to its last and one more.
-
-    Without wind nobody sails, not even a boat whose polar is one speed for every wind.
-    """
-    winds = np.arange(0.0, float(polar.tws_mps[-1]) + 2.0 * k.POLAR_STEP_MPS, k.POLAR_STEP_MPS)
-    angles = np.radians(np.arange(181.0))
-    table = np.stack([polar.speeds_mps(angles, float(tws)) for tws in winds], axis=1)
-    table[:, 0] = 0.0
-    return table
 
 
 class Vehicle:
@@ -76,7 +32,7 @@ class Vehicle:
         self._settings = np.zeros(k.P_SIZE)
         self._seen = -1
         self._seed = seed
-        self._polar = np.zeros((0, 0)) if polar is None else _table(polar)
+        self._polar = np.zeros((0, 0)) if polar is None else polar_table(polar)
         self._still_until_s = 0.0
         self.state[k.S_YAW] = heading_rad
         self.state[k.S_MOORED] = float(is_moored)
@@ -92,12 +48,7 @@ class Vehicle:
             return
         self._seen = self._parameters.revision
         get = self._parameters.get
-        for index, name, factor in _SETTINGS:
-            self._settings[index] = get(name) * factor
-        if get("WP_ACCEL") > 0.0:
-            self._settings[k.P_ACCEL] = get("WP_ACCEL")
-        self._settings[k.P_ACCEL] = max(self._settings[k.P_ACCEL], 0.1)
-        self._settings[k.P_WP_SPEED] = max(self._settings[k.P_WP_SPEED], 0.5)
+        fill(self._settings, get)
         tide_from = math.radians(get("SIM_TIDE_DIR"))
         self.state[k.S_CURRENT_E] = -get("SIM_TIDE_SPEED") * math.sin(tide_from)
         self.state[k.S_CURRENT_N] = -get("SIM_TIDE_SPEED") * math.cos(tide_from)

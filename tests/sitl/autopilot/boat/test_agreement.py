@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot import kernel as k
-from sitl.autopilot.parameters import Parameters
-from sitl.autopilot.vehicle import Vehicle
+from sitl.autopilot.boat import kernel as k
+from sitl.autopilot.boat.parameters import Parameters
+from sitl.autopilot.boat.vehicle import Vehicle
 from sitl.world.wind import Constant, Event, Scripted
 from tests.sitl.boats import Client, en, sail
 
@@ -408,7 +408,7 @@ def test_slow_rudder_makes_slow_tacks() -> None:
 def test_table_of_differences_is_in_the_documentation() -> None:
     from pathlib import Path
 
-    text = (Path(__file__).parents[3] / "docs" / "simulated-autopilot.md").read_text()
+    text = (Path(__file__).parents[4] / "docs" / "simulated-autopilot.md").read_text()
     for name in NOT_IMITATED:
         assert name in text, f"docs/simulated-autopilot.md does not mention: {name}"
 

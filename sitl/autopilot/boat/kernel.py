@@ -3,8 +3,7 @@
 ``advance`` moves one state vector through whole loops of 20 ms and stops early when something happened that
 the mission logic must see. The equations are those of ArduPilot's SIM_Sailboat (hull), AP_WindVane (filters),
 sailboat.cpp (tacking), AR_WPNav and AR_PosControl (legs) and AR_AttitudeControl (rudder), restated; what the legs
-and the corners do was fitted to recordings of the real program. Everything is in one module because numba's
-cache notices a change of the module it compiled, not of those that it calls.
+and the corners do was fitted to recordings of the real program.
 
 Frame: east, north [m] from the boat's home; headings [rad] clockwise from north. Indices of the state (``S_``),
 of the settings (``P_``) and the codes below are the interface.
@@ -18,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.kernels.jit import kernel
+from sitl.autopilot.boat.sail import polar_force, polar_speed, sail_force
+from sitl.autopilot.boat.scalars import alpha, clip, wrap
 
 LOOP_S = 0.02
 SUBSTEPS = 4
@@ -39,7 +40,7 @@ S_PHASE, S_U, S_SCALE = 37, 38, 39                             # target: curve i
 S_TE, S_TN = 40, 41                                            # target point
 S_XTRACK, S_DIST, S_BEARING = 42, 43, 44                       # cross-track (+: boat left of the leg), to go
 S_TACKING, S_TACK_YAW, S_TACK_START, S_TACK_END, S_TACK_ASKED = range(45, 50)
-S_LE, S_LN, S_LOITER_YAW, S_LOITER_SPEED = 50, 51, 52, 53      # where to loiter
+S_LE, S_LN, S_LOITER_YAW = 50, 51, 52                          # where to loiter
 S_ARMED, S_EASE, S_NAV_YAW, S_TACKS = 54, 55, 56, 57           # sheet eased by avoidance; heading steered
 S_CURRENT_E, S_CURRENT_N = 58, 59                              # of the water [m/s]
 S_VANE_FAULT, S_VANE_VALUE, S_AVOID = 60, 61, 62               # FAULT_, its angle [rad]; near a fence
@@ -53,8 +54,8 @@ S_SIZE = 72
 # --- settings --------------------------------------------------------------------------------------------------
 (P_NOGO, P_XTRACK_MAX, P_IDEAL, P_SAIL_MIN, P_SAIL_MAX, P_LOITER_RADIUS, P_WP_RADIUS, P_WP_SPEED, P_PIVOT_RATE,
  P_ANG_P, P_RATE_P, P_RATE_I, P_RATE_FF, P_RATE_MAX, P_RATE_ACC, P_SCALE_BASE, P_POS_P, P_VEL_P, P_ACCEL,
- P_TURN_MAX_G, P_DIR_FILT, P_SPD_FILT, P_TRUE_FILT, P_WIND_TC, P_VANE, P_SPEED_MIN, P_LOIT_GAIN,
- P_TURN_RADIUS, P_VANE_OFFSET, P_SPEED_SENSOR) = range(30)
+ P_TURN_MAX_G, P_DIR_FILT, P_SPD_FILT, P_TRUE_FILT, P_WIND_TC, P_VANE, P_SPEED_MIN,
+ P_TURN_RADIUS, P_VANE_OFFSET, P_SPEED_SENSOR) = range(29)
 P_SIZE = 32
 
 STEER_OFF, STEER_HOLD, STEER_LEG, STEER_LOITER, STEER_HEADING, STEER_RATE = range(6)
@@ -69,7 +70,6 @@ TACK_TIMEOUT_S = 5.0
 TACK_RETRY_S = 5.0
 TACK_REQUEST_S = 0.5
 MASS_KG = 2.0
-POLAR_STEP_MPS = 0.5
 MOTOR_MPS = 2.0                   # speed under the auxiliary motor: what a small boat's makes
 TURNING_CIRCLE_M = 1.8
 RUDDER_MAX_RAD = math.radians(35.0)
@@ -80,64 +80,7 @@ VANE_LOOPS = 2
 TRACK_LEAD = 0.05
 OVERSPEED = 5.0
 
-# Lift and drag of the sail per m/s of apparent wind, by angle of attack in steps of 10 degrees (SIM_Sailboat).
-_LIFT = np.array([0.0, 0.5, 1.0, 1.1, 0.95, 0.75, 0.6, 0.4, 0.2, 0.0, -0.2, -0.4, -0.6, -0.75, -0.95, -1.1, -1.0, -0.5])
-_DRAG = np.array([0.1, 0.1, 0.2, 0.4, 0.8, 1.2, 1.5, 1.7, 1.9, 1.95, 1.9, 1.7, 1.5, 1.2, 0.8, 0.4, 0.2, 0.1])
-
 Vector = NDArray[np.float64]
-
-
-@kernel
-def _wrap(angle: float) -> float:
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
-
-
-@kernel
-def _clip(x: float, low: float, high: float) -> float:
-    return low if x < low else min(x, high)
-
-
-@kernel
-def _alpha(dt_s: float, cutoff_hz: float) -> float:
-    return 1.0 if cutoff_hz <= 0.0 else dt_s / (dt_s + 1.0 / (2.0 * math.pi * cutoff_hz))
-
-
-@kernel
-def sail_force(aws_mps: float, awa_rad: float, sail_rad: float) -> float:
-    """Return the driving force [N]: F = aws (CL sin|b| - CD cos b), linear in the apparent wind speed."""
-    angle = abs(awa_rad)
-    attack = max(math.degrees(angle - sail_rad), 0.0)
-    if attack >= 170.0:
-        lift, drag = _LIFT[17], _DRAG[17]
-    else:
-        i = int(attack / 10.0)
-        share = attack / 10.0 - i
-        lift = _LIFT[i] + share * (_LIFT[i + 1] - _LIFT[i])
-        drag = _DRAG[i] + share * (_DRAG[i + 1] - _DRAG[i])
-    return float(aws_mps * (lift * math.sin(angle) - drag * math.cos(angle)))
-
-
-@kernel
-def polar_speed(polar: NDArray[np.float64], twa_rad: float, tws_mps: float) -> float:
-    """Return the speed [m/s] in a table by whole degrees (0..180) and steps of POLAR_STEP_MPS; its last one above."""
-    row = min(abs(math.degrees(twa_rad)), 180.0)
-    column = min(tws_mps / POLAR_STEP_MPS, polar.shape[1] - 1.0)
-    i, j = min(int(row), 179), min(int(column), polar.shape[1] - 2)
-    f, g = row - i, column - j
-    low = (1.0 - g) * polar[i, j] + g * polar[i, j + 1]
-    return float((1.0 - f) * low + f * ((1.0 - g) * polar[i + 1, j] + g * polar[i + 1, j + 1]))
-
-
-@kernel
-def _polar_force(speed_mps: float, force: float, awa_rad: float, sail_rad: float, ideal_rad: float) -> float:
-    """Return the driving force [N] of a boat whose polar says ``speed_mps``; ``force`` is that of SIM_Sailboat's sail.
-
-    Sheeted as the autopilot does for full speed it balances the drag at that speed; eased by the sail's ideal angle of
-    attack it is none. Near head to wind the sail pushes her astern as it does there.
-    """
-    eased = sail_rad - _clip(abs(awa_rad) - ideal_rad, 0.0, 0.5 * math.pi)
-    drawing = 1.0 - _clip(eased / max(ideal_rad, 0.1), 0.0, 1.0)
-    return 0.5 * speed_mps * speed_mps * drawing + min(force, 0.0)
 
 
 @kernel
@@ -151,13 +94,13 @@ def _hull(s: Vector, p: Vector, polar: NDArray[np.float64]) -> None:
         ve, vn = v * math.sin(yaw) + ce, v * math.cos(yaw) + cn
         ae, an = ve - we, vn - wn
         aws = math.hypot(ae, an)
-        awa = _wrap(math.atan2(ae, an) - yaw)
+        awa = wrap(math.atan2(ae, an) - yaw)
         force = sail_force(aws, awa, s[S_SAIL])
         if polar.shape[0] > 0:
             # a polar is of the wind over the water
-            twa = _wrap(math.atan2(ce - we, cn - wn) - yaw)
+            twa = wrap(math.atan2(ce - we, cn - wn) - yaw)
             speed = polar_speed(polar, twa, math.hypot(ce - we, cn - wn))
-            force = _polar_force(speed, force, awa, s[S_SAIL], p[P_IDEAL])
+            force = polar_force(speed, force, awa, s[S_SAIL], p[P_IDEAL])
         rate = v * math.sin(s[S_RUDDER] * RUDDER_MAX_RAD) * 2.0 / (TURNING_CIRCLE_M * math.sin(RUDDER_MAX_RAD))
         if s[S_MOTOR] > 0.0:
             # the auxiliary motor, with the sails down: full throttle balances the drag at MOTOR_MPS
@@ -168,7 +111,7 @@ def _hull(s: Vector, p: Vector, polar: NDArray[np.float64]) -> None:
         s[S_VE], s[S_VN] = v * math.sin(half) + ce, v * math.cos(half) + cn
         s[S_E] += s[S_VE] * dt
         s[S_N] += s[S_VN] * dt
-        s[S_YAW] = _wrap(yaw + rate * dt)
+        s[S_YAW] = wrap(yaw + rate * dt)
         s[S_V] = v
         s[S_RATE] = rate
 
@@ -184,18 +127,18 @@ def _vane(s: Vector, p: Vector, noise: float) -> None:
         ae = s[S_WSPD] * math.sin(s[S_WDIR]) + s[S_VE]
         an = s[S_WSPD] * math.cos(s[S_WDIR]) + s[S_VN]
         raw_speed = math.hypot(ae, an)
-        raw_awa = _wrap(math.atan2(ae, an) - s[S_YAW] + p[P_VANE_OFFSET])
+        raw_awa = wrap(math.atan2(ae, an) - s[S_YAW] + p[P_VANE_OFFSET])
     if s[S_VANE_FAULT] == FAULT_FROZEN:
         raw_awa = s[S_AWA_RAW]
     elif s[S_VANE_FAULT] == FAULT_OFFSET:
-        raw_awa = _wrap(raw_awa + s[S_VANE_VALUE])
+        raw_awa = wrap(raw_awa + s[S_VANE_VALUE])
     elif s[S_VANE_FAULT] == FAULT_SPIKES:
         # now and then (one reading in fifty) the vane points anywhere within the stated angle
-        raw_awa = _wrap(raw_awa + (s[S_VANE_VALUE] * (noise * 100.0 - 1.0) if noise < 0.02 else 0.0))
+        raw_awa = wrap(raw_awa + (s[S_VANE_VALUE] * (noise * 100.0 - 1.0) if noise < 0.02 else 0.0))
     s[S_AWA_RAW] = raw_awa
     believed = s[S_YAW] + s[S_COMPASS]
-    a_dir, a_spd = _alpha(VANE_DT_S, p[P_DIR_FILT]), _alpha(VANE_DT_S, p[P_SPD_FILT])
-    a_true = _alpha(VANE_DT_S, p[P_TRUE_FILT])
+    a_dir, a_spd = alpha(VANE_DT_S, p[P_DIR_FILT]), alpha(VANE_DT_S, p[P_SPD_FILT])
+    a_true = alpha(VANE_DT_S, p[P_TRUE_FILT])
     if s[S_VANE_SET] == 0.0:
         a_dir = a_spd = a_true = 1.0
         s[S_VANE_SET] = 1.0
@@ -228,7 +171,7 @@ def _indirect(s: Vector, p: Vector, yaw_rad: float) -> bool:
     if s[S_TACKING]:
         return True
     twd = math.atan2(s[S_TWD_SIN], s[S_TWD_COS])
-    return bool(abs(_wrap(twd - yaw_rad)) <= p[P_NOGO] + NOGO_PAD_RAD)
+    return bool(abs(wrap(twd - yaw_rad)) <= p[P_NOGO] + NOGO_PAD_RAD)
 
 
 @kernel
@@ -240,8 +183,8 @@ def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
     on_port = math.atan2(s[S_AWA_SIN], s[S_AWA_COS]) < 0.0  # wind over the port side
     tacking = s[S_TACKING] > 0.0
     should_tack = False
-    if abs(_wrap(twd - yaw_rad)) > p[P_NOGO] and not tacking:
-        if (_wrap(twd - yaw_rad) < 0.0) == on_port:
+    if abs(wrap(twd - yaw_rad)) > p[P_NOGO] and not tacking:
+        if (wrap(twd - yaw_rad) < 0.0) == on_port:
             return yaw_rad, events
         should_tack = True
     if s[S_TACK_ASKED] > 0.0 and not should_tack and not tacking:
@@ -252,14 +195,14 @@ def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
         # left of the leg on starboard tack, or right of it on port tack: the other tack leads back
         should_tack = (xtrack > 0.0) != on_port
     if should_tack and t - s[S_TACK_END] > TACK_RETRY_S:
-        s[S_TACK_YAW] = _wrap(twd - p[P_NOGO] if on_port else twd + p[P_NOGO])
+        s[S_TACK_YAW] = wrap(twd - p[P_NOGO] if on_port else twd + p[P_NOGO])
         s[S_TACKING] = 1.0
         s[S_TACK_START] = t
         s[S_TACKS] += 1.0
         tacking = True
         events |= TACKED
     if tacking:
-        if abs(_wrap(s[S_TACK_YAW] - s[S_YAW] - s[S_COMPASS])) <= TACK_DONE_RAD:
+        if abs(wrap(s[S_TACK_YAW] - s[S_YAW] - s[S_COMPASS])) <= TACK_DONE_RAD:
             s[S_TACKING] = 0.0
             s[S_TACK_END] = t
         elif t - s[S_TACK_START] > TACK_TIMEOUT_S:
@@ -267,7 +210,7 @@ def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
             s[S_TACK_END] = t
             events |= TACK_TIMED_OUT
         return s[S_TACK_YAW], events
-    return _wrap(twd + p[P_NOGO] if on_port else twd - p[P_NOGO]), events
+    return wrap(twd + p[P_NOGO] if on_port else twd - p[P_NOGO]), events
 
 
 @kernel
@@ -306,12 +249,12 @@ def _target(s: Vector, p: Vector) -> tuple[float, float, float, float, bool]:
         de, dn = ue, un
         # speeding up since the last corner or the start, braking for the next corner or the end
         pace = math.sqrt(2.0 * accel * max(min(s[S_U], length - s[S_U]), 0.0))
-        pace = _clip(pace, 0.5, p[P_WP_SPEED])
+        pace = clip(pace, 0.5, p[P_WP_SPEED])
         he, hn = pace * ue, pace * un
     # the target waits for the boat, and keeps a little ahead of it
     error = (s[S_TE] - (s[S_E] + s[S_GPS_E])) * de + (s[S_TN] - (s[S_N] + s[S_GPS_N])) * dn
     along = s[S_VE] * de + s[S_VN] * dn
-    want = _clip(TRACK_LEAD + (along - p[P_POS_P] * error) / pace, 0.0, OVERSPEED)
+    want = clip(TRACK_LEAD + (along - p[P_POS_P] * error) / pace, 0.0, OVERSPEED)
     s[S_SCALE] += (want - s[S_SCALE]) * LOOP_S
     step = s[S_SCALE] * pace * LOOP_S
     arrived = False
@@ -382,11 +325,11 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     slowest = min(v, math.sqrt(limit * p[P_TURN_RADIUS]))
     # the desired speed changes no faster than P_ACCEL; it starts at 0 when avoidance had eased the sheet
     step = p[P_ACCEL] * LOOP_S
-    s[S_WANT_SPEED] = _clip(max(forward, slowest), s[S_WANT_SPEED] - step, s[S_WANT_SPEED] + step)
+    s[S_WANT_SPEED] = clip(max(forward, slowest), s[S_WANT_SPEED] - step, s[S_WANT_SPEED] + step)
     if s[S_EASE]:
         s[S_WANT_SPEED] = 0.0
     speed = max(s[S_WANT_SPEED], 0.1)
-    return 0.0, _clip(lateral, -limit, limit) / speed, False, events
+    return 0.0, clip(lateral, -limit, limit) / speed, False, events
 
 
 @kernel
@@ -395,7 +338,6 @@ def _loiter(s: Vector, p: Vector) -> tuple[float, int]:
     de, dn = s[S_LE] - (s[S_E] + s[S_GPS_E]), s[S_LN] - (s[S_N] + s[S_GPS_N])
     s[S_DIST] = math.hypot(de, dn)
     s[S_BEARING] = math.atan2(de, dn)
-    s[S_LOITER_SPEED] = 0.1
     if s[S_DIST] > p[P_LOITER_RADIUS]:
         s[S_LOITER_YAW] = s[S_BEARING]
     if _indirect(s, p, s[S_LOITER_YAW]):
@@ -412,13 +354,13 @@ def _rudder(s: Vector, p: Vector, rate_rad: float) -> None:
     """AR_AttitudeControl: acceleration-limited turn rate, PI with feed-forward, less rudder at speed."""
     change = p[P_RATE_ACC] * LOOP_S
     if change > 0.0:
-        rate_rad = _clip(rate_rad, s[S_WANT_RATE] - change, s[S_WANT_RATE] + change)
+        rate_rad = clip(rate_rad, s[S_WANT_RATE] - change, s[S_WANT_RATE] + change)
     if p[P_RATE_MAX] > 0.0:
-        rate_rad = _clip(rate_rad, -p[P_RATE_MAX], p[P_RATE_MAX])
+        rate_rad = clip(rate_rad, -p[P_RATE_MAX], p[P_RATE_MAX])
     s[S_WANT_RATE] = rate_rad
     error = rate_rad - s[S_RATE]
-    s[S_INTEGRAL] = _clip(s[S_INTEGRAL] + error * p[P_RATE_I] * LOOP_S, -1.0, 1.0)
-    out = _clip(p[P_RATE_P] * error + s[S_INTEGRAL] + p[P_RATE_FF] * rate_rad, -1.0, 1.0)
+    s[S_INTEGRAL] = clip(s[S_INTEGRAL] + error * p[P_RATE_I] * LOOP_S, -1.0, 1.0)
+    out = clip(p[P_RATE_P] * error + s[S_INTEGRAL] + p[P_RATE_FF] * rate_rad, -1.0, 1.0)
     speed = s[S_V]
     if speed < 0.0:
         out = -out
@@ -457,15 +399,15 @@ def _control(s: Vector, p: Vector) -> int:
     else:
         rate, by_heading, thrust = s[S_WANT_TURN], False, s[S_THRUST]
     if by_heading:
-        rate = p[P_ANG_P] * _wrap(heading - s[S_YAW] - s[S_COMPASS])
+        rate = p[P_ANG_P] * wrap(heading - s[S_YAW] - s[S_COMPASS])
         if s[S_TACKING] and p[P_PIVOT_RATE] > 0.0:
-            rate = _clip(rate, -p[P_PIVOT_RATE], p[P_PIVOT_RATE])
+            rate = clip(rate, -p[P_PIVOT_RATE], p[P_PIVOT_RATE])
         s[S_NAV_YAW] = heading
     _rudder(s, p, rate)
     s[S_THROTTLE] = thrust
     if thrust > 0.0:
         awa = abs(math.atan2(s[S_AWA_SIN], s[S_AWA_COS]))
-        s[S_SAIL] = _clip(awa - p[P_IDEAL], p[P_SAIL_MIN], p[P_SAIL_MAX])
+        s[S_SAIL] = clip(awa - p[P_IDEAL], p[P_SAIL_MIN], p[P_SAIL_MAX])
     else:
         s[S_SAIL] = p[P_SAIL_MAX]
     return events
@@ -486,9 +428,9 @@ def advance(
         tick = int(s[S_TICK])
         i = (tick - first_tick) // 5
         # SITL lets the wind follow its set value with tau = SIM_WIND_TC / 2 pi, direction and speed apart
-        a = _alpha(LOOP_S, 1.0 / max(p[P_WIND_TC], 0.1))
+        a = alpha(LOOP_S, 1.0 / max(p[P_WIND_TC], 0.1))
         s[S_WSPD] += a * (wind[i, 1] - s[S_WSPD])
-        s[S_WDIR] = _wrap(s[S_WDIR] + a * _wrap(wind[i, 0] - s[S_WDIR]))
+        s[S_WDIR] = wrap(s[S_WDIR] + a * wrap(wind[i, 0] - s[S_WDIR]))
         if s[S_MOORED] == ANCHORED:
             s[S_V], s[S_VE], s[S_VN], s[S_RATE] = 0.0, 0.0, 0.0, 0.0
         elif not (s[S_MOORED] and not s[S_ARMED]):

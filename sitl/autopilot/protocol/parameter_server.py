@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot.links import Link
+from sitl.autopilot.links.link import Link
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
-from sitl.autopilot.helm import AUX_MOTOR, AUX_TACK
-from sitl.autopilot.links import GROUPS, LOOP_S, OPTIONAL_STREAMS, STREAMABLE, Link
-from sitl.autopilot.telemetry import BUILDERS, autopilot_version
+from sitl.autopilot.pilot.helm import AUX_MOTOR, AUX_TACK
+from sitl.autopilot.links.link import GROUPS, LOOP_S, OPTIONAL_STREAMS, STREAMABLE, Link
+from sitl.autopilot.protocol.telemetry import BUILDERS, autopilot_version
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot

@@ -14,7 +14,7 @@ from companion.clock import now_s, run_virtual
 from companion.errors import LinkError
 from companion.mavlink.transports.transport import TransportState
 from sitl.autopilot import Impairment, MemoryLink
-from sitl.autopilot.memory import FrameStream, frames
+from sitl.autopilot.links.memory import FrameStream, frames
 from sitl.autopilot.server import pieces
 
 

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Mapping
 
 from companion.errors import InputError
-from sitl.autopilot.parameter_table import NEW_NAMES, TABLE
+from sitl.autopilot.boat.parameter_table import NEW_NAMES, TABLE
 
 _TYPES = {"INT8": 2, "INT16": 4, "INT32": 6, "REAL32": 9}
 _LIMITS = {2: (-128, 127), 4: (-32768, 32767), 6: (-(2**31), 2**31 - 1)}

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot.items import FENCE, FILE_ITEM, MISSION, RALLY, Item, accept, from_file, to_file
-from sitl.autopilot.transfer import LIMITS
+from sitl.autopilot.pilot.items import FENCE, FILE_ITEM, MISSION, RALLY, Item, accept, from_file, to_file
+from sitl.autopilot.protocol.transfer import LIMITS
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot

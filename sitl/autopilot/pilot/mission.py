@@ -7,7 +7,7 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot.items import NAV_COMMANDS, REPORTED_DO, Item
+from sitl.autopilot.pilot.items import NAV_COMMANDS, REPORTED_DO, Item
 
 _MAX_JUMPS_IN_A_ROW = 100
 

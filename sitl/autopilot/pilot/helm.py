@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
-from sitl.autopilot import kernel as k
-from sitl.autopilot.items import NAMES, Item
-from sitl.autopilot.mission import Mission, RunState, is_reported
+from sitl.autopilot.boat import kernel as k
+from sitl.autopilot.pilot.items import NAMES, Item
+from sitl.autopilot.pilot.mission import Mission, RunState, is_reported
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot

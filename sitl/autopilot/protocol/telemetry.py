@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.geo.angles import wrap_two_pi
 from companion.messages import Mode
-from sitl.autopilot import kernel as k
+from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.config import INVALID_RESULT
 
 if TYPE_CHECKING:

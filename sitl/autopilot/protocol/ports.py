@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot import commands
-from sitl.autopilot.links import FIRST_STREAMS_S, Link, Router
-from sitl.autopilot.telemetry import BUILDERS, apparent_wind
+from sitl.autopilot.protocol import commands
+from sitl.autopilot.links.link import FIRST_STREAMS_S, Link, Router
+from sitl.autopilot.protocol.telemetry import BUILDERS, apparent_wind
 
 if TYPE_CHECKING:
     from sitl.autopilot.autopilot import Autopilot
