@@ -24,8 +24,8 @@ The shell joins it to transports and to the event loop's clock, whatever that is
 from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.config import HOME, AutopilotConfig, GpsFault, Truth, VaneFault, VaneState
 from sitl.autopilot.links.memory import PERFECT, Impairment, MemoryLink
-from sitl.autopilot.server import Server, serve
 from sitl.autopilot.protocol.ais_list import Vessel
+from sitl.autopilot.server import Server, serve
 
 __all__ = [
     "HOME", "PERFECT", "Autopilot", "AutopilotConfig", "GpsFault", "Impairment", "MemoryLink", "Server", "Truth",

@@ -137,10 +137,10 @@ async def _crew(world: World, event: EventSpec) -> None:
     await _begins(event)
     await world.called.wait()
     await asyncio.sleep(event.react_s)
-    world.autopilot.vehicle.anchor(down=True)
+    world.autopilot.core.vehicle.anchor(down=True)
     if event.for_s is not None:
         await asyncio.sleep(event.for_s)
-        world.autopilot.vehicle.anchor(down=False)
+        world.autopilot.core.vehicle.anchor(down=False)
 
 
 async def _traffic(world: World, event: EventSpec) -> None:
@@ -167,7 +167,7 @@ async def _neighbour(world: World, event: EventSpec) -> None:
         try:
             await asyncio.sleep(math.inf if event.for_s is None else event.for_s)
         finally:
-            if other.is_armed or other.helm.mission.total > 1:
+            if other.truth.is_armed or other.pilot.helm.mission.total > 1:
                 world.ordered.append(event.system)
 
 

@@ -41,6 +41,7 @@ GROUPS: dict[int, tuple[int, ...]] = {
     12: (168, 193, 241, 226, 147, 2),      # extra 3
 }
 MAX_BUFFER_BYTES = 65536
+MAX_UNREAD_BYTES = 1 << 20
 FIRST_STREAMS_S = 2.96
 
 
@@ -62,8 +63,15 @@ class Link:
         self.restart(0.0)
 
     # --------------------------------------------------------------------------------------------- bytes
-    def parse(self, data: bytes) -> Iterator[Any]:
-        """Return the good messages in ``data``; noise is skipped."""
+    def hear(self, data: bytes) -> None:
+        """Take bytes that arrived; they are read at the next loop."""
+        if len(self.inbox) < MAX_UNREAD_BYTES:
+            self.inbox += data
+
+    def read(self) -> Iterator[Any]:
+        """Return the good messages in what arrived; noise is skipped."""
+        data = bytes(self.inbox)
+        self.inbox.clear()
         for m in self._codec.parse_buffer(data) or ():
             if m.get_type() != "BAD_DATA" and not m.get_type().startswith("UNKNOWN"):
                 yield m

@@ -9,17 +9,17 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
 from sitl.autopilot.config import GpsFault
+from sitl.autopilot.pilot.arming import Arming
+from sitl.autopilot.pilot.core import Core
 from sitl.autopilot.pilot.ekf import Ekf
-from sitl.autopilot.protocol.telemetry import POSITION_MODES
-
-if TYPE_CHECKING:
-    from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.pilot.fence import Fence
+from sitl.autopilot.pilot.helm import POSITION_MODES, Helm
+from sitl.autopilot.pilot.radio import Radio
 
 _CHECK_S = 0.1
 RADIO, STATION = 1, 2
@@ -36,9 +36,13 @@ RECOVERY_S = 10.0   # AC_FENCE_MANUAL_RECOVERY_TIME_MIN
 class Failsafe:
     """Watches; acts once when something begins, says when it has ended, never restores a mode."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self._a = autopilot
-        self.ekf = Ekf(autopilot)
+    def __init__(self, core: Core, helm: Helm, arming: Arming, fence: Fence, radio: Radio, ekf: Ekf) -> None:
+        self._core = core
+        self._helm = helm
+        self._arming = arming
+        self._fence = fence
+        self._radio = radio
+        self._ekf = ekf
         self._gcs_heard_s: float | None = None
         self._lost = self._acted = 0           # bits of the links
         self._lost_since_s = 0.0
@@ -53,85 +57,86 @@ class Failsafe:
     @property
     def is_active(self) -> bool:
         """Whether a failsafe has acted and not cleared, as HEARTBEAT tells it: of links and position only."""
-        return bool(self._acted) or self.ekf.has_acted
+        return bool(self._acted) or self._ekf.has_acted
 
     @property
     def due_s(self) -> float:
         """When to look again."""
-        a = self._a
-        get = a.parameters.get
+        core = self._core
+        get = core.parameters.get
         watching = (
-            (self._gcs_heard_s is not None and a.parameters.flag("FS_GCS_ENABLE"))
-            or a.radio.is_switched_off or self._lost
-            or 0.0 < a.battery_v < max(get("BATT_LOW_VOLT"), get("BATT_CRT_VOLT"))
-            or a.roll_rad != 0.0 or self.ekf.is_watching
+            (self._gcs_heard_s is not None and core.parameters.flag("FS_GCS_ENABLE"))
+            or self._radio.is_switched_off or self._lost
+            or 0.0 < core.battery_v < max(get("BATT_LOW_VOLT"), get("BATT_CRT_VOLT"))
+            or core.roll_rad != 0.0 or self._ekf.is_watching
         )
         return self._due_s if watching else math.inf
 
     def heard(self, sender: tuple[int, int]) -> None:
         """A heartbeat; that of SYSID_MYGCS counts, from any component."""
-        if sender[0] == self._a.parameters.flag("SYSID_MYGCS"):
-            self._gcs_heard_s = self._a.t_s
+        if sender[0] == self._core.parameters.flag("SYSID_MYGCS"):
+            self._gcs_heard_s = self._core.t_s
 
     def update(self) -> None:
         """Look at what may be lost."""
-        a = self._a
-        if a.t_s < self._due_s - 1e-9:
+        core = self._core
+        if core.t_s < self._due_s - 1e-9:
             return
-        self._due_s = a.t_s + _CHECK_S
+        self._due_s = core.t_s + _CHECK_S
         self._watch_links()
         self._watch_battery()
         self._watch_roll()
-        self.ekf.update()
+        self._ekf.update()
 
     def set_gps(self, fault: GpsFault) -> None:
         """Break or mend the position."""
-        self._due_s = self._a.t_s
-        self.ekf.set_gps(fault)
+        self._due_s = self._core.t_s
+        self._ekf.set_gps(fault)
 
     # ----------------------------------------------------------------------------------- links to the shore
     def _watch_links(self) -> None:
-        a = self._a
-        get = a.parameters.flag
+        core = self._core
+        get = core.parameters.flag
         if get("FS_THR_ENABLE"):
-            self._trigger(RADIO, is_lost=a.radio.has_failed)
+            self._trigger(RADIO, is_lost=self._radio.has_failed)
         if self._gcs_heard_s is not None and get("FS_GCS_ENABLE"):
-            self._trigger(STATION, is_lost=a.t_s - self._gcs_heard_s >= a.parameters.get("FS_GCS_TIMEOUT") - 1e-9)
+            self._trigger(STATION, is_lost=core.t_s - self._gcs_heard_s >= core.parameters.get("FS_GCS_TIMEOUT") - 1e-9)
 
     def _trigger(self, link: int, *, is_lost: bool) -> None:
-        a, before = self._a, self._lost
+        core, before = self._core, self._lost
         self._lost = before | link if is_lost else before & ~link
         if not before and self._lost:
-            self._lost_since_s = a.t_s
+            self._lost_since_s = core.t_s
         if self._acted and not self._lost:
-            a.announce(mav.MAV_SEVERITY_INFO, f"{_NAMES[link]} Failsafe Cleared")
+            core.voice.announce(mav.MAV_SEVERITY_INFO, f"{_NAMES[link]} Failsafe Cleared")
         self._acted &= self._lost
-        waited = a.t_s - self._lost_since_s >= a.parameters.get("FS_TIMEOUT") - 1e-9
-        if self._acted or not self._lost or not waited or a.helm.mode in {Mode.RTL, Mode.HOLD}:
+        waited = core.t_s - self._lost_since_s >= core.parameters.get("FS_TIMEOUT") - 1e-9
+        if self._acted or not self._lost or not waited or self._helm.mode in {Mode.RTL, Mode.HOLD}:
             return
         self._acted = self._lost
-        a.announce(mav.MAV_SEVERITY_WARNING, f"{_NAMES[link]} Failsafe")
-        if a.helm.mode is Mode.AUTO and a.parameters.flag(_GOES_ON[link]) == 2:
-            a.announce(mav.MAV_SEVERITY_WARNING, "Failsafe - Continuing Auto Mode")
+        core.voice.announce(mav.MAV_SEVERITY_WARNING, f"{_NAMES[link]} Failsafe")
+        if self._helm.mode is Mode.AUTO and core.parameters.flag(_GOES_ON[link]) == 2:
+            core.voice.announce(mav.MAV_SEVERITY_WARNING, "Failsafe - Continuing Auto Mode")
         else:
-            self._act(a.parameters.flag("FS_ACTION"))
+            self._act(core.parameters.flag("FS_ACTION"))
 
     # --------------------------------------------------------------------------------------------- battery
     def _watch_battery(self) -> None:
-        a = self._a
-        if not a.is_armed:
+        core = self._core
+        if not core.is_armed:
             return
         level = 0
+        get = core.parameters.get
         for n, (_, limit, _) in enumerate(_BATTERY, start=1):
-            if not 0.0 < a.battery_v < a.parameters.get(limit):
+            if not 0.0 < core.battery_v < get(limit):
                 self._battery_since_s.pop(n, None)
-            elif a.t_s - self._battery_since_s.setdefault(n, a.t_s) >= a.parameters.get("BATT_LOW_TIMER") - 1e-9:
+            elif core.t_s - self._battery_since_s.setdefault(n, core.t_s) >= get("BATT_LOW_TIMER") - 1e-9:
                 level = n
         if level > self.battery_level:
             self.battery_level = level
             kind, _, action = _BATTERY[level - 1]
-            a.announce(mav.MAV_SEVERITY_WARNING, f"Battery 1 is {kind} {a.battery_v:.2f}V used 0 mAh")
-            self._act_for_battery(a.parameters.flag(action))
+            core.voice.announce(mav.MAV_SEVERITY_WARNING, f"Battery 1 is {kind} {core.battery_v:.2f}V used 0 mAh")
+            self._act_for_battery(core.parameters.flag(action))
 
     def _act_for_battery(self, action: int) -> None:
         before = self._battery_action
@@ -142,14 +147,14 @@ class Failsafe:
 
     # ------------------------------------------------------------------------------------------ knock-down
     def _watch_roll(self) -> None:
-        a = self._a
-        check, angle_deg = a.parameters.flag("FS_CRASH_CHECK"), a.parameters.flag("CRASH_ANGLE")
-        if not check or not angle_deg or not a.is_armed or a.helm.mode not in POSITION_MODES:
+        core = self._core
+        check, angle_deg = core.parameters.flag("FS_CRASH_CHECK"), core.parameters.flag("CRASH_ANGLE")
+        if not check or not angle_deg or not core.is_armed or self._helm.mode not in POSITION_MODES:
             return
-        if abs(a.roll_rad) > math.radians(angle_deg):
-            a.announce(mav.MAV_SEVERITY_EMERGENCY, "Crash: Going to HOLD")
+        if abs(core.roll_rad) > math.radians(angle_deg):
+            core.voice.announce(mav.MAV_SEVERITY_EMERGENCY, "Crash: Going to HOLD")
             with self._own_doing("crash"):
-                a.helm.set_mode(Mode.HOLD)
+                self._helm.set_mode(Mode.HOLD)
                 if check == 2:
                     self._disarm()
 
@@ -167,7 +172,7 @@ class Failsafe:
             self._take(action)
 
     def _take(self, action: int) -> None:
-        helm = self._a.helm
+        helm = self._helm
         if action in {_RTL, _SMART, 4} and helm.set_mode(Mode.SMART_RTL if action == 4 else Mode.RTL):
             return
         if action == 6 and helm.set_mode(Mode.LOITER):
@@ -179,39 +184,22 @@ class Failsafe:
 
     def _disarm(self) -> None:
         self.stopped_by = self._acting
-        self._a.disarm()
-        self._a.ports.after_ack()
+        self._arming.disarm()
+        self._core.voice.after_ack()
 
     # ----------------------------------------------------------------------------------------------- fence
     def watch_fence(self) -> None:
-        """Compare the position with the fence: avoidance near it, action when a breach begins."""
-        a = self._a
-        if not a.has_origin:
+        """Look at the fence; when a breach begins, change mode by FENCE_ACTION."""
+        outside_m = self._fence.update()
+        if outside_m is None or not self._core.is_armed or self._core.t_s < self._recovery_until_s:
             return
-        get, fence = a.parameters.get, a.fence
-        clearance = fence.clearance_m(
-            a.vehicle.position, a.home_en, a.parameters.flag("FENCE_TYPE"), get("FENCE_RADIUS")
-        )
-        begins = fence.judge(clearance, a.boot_ms)
-        margin = get("FENCE_MARGIN")
-        reach = margin + get("WP_SPEED") / max(get("PSC_POS_P"), 0.01)
-        avoiding = a.parameters.flag("AVOID_ENABLE") & 1 and not fence.is_breached and a.is_armed
-        fence.is_limiting = bool(avoiding) and clearance <= reach
-        a.vehicle.avoid(near=fence.is_limiting, ease=fence.is_limiting and clearance <= margin)
-        if begins:
-            a.broadcast(fence.status_message())
-            if a.is_armed and a.t_s >= self._recovery_until_s:
-                self._fence_breached(-clearance)
-
-    def _fence_breached(self, outside_m: float) -> None:
-        """A breach began: change mode by FENCE_ACTION."""
-        action = self._a.parameters.flag("FENCE_ACTION")
+        action = self._core.parameters.flag("FENCE_ACTION")
         if action != 0:
             self._act(action if outside_m <= GIVE_UP_M else 2)
 
     def mode_changed(self) -> None:
         """Leave ten seconds to whoever steers now, if the mode was changed outside the fence, by anybody."""
         self.stopped_by = self._acting
-        if self._a.fence.is_breached:
-            self._recovery_until_s = self._a.t_s + RECOVERY_S
-            self._a.announce(mav.MAV_SEVERITY_INFO, "Manual recovery started")
+        if self._fence.is_breached:
+            self._recovery_until_s = self._core.t_s + RECOVERY_S
+            self._core.voice.announce(mav.MAV_SEVERITY_INFO, "Manual recovery started")

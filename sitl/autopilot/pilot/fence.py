@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from sitl.autopilot.pilot.core import Core
 from sitl.autopilot.pilot.items import Item
 
 CHECK_S = 0.1
@@ -84,7 +85,9 @@ def zones(items: Sequence[Item], to_en: Callable[[int, int], tuple[float, float]
 class Fence:
     """What is stored, whether it is on, and what it found."""
 
-    def __init__(self) -> None:
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self._due_s = core.t_s
         self.items: list[Item] = []
         self._zones: list[Polygon | Circle] = []
         self.is_enabled = False
@@ -96,38 +99,65 @@ class Fence:
         self._types = TYPE_POLYGON
         self._circle_clear_m = math.inf
         self._circle_m = math.inf         # how far outside the home circle the next breach of it begins
+        if core.parameters.flag("FENCE_ENABLE"):
+            self.switch(enabled=True)
 
     @property
     def is_present(self) -> bool:
         """Whether there is anything to keep (SYS_STATUS)."""
         return bool(self._zones) or (self.is_enabled and bool(self._types & TYPE_CIRCLE))
 
-    def load(self, items: Sequence[Item], to_en: Callable[[int, int], tuple[float, float]]) -> bool:
+    def load(self, items: Sequence[Item]) -> bool:
         """Take over a new list; False, and nothing changed, if it does not make sense."""
-        found = zones(items, to_en)
+        found = zones(items, self._core.chart.to_en)
         if found is None:
             return False
         self.items, self._zones = list(items), found
         return True
 
-    def clearance_m(
-        self, position: tuple[float, float], home: tuple[float, float] | None, types: int, radius_m: float
-    ) -> float:
+    def _clearance_m(self) -> float:
         """Return the distance [m] to the nearest forbidden water, negative in it, infinite without a fence.
 
         Zones are intersected: outside any inclusion zone is forbidden, also when there are several.
         """
-        self._types = types
+        core = self._core
+        self._types = types = core.parameters.flag("FENCE_TYPE")
         found = self._circle_clear_m = math.inf
         if types & TYPE_POLYGON:
             for zone in self._zones:
-                found = min(found, zone.clearance_m(*position))
-        if types & TYPE_CIRCLE and home is not None:
-            self._circle_clear_m = radius_m - math.dist(position, home)
+                found = min(found, zone.clearance_m(*core.vehicle.position))
+        if types & TYPE_CIRCLE and core.home_en is not None:
+            self._circle_clear_m = core.parameters.get("FENCE_RADIUS") - math.dist(core.vehicle.position, core.home_en)
             found = min(found, self._circle_clear_m)
         return found
 
-    def judge(self, clearance_m: float, boot_ms: int) -> bool:
+    @property
+    def due_s(self) -> float:
+        """When to look again."""
+        return self._due_s if self.is_enabled else math.inf
+
+    def update(self) -> float | None:
+        """Look at the fence: avoidance near it. Return how far outside [m] the boat is when a breach begins."""
+        core = self._core
+        if core.t_s < self.due_s - 1e-9:
+            return None
+        self._due_s = core.t_s + CHECK_S
+        if not core.has_origin:
+            return None
+        clearance_m = self._clearance_m()
+        begins = self._judge(clearance_m)
+        get = core.parameters.get
+        margin_m = get("FENCE_MARGIN")
+        reach_m = margin_m + get("WP_SPEED") / max(get("PSC_POS_P"), 0.01)
+        avoiding = core.parameters.flag("AVOID_ENABLE") & 1 and not self.is_breached and core.is_armed
+        self.is_limiting = bool(avoiding) and clearance_m <= reach_m
+        core.vehicle.avoid(near=self.is_limiting, ease=self.is_limiting and clearance_m <= margin_m)
+        if not begins:
+            return None
+        core.voice.broadcast(self.status_message())
+        return -clearance_m
+
+    def _judge(self, clearance_m: float) -> bool:
         """Note the state; True when a breach begins."""
         was = self.is_breached
         self.is_breached = clearance_m < 0.0
@@ -140,7 +170,7 @@ class Fence:
             self.breach_count += 1
             self.breach_type = mav.FENCE_BREACH_BOUNDARY
             if not was:
-                self.breach_ms = boot_ms
+                self.breach_ms = self._core.boot_ms
             return True
         if not self.is_breached:
             self.breach_type = 0
@@ -152,6 +182,8 @@ class Fence:
         if not enabled:
             self.is_breached = self.is_limiting = False
             self.breach_type = 0
+        self._core.vehicle.avoid(near=False, ease=False)
+        self._due_s = self._core.t_s
 
     def status_message(self) -> Any:
         """Return FENCE_STATUS."""

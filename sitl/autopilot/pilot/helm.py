@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import enum
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
 from sitl.autopilot.boat import kernel as k
+from sitl.autopilot.pilot.core import Core
+from sitl.autopilot.pilot.fence import Fence
 from sitl.autopilot.pilot.items import NAMES, Item
 from sitl.autopilot.pilot.mission import Mission, RunState, is_reported
-
-if TYPE_CHECKING:
-    from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.pilot.rally import Rally
 
 GUIDED_TIMEOUT_S = 3.0
 AUX_TACK, AUX_MOTOR = 63, 74
 # Entering one of these gives the navigation its limits of acceleration and jerk.
 NAVIGATING = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL})
+POSITION_MODES = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL, Mode.LOITER})
 KNOWN = frozenset({
     Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.HOLD, Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED,
 })
@@ -38,10 +39,15 @@ class Task(enum.Enum):
 
 
 class Helm:
-    """Owner of the mode. Talks to the vehicle in orders, to the world through the autopilot's voice."""
+    """Owner of the mode. ``mode_changed`` is called as soon as the mode is another one."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self._a = autopilot
+    def __init__(self, core: Core, fence: Fence, rally: Rally, mode_changed: Callable[[], None]) -> None:
+        self._core = core
+        self._vehicle = core.vehicle
+        self._voice = core.voice
+        self._fence = fence
+        self._rally = rally
+        self._mode_changed = mode_changed
         self.mission = Mission(self)
         self.mode = Mode.MANUAL
         self.task = Task.HOLD
@@ -53,31 +59,30 @@ class Helm:
         self._told_home = False
         self._setpoint_s = 0.0
         self._has_limits = False
-        autopilot.vehicle.sticks_at_rest()
+        core.vehicle.sticks_at_rest()
 
     # ------------------------------------------------------------------------------------------- modes
     def set_mode(self, number: int) -> bool:
         """Change mode; False, with the reason announced, when it is refused."""
-        a = self._a
         if number not in KNOWN:
-            a.announce(mav.MAV_SEVERITY_WARNING, f"No such mode {number}")
+            self._voice.announce(mav.MAV_SEVERITY_WARNING, f"No such mode {number}")
             return False
         mode = Mode(number)
         if mode is self.mode:
             return True
         if mode is Mode.AUTO and self.mission.total == 0:
-            a.announce(mav.MAV_SEVERITY_NOTICE, "No Mission. Can't set AUTO.")
-            a.announce(mav.MAV_SEVERITY_WARNING, "Flight mode change failed")
+            self._voice.announce(mav.MAV_SEVERITY_NOTICE, "No Mission. Can't set AUTO.")
+            self._voice.announce(mav.MAV_SEVERITY_WARNING, "Flight mode change failed")
             return False
-        if mode in {Mode.RTL, Mode.SMART_RTL} and a.home_en is None:
-            a.announce(mav.MAV_SEVERITY_WARNING, "Flight mode change failed")
+        if mode in {Mode.RTL, Mode.SMART_RTL} and self._core.home_en is None:
+            self._voice.announce(mav.MAV_SEVERITY_WARNING, "Flight mode change failed")
             return False
         if self.mode is Mode.AUTO:
             self.mission.stop()
-        a.vehicle.clear_tack()
+        self._vehicle.clear_tack()
         self.mode = mode
         self._has_limits = self._has_limits or mode in NAVIGATING
-        a.mode_changed()
+        self._mode_changed()
         self._is_waiting = False
         self._corner_passed = False
         if mode is Mode.AUTO:
@@ -108,58 +113,58 @@ class Helm:
         if is_outside and mission.nav_item is not None:
             mission.state = RunState.RUNNING
             name = NAMES.get(mission.nav_item.command, "Cmd")
-            self._a.announce_after_ack(mav.MAV_SEVERITY_INFO, f"Mission: {mission.nav_index} {name}")
+            self._voice.announce_after_ack(mav.MAV_SEVERITY_INFO, f"Mission: {mission.nav_index} {name}")
             if not self._has_limits:
-                self._a.err_internally()
+                self._core.err_internally()
         return True
 
     def armed(self) -> None:
         """The boat was armed: a leg that waited starts here."""
         if self.mode is Mode.AUTO and self.task is Task.LEG and self.mission.state is RunState.RUNNING:
             self._corner_passed = False
-            self._a.vehicle.leave_from_here()
+            self._vehicle.leave_from_here()
 
     def _hold(self) -> None:
         self.task = Task.HOLD
-        self._a.vehicle.hold()
+        self._vehicle.hold()
 
     def _manual(self) -> None:
         self.task = Task.HOLD
-        self._a.vehicle.sticks_at_rest()
+        self._vehicle.sticks_at_rest()
 
     def loiter(self) -> None:
         """Loiter where the boat could stop."""
         self.task = Task.LOITER
-        self._a.vehicle.loiter()
+        self._vehicle.loiter()
 
     def sail_home(self) -> None:
         """Sail to home or the nearest rally point."""
-        goal = self._a.refuge()
+        goal = self._rally.refuge()
         if goal is None:
             self._hold()
             return
         self.task = Task.RTL
         self._is_reached = self._told_home = False
-        self._a.vehicle.sail_leg(self._a.vehicle.position, goal, None, is_corner=False, goes_on=False)
+        self._vehicle.sail_leg(self._vehicle.position, goal, None, is_corner=False, goes_on=False)
 
     # ------------------------------------------------------------------------------------------ guided
     def go_to(self, goal: tuple[float, float]) -> None:
         """GUIDED: sail to a position; no time-out."""
         self.task = Task.GUIDED
         self._is_reached = False
-        self._a.vehicle.sail_leg(self._a.vehicle.position, goal, None, is_corner=False, goes_on=False)
+        self._vehicle.sail_leg(self._vehicle.position, goal, None, is_corner=False, goes_on=False)
 
     def steer(self, heading_rad: float, thrust: float) -> None:
         """GUIDED: hold a heading; to be sent again within three seconds."""
         self.task = Task.SETPOINT
-        self._setpoint_s = self._a.t_s
-        self._a.vehicle.steer_heading(heading_rad, thrust)
+        self._setpoint_s = self._core.t_s
+        self._vehicle.steer_heading(heading_rad, thrust)
 
     def turn(self, rate_radps: float, thrust: float) -> None:
         """GUIDED: turn at a rate; to be sent again within three seconds."""
         self.task = Task.SETPOINT
-        self._setpoint_s = self._a.t_s
-        self._a.vehicle.steer_rate(rate_radps, thrust)
+        self._setpoint_s = self._core.t_s
+        self._vehicle.steer_rate(rate_radps, thrust)
 
     # ------------------------------------------------------------------------------------------- loops
     @property
@@ -169,33 +174,31 @@ class Helm:
             return self._setpoint_s + GUIDED_TIMEOUT_S
         if self.mode is Mode.AUTO:
             if self._is_waiting:
-                return self._a.t_s + 0.5
-            if self._hold_until_s > self._a.t_s:
+                return self._core.t_s + 0.5
+            if self._hold_until_s > self._core.t_s:
                 return self._hold_until_s
             if self.mission.state is RunState.RUNNING and (
                 (self.task is Task.LEG and self._is_reached) or self.mission.is_changed
             ):
-                return self._a.t_s
+                return self._core.t_s
         return math.inf
 
     def happened(self, events: int) -> None:
         """Take the events of the compiled loop."""
-        a = self._a
         if events & k.TACKED:
-            a.announce(mav.MAV_SEVERITY_INFO, "Sailboat: Tacking")
+            self._voice.announce(mav.MAV_SEVERITY_INFO, "Sailboat: Tacking")
         if events & k.TACK_TIMED_OUT:
-            a.announce(mav.MAV_SEVERITY_INFO, "Sailboat: Tacking timed out")
+            self._voice.announce(mav.MAV_SEVERITY_INFO, "Sailboat: Tacking timed out")
         if events & k.REACHED:
             self._is_reached = True
 
     def update(self) -> None:
         """One loop of the mode."""
-        a = self._a
         if self.mode is Mode.AUTO:
-            if self._is_waiting and a.has_origin:
+            if self._is_waiting and self._core.has_origin:
                 self._is_waiting = False
                 self.mission.is_changed = False
-                self.mission.start_or_resume(restart=a.parameters.flag("MIS_RESTART") == 1)
+                self.mission.start_or_resume(restart=self._core.parameters.flag("MIS_RESTART") == 1)
             if self.mission.is_changed and not self._is_waiting:
                 self.mission.is_changed = False
                 if self.mission.state is RunState.RUNNING and self.task is Task.LEG:
@@ -203,25 +206,24 @@ class Helm:
                     done = self.mission.restart_current()
                     what = "restarted command" if done else "but failed to restart command"
                     comma = "," if done else ""
-                    a.announce(mav.MAV_SEVERITY_CRITICAL, f"Auto mission changed{comma} {what}")
+                    self._voice.announce(mav.MAV_SEVERITY_CRITICAL, f"Auto mission changed{comma} {what}")
             self.mission.update()
         elif self.mode is Mode.GUIDED:
-            if self.task is Task.SETPOINT and a.t_s - self._setpoint_s >= GUIDED_TIMEOUT_S - 1e-9:
-                a.announce(mav.MAV_SEVERITY_WARNING, "target not received last 3secs, stopping")
+            if self.task is Task.SETPOINT and self._core.t_s - self._setpoint_s >= GUIDED_TIMEOUT_S - 1e-9:
+                self._voice.announce(mav.MAV_SEVERITY_WARNING, "target not received last 3secs, stopping")
                 self.loiter()
             elif self.task is Task.GUIDED and self._is_reached:
-                a.broadcast(mav.MAVLink_mission_item_reached_message(0))
+                self._voice.broadcast(mav.MAVLink_mission_item_reached_message(0))
                 self.loiter()
         if self.task is Task.RTL and self._is_reached and not self._told_home:
             self._told_home = True
-            a.announce(mav.MAV_SEVERITY_INFO, "Reached destination")
-            a.vehicle.loiter()
+            self._voice.announce(mav.MAV_SEVERITY_INFO, "Reached destination")
+            self._vehicle.loiter()
 
     # ----------------------------------------------------------------------------------- mission's crew
     def start_nav(self, index: int, item: Item) -> bool:
         """Begin a navigation command."""
-        a = self._a
-        a.announce(mav.MAV_SEVERITY_INFO, f"Mission: {index} {NAMES.get(item.command, 'Cmd')}")
+        self._voice.announce(mav.MAV_SEVERITY_INFO, f"Mission: {index} {NAMES.get(item.command, 'Cmd')}")
         passed, self._corner_passed = self._corner_passed, False
         self._hold_until_s = -1.0
         self._is_arrival_told = False
@@ -230,8 +232,8 @@ class Helm:
             self.sail_home()
             return True
         if item.command == mav.MAV_CMD_NAV_DELAY:
-            self._hold_until_s = a.t_s + max(0.0, item.p1)
-            a.announce(mav.MAV_SEVERITY_INFO, f"Delaying {int(item.p1)} sec")
+            self._hold_until_s = self._core.t_s + max(0.0, item.p1)
+            self._voice.announce(mav.MAV_SEVERITY_INFO, f"Delaying {int(item.p1)} sec")
             self.loiter()
             return True
         if item.command in {mav.MAV_CMD_NAV_GUIDED_ENABLE, mav.MAV_CMD_NAV_SET_YAW_SPEED}:
@@ -242,8 +244,8 @@ class Helm:
             item.command == mav.MAV_CMD_NAV_WAYPOINT and item.p1 <= 0.0
             and following is not None and NAMES.get(following.command) in {"WP", "LoitUnlim", "LoitTime", "LoitTurns"}
         )
-        origin = a.vehicle.destination if passed else a.vehicle.position
-        a.vehicle.sail_leg(
+        origin = self._vehicle.destination if passed else self._vehicle.position
+        self._vehicle.sail_leg(
             origin, goal, self._place(following) if is_corner and following is not None else None,
             is_corner=is_corner, goes_on=passed,
         )
@@ -251,16 +253,15 @@ class Helm:
         return True
 
     def _place(self, item: Item) -> tuple[float, float]:
-        return self._a.chart.to_en(item.x, item.y) if item.x or item.y else self._a.vehicle.position
+        return self._core.chart.to_en(item.x, item.y) if item.x or item.y else self._vehicle.position
 
     def verify_nav(self, index: int, item: Item) -> bool:
         """Return whether a navigation command is done."""
-        a = self._a
         if item.command in {mav.MAV_CMD_NAV_GUIDED_ENABLE, mav.MAV_CMD_NAV_SET_YAW_SPEED}:
             self._report(index)
             return True
         if item.command == mav.MAV_CMD_NAV_DELAY:
-            if a.t_s < self._hold_until_s - 1e-9:
+            if self._core.t_s < self._hold_until_s - 1e-9:
                 return False
             self._report(index)
             return True
@@ -276,19 +277,19 @@ class Helm:
             stay_s = item.p1 if item.command in {mav.MAV_CMD_NAV_WAYPOINT, mav.MAV_CMD_NAV_LOITER_TIME} else 0.0
             # the message of completion comes first on the wire, the text after it
             more = f". Loiter for {int(stay_s)} seconds" if stay_s > 0.0 else ""
-            self._hold_until_s = a.t_s + max(0.0, stay_s)
+            self._hold_until_s = self._core.t_s + max(0.0, stay_s)
             if stay_s <= 0.0 and item.command != mav.MAV_CMD_NAV_LOITER_UNLIM:
                 self._report(index)
-            a.announce(mav.MAV_SEVERITY_INFO, f"Reached waypoint #{index}{more}")
+            self._voice.announce(mav.MAV_SEVERITY_INFO, f"Reached waypoint #{index}{more}")
             if stay_s > 0.0 or item.command == mav.MAV_CMD_NAV_LOITER_UNLIM:
-                a.vehicle.loiter()
-        if item.command == mav.MAV_CMD_NAV_LOITER_UNLIM or a.t_s < self._hold_until_s - 1e-9:
+                self._vehicle.loiter()
+        if item.command == mav.MAV_CMD_NAV_LOITER_UNLIM or self._core.t_s < self._hold_until_s - 1e-9:
             return False
         if self._hold_until_s > 0.0 and item.p1 > 0.0 and item.command != mav.MAV_CMD_NAV_LOITER_TURNS:
             self._report(index)
             if item.command == mav.MAV_CMD_NAV_LOITER_TIME:
-                a.announce(mav.MAV_SEVERITY_WARNING, "Finished active loiter")
-        self._corner_passed = a.vehicle.state[k.S_STEER] == k.STEER_LEG
+                self._voice.announce(mav.MAV_SEVERITY_WARNING, "Finished active loiter")
+        self._corner_passed = self._vehicle.state[k.S_STEER] == k.STEER_LEG
         return True
 
     def _report(self, index: int) -> None:
@@ -296,26 +297,24 @@ class Helm:
         items = self.mission.items
         if index + 1 < len(items) and is_reported(items[index + 1]):
             return
-        self._a.broadcast(mav.MAVLink_mission_item_reached_message(index))
+        self._voice.broadcast(mav.MAVLink_mission_item_reached_message(index))
 
     def do(self, index: int, item: Item) -> None:
         """Carry out a DO command."""
-        a = self._a
-        a.announce(mav.MAV_SEVERITY_INFO, f"Mission: {index} {NAMES.get(item.command, 'Cmd')}")
+        self._voice.announce(mav.MAV_SEVERITY_INFO, f"Mission: {index} {NAMES.get(item.command, 'Cmd')}")
         if item.command == mav.MAV_CMD_DO_FENCE_ENABLE:
-            a.switch_fence(enabled=item.p1 == 1.0)
+            self._fence.switch(enabled=item.p1 == 1.0)
         elif item.command == mav.MAV_CMD_DO_SET_HOME:
-            a.set_home(None if item.p1 == 1.0 else a.chart.to_en(item.x, item.y))
+            self._core.set_home(None if item.p1 == 1.0 else self._core.chart.to_en(item.x, item.y))
         elif item.command == mav.MAV_CMD_DO_AUX_FUNCTION and int(item.p1) == AUX_TACK:
-            a.vehicle.ask_tack()
+            self._vehicle.ask_tack()
         if is_reported(item):
             self._report(index)
 
     def mission_complete(self) -> None:
         """The last item is done."""
-        a = self._a
-        a.announce(mav.MAV_SEVERITY_NOTICE, "Mission Complete")
-        behaviour = a.parameters.flag("MIS_DONE_BEHAVE")
+        self._voice.announce(mav.MAV_SEVERITY_NOTICE, "Mission Complete")
+        behaviour = self._core.parameters.flag("MIS_DONE_BEHAVE")
         if behaviour == 1:
             self.loiter()
         elif behaviour == 3:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from companion.messages import Mode
-
-if TYPE_CHECKING:
-    from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.pilot.core import Core
+from sitl.autopilot.pilot.helm import Helm
 
 # Sticks at rest and the mode switch in its highest place, as SITL's 16 channels [us].
 CHANNELS_US = (1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, *([1500] * 8))
@@ -20,8 +18,9 @@ SILENT_S = 0.5   # without pulses for longer than this the receiver has lost its
 class Radio:
     """What the receiver hears. A receiver that hears nothing holds its last values."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self._a = autopilot
+    def __init__(self, core: Core, helm: Helm) -> None:
+        self._core = core
+        self._helm = helm
         self.channels_us: list[int] = list(CHANNELS_US)
         self._lost_s = math.inf
 
@@ -33,21 +32,21 @@ class Radio:
     @property
     def has_failed(self) -> bool:
         """Whether the autopilot counts the radio as lost."""
-        return self._a.t_s - self._lost_s > SILENT_S
+        return self._core.t_s - self._lost_s > SILENT_S
 
     def switch(self, *, is_on: bool) -> None:
         """Switch the transmitter on or off, or carry it out of range."""
         if is_on:
             self._lost_s = math.inf
         elif not self.is_switched_off:
-            self._lost_s = self._a.t_s
+            self._lost_s = self._core.t_s
 
     def select(self, mode: Mode) -> bool:
         """Move the mode switch to ``mode``; False when the transmitter is off or no place of the switch has it."""
-        get = self._a.parameters.flag
+        get = self._core.parameters.flag
         places = [n for n in range(6) if get(f"MODE{n + 1}") == mode]
         channel = get("MODE_CH")
         if self.is_switched_off or not places or not 1 <= channel <= len(self.channels_us):
             return False
         self.channels_us[channel - 1] = SWITCH_US[places[0]]
-        return self._a.helm.set_mode(int(mode))
+        return self._helm.set_mode(int(mode))

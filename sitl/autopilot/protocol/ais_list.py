@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import GeoPoint
-
-if TYPE_CHECKING:
-    from sitl.autopilot.autopilot import Autopilot
 
 LIST_MAX = 25
 TIMEOUT_S = 600.0
@@ -43,26 +40,24 @@ class _Entry:
     sent_s: dict[int, float]
 
 
-class Traffic:
+class AisList:
     """Vessels heard, sent one a message to each port that asked for AIS_VESSEL."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self._a = autopilot
+    def __init__(self) -> None:
         self._entries: dict[int, _Entry] = {}
         self._turn = 0
 
-    def hear(self, vessel: Vessel) -> None:
+    def hear(self, vessel: Vessel, t_s: float) -> None:
         """Take a report. Class B is not decoded by the real one and leaves no trace."""
         if vessel.is_class_b:
             return
         if vessel.mmsi not in self._entries and len(self._entries) >= LIST_MAX:
             oldest = min(self._entries, key=lambda m: self._entries[m].heard_s)
             del self._entries[oldest]
-        self._entries[vessel.mmsi] = _Entry(vessel, self._a.t_s, {})
+        self._entries[vessel.mmsi] = _Entry(vessel, t_s, {})
 
-    def next_message(self, link: int) -> Any:
+    def next_message(self, link: int, t_s: float) -> Any:
         """Return the next vessel that is new or was not sent for 30 s on this port, or None."""
-        t_s = self._a.t_s
         for mmsi in [m for m, e in self._entries.items() if t_s - e.heard_s > TIMEOUT_S]:
             del self._entries[mmsi]
         keys = list(self._entries)

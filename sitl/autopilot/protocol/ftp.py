@@ -7,15 +7,14 @@ While a mission runs it cannot be cleared, so a shorter file leaves the old tail
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from sitl.autopilot.pilot.core import Core
 from sitl.autopilot.pilot.items import FENCE, FILE_ITEM, MISSION, RALLY, Item, accept, from_file, to_file
+from sitl.autopilot.pilot.storage import Storage
 from sitl.autopilot.protocol.transfer import LIMITS
-
-if TYPE_CHECKING:
-    from sitl.autopilot.autopilot import Autopilot
 
 HEADER = struct.Struct("<HHHHH")
 MAGIC = 0x763D
@@ -34,8 +33,9 @@ FILES = {"@MISSION/mission.dat": MISSION, "@MISSION/fence.dat": FENCE, "@MISSION
 class FtpServer:
     """One session at a time."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self._a = autopilot
+    def __init__(self, core: Core, storage: Storage) -> None:
+        self._core = core
+        self._storage = storage
         self._kind: int | None = None
         self._is_writing = False
         self._data = bytearray()
@@ -58,10 +58,10 @@ class FtpServer:
             head = _FRAME.pack((seq + 1) & 0xFFFF, self._session, code, len(answer), opcode, 0, 0, at)
             reply = (head + answer).ljust(251, b"\0")
             self._last = (sender, seq, reply)
-        self._a.ports.reply(mav.MAVLink_file_transfer_protocol_message(0, *sender, list(reply)), link)
+        self._core.voice.reply(mav.MAVLink_file_transfer_protocol_message(0, *sender, list(reply)), link)
 
     def _execute(self, opcode: int, session: int, data: bytes, offset: int, size: int) -> tuple[int, bytes, int]:
-        t_s = self._a.t_s
+        t_s = self._core.t_s
         if opcode in {_CREATE, _OPEN_WRITE, _OPEN_READ}:
             if self._kind is not None and t_s - self._used_s < _IDLE_S:
                 return _nak(_FAIL)
@@ -99,7 +99,7 @@ class FtpServer:
         return _ACK, b"", 0
 
     def _whole_file(self, kind: int) -> bytes:
-        stored = self._a.storage.read_list(kind)
+        stored = self._storage.read_list(kind)
         head = HEADER.pack(MAGIC, kind, 0, 0, len(stored))
         return head + b"".join(to_file(item, seq, kind) for seq, item in enumerate(stored))
 
@@ -118,11 +118,11 @@ class FtpServer:
                 break
             new.append(item)
         if kind != MISSION:
-            self._a.storage.replace_list(kind, new)
+            self._storage.replace_list(kind, new)
             return
-        mission = self._a.helm.mission
+        mission = self._storage.mission
         if not options & NO_CLEAR:
-            self._a.storage.clear_list(MISSION)
+            self._storage.clear_list(MISSION)
         if start <= len(mission.items):
             for n, item in enumerate(new):
                 mission.put(start + n, item)

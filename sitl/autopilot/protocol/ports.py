@@ -1,180 +1,117 @@
-"""All ports of the autopilot: what arrives is routed and handed on, what is due is sent."""
+"""What arrives on the ports is routed and handed on, what is due is sent."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot.protocol import commands
 from sitl.autopilot.links.link import FIRST_STREAMS_S, Link, Router
-from sitl.autopilot.protocol.telemetry import BUILDERS, apparent_wind
+from sitl.autopilot.pilot.pilot import Pilot
+from sitl.autopilot.protocol import commands
+from sitl.autopilot.protocol.ais_list import AisList
+from sitl.autopilot.protocol.ftp import FtpServer
+from sitl.autopilot.protocol.parameter_server import ParameterServer
+from sitl.autopilot.protocol.telemetry import BUILDERS, apparent_wind, send_once
+from sitl.autopilot.protocol.transfer import TransferServer
 
-if TYPE_CHECKING:
-    from sitl.autopilot.autopilot import Autopilot
-
-_MAX_UNREAD_BYTES = 1 << 20
 _SETPOINTS = frozenset({
     "SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_GLOBAL_INT", "SET_POSITION_TARGET_LOCAL_NED",
 })
 
 
 class Ports:
-    """The links by number, the routes between them, and the voice on all of them."""
+    """The servers of MAVLink's protocols and the routes between the ports, made anew at every power-up."""
 
-    def __init__(self, autopilot: Autopilot, sysid: int) -> None:
-        self._a = autopilot
-        self._sysid = sysid
-        self.links: dict[int, Link] = {}
-        self._router = Router(sysid)
-        self._text_id = 0
-        self._late_texts: list[tuple[int, str]] = []
+    def __init__(self, pilot: Pilot) -> None:
+        self._pilot = pilot
+        self._core = core = pilot.core
+        self._voice = core.voice
+        self._router = Router(core.config.sysid)
+        self._parameters = ParameterServer(core.parameters, core.voice, pilot.parameter_changed)
+        self._transfers = TransferServer(pilot.storage, core.voice)
+        self._ftp = FtpServer(core, pilot.storage)
+        self.ais_list = AisList()
 
     @property
     def has_work(self) -> bool:
-        """Whether bytes wait to be read or texts to be sent."""
-        return bool(self._late_texts) or any(link.inbox for link in self.links.values())
+        """Whether bytes wait to be read, or texts or parameters to be sent."""
+        return self._voice.has_work or self._parameters.is_busy
 
     @property
     def due_s(self) -> float:
-        """When the next stream of any port is due."""
-        return min((link.due_s for link in self.links.values()), default=float("inf"))
-
-    def restart(self, t_s: float) -> None:
-        """A reboot: default rates, no routes, nothing waiting."""
-        self._router.forget()
-        self._late_texts.clear()
-        for link in self.links.values():
-            link.restart(t_s)
-            link.take()
-
-    def open(self, number: int) -> Link:
-        """Return a port; a new one sends the default streams from now on."""
-        link = self.links.get(number)
-        if link is None:
-            link = self.links[number] = Link(number, self._sysid)
-            link.restart(self._a.t_s)
-        return link
-
-    def receive(self, number: int, data: bytes) -> None:
-        """Take bytes that arrived; they are read at the next loop."""
-        link = self.open(number)
-        if len(link.inbox) < _MAX_UNREAD_BYTES:
-            link.inbox += data
+        """When there is something to send."""
+        return min(self._voice.due_s, self._transfers.due_s)
 
     # ------------------------------------------------------------------------------------------------ in
     def read(self) -> None:
-        """Act on what arrived on every port."""
-        for link in list(self.links.values()):
+        """Act on what arrived on every port, and on what did not come in time."""
+        for link in list(self._voice.links.values()):
             if link.inbox:
-                data = bytes(link.inbox)
-                link.inbox.clear()
-                for m in link.parse(data):
+                for m in link.read():
                     self._message(m, link)
+        self._transfers.update(self._core.t_s)
 
     def _message(self, m: Any, link: Link) -> None:
-        a = self._a
+        links, pilot = self._voice.links, self._pilot
         link.is_heard = True
-        link.last_heard_s = a.t_s
+        link.last_heard_s = self._core.t_s
         self._router.learn(m, link.number)
-        is_ours, forward = self._router.route(m, link.number, self.links)
+        is_ours, forward = self._router.route(m, link.number, links)
         frame = bytes(m.get_msgbuf())
         for number in forward:
-            self.links[number].forward(frame)
+            links[number].forward(frame)
         if not is_ours:
             return
         name = m.get_type()
         if name in {"COMMAND_LONG", "COMMAND_INT"}:
-            commands.execute(a, m, link)
+            commands.execute(pilot, m, link)
+        elif name == "MISSION_SET_CURRENT":
+            mission = pilot.helm.mission
+            if m.seq < len(mission.items) and mission.set_current(m.seq):
+                send_once(pilot, link, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
         elif name.startswith("MISSION_"):
-            self._mission_message(m, name, link)
+            self._transfers.handle(m, link.number, self._core.t_s)
         elif name.startswith("PARAM_"):
-            a.parameter_server.handle(m, link)
+            self._parameters.handle(m, link)
         elif name in _SETPOINTS:
-            commands.setpoint(a, m)
+            commands.setpoint(pilot, m)
         elif name == "HEARTBEAT":
-            a.failsafe.heard((m.get_srcSystem(), m.get_srcComponent()))
-        elif name == "FILE_TRANSFER_PROTOCOL" and a.config.has_ftp:
-            a.ftp.handle(m, link.number)
+            pilot.failsafe.heard((m.get_srcSystem(), m.get_srcComponent()))
+        elif name == "FILE_TRANSFER_PROTOCOL" and self._core.config.has_ftp:
+            self._ftp.handle(m, link.number)
         elif name == "SET_MODE":
-            a.helm.set_mode(m.custom_mode)
+            pilot.helm.set_mode(m.custom_mode)
         elif name == "REQUEST_DATA_STREAM":
-            commands.send_group(a, m, link)
+            commands.send_group(pilot, m, link)
         elif name == "TIMESYNC" and m.tc1 == 0:
-            link.send(mav.MAVLink_timesync_message(a.boot_us * 1000, m.ts1))
-
-    def _mission_message(self, m: Any, name: str, link: Link) -> None:
-        a = self._a
-        if name == "MISSION_SET_CURRENT":
-            if m.seq < len(a.helm.mission.items) and a.helm.mission.set_current(m.seq):
-                self.send_once(link, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
-        else:
-            a.transfers.handle(m, link.number, a.t_s)
+            link.send(mav.MAVLink_timesync_message(self._core.boot_us * 1000, m.ts1))
 
     # ----------------------------------------------------------------------------------------------- out
     def send_due(self) -> None:
-        """Send the streams that are due, and texts that waited."""
-        t_s = self._a.t_s
-        for link in self.links.values():
-            self._send_streams(link, t_s)
-        self.after_ack()
+        """Send the parameters and streams that are due, and texts that waited."""
+        self._parameters.update()
+        for link in self._voice.links.values():
+            self._send_streams(link, self._core.t_s)
+        self._voice.after_ack()
 
     def _send_streams(self, link: Link, t_s: float) -> None:
         if link.due_s > t_s + 1e-9:
             return
         due = link.take_due(t_s)
-        if self._a.boot_s < FIRST_STREAMS_S:
+        if self._core.boot_s < FIRST_STREAMS_S:
             due = [i for i in due if i == mav.MAVLINK_MSG_ID_HEARTBEAT]
         for msgid in due:
             if msgid == mav.MAVLINK_MSG_ID_AIS_VESSEL:
-                message = self._a.traffic.next_message(link.number)
+                message = self.ais_list.next_message(link.number, t_s)
             else:
-                message = BUILDERS[msgid](self._a)
+                message = BUILDERS[msgid](self._pilot)
             if message is None:
                 continue
             link.send(message)
             if msgid == mav.MAVLINK_MSG_ID_WIND:
                 # named floats go out on every port on which somebody was heard, whoever asked for WIND
-                for named in apparent_wind(self._a):
-                    for other in self.links.values():
+                for named in apparent_wind(self._pilot):
+                    for other in self._voice.links.values():
                         if other is link or other.is_heard:
                             other.send(named)
-
-    def announce(self, severity: int, text: str) -> None:
-        """STATUSTEXT on every port, in chunks of 50 characters."""
-        pieces = [text[i:i + 50] for i in range(0, len(text), 50)] or [""]
-        ident = 0
-        if len(pieces) > 1:
-            self._text_id = self._text_id % 65535 + 1
-            ident = self._text_id
-        for n, piece in enumerate(pieces):
-            self.broadcast(mav.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), ident, n))
-
-    def announce_after_ack(self, severity: int, text: str) -> None:
-        """As ``announce``, behind the acknowledgement of the command being carried out."""
-        self._late_texts.append((severity, text))
-
-    def after_ack(self) -> None:
-        """A command was acknowledged: say what belongs behind it."""
-        late, self._late_texts = self._late_texts, []
-        for severity, text in late:
-            self.announce(severity, text)
-
-    def broadcast(self, message: Any) -> None:
-        """Send on every port."""
-        for link in self.links.values():
-            link.send(message)
-
-    def reply(self, message: Any, link: int) -> None:
-        """Send on one port."""
-        if link in self.links:
-            self.links[link].send(message)
-
-    def send_once(self, link: Link, msgid: int) -> bool:
-        """Send a message now; False if there is none of that kind, or none at this moment."""
-        builder = BUILDERS.get(msgid)
-        message = builder(self._a) if builder is not None else None
-        if message is None:
-            return False
-        link.send(message)
-        return True

@@ -6,41 +6,19 @@ upload at a time; each item is asked for in one loop and written in the next.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot.pilot.items import FENCE, MAX_FENCE, MAX_MISSION, MAX_RALLY, MISSION, RALLY, Item, item_from_message
+from sitl.autopilot.links.voice import Voice
+from sitl.autopilot.pilot.items import FENCE, MAX_FENCE, MAX_MISSION, MAX_RALLY, MISSION, RALLY, item_from_message
+from sitl.autopilot.pilot.storage import Storage
 
 REPEAT_S = 1.0
 TIMEOUT_S = 8.0
 LIMITS = {MISSION: MAX_MISSION, FENCE: MAX_FENCE, RALLY: MAX_RALLY}
-
-
-class Lists(Protocol):
-    """The three lists and the voice of the autopilot."""
-
-    def read_list(self, kind: int) -> list[Item]:
-        """Return the stored list; a mission's item 0 is home as it is now."""
-
-    def begin_list(self, kind: int, count: int) -> None:
-        """An upload of ``count`` items begins."""
-
-    def write_item(self, kind: int, index: int, item: Item) -> None:
-        """Store an item."""
-
-    def end_list(self, kind: int) -> int:
-        """An upload is over: return MAV_MISSION_RESULT."""
-
-    def clear_list(self, kind: int) -> bool:
-        """Empty a list; False if refused."""
-
-    def reply(self, message: Any, link: int) -> None:
-        """Send on one link."""
-
-    def announce(self, severity: int, text: str) -> None:
-        """STATUSTEXT everywhere."""
 
 
 @dataclass(slots=True)
@@ -58,20 +36,17 @@ class _Upload:
 class TransferServer:
     """Answers MISSION_* messages."""
 
-    def __init__(self, lists: Lists) -> None:
-        self._lists = lists
+    def __init__(self, storage: Storage, voice: Voice) -> None:
+        self._storage = storage
+        self._voice = voice
         self._upload: _Upload | None = None
 
     @property
-    def due_s(self) -> float | None:
-        """When ``update`` has something to do, or None."""
+    def due_s(self) -> float:
+        """When ``update`` has something to do."""
         if self._upload is None:
-            return None
+            return math.inf
         return min(self._upload.asked_s + REPEAT_S, self._upload.heard_s + TIMEOUT_S)
-
-    def forget(self) -> None:
-        """A reboot."""
-        self._upload = None
 
     def update(self, t_s: float) -> None:
         """Ask again for what did not come; give up after eight seconds."""
@@ -81,7 +56,7 @@ class TransferServer:
         if t_s - up.heard_s >= TIMEOUT_S - 1e-9:
             self._upload = None
             self._ack(up.link, up.sender, mav.MAV_MISSION_OPERATION_CANCELLED, up.kind)
-            self._lists.announce(mav.MAV_SEVERITY_WARNING, "Mission upload timeout")
+            self._voice.announce(mav.MAV_SEVERITY_WARNING, "Mission upload timeout")
         elif t_s - up.asked_s >= REPEAT_S - 1e-9:
             self._ask(up, t_s)
 
@@ -110,7 +85,7 @@ class TransferServer:
             if self._upload is not None:
                 self._ack(link, sender, mav.MAV_MISSION_DENIED, kind)
             else:
-                done = self._lists.clear_list(kind)
+                done = self._storage.clear_list(kind)
                 self._ack(link, sender, mav.MAV_MISSION_ACCEPTED if done else mav.MAV_MISSION_ERROR, kind)
 
     # ------------------------------------------------------------------------------------------ upload
@@ -121,10 +96,10 @@ class TransferServer:
         if m.count > LIMITS[kind]:
             self._upload = None
             self._ack(link, sender, mav.MAV_MISSION_NO_SPACE, kind)
-            self._lists.announce(mav.MAV_SEVERITY_WARNING, f"Only {LIMITS[kind]} items are supported")
+            self._voice.announce(mav.MAV_SEVERITY_WARNING, f"Only {LIMITS[kind]} items are supported")
             return
         self._upload = None
-        self._lists.begin_list(kind, m.count)
+        self._storage.begin_list(kind, m.count)
         if m.count == 0:
             self._finish(kind, link, sender)
             return
@@ -135,11 +110,11 @@ class TransferServer:
         if self._upload is not None and self._upload.sender != sender:
             self._ack(link, sender, mav.MAV_MISSION_DENIED, kind)
             return
-        count = len(self._lists.read_list(kind))
+        count = len(self._storage.read_list(kind))
         # one past the end appends one item
         if kind != MISSION or not 0 <= m.start_index <= m.end_index <= count or m.start_index >= LIMITS[kind]:
             self._ack(link, sender, mav.MAV_MISSION_ERROR, kind)
-            self._lists.announce(mav.MAV_SEVERITY_WARNING, "Flight plan update rejected")
+            self._voice.announce(mav.MAV_SEVERITY_WARNING, "Flight plan update rejected")
             return
         self._upload = _Upload(kind, link, sender, m.start_index, m.end_index, t_s, t_s, is_partial=True)
         self._ask(self._upload, t_s)
@@ -157,7 +132,7 @@ class TransferServer:
             self._upload = None
             self._ack(link, sender, error, kind)
             return
-        self._lists.write_item(kind, m.seq, item)
+        self._storage.write_item(kind, m.seq, item)
         up.heard_s = t_s
         up.next_index += 1
         if up.next_index > up.last_index:
@@ -167,22 +142,22 @@ class TransferServer:
             self._ask(up, t_s)
 
     def _finish(self, kind: int, link: int, sender: tuple[int, int]) -> None:
-        result = self._lists.end_list(kind)
+        result = self._storage.end_list(kind)
         self._ack(link, sender, result, kind)
         if kind == MISSION and result == mav.MAV_MISSION_ACCEPTED:
-            self._lists.announce(mav.MAV_SEVERITY_INFO, "Flight plan received")
+            self._voice.announce(mav.MAV_SEVERITY_INFO, "Flight plan received")
 
     def _ask(self, up: _Upload, t_s: float) -> None:
         up.asked_s = t_s
         request = mav.MAVLink_mission_request_message(*up.sender, up.next_index, up.kind)
-        self._lists.reply(request, up.link)
+        self._voice.reply(request, up.link)
 
     # ---------------------------------------------------------------------------------------- download
     def _request(self, m: Any, kind: int, link: int, sender: tuple[int, int]) -> None:
         if self._upload is not None:
             self._ack(link, sender, mav.MAV_MISSION_DENIED, kind)
             return
-        items = self._lists.read_list(kind)
+        items = self._storage.read_list(kind)
         if m.seq >= len(items):
             self._send_count(kind, link, sender)
             self._ack(link, sender, mav.MAV_MISSION_ERROR, kind)
@@ -196,11 +171,11 @@ class TransferServer:
             message = mav.MAVLink_mission_item_message(
                 *sender, m.seq, i.frame, i.command, 0, 1, i.p1, i.p2, i.p3, i.p4, i.x * 1e-7, i.y * 1e-7, i.z, kind
             )
-        self._lists.reply(message, link)
+        self._voice.reply(message, link)
 
     def _send_count(self, kind: int, link: int, sender: tuple[int, int]) -> None:
-        count = len(self._lists.read_list(kind))
-        self._lists.reply(mav.MAVLink_mission_count_message(*sender, count, kind), link)
+        count = len(self._storage.read_list(kind))
+        self._voice.reply(mav.MAVLink_mission_count_message(*sender, count, kind), link)
 
     def _ack(self, link: int, sender: tuple[int, int], result: int, kind: int) -> None:
-        self._lists.reply(mav.MAVLink_mission_ack_message(*sender, result, kind), link)
+        self._voice.reply(mav.MAVLink_mission_ack_message(*sender, result, kind), link)

@@ -45,7 +45,7 @@ def test_the_transmitter_out_of_range(parameters: dict[str, float], mode: Mode, 
     async def job(c: Client) -> None:
         await c.set_sail(EAST)
         start = c.autopilot.t_s
-        c.autopilot.radio.switch(is_on=False)
+        c.autopilot.pilot.radio.switch(is_on=False)
         await asyncio.sleep(4.0)
         assert c.autopilot.truth.mode is mode
         said = [t for t in c.texts() if "ailsafe" in t]
@@ -54,7 +54,7 @@ def test_the_transmitter_out_of_range(parameters: dict[str, float], mode: Mode, 
         assert c.last("SYS_STATUS").onboard_control_sensors_health & RECEIVER_BIT == 0
         if texts:
             assert c.text_time("Radio Failsafe") - start == pytest.approx(2.0, abs=0.3)
-            c.autopilot.radio.switch(is_on=True)
+            c.autopilot.pilot.radio.switch(is_on=True)
             await asyncio.sleep(1.2)
             assert c.texts()[-1] == "Radio Failsafe Cleared"
             assert c.autopilot.truth.mode is mode   # not restored
@@ -66,7 +66,7 @@ def test_in_hold_and_rtl_the_links_do_not_act_and_do_once_the_mission_goes_on() 
     async def job(c: Client) -> None:
         await c.set_sail(EAST)
         c.autopilot.set_mode(Mode.HOLD)
-        c.autopilot.radio.switch(is_on=False)
+        c.autopilot.pilot.radio.switch(is_on=False)
         await asyncio.sleep(10.0)
         assert "Radio Failsafe" not in c.texts()
         assert status(c) == 3
@@ -84,13 +84,13 @@ def test_the_mode_switch_moves_its_channel() -> None:
         await asyncio.sleep(1.2)
         before = c.last("RC_CHANNELS")
         assert before.chan8_raw == 1800
-        assert c.autopilot.radio.select(Mode.RTL)
+        assert c.autopilot.pilot.radio.select(Mode.RTL)
         await asyncio.sleep(1.2)
         assert c.last("RC_CHANNELS").chan8_raw == 1425
         assert c.autopilot.truth.mode is Mode.RTL
-        assert not c.autopilot.radio.select(Mode.GUIDED)   # no place of the switch has it
-        c.autopilot.radio.switch(is_on=False)
-        assert not c.autopilot.radio.select(Mode.MANUAL)
+        assert not c.autopilot.pilot.radio.select(Mode.GUIDED)   # no place of the switch has it
+        c.autopilot.pilot.radio.switch(is_on=False)
+        assert not c.autopilot.pilot.radio.select(Mode.MANUAL)
 
     sail(job, is_moored=True)
 
@@ -177,7 +177,7 @@ def test_a_breach_is_told_at_once() -> None:
         await c.set_sail([(200.0, 0.0)])
         breach = await c.wait("FENCE_STATUS", 60.0, lambda m: m.breach_status == 1)
         await asyncio.sleep(0.05)
-        assert c.autopilot.boot_ms - breach.breach_time < 200
+        assert c.autopilot.core.boot_ms - breach.breach_time < 200
         assert c.autopilot.truth.mode is Mode.HOLD
 
     sail(job, is_moored=True, FENCE_TYPE=4.0, FENCE_ACTION=2.0)

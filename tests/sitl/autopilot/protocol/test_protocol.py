@@ -399,7 +399,7 @@ def test_ftp_refusals() -> None:
         # TerminateSession is acknowledged whatever becomes of the file
         for data in (b"", b"abc", b"\0\0" + mission_file(SEVEN)[2:]):
             assert await ftp.write("@MISSION/mission.dat", data) == 128
-        assert c.autopilot.helm.mission.items == []
+        assert c.autopilot.pilot.helm.mission.items == []
         bad = bytearray(mission_file([(0.0, 0.0), *SEVEN[:3]]))
         struct.pack_into("<H", bad, 10 + 38 * 2 + 30, 9999)
         assert await ftp.write("@MISSION/mission.dat", bytes(bad)) == 128
