@@ -35,8 +35,8 @@ from companion.mavlink.transports.endpoints import open_link
 from companion.messages import Command, MissionItem, Mode, VehicleState, WindSample, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, Truth, serve
 from sitl.scene.scores import station_score
-from sitl.tasks.wrsc2013 import HALF_M, LEAVE_WITHIN_S, ORIGIN, Score, broadcast, draw, score
-from sitl.tasks.wrsc2013_skippers import FieldSkipper
+from sitl.tasks.wrsc2013 import LEAVE_WITHIN_S, ORIGIN, Score, broadcast, draw, score
+from sitl.tasks.wrsc2013_skippers import HALF_M, FieldSkipper
 from sitl.world.wind import AR1
 
 Decide = Callable[[Situation], tuple[float, float]]

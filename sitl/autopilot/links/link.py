@@ -147,15 +147,11 @@ class Link:
 
 
 class Router:
-    """MAVLink_routing: who was heard where, and where a frame goes on to."""
+    """MAVLink_routing: who was heard where since boot, and where a frame goes on to."""
 
     def __init__(self, sysid: int) -> None:
         self._sysid = sysid
         self._routes: dict[tuple[int, int], set[int]] = {}
-
-    def forget(self) -> None:
-        """A boot."""
-        self._routes.clear()
 
     def learn(self, m: Any, link: int) -> None:
         """Remember that the sender lives on ``link``."""

@@ -8,7 +8,8 @@ from companion.messages import Mode
 from sitl.autopilot.pilot.core import INTERNAL_ERROR, Core
 from sitl.autopilot.pilot.ekf import Ekf
 from sitl.autopilot.pilot.fence import Fence
-from sitl.autopilot.pilot.helm import POSITION_MODES, Helm
+from sitl.autopilot.pilot.helm import Helm
+from sitl.autopilot.pilot.modes import POSITION_MODES
 
 
 class Arming:

@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.messages import Mode
 from sitl.autopilot.config import GpsFault
 from sitl.autopilot.pilot.core import Core
-from sitl.autopilot.pilot.helm import POSITION_MODES, Helm
+from sitl.autopilot.pilot.helm import Helm
+from sitl.autopilot.pilot.modes import POSITION_MODES
 
 READY_S = 42.0   # boot to "EKF3 IMU0 is using GPS" on the real one
 # Measured on the real one, with FS_EKF_THRESH 0.8: a jump of 30 m, and a receiver switched off.

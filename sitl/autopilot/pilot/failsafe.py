@@ -18,7 +18,8 @@ from sitl.autopilot.pilot.arming import Arming
 from sitl.autopilot.pilot.core import Core
 from sitl.autopilot.pilot.ekf import Ekf
 from sitl.autopilot.pilot.fence import Fence
-from sitl.autopilot.pilot.helm import POSITION_MODES, Helm
+from sitl.autopilot.pilot.helm import Helm
+from sitl.autopilot.pilot.modes import POSITION_MODES
 from sitl.autopilot.pilot.radio import Radio
 
 _CHECK_S = 0.1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Callable
 
@@ -14,28 +13,11 @@ from sitl.autopilot.pilot.core import Core
 from sitl.autopilot.pilot.fence import Fence
 from sitl.autopilot.pilot.items import NAMES, Item
 from sitl.autopilot.pilot.mission import Mission, RunState, is_reported
+from sitl.autopilot.pilot.modes import KNOWN, NAVIGATING, Task
 from sitl.autopilot.pilot.rally import Rally
 
 GUIDED_TIMEOUT_S = 3.0
 AUX_TACK, AUX_MOTOR = 63, 74
-# Entering one of these gives the navigation its limits of acceleration and jerk.
-NAVIGATING = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL})
-POSITION_MODES = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL, Mode.LOITER})
-KNOWN = frozenset({
-    Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.HOLD, Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED,
-})
-
-
-class Task(enum.Enum):
-    """What the boat is doing within its mode."""
-
-    NONE = "none"
-    LEG = "leg"                # to a waypoint of the mission
-    RTL = "rtl"
-    GUIDED = "guided"          # to a position that was sent
-    SETPOINT = "setpoint"      # a heading or turn rate that was sent
-    LOITER = "loiter"
-    HOLD = "hold"
 
 
 class Helm:

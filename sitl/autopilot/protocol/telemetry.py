@@ -13,7 +13,7 @@ from companion.messages import Mode
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.links.link import Link
 from sitl.autopilot.pilot.core import INVALID_RESULT
-from sitl.autopilot.pilot.helm import POSITION_MODES
+from sitl.autopilot.pilot.modes import POSITION_MODES
 from sitl.autopilot.pilot.pilot import Pilot
 
 # 2025-02-01T00:00:00Z: simulated calendars start at one moment, so that a voyage repeats bit for bit.
@@ -232,10 +232,15 @@ def apparent_wind(p: Pilot) -> tuple[Any, Any]:
     )
 
 
-_EXTENDED_STATE = mav.MAVLink_extended_sys_state_message(0, mav.MAV_LANDED_STATE_ON_GROUND)
+def _rc_channels(p: Pilot) -> Any:
+    channels = p.radio.channels_us
+    return mav.MAVLink_rc_channels_message(
+        p.core.boot_ms, len(channels), *channels, *([0] * (18 - len(channels))), 255
+    )
 
-# Messages that only fill their place: no instrument of the simulated boat is behind them.
-_FIXED: dict[int, Callable[[Pilot], Any]] = {
+
+BUILDERS: dict[int, Callable[[Pilot], Any]] = {
+    # These only fill their place: no instrument of the simulated boat is behind them.
     mav.MAVLINK_MSG_ID_AHRS: lambda _: mav.MAVLink_ahrs_message(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     mav.MAVLINK_MSG_ID_POWER_STATUS: lambda _: mav.MAVLink_power_status_message(5000, 0, 0),
     mav.MAVLINK_MSG_ID_MEMINFO: lambda _: mav.MAVLink_meminfo_message(0, 65535, 524288),
@@ -258,21 +263,14 @@ _FIXED: dict[int, Callable[[Pilot], Any]] = {
         p.core.boot_ms, 0, *([0] * 8), 255
     ),
     mav.MAVLINK_MSG_ID_VIBRATION: lambda p: mav.MAVLink_vibration_message(p.core.boot_us, 0.003, 0.003, 0.003, 0, 0, 0),
-    mav.MAVLINK_MSG_ID_RPM: lambda p: mav.MAVLink_rpm_message(p.core.vehicle.apparent[1], -1.0),
+    mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda _: mav.MAVLink_extended_sys_state_message(
+        0, mav.MAV_LANDED_STATE_ON_GROUND
+    ),
+    # What there is.
     mav.MAVLINK_MSG_ID_AHRS2: lambda p: mav.MAVLink_ahrs2_message(
         0.0, 0.0, p.core.vehicle.heading, 0.0, *(p.core.latlon_e7 if p.core.has_origin else (0, 0))
     ) if p.core.boot_s > 4.2 else None,
-    mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda _: _EXTENDED_STATE,
-}
-
-def _rc_channels(p: Pilot) -> Any:
-    channels = p.radio.channels_us
-    return mav.MAVLink_rc_channels_message(
-        p.core.boot_ms, len(channels), *channels, *([0] * (18 - len(channels))), 255)
-
-
-BUILDERS: dict[int, Callable[[Pilot], Any]] = {
-    **_FIXED,
+    mav.MAVLINK_MSG_ID_RPM: lambda p: mav.MAVLink_rpm_message(p.core.vehicle.apparent[1], -1.0),
     mav.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
     mav.MAVLINK_MSG_ID_SYS_STATUS: _sys_status,
     mav.MAVLINK_MSG_ID_ATTITUDE: _attitude,
