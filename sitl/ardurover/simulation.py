@@ -25,7 +25,7 @@ from companion.geo.angles import wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint, Mode
-from sitl.autopilot.config import Truth
+from sitl.autopilot import Truth
 from sitl.world import Wind
 
 DEFAULTS = Path(__file__).with_name("sailboat.parm")

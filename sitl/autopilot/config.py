@@ -10,10 +10,6 @@ from companion.boat import Polar
 from companion.messages import GeoPoint, Mode
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
-EKF_READY_S = 42.0
-"""Boot to "EKF3 IMU0 is using GPS" on the real one [s]."""
-INVALID_RESULT = 0x20000000
-"""AP_InternalError's bit of an argument or result that cannot be."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -33,7 +33,7 @@ from companion.mavlink.trust import LinkIdentity
 from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
 from sitl.ardurover import ArduRover, require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.autopilot.config import Truth as Now
+from sitl.autopilot import Truth as Now
 from sitl.run.embedded import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.run.live import run_live
 from sitl.scene import Truth, Verdict, count_tacks, load_scenario, own_polar, scenario_wind

@@ -136,11 +136,11 @@ class Watch:
 
     def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:
         """Note where the boat is, where it believes to be, who steers, and what it sails by."""
-        truth, pilot = autopilot.truth, autopilot.chart.point(autopilot.vehicle.position)
+        truth, pilot = autopilot.truth, autopilot.core.chart.point(autopilot.core.vehicle.position)
         helm = Helm.ADRIFT
         if truth.is_armed and truth.mode in {Mode.AUTO, Mode.GUIDED}:
             helm = Helm.SAILED
-        elif autopilot.failsafe.is_active or not (truth.is_armed or autopilot.ekf_ready):
+        elif autopilot.pilot.failsafe.is_active or not (truth.is_armed or autopilot.pilot.ekf.is_ready):
             helm = Helm.REFUSED
         self.has_sailed = self.has_sailed or helm is Helm.SAILED
         self.t_s.append(t_s)
@@ -149,13 +149,13 @@ class Watch:
         self.believed_en_m.append(self.frame.en_from_geo(pilot))
         self.helm.append(helm)
         self.armed.append(truth.is_armed)
-        items = tuple(autopilot.helm.mission.items[1:])
+        items = tuple(autopilot.pilot.helm.mission.items[1:])
         if items != self._last[0]:
             self._last = (items, mission_key((i.command, i.x, i.y) for i in items))
         self.missions.append(self._last[1])
         self.link_up.append(link.is_up)
-        self.stopped.append("" if helm is Helm.SAILED else autopilot.failsafe.stopped_by)
-        current = autopilot.vehicle.current_en_mps
+        self.stopped.append("" if helm is Helm.SAILED else autopilot.pilot.failsafe.stopped_by)
+        current = autopilot.core.vehicle.current_en_mps
         air = (truth.tws_mps * math.sin(truth.twd_from_rad) + current[0],
                truth.tws_mps * math.cos(truth.twd_from_rad) + current[1])
         drift_mps = math.hypot(*current)

@@ -63,8 +63,7 @@ def run(args: argparse.Namespace) -> int:
     from companion.boat import read_polar
     from companion.errors import LinkError
     from companion.mavlink.transports import parse_link
-    from sitl.autopilot import Autopilot, AutopilotConfig, serve
-    from sitl.autopilot.parameters import check_parameters
+    from sitl.autopilot import Autopilot, AutopilotConfig, check_parameters, serve
     from sitl.world import parse_wind
 
     parameters: dict[str, float] = {}

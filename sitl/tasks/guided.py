@@ -31,13 +31,13 @@ from companion.field.values import RESEND_S, Habits, Situation
 from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Facade
 from companion.mavlink.link import Link
-from companion.mavlink.transports.endpoints import open_link
+from companion.mavlink.transports import open_link
 from companion.messages import Command, MissionItem, Mode, VehicleState, WindSample, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, Truth, serve
-from sitl.scene.scores import station_score
-from sitl.tasks.wrsc2013 import HALF_M, LEAVE_WITHIN_S, ORIGIN, Score, broadcast, draw, score
-from sitl.tasks.wrsc2013_skippers import FieldSkipper
-from sitl.world.wind import AR1
+from sitl.scene import station_score
+from sitl.tasks.wrsc2013 import LEAVE_WITHIN_S, ORIGIN, Score, broadcast, draw, score
+from sitl.tasks.wrsc2013_skippers import HALF_M, FieldSkipper
+from sitl.world import AR1
 
 Decide = Callable[[Situation], tuple[float, float]]
 # The intruder of a run over MAVLink comes early: nobody learns more from 40 minutes of waiting.
@@ -153,8 +153,7 @@ def with_boat(
             return await job(facade, lambda: server.truth)
 
     async def real() -> Any:
-        from sitl.ardurover.program import require
-        from sitl.ardurover.simulation import ArduRover
+        from sitl.ardurover import ArduRover, require
 
         async with (
             ArduRover(require(), ORIGIN, wind, heading_rad=heading_rad, speedup=speedup, model=model) as boat,

@@ -29,8 +29,7 @@ from companion.mavlink.autopilot import Autopilot as Facade
 from sitl.autopilot import Truth
 from sitl.tasks.guided import sail_guided, with_boat
 from sitl.tasks.wrsc2013 import ORIGIN
-from sitl.world.motorboat import MotorBoat
-from sitl.world.wind import AR1
+from sitl.world import AR1, MotorBoat
 
 MARKS = ((0.0, 80.0), (110.0, 80.0), (110.0, 0.0), (0.0, 0.0))
 REACHED_M = 5.0

@@ -23,10 +23,8 @@ from numpy.typing import NDArray
 from companion.geo.frame import LocalFrame
 from companion.messages import AisReport, GeoPoint
 from companion.planner import Plan, Problem, plan
-from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.parts import BoatLimits, Sigma, Wind
-from companion.planner.problem.value import VESSELS_SHARE
-from companion.skipper.planning.vessels import (
+from companion.planner.problem import VESSELS_SHARE, BoatLimits, Sigma, Wind, evaluate
+from companion.skipper.planning import (
     ALIKE_S,
     GIVE_UP_RISK,
     HORIZON_S,
@@ -50,7 +48,7 @@ from companion.traffic.plans import MIN_INTERVAL_S, pressing
 from companion.traffic.predict import tail_factor
 from sitl.tasks.wrsc2013 import least_distance_m
 from sitl.tasks.wrsc2013_planner import target_of
-from sitl.world.afloat import polar_at
+from sitl.world import polar_at
 
 ORIGIN = GeoPoint(lat_deg=48.0, lon_deg=-6.0)
 STEP_S = 5.0

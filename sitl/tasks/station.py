@@ -21,8 +21,8 @@ from companion.field.controllers import line_following
 from companion.field.guidance import go_to, helm, step
 from companion.field.station import Station, StationState, keep
 from companion.field.values import GuidanceState, Habits, Situation
-from sitl.scene.scores import TASK_S, StationScore, station_score
-from sitl.world.afloat import LENGTH_M, Afloat, habits_for, wind_for
+from sitl.scene import TASK_S, StationScore, station_score
+from sitl.world import LENGTH_M, Afloat, habits_for, wind_for
 
 PLAN_HALF_M = 2.0     # the plan: to and fro between two waypoints this far from the station, across the wind
 PLAN_REACHED_M = 3.0

@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
-from sitl.world.afloat import LENGTH_M, Afloat, habits_for, summary, wind_for
+from sitl.tasks.wrsc2013_planner import PlanSkipper
+from sitl.tasks.wrsc2013_skippers import HALF_M, FieldSkipper
+from sitl.world import LENGTH_M, Afloat, habits_for, summary, wind_for
 
-HALF_M = 100.0
 APPROACH_M = 5.0
 ENTRY_LIMIT_S = 2700.0
 LEAVE_WITHIN_S = 900.0
@@ -162,14 +163,15 @@ class Run:
 
 def run(seed: int, method: str = "field") -> Run:
     """Sail one seed in the fast closed loop and score it."""
-    from sitl.tasks.wrsc2013_skippers import make_skipper
-
     course = draw(seed)
     rng = np.random.default_rng((2013, seed, 7))
     frame = LocalFrame(ORIGIN)
     boat = Afloat.launch(wind_for(course.twd_from_rad, course.tws_mps, seed), rng, (0.0, 0.0),
                          course.twd_from_rad + math.pi / 2.0)
-    skipper = make_skipper(method, habits_for, frame, seed)
+    skipper = (
+        PlanSkipper(habits_for, frame, seed) if method == "plan"
+        else FieldSkipper(habits_for, frame, look_ahead=method != "schmitt")
+    )
     end = course.entry_s + LEAVE_WITHIN_S + 30.0
     done_s: float | None = None
     while boat.t_s < end:

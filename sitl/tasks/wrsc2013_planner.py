@@ -14,8 +14,7 @@ from companion.field.guidance import LastResort, helm
 from companion.field.values import GuidanceState, Habits, Situation
 from companion.geo.frame import LocalFrame
 from companion.planner import Problem, plan
-from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.parts import BoatLimits, Sigma, Target, Wind
+from companion.planner.problem import BoatLimits, Sigma, Target, Wind, evaluate
 from companion.traffic import Vessel, check_legs, decide, planning_discs
 from companion.traffic.occupancy import Disc
 from companion.traffic.plans import Conflict, Decision
@@ -65,7 +64,6 @@ class PlanSkipper(FieldSkipper):
         self._seed = seed
         self._way: NDArray[np.float64] | None = None
         self._goal: tuple[float, float] | None = None
-        self._cost_s = math.inf
         self._planned_s = -math.inf
         self._checked_s = -math.inf
         self._q = 1
@@ -153,7 +151,6 @@ class PlanSkipper(FieldSkipper):
             answer = plan(problem_for(seen, habits, goal, discs), expansions=EXPANSIONS, seed=self._seed)
             if answer.legs and answer.cost_s < best_s and len(answer.waypoints_en) >= 2:
                 best_s, self._way, self._goal = answer.cost_s, np.array(answer.waypoints_en), goal
-        self._cost_s = best_s
         self._q = 1
         self._helm = replace(self._helm, failed_tacks=0)
 

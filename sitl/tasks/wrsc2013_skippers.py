@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from companion.geo.frame import LocalFrame
 from companion.traffic import TargetLimits, Targets, Vessel, decode_json, predict
 from companion.traffic.occupancy import Keep
 from companion.traffic.predict import STEADY, risk_factor
-from sitl.world.afloat import LENGTH_M
+from sitl.world import LENGTH_M
 
 HALF_M = 100.0
 SHUTTLE_M = 30.0      # while waiting: to and fro across the wind, this far each side of the centre
@@ -31,17 +30,6 @@ FAR_M = 600.0         # beyond what both can run in a minute and a half
 CLEARANCE_M = 12.0    # between hulls; the task asks for 5
 KEEP = Keep(sigmas=risk_factor(1e-4), clearance_m=CLEARANCE_M, own_radius_m=0.5 * LENGTH_M, own_timing_mps=0.05,
             ahead_m=25.0, horizon_s=180.0)
-
-
-class Skipper(Protocol):
-    """Decides once a second."""
-
-    irons: int
-    plans: int
-    last_resort_s: float
-
-    def decide(self, seen: Situation, datagram: bytes | None) -> tuple[float, float]:
-        """Return (heading [rad], thrust)."""
 
 
 class FieldSkipper:
@@ -142,12 +130,3 @@ def obstacles_of(vessels: tuple[Vessel, ...], seen: Situation) -> tuple[Obstacle
         out.append(Obstacle(en_m=now.mean_en_m, velocity_en_mps=now.velocity_en_mps, keep_m=keep,
                             growth_mps=k * (sigma_later - sigma_now) / 90.0))
     return tuple(out)
-
-
-def make_skipper(method: str, habits_for: Callable[..., Habits], frame: LocalFrame, seed: int) -> Skipper:
-    """Return the skipper by name."""
-    if method == "plan":
-        from sitl.tasks.wrsc2013_planner import PlanSkipper
-
-        return PlanSkipper(habits_for, frame, seed)
-    return FieldSkipper(habits_for, frame, look_ahead=method != "schmitt")

@@ -18,8 +18,7 @@ from companion.mavlink.link import Link
 from companion.mavlink.transports import Transport
 from companion.mavlink.trust import LinkIdentity
 from companion.messages import GeoPoint, MissionItem, waypoint
-from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryLink, VaneFault, VaneState, serve
-from sitl.autopilot.memory import MemoryEnd
+from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryEnd, MemoryLink, VaneFault, VaneState, serve
 from sitl.scene import TRAFFIC, EventSpec, Motion, Others, Truth
 from sitl.trouble.failsafes import FAILURES, PERSONS, play
 from sitl.trouble.forgeries import Forger, forgery_named
@@ -133,10 +132,10 @@ async def _crew(world: World, event: EventSpec) -> None:
     await _begins(event)
     await world.called.wait()
     await asyncio.sleep(event.react_s)
-    world.autopilot.vehicle.anchor(down=True)
+    world.autopilot.core.vehicle.anchor(down=True)
     if event.for_s is not None:
         await asyncio.sleep(event.for_s)
-        world.autopilot.vehicle.anchor(down=False)
+        world.autopilot.core.vehicle.anchor(down=False)
 
 
 async def _traffic(world: World, event: EventSpec) -> None:
@@ -163,7 +162,7 @@ async def _neighbour(world: World, event: EventSpec) -> None:
         try:
             await asyncio.sleep(math.inf if event.for_s is None else event.for_s)
         finally:
-            if other.is_armed or other.helm.mission.total > 1:
+            if other.truth.is_armed or other.pilot.helm.mission.total > 1:
                 world.ordered.append(event.system)
 
 

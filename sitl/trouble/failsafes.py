@@ -9,8 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.clock import now_s
 from companion.messages import Mode
-from sitl.autopilot import Autopilot
-from sitl.autopilot.memory import MemoryEnd
+from sitl.autopilot import Autopilot, MemoryEnd
 from sitl.scene import EventSpec
 
 BEAT_S = 1.0
@@ -22,26 +21,26 @@ async def play(event: EventSpec, autopilot: Autopilot, station: MemoryEnd) -> No
     """Let one event happen, and end it after ``for_s``; ``station`` is the ground station's own end of a link."""
     lasts_s = math.inf if event.for_s is None else event.for_s
     if event.kind == "mode" and event.by == "radio":
-        if not autopilot.radio.select(Mode[event.mode or "HOLD"]):
+        if not autopilot.pilot.radio.select(Mode[event.mode or "HOLD"]):
             raise ValueError(f"no place of the mode switch has {event.mode}: set MODE1 to MODE6 in [parameters]")
     elif event.kind == "mode":
         autopilot.set_mode(Mode[event.mode or "HOLD"])
     elif event.kind == "arm":
-        autopilot.arm(force=False)
+        autopilot.pilot.arming.arm(force=False)
     elif event.kind == "disarm":
-        autopilot.disarm()
+        autopilot.pilot.arming.disarm()
     elif event.kind == "set_current":
         until_s = now_s() + (event.for_s or 0.0)
-        autopilot.helm.set_current(event.seq, resets=False)
+        autopilot.pilot.helm.set_current(event.seq, resets=False)
         while now_s() < until_s:
             await asyncio.sleep(BEAT_S)
-            autopilot.helm.set_current(event.seq, resets=False)
+            autopilot.pilot.helm.set_current(event.seq, resets=False)
     elif event.kind == "battery":
         autopilot.set_battery(event.volts or 0.0)
     elif event.kind == "radio_lost":
-        autopilot.radio.switch(is_on=False)
+        autopilot.pilot.radio.switch(is_on=False)
         await asyncio.sleep(lasts_s)
-        autopilot.radio.switch(is_on=True)
+        autopilot.pilot.radio.switch(is_on=True)
     elif event.kind == "knockdown":
         autopilot.set_roll(math.radians(event.roll_deg))
         await asyncio.sleep(lasts_s)

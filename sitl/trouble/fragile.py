@@ -8,26 +8,12 @@ import os
 import resource
 import signal
 from pathlib import Path
-from typing import Protocol
 
 from companion.clock import now_s
 from companion.planner import Plan, Problem
 from companion.planner.worker import DEFAULT_GRACE_S, InlinePlanner, PlannerWorker, failed
 
 START_S = 1.5   # what it takes to start another worker
-
-
-class Fates(Protocol):
-    """What may befall a planner."""
-
-    def die(self) -> None:
-        """Kill it, in the middle of whatever it computes."""
-
-    def hang(self, until_s: float) -> None:
-        """Answer nothing until ``until_s``."""
-
-    def starve(self) -> None:
-        """Get no more memory."""
 
 
 class FragilePlanner(InlinePlanner):

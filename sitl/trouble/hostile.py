@@ -143,8 +143,9 @@ def _false(step: Step, autopilot: Autopilot) -> list[str]:
         out += ["false battery"] * (status.battery_remaining is not None and status.battery_remaining < 0.5)
         out += ["false fence state"] * bool(status.fence_breached)
         out += ["a person at the sticks"] * (snapshot.t_s - step.state.signs.rc_moved_s <= TOLD_S)
-        if status.home is not None and autopilot.home_en is not None:
-            out += ["false home"] * (_apart_m(status.home, autopilot.chart.point(autopilot.home_en)) > FALSE_PLACE_M)
+        core = autopilot.core
+        if status.home is not None and core.home_en is not None:
+            out += ["false home"] * (_apart_m(status.home, core.chart.point(core.home_en)) > FALSE_PLACE_M)
     if snapshot.limits is not None:
         out += ["false limit"] * (math.degrees(snapshot.limits.sail_no_go_angle_rad) > 50.0)
     out += ["a ghost ship"] * (snapshot.traffic is not None and bool(snapshot.traffic.vessels))
@@ -207,7 +208,7 @@ async def _window(trial: _Trial, burst: Sequence[Forgery], *, in_a_read: bool) -
     before = set(_false(trial.last, trial.autopilot))
     trial.seen = set()
     if in_a_read:
-        trial.autopilot.announce(6, "Flight plan received")
+        trial.autopilot.core.voice.announce(6, "Flight plan received")
         await trial.until(lambda step: step.state.pending_read is not None)
     for _ in range(round(BURST_S * trial.rate_hz)):
         for forgery in burst:

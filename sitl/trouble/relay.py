@@ -11,8 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from companion.mavlink.transports import open_link
-from sitl.autopilot import Impairment, MemoryLink
-from sitl.autopilot.memory import FrameStream
+from sitl.autopilot import FrameStream, Impairment, MemoryLink
 from sitl.scene import EventSpec, free_port
 from sitl.trouble.false_vane import FalseVane
 

@@ -7,7 +7,7 @@ import hashlib
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.mavlink.transports import OnBytes, Transport, TransportState, TransportStats
-from sitl.autopilot.memory import FrameStream
+from sitl.autopilot import FrameStream
 
 _V2, _SIGNED = 0xFD, 0x01
 _SIGNATURE_BYTES = 13

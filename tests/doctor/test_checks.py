@@ -18,7 +18,7 @@ from companion.geofence import load_mission
 from companion.mavlink.transports.signing import EPOCH_S, TICKS_PER_S, SigningStore
 from companion.messages import GeoPoint, MissionItem
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.autopilot.memory import frames
+from sitl.autopilot.links.memory import frames
 from sitl.trouble.signer import Signer
 from sitl.world.wind import parse_wind
 from tests.sitl.boats import boat_process

@@ -18,7 +18,8 @@ from companion.messages import GeoPoint
 from sitl.scene.scores import sailbot_points, station_score
 from sitl.tasks.guided import run_station, run_wrsc
 from sitl.tasks.station import run as keep_station
-from sitl.tasks.wrsc2013 import HALF_M, campaign, draw, run, score, table
+from sitl.tasks.wrsc2013 import campaign, draw, run, score, table
+from sitl.tasks.wrsc2013_skippers import HALF_M
 
 EARLY = (66, 154)
 

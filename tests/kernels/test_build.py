@@ -34,7 +34,7 @@ class Listener(event.Listener):
 event.register("numba:compile", Listener())
 from companion.planner.solve import warm
 from companion.wind.estimators.forecaster import compile_kernels
-from sitl.autopilot import kernel
+from sitl.autopilot.boat import kernel
 warm()
 compile_kernels()
 print(late)

@@ -18,7 +18,7 @@ from sitl.ardurover.program import find
 from sitl.ardurover.simulation import ArduRover
 from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Autopilot as SimulatedAutopilot
-from sitl.autopilot.memory import frames
+from sitl.autopilot.links.memory import frames
 from sitl.world.wind import Constant
 
 PROGRAM = find()

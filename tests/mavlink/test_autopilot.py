@@ -18,7 +18,7 @@ from companion.mavlink.wire.status import StatusReader
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
-from sitl.autopilot.memory import Impairment
+from sitl.autopilot.links.memory import Impairment
 from sitl.world.wind import Constant
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
@@ -130,7 +130,7 @@ def test_behind_a_stopgap_no_mixture_is_ever_on_board(old):
             new, method="guarded", keep_first=2, set_current=None, stopgap=GUARD_GAP))
         while not task.done():
             await asyncio.sleep(0.02)
-            stored = boat.helm.mission.items[1:]
+            stored = boat.pilot.helm.mission.items[1:]
             on_board = tuple(canonical(MissionItem(
                 command=i.command, lat_e7=i.x, lon_e7=i.y, frame=i.frame, params=(i.p1, i.p2, i.p3, i.p4)))
                 for i in stored)

@@ -100,7 +100,7 @@ def scenario(**changes):
 def items_of(autopilot):
     return tuple(
         MissionItem(command=i.command, lat_e7=i.x, lon_e7=i.y, alt_m=i.z, frame=i.frame, params=i[2:6])
-        for i in autopilot.helm.mission.items[1:])
+        for i in autopilot.pilot.helm.mission.items[1:])
 
 
 class Witness:

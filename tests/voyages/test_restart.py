@@ -228,7 +228,7 @@ class Stranger(PowerCut):
 
     def life(self, start_s, end_s):
         super().life(start_s, end_s)
-        items = self.autopilot.helm.mission.items
+        items = self.autopilot.pilot.helm.mission.items
         items[1:] = [item._replace(x=item.x + 500, z=0.0) for item in items[1:]]
 
 

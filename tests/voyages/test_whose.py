@@ -87,7 +87,7 @@ class World:
 
     def is_untouched(self, name):
         boat = self.boats[name]
-        return not boat.truth.is_armed and boat.truth.mode is not Mode.AUTO and len(boat.helm.mission.items) <= 1
+        return not boat.truth.is_armed and boat.truth.mode is not Mode.AUTO and len(boat.pilot.helm.mission.items) <= 1
 
 
 def _served(world):
@@ -157,15 +157,15 @@ def test_a_rover_without_sails_is_not_sailed_and_the_remedy_is_said(tmp_path):
 def test_another_board_under_way_stops_all_orders_until_ours_is_back(tmp_path):
     world = World(tmp_path)
     boat = world.boats["ours"]
-    ours, changed_s, back_s = boat.config, [], []
+    ours, changed_s, back_s = boat.core.config, [], []
 
     def exchange(step):
         if step.state.sailing and not changed_s and step.snapshot.t_s - world.steps[0].snapshot.t_s > 50.0:
-            boat.config = replace(ours, uid=b"another")
+            boat.core.config = replace(ours, uid=b"another")
             boat.reboot()
             changed_s.append(step.snapshot.t_s)
         elif changed_s and not back_s and step.snapshot.t_s - changed_s[0] > 90.0:
-            boat.config = ours
+            boat.core.config = ours
             boat.reboot()
             back_s.append(step.snapshot.t_s)
 

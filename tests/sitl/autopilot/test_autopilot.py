@@ -94,17 +94,17 @@ def test_parameters() -> None:
         c.send(mav.MAVLink_param_set_message(1, 1, b"SAIL_XTRACK_MAX", math.nan, 9))
         await asyncio.sleep(1.0)
         assert [m.param_id for m in c.of("PARAM_VALUE", start + 0.1)] in ([], ["SAIL_XTRACK_MAX"])
-        assert c.autopilot.parameters.get("SAIL_XTRACK_MAX") == 30.0
+        assert c.autopilot.core.parameters.get("SAIL_XTRACK_MAX") == 30.0
 
     sail(job)
 
 
 def test_new_names_of_4_7() -> None:
     autopilot = Autopilot(AutopilotConfig(is_warm=True, new_parameter_names=True), Constant(0.0, 5.0), 0)
-    assert autopilot.parameters.entry("SYSID_MYGCS") is None
-    assert autopilot.parameters.entry("MAV_GCS_SYSID")[1] == 255.0
-    assert autopilot.parameters.set("MAV_GCS_SYSID", 250.0)
-    assert autopilot.parameters.flag("SYSID_MYGCS") == 250
+    assert autopilot.core.parameters.entry("SYSID_MYGCS") is None
+    assert autopilot.core.parameters.entry("MAV_GCS_SYSID")[1] == 255.0
+    assert autopilot.core.parameters.set("MAV_GCS_SYSID", 250.0)
+    assert autopilot.core.parameters.flag("SYSID_MYGCS") == 250
 
 
 # ------------------------------------------------------------------------------------------------------ routing
@@ -229,13 +229,13 @@ def test_an_anchor_holds_at_once_and_is_weighed() -> None:
     async def job(c: Client) -> None:
         await c.set_sail(EAST)
         await asyncio.sleep(10.0)
-        c.autopilot.vehicle.anchor(down=True)
+        c.autopilot.core.vehicle.anchor(down=True)
         await asyncio.sleep(1.0)
         there = c.autopilot.truth
         await asyncio.sleep(20.0)
         assert c.autopilot.truth.position == there.position
         assert c.autopilot.truth.speed_mps == 0.0
-        c.autopilot.vehicle.anchor(down=False)
+        c.autopilot.core.vehicle.anchor(down=False)
         await asyncio.sleep(20.0)
         assert c.autopilot.truth.position != there.position
 
@@ -370,7 +370,7 @@ def test_clearance_agrees_with_shapely(seed: int, east: float, north: float, *, 
     from shapely import Point
     from shapely import Polygon as Shape
 
-    from sitl.autopilot.fence import Polygon
+    from sitl.autopilot.pilot.fence import Polygon
 
     rng = np.random.default_rng(seed)
     angles = np.sort(rng.uniform(0.0, 2.0 * math.pi, 9))
@@ -531,10 +531,10 @@ def test_a_jump_that_the_ekf_resists() -> None:
         start = now_s()
         c.autopilot.set_gps(GpsFault(north_m=30.0, is_resisted=True))
         await asyncio.sleep(3.0)
-        assert abs(c.autopilot.vehicle.position[1]) < 3.0
+        assert abs(c.autopilot.core.vehicle.position[1]) < 3.0
         assert c.last("EKF_STATUS_REPORT").flags == 0x833F
         await asyncio.sleep(1.5)
-        assert c.autopilot.vehicle.position[1] == pytest.approx(30.0, abs=5.0)
+        assert c.autopilot.core.vehicle.position[1] == pytest.approx(30.0, abs=5.0)
         await asyncio.sleep(1.0)
         assert c.autopilot.truth.mode is Mode.HOLD
         assert c.text_time("EKF failsafe") - start == pytest.approx(4.8, abs=0.2)
@@ -616,8 +616,8 @@ def test_the_core_does_not_depend_on_how_time_is_cut() -> None:
     def run(steps: list[float]) -> tuple[bytes, Any]:
         autopilot = Autopilot(AutopilotConfig(is_warm=True), AR1(1.0, 5.0, seed=9), 9)
         autopilot.open_link(0)
-        autopilot.arm(force=True)
-        autopilot.vehicle.sail_leg((0.0, 0.0), (300.0, 0.0), None, is_corner=False, goes_on=False)
+        autopilot.pilot.arming.arm(force=True)
+        autopilot.core.vehicle.sail_leg((0.0, 0.0), (300.0, 0.0), None, is_corner=False, goes_on=False)
         for step in steps:
             autopilot.step(step)
         return autopilot.take_outgoing(0), autopilot.truth

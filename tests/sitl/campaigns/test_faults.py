@@ -118,7 +118,7 @@ def test_what_comes_below_the_floor_in_ordinary_weather_fails(tmp_path):
         (tmp_path / name).write_text(text.replace("margin_floor_m = 6.0", "margin_floor_m = 12.0"))
     base = tmp_path / "s.toml"
     kept = (SEEDS / "9.toml").read_text()          # a gust, long after the rocks
-    base.write_text(kept.replace("../../../missions/rocks.toml", "rocks.toml"))
+    base.write_text(kept.replace("../../../../missions/rocks.toml", "rocks.toml"))
     record = sail_faults(load_scenario(base), 9, base)
     assert record["weather_only"]
     assert not record["passed"]
@@ -139,16 +139,21 @@ class Ghost:
            stopped_by="", tws_mps=5.0, current_en_mps=(0.0, 0.0)):
         geo = self.watch.frame.geo_from_en
         point, seen = geo(east, north), geo(*(believed or (east, north)))
-        pilot = SimpleNamespace(
+        autopilot = SimpleNamespace(
             truth=SimpleNamespace(position=point, heading_rad=0.0, is_armed=is_armed, mode=mode,
                                   tws_mps=tws_mps, twd_from_rad=0.0),
-            failsafe=SimpleNamespace(is_active=fails, stopped_by=stopped_by), ekf_ready=not fails,
-            chart=SimpleNamespace(point=lambda _: seen),
-            vehicle=SimpleNamespace(position=None, current_en_mps=current_en_mps),
-            helm=SimpleNamespace(mission=SimpleNamespace(items=[None, *self.items])),
+            core=SimpleNamespace(
+                chart=SimpleNamespace(point=lambda _: seen),
+                vehicle=SimpleNamespace(position=None, current_en_mps=current_en_mps),
+            ),
+            pilot=SimpleNamespace(
+                failsafe=SimpleNamespace(is_active=fails, stopped_by=stopped_by),
+                ekf=SimpleNamespace(is_ready=not fails),
+                helm=SimpleNamespace(mission=SimpleNamespace(items=[None, *self.items])),
+            ),
         )
         for _ in range(round(for_s / 0.25)):
-            self.watch.truth(self.t_s, pilot, self.link)
+            self.watch.truth(self.t_s, autopilot, self.link)
             self.t_s += 0.25
 
 

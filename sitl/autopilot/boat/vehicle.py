@@ -1,0 +1,295 @@
+"""The boat with its steering: orders in words, carried out by the compiled loop."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from companion.boat import Polar
+from companion.geo.angles import wrap_pi, wrap_two_pi
+from sitl.autopilot.boat import kernel as k
+from sitl.autopilot.boat.parameters import Parameters
+from sitl.autopilot.boat.sail import polar_table
+from sitl.autopilot.boat.settings import fill
+from sitl.world import Wind
+
+LOOP_S = k.LOOP_S
+_WIND_LOOPS = 5
+_NONE = np.empty(0)
+
+
+class Vehicle:
+    """The boat on the water. Positions are (east, north) [m] from home, headings compass radians."""
+
+    def __init__(
+        self, wind: Wind, parameters: Parameters, *, heading_rad: float, is_moored: bool, seed: int,
+        polar: Polar | None = None,
+    ) -> None:
+        self.state = np.zeros(k.S_SIZE)
+        self.wind = wind
+        self._parameters = parameters
+        self._settings = np.zeros(k.P_SIZE)
+        self._seen = -1
+        self._seed = seed
+        self._polar = np.zeros((0, 0)) if polar is None else polar_table(polar)
+        self._still_until_s = 0.0
+        self.state[k.S_YAW] = heading_rad
+        self.state[k.S_MOORED] = float(is_moored)
+        self.state[k.S_TACK_END] = -k.TACK_RETRY_S
+        self.load_parameters()
+        # compiles the kernel, or loads it, now rather than in the middle of a voyage in real time
+        k.advance(self.state, self._settings, np.zeros((1, 2)), 0, _NONE, 0, self._polar)
+
+    # ------------------------------------------------------------------------------------------- time
+    def load_parameters(self) -> None:
+        """Take over the parameters if any changed."""
+        if self._seen == self._parameters.revision:
+            return
+        self._seen = self._parameters.revision
+        get = self._parameters.get
+        fill(self._settings, get)
+        tide_from = math.radians(get("SIM_TIDE_DIR"))
+        self.state[k.S_CURRENT_E] = -get("SIM_TIDE_SPEED") * math.sin(tide_from)
+        self.state[k.S_CURRENT_N] = -get("SIM_TIDE_SPEED") * math.cos(tide_from)
+
+    def still_air_until(self, t_s: float) -> None:
+        """SITL has no wind in the first seconds after boot."""
+        self._still_until_s = t_s
+        self.state[k.S_WSPD] = 0.0
+
+    def settle(self) -> None:
+        """Let the air and the filters be as after a long time at rest."""
+        s = self.state
+        twd, tws = self.wind.at(self.t_s)
+        s[k.S_WDIR], s[k.S_WSPD] = twd, tws
+        self._still_until_s = 0.0
+        s[k.S_AWS] = s[k.S_TWS] = tws
+        awa = twd - s[k.S_YAW]
+        s[k.S_AWA_RAW] = (awa + math.pi) % (2.0 * math.pi) - math.pi
+        s[k.S_AWA_SIN], s[k.S_AWA_COS] = math.sin(awa), math.cos(awa)
+        s[k.S_TWD_SIN], s[k.S_TWD_COS] = math.sin(twd), math.cos(twd)
+        s[k.S_VANE_SET] = 1.0
+
+    @property
+    def tick(self) -> int:
+        """Loops since the start."""
+        return int(self.state[k.S_TICK])
+
+    @property
+    def t_s(self) -> float:
+        """Simulated time [s]."""
+        return self.tick * LOOP_S
+
+    def advance(self, loops: int) -> tuple[int, int]:
+        """Run up to ``loops`` loops; return (loops done, events)."""
+        first = self.tick + 1
+        # the wind is asked for on a fixed grid of five loops, so chunks of any size see the same wind
+        first -= first % _WIND_LOOPS
+        count = (self.tick + loops - first) // _WIND_LOOPS + 1
+        wind = np.empty((count, 2))
+        for i in range(count):
+            t_s = (first + i * _WIND_LOOPS) * LOOP_S
+            twd, tws = self.wind.at(t_s)
+            wind[i, 0], wind[i, 1] = twd, (tws if t_s >= self._still_until_s else 0.0)
+        noise = _NONE
+        if self.state[k.S_VANE_FAULT] == k.FAULT_SPIKES:
+            noise = np.array([_hash01(self._seed, self.tick + 1 + i) for i in range(loops)])
+        done, events = k.advance(self.state, self._settings, wind, first, noise, loops, self._polar)
+        return int(done), int(events)
+
+    # ----------------------------------------------------------------------------------------- orders
+    def hold(self) -> None:
+        """Sheet eased, rudder centred."""
+        self._steer(k.STEER_HOLD)
+
+    def sticks_at_rest(self) -> None:
+        """MANUAL with nobody at the sticks: rudder centred, sheet hauled in."""
+        self._steer(k.STEER_OFF)
+
+    def sail_leg(
+        self, origin: tuple[float, float], destination: tuple[float, float], following: tuple[float, float] | None,
+        *, is_corner: bool, goes_on: bool,
+    ) -> None:
+        """Follow the line from ``origin`` to ``destination``.
+
+        Args:
+            origin: where the line starts.
+            destination: the waypoint.
+            following: the waypoint after it, which shapes the corner.
+            is_corner: the boat need not stop at the destination.
+            goes_on: the boat has just passed the corner at ``origin``; its curve is finished first.
+        """
+        s = self.state
+        goes_on = goes_on and s[k.S_STEER] == k.STEER_LEG and s[k.S_PHASE] == 2.0
+        unit_before = _unit(s[k.S_DE] - s[k.S_OE], s[k.S_DN] - s[k.S_ON])
+        curve_before = s[k.S_OUT]
+        self._steer(k.STEER_LEG)
+        s[k.S_OE], s[k.S_ON] = origin
+        s[k.S_DE], s[k.S_DN] = destination
+        s[k.S_FAST] = float(is_corner and following is not None)
+        length = math.dist(origin, destination)
+        unit = _unit(destination[0] - origin[0], destination[1] - origin[1])
+        if goes_on:
+            s[k.S_IN], s[k.S_PHASE] = curve_before, 0.0
+            s[k.S_PE], s[k.S_PN] = unit_before
+        else:
+            s[k.S_IN], s[k.S_PHASE], s[k.S_U], s[k.S_SCALE] = 0.0, 1.0, 0.0, 1.0
+            s[k.S_TE], s[k.S_TN] = origin
+        s[k.S_OUT] = 0.0
+        if s[k.S_FAST] and following is not None:
+            s[k.S_XE], s[k.S_XN] = following
+            after = _unit(following[0] - destination[0], following[1] - destination[1])
+            half_turn = math.acos(max(-1.0, min(1.0, unit[0] * after[0] + unit[1] * after[1]))) / 2.0
+            p = self._settings
+            braking_m = p[k.P_WP_SPEED] ** 2 / (2.0 * p[k.P_ACCEL])
+            radius_m = max(p[k.P_WP_RADIUS], p[k.P_TURN_RADIUS])
+            curve_m = 2.0 * radius_m / max(math.sin(half_turn), 1e-3)
+            s[k.S_OUT] = max(
+                min(curve_m, braking_m, (length - s[k.S_IN]) * 0.5, math.dist(destination, following) * 0.5), 0.1
+            )
+        self._measure(destination)
+
+    def leave_from_here(self) -> None:
+        """The boat drifted while it waited: start its leg at the present position."""
+        s = self.state
+        s[k.S_OE], s[k.S_ON] = s[k.S_TE], s[k.S_TN] = self.position
+        s[k.S_IN], s[k.S_PHASE], s[k.S_U], s[k.S_SCALE] = 0.0, 1.0, 0.0, 1.0
+        self._measure(self.destination)
+
+    @property
+    def heading(self) -> float:
+        """Heading [rad, -π..π), as the autopilot believes."""
+        yaw = float(self.state[k.S_YAW] + self.state[k.S_COMPASS])
+        return yaw if -math.pi <= yaw < math.pi else wrap_pi(yaw)
+
+    def loiter(self, centre: tuple[float, float] | None = None) -> None:
+        """Stay near ``centre``, or near where the boat could stop."""
+        s = self.state
+        s[k.S_LE], s[k.S_LN] = centre if centre is not None else self.stopping_point()
+        s[k.S_LOITER_YAW] = self.heading
+        self._steer(k.STEER_LOITER)
+        self._measure((s[k.S_LE], s[k.S_LN]))
+
+    def steer_heading(self, heading_rad: float, thrust: float) -> None:
+        """Hold a heading; ``thrust`` above 0 trims the sail."""
+        self.state[k.S_WANT_YAW], self.state[k.S_THRUST] = heading_rad, thrust
+        self._steer(k.STEER_HEADING)
+
+    def steer_rate(self, rate_radps: float, thrust: float) -> None:
+        """Turn at a rate."""
+        self.state[k.S_WANT_TURN], self.state[k.S_THRUST] = rate_radps, thrust
+        self._steer(k.STEER_RATE)
+
+    def ask_tack(self) -> None:
+        """Tack at the next opportunity; acts on an upwind route only."""
+        self.state[k.S_TACK_ASKED] = max(self.t_s, LOOP_S)
+
+    def set_armed(self, *, armed: bool) -> None:
+        """Arm or disarm."""
+        self.state[k.S_ARMED] = float(armed)
+
+    def avoid(self, *, near: bool, ease: bool) -> None:
+        """Tell what simple avoidance makes of the fence."""
+        self.state[k.S_AVOID], self.state[k.S_EASE] = float(near), float(ease)
+
+    def set_vane_fault(self, fault: int, value_rad: float) -> None:
+        """Break or mend the wind vane."""
+        self.state[k.S_VANE_FAULT], self.state[k.S_VANE_VALUE] = fault, value_rad
+
+    def set_compass_error(self, error_rad: float) -> None:
+        """Let the autopilot believe that it heads so much to starboard of where it does."""
+        self.state[k.S_COMPASS] = error_rad
+
+    def anchor(self, *, down: bool) -> None:
+        """Let go the anchor, which holds at once, or weigh it."""
+        self.state[k.S_MOORED] = k.ANCHORED if down else 0.0
+
+    def run_motor(self, *, on: bool) -> None:
+        """Run the auxiliary motor in place of the sails, or not."""
+        self.state[k.S_MOTOR] = float(on)
+
+    def set_position_error(self, east_m: float, north_m: float) -> None:
+        """Let the autopilot believe that it is so far from where it is."""
+        self.state[k.S_GPS_E], self.state[k.S_GPS_N] = east_m, north_m
+
+    def clear_tack(self) -> None:
+        """A new mode knows no tack."""
+        if self.state[k.S_TACKING]:
+            self.state[k.S_TACKING], self.state[k.S_TACK_END] = 0.0, self.t_s
+
+    def _steer(self, how: int) -> None:
+        s = self.state
+        if s[k.S_STEER] != how:
+            s[k.S_INTEGRAL] = 0.0
+            s[k.S_WANT_SPEED] = abs(s[k.S_V])
+            s[k.S_WANT_RATE] = s[k.S_RATE]
+            s[k.S_XTRACK] = 0.0
+        s[k.S_STEER] = how
+
+    def _measure(self, goal: tuple[float, float]) -> None:
+        s = self.state
+        east, north = self.position
+        de, dn = goal[0] - east, goal[1] - north
+        s[k.S_DIST], s[k.S_BEARING] = math.hypot(de, dn), math.atan2(de, dn)
+        if s[k.S_STEER] == k.STEER_LEG:
+            le, ln = s[k.S_DE] - s[k.S_OE], s[k.S_DN] - s[k.S_ON]
+            length = math.hypot(le, ln)
+            s[k.S_XTRACK] = (
+                ((north - s[k.S_ON]) * le - (east - s[k.S_OE]) * ln) / length if length > 1e-6 else 0.0
+            )
+
+    # --------------------------------------------------------------------------------------- readings
+    @property
+    def position(self) -> tuple[float, float]:
+        """East, north [m], as the autopilot believes."""
+        s = self.state
+        return float(s[k.S_E] + s[k.S_GPS_E]), float(s[k.S_N] + s[k.S_GPS_N])
+
+    @property
+    def true_position(self) -> tuple[float, float]:
+        """East, north [m]."""
+        return float(self.state[k.S_E]), float(self.state[k.S_N])
+
+    @property
+    def destination(self) -> tuple[float, float]:
+        """End of the present leg [m]."""
+        return float(self.state[k.S_DE]), float(self.state[k.S_DN])
+
+    @property
+    def current_en_mps(self) -> tuple[float, float]:
+        """Of the water, towards east and north [m/s]."""
+        return float(self.state[k.S_CURRENT_E]), float(self.state[k.S_CURRENT_N])
+
+    def stopping_point(self) -> tuple[float, float]:
+        """Return where the boat could come to rest: v² / 2a ahead, as the autopilot reckons."""
+        s = self.state
+        speed = math.hypot(s[k.S_VE], s[k.S_VN])
+        reach_s = speed / (2.0 * self._settings[k.P_ACCEL])
+        east, north = self.position
+        return float(east + s[k.S_VE] * reach_s), float(north + s[k.S_VN] * reach_s)
+
+    @property
+    def apparent(self) -> tuple[float, float]:
+        """Filtered apparent wind: (angle to the bow [rad, + starboard], speed [m/s])."""
+        s = self.state
+        return math.atan2(s[k.S_AWA_SIN], s[k.S_AWA_COS]), float(s[k.S_AWS])
+
+    @property
+    def true_wind(self) -> tuple[float, float]:
+        """What WIND tells: (from [rad, 0..2π), speed [m/s])."""
+        s = self.state
+        return wrap_two_pi(math.atan2(s[k.S_TWD_SIN], s[k.S_TWD_COS])), float(s[k.S_TWS])
+
+
+def _unit(east: float, north: float) -> tuple[float, float]:
+    length = math.hypot(east, north)
+    return (east / length, north / length) if length > 1e-9 else (0.0, 1.0)
+
+
+def _hash01(seed: int, tick: int) -> float:
+    """Return a number on 0..1 that depends on the seed and the loop only (splitmix64)."""
+    z = (seed * 0x9E3779B97F4A7C15 + tick * 0xBF58476D1CE4E5B9 + 1) & 0xFFFFFFFFFFFFFFFF
+    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & 0xFFFFFFFFFFFFFFFF
+    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & 0xFFFFFFFFFFFFFFFF
+    return ((z ^ (z >> 31)) >> 11) / float(1 << 53)

@@ -1,0 +1,184 @@
+"""The autopilot's MAVLink ports: parsing, packing, stream rates of each, and routing between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+LOOP_S = 0.02
+# What a port sends at 1 Hz without being asked, in the order seen on the real one.
+DEFAULT_STREAMS: tuple[int, ...] = (
+    mav.MAVLINK_MSG_ID_HEARTBEAT, mav.MAVLINK_MSG_ID_AHRS, mav.MAVLINK_MSG_ID_AHRS2, mav.MAVLINK_MSG_ID_ATTITUDE,
+    mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mav.MAVLINK_MSG_ID_VFR_HUD, mav.MAVLINK_MSG_ID_SYS_STATUS,
+    mav.MAVLINK_MSG_ID_POWER_STATUS, mav.MAVLINK_MSG_ID_MEMINFO, mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
+    mav.MAVLINK_MSG_ID_MISSION_CURRENT, mav.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, mav.MAVLINK_MSG_ID_RC_CHANNELS,
+    mav.MAVLINK_MSG_ID_RAW_IMU, mav.MAVLINK_MSG_ID_SCALED_IMU2, mav.MAVLINK_MSG_ID_SCALED_IMU3,
+    mav.MAVLINK_MSG_ID_SCALED_PRESSURE, mav.MAVLINK_MSG_ID_SCALED_PRESSURE2, mav.MAVLINK_MSG_ID_GPS_RAW_INT,
+    mav.MAVLINK_MSG_ID_SYSTEM_TIME, mav.MAVLINK_MSG_ID_RC_CHANNELS_SCALED, mav.MAVLINK_MSG_ID_SIMSTATE,
+    mav.MAVLINK_MSG_ID_WIND, mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT, mav.MAVLINK_MSG_ID_VIBRATION,
+    mav.MAVLINK_MSG_ID_RPM, mav.MAVLINK_MSG_ID_BATTERY_STATUS, mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    mav.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, mav.MAVLINK_MSG_ID_FENCE_STATUS,
+    mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, mav.MAVLINK_MSG_ID_HOME_POSITION,
+)
+# Can be asked for, off by default.
+OPTIONAL_STREAMS: tuple[int, ...] = (
+    mav.MAVLINK_MSG_ID_AIS_VESSEL, mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mav.MAVLINK_MSG_ID_HIGH_LATENCY2,
+    mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+)
+STREAMABLE = frozenset((*DEFAULT_STREAMS, *OPTIONAL_STREAMS))
+# MAV_DATA_STREAM -> its messages
+GROUPS: dict[int, tuple[int, ...]] = {
+    1: (27, 116, 129, 29, 137),            # raw sensors
+    2: (1, 125, 152, 42, 24, 62, 162, 87),  # extended status
+    3: (36, 65),                           # radio control
+    4: (34,),                              # raw controller
+    6: (33, 32),                           # position
+    10: (30, 163, 178, 164),               # extra 1
+    11: (74,),                             # extra 2
+    12: (168, 193, 241, 226, 147, 2),      # extra 3
+}
+MAX_BUFFER_BYTES = 65536
+MAX_UNREAD_BYTES = 1 << 20
+FIRST_STREAMS_S = 2.96
+
+
+class Link:
+    """One port: a parser, a sequence number, a buffer of outgoing bytes, the rates asked for on it."""
+
+    def __init__(self, number: int, sysid: int) -> None:
+        self.number = number
+        self.is_heard = False
+        self.last_heard_s = -math.inf
+        self._codec = mav.MAVLink(None, srcSystem=sysid, srcComponent=1)
+        self._codec.robust_parsing = True
+        self._out = bytearray()
+        self.inbox = bytearray()
+        self.dropped_bytes = 0
+        self._interval_s: dict[int, float] = {}
+        # messages of one rate are sent together: (interval, next due time, messages)
+        self._buckets: list[tuple[float, float, tuple[int, ...]]] = []
+        self.restart(0.0)
+
+    # --------------------------------------------------------------------------------------------- bytes
+    def hear(self, data: bytes) -> None:
+        """Take bytes that arrived; they are read at the next loop."""
+        if len(self.inbox) < MAX_UNREAD_BYTES:
+            self.inbox += data
+
+    def read(self) -> Iterator[Any]:
+        """Return the good messages in what arrived; noise is skipped."""
+        data = bytes(self.inbox)
+        self.inbox.clear()
+        for m in self._codec.parse_buffer(data) or ():
+            if m.get_type() != "BAD_DATA" and not m.get_type().startswith("UNKNOWN"):
+                yield m
+
+    def send(self, message: Any) -> None:
+        """Pack a message of our own; when nobody drains the port, it is dropped whole."""
+        self.forward(message.pack(self._codec))
+        self._codec.seq = (self._codec.seq + 1) & 0xFF
+
+    def forward(self, frame: bytes) -> None:
+        """Pass bytes on as they are."""
+        if len(self._out) + len(frame) > MAX_BUFFER_BYTES:
+            self.dropped_bytes += len(frame)
+        else:
+            self._out += frame
+
+    def take(self) -> bytes:
+        """Return and forget what waits to be sent."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+    @property
+    def has_output(self) -> bool:
+        """Whether ``take`` would return something."""
+        return bool(self._out)
+
+    # ----------------------------------------------------------------------------------------------- rates
+    def restart(self, t_s: float) -> None:
+        """A boot: default rates, nothing heard."""
+        self.is_heard = False
+        self._interval_s = dict.fromkeys(DEFAULT_STREAMS, 1.0)
+        self._buckets = []
+        self._rebuild(t_s)
+
+    def interval_s(self, msgid: int) -> float:
+        """Return the interval of a message, 0 when it is off."""
+        return self._interval_s.get(msgid, 0.0)
+
+    def set_interval(self, msgids: tuple[int, ...], interval_s: float, t_s: float) -> None:
+        """Set a rate; 0 switches off."""
+        for msgid in msgids:
+            if interval_s > 0.0:
+                self._interval_s[msgid] = interval_s
+            else:
+                self._interval_s.pop(msgid, None)
+        self._rebuild(t_s)
+
+    def _rebuild(self, t_s: float) -> None:
+        due = {interval: when for interval, when, _ in self._buckets}
+        groups: dict[float, list[int]] = {}
+        for msgid in (*DEFAULT_STREAMS, *OPTIONAL_STREAMS):
+            interval = self._interval_s.get(msgid)
+            if interval is not None:
+                groups.setdefault(interval, []).append(msgid)
+        self._buckets = [(i, due.get(i, t_s + i), tuple(ids)) for i, ids in sorted(groups.items())]
+
+    @property
+    def due_s(self) -> float:
+        """When the next stream is due."""
+        return min((when for _, when, _ in self._buckets), default=math.inf)
+
+    def take_due(self, t_s: float) -> list[int]:
+        """Return the messages that are due, each once, and move their clocks on."""
+        out: list[int] = []
+        for n, (interval, when, msgids) in enumerate(self._buckets):
+            if when <= t_s + 1e-9:
+                out.extend(msgids)
+                # whole intervals, so that a rate that does not divide the loop rate is kept on average
+                missed = math.floor((t_s - when) / interval + 1e-9)
+                self._buckets[n] = (interval, when + (missed + 1) * interval, msgids)
+        return out
+
+
+class Router:
+    """MAVLink_routing: who was heard where since boot, and where a frame goes on to."""
+
+    def __init__(self, sysid: int) -> None:
+        self._sysid = sysid
+        self._routes: dict[tuple[int, int], set[int]] = {}
+
+    def learn(self, m: Any, link: int) -> None:
+        """Remember that the sender lives on ``link``."""
+        sender = (m.get_srcSystem(), m.get_srcComponent())
+        if 0 not in sender and sender != (self._sysid, 1):
+            self._routes.setdefault(sender, set()).add(link)
+
+    def route(self, m: Any, link: int, links: dict[int, Link]) -> tuple[bool, list[int]]:
+        """Return (is it for us, links to forward it to).
+
+        A broadcast goes to every other link on which somebody was heard; a frame with a target goes where the
+        target is known. What is for another component of our system and was forwarded is not ours.
+        """
+        sender = (m.get_srcSystem(), m.get_srcComponent())
+        if sender == (self._sysid, 1):
+            return False, []
+        system = getattr(m, "target_system", 0) or 0
+        component = getattr(m, "target_component", 0) or 0
+        if system == 0:
+            return True, [n for n in sorted(links) if n != link and links[n].is_heard]
+        ours = system == self._sysid
+        if ours and component == 1:
+            return True, []
+        targets: set[int] = set()
+        for (known_system, known_component), where in self._routes.items():
+            if known_system == system and component in {0, known_component}:
+                targets |= where
+        targets.discard(link)
+        forward = [n for n in sorted(targets) if n in links]
+        return ours and (component == 0 or not forward), forward

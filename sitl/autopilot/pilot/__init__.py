@@ -1,0 +1,1 @@
+"""What the autopilot decides: modes, the mission, the fence, failsafes, arming. It knows no MAVLink link."""

@@ -1,0 +1,130 @@
+"""What every part of the autopilot stands on: the boat, its parameters, the clock since boot, home, the voice."""
+
+from __future__ import annotations
+
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from sitl.autopilot.boat.chart import Chart
+from sitl.autopilot.boat.kernel import WIND_DELAY_S
+from sitl.autopilot.boat.parameters import Parameters
+from sitl.autopilot.boat.vehicle import Vehicle
+from sitl.autopilot.config import AutopilotConfig
+from sitl.autopilot.links.voice import Voice
+from sitl.world import Wind
+
+INVALID_RESULT = 0x20000000
+"""AP_InternalError's bit of an argument or result that cannot be."""
+INTERNAL_ERROR = f"Internal errors 0x{INVALID_RESULT:x} l:90 invalid arguments"
+WARM_BOOT_S = 60.0
+
+
+class Core:
+    """State that belongs to no single part. ``power_up`` forgets what a reboot forgets."""
+
+    def __init__(self, config: AutopilotConfig, wind: Wind, seed: int) -> None:
+        self.config = config
+        self.voice = Voice(config.sysid)
+        self.chart = Chart(config.home)
+        self.parameters = Parameters(config.parameters, new_names=config.new_parameter_names)
+        twd, tws = wind.at(0.0)
+        self.parameters.put("SIM_WIND_DIR", math.degrees(twd))
+        self.parameters.put("SIM_WIND_SPD", tws)
+        self.parameters.put("SYSID_THISMAV", float(config.sysid))
+        self.vehicle = Vehicle(
+            wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed,
+            polar=config.polar,
+        )
+        self.battery_v = config.battery_v
+        self.roll_rad = 0.0
+        self.power_up(-WARM_BOOT_S if config.is_warm else 0.0)
+        if config.is_warm:
+            self.vehicle.settle()
+            self.take_origin()
+            self.set_home(None)
+        else:
+            self.vehicle.still_air_until(WIND_DELAY_S)
+
+    def power_up(self, boot_at_s: float) -> None:
+        """Start as at ``boot_at_s``: disarmed, without origin and home."""
+        self.boot_at_s = boot_at_s
+        self.reboot_at_s = math.inf
+        self.voice.restart(self.t_s)
+        self.vehicle.set_armed(armed=False)
+        self.vehicle.clear_tack()
+        self.vehicle.avoid(near=False, ease=False)
+        self.is_armed = False
+        self.internal_errors = 0
+        self.has_origin = False
+        self.origin_en = (0.0, 0.0)
+        self.home_en: tuple[float, float] | None = None
+        self.home_due_s = self.t_s     # of the next look at home, while disarmed
+
+    # ---------------------------------------------------------------------------------------------- time
+    @property
+    def t_s(self) -> float:
+        """Simulated time since the start [s]."""
+        return self.vehicle.t_s
+
+    @property
+    def boot_s(self) -> float:
+        """Time since power-up or reboot [s]."""
+        return self.vehicle.t_s - self.boot_at_s
+
+    @property
+    def boot_ms(self) -> int:
+        """Time since boot [ms]."""
+        return round(self.boot_s * 1e3)
+
+    @property
+    def boot_us(self) -> int:
+        """Time since boot [us]."""
+        return round(self.boot_s * 1e6)
+
+    def reboot_soon(self) -> None:
+        """Reboot a moment after the acknowledgement has left."""
+        self.reboot_at_s = self.t_s + 0.5
+
+    # --------------------------------------------------------------------------------------------- place
+    @property
+    def latlon_e7(self) -> tuple[int, int]:
+        """Where the autopilot believes to be [deg x 1e7]."""
+        return self.chart.to_e7(self.vehicle.position)
+
+    def take_origin(self) -> None:
+        """Let local positions count from here."""
+        self.has_origin, self.origin_en = True, self.vehicle.position
+
+    def set_home(self, en: tuple[float, float] | None) -> bool:
+        """Set home, there or here; False without an origin."""
+        if self.has_origin:
+            self.home_en = en if en is not None else self.vehicle.position
+        return self.has_origin
+
+    # --------------------------------------------------------------------------------------------- state
+    def set_armed(self, *, armed: bool) -> None:
+        """Arm or disarm, whatever speaks against it."""
+        self.is_armed = armed
+        self.vehicle.set_armed(armed=armed)
+        if not armed:
+            self.home_due_s = self.t_s + 1.0
+
+    def run_motor(self, *, on: bool) -> None:
+        """Run the auxiliary motor, or not: there is no assistance in tacks here.
+
+        As on the real one (measured) nothing is said by a boat that has none.
+        """
+        self.vehicle.run_motor(on=on and self.config.has_motor)
+
+    def err_internally(self) -> None:
+        """Find a result that cannot be, as the S-curve of a leg without limits is: no arming until a reboot."""
+        self.voice.announce_after_ack(mav.MAV_SEVERITY_CRITICAL, f"Internal Errors 0x{INVALID_RESULT:x}")
+        if not self.internal_errors:
+            self.voice.announce_after_ack(mav.MAV_SEVERITY_CRITICAL, f"PreArm: {INTERNAL_ERROR}")
+        self.internal_errors += 1
+
+    @property
+    def battery_percent(self) -> int:
+        """Charge, reckoned from a three-cell battery's 9.6 to 12.6 V."""
+        return max(0, min(100, round((self.battery_v - 9.6) / 3.0 * 100.0)))

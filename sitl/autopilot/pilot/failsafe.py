@@ -1,0 +1,206 @@
+"""Failsafes: the links to the shore, the battery, a knock-down, the position, and what a breached fence does.
+
+The order of things follows ArduRover's ``failsafe_trigger``: the radio is looked at in every loop, the ground
+station ten times a second, both act through one place, and whoever looks next acts for the other, under its own name.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from companion.messages import Mode
+from sitl.autopilot.config import GpsFault
+from sitl.autopilot.pilot.arming import Arming
+from sitl.autopilot.pilot.core import Core
+from sitl.autopilot.pilot.ekf import Ekf
+from sitl.autopilot.pilot.fence import Fence
+from sitl.autopilot.pilot.helm import Helm
+from sitl.autopilot.pilot.modes import POSITION_MODES
+from sitl.autopilot.pilot.radio import Radio
+
+_CHECK_S = 0.1
+RADIO, STATION = 1, 2
+_NAMES = {RADIO: "Radio", STATION: "GCS"}
+_GOES_ON = {RADIO: "FS_THR_ENABLE", STATION: "FS_GCS_ENABLE"}   # 2: the mission goes on in AUTO
+_RTL, _SMART = 1, 3
+_BATTERY = (("low", "BATT_LOW_VOLT", "BATT_FS_LOW_ACT"), ("critical", "BATT_CRT_VOLT", "BATT_FS_CRT_ACT"))
+# Of the battery's actions the first in this list that was taken stays: a later one that stands behind it is not taken.
+_BATTERY_ORDER = (5, 2, 6, 1, 4, 3, 0)
+GIVE_UP_M = 100.0   # AC_FENCE_GIVE_UP_DISTANCE: farther outside than this a breach means HOLD, whatever is set
+RECOVERY_S = 10.0   # AC_FENCE_MANUAL_RECOVERY_TIME_MIN
+
+
+class Failsafe:
+    """Watches; acts once when something begins, says when it has ended, never restores a mode."""
+
+    def __init__(self, core: Core, helm: Helm, arming: Arming, fence: Fence, radio: Radio, ekf: Ekf) -> None:
+        self._core = core
+        self._helm = helm
+        self._arming = arming
+        self._fence = fence
+        self._radio = radio
+        self._ekf = ekf
+        self._gcs_heard_s: float | None = None
+        self._lost = self._acted = 0           # bits of the links
+        self._lost_since_s = 0.0
+        self._battery_since_s: dict[int, float] = {}
+        self.battery_level = 0                 # that was said: 1 low, 2 critical; it never falls
+        self._battery_action: int | None = None
+        self._due_s = 0.0
+        self._recovery_until_s = -math.inf
+        self._acting = ""
+        self.stopped_by = ""    # "crash" or "action": that changed the mode or disarmed, and nobody has since
+
+    @property
+    def is_active(self) -> bool:
+        """Whether a failsafe has acted and not cleared, as HEARTBEAT tells it: of links and position only."""
+        return bool(self._acted) or self._ekf.has_acted
+
+    @property
+    def due_s(self) -> float:
+        """When to look again."""
+        core = self._core
+        get = core.parameters.get
+        watching = (
+            (self._gcs_heard_s is not None and core.parameters.flag("FS_GCS_ENABLE"))
+            or self._radio.is_switched_off or self._lost
+            or 0.0 < core.battery_v < max(get("BATT_LOW_VOLT"), get("BATT_CRT_VOLT"))
+            or core.roll_rad != 0.0 or self._ekf.is_watching
+        )
+        return self._due_s if watching else math.inf
+
+    def heard(self, sender: tuple[int, int]) -> None:
+        """A heartbeat; that of SYSID_MYGCS counts, from any component."""
+        if sender[0] == self._core.parameters.flag("SYSID_MYGCS"):
+            self._gcs_heard_s = self._core.t_s
+
+    def update(self) -> None:
+        """Look at what may be lost."""
+        core = self._core
+        if core.t_s < self._due_s - 1e-9:
+            return
+        self._due_s = core.t_s + _CHECK_S
+        self._watch_links()
+        self._watch_battery()
+        self._watch_roll()
+        self._ekf.update()
+
+    def set_gps(self, fault: GpsFault) -> None:
+        """Break or mend the position."""
+        self._due_s = self._core.t_s
+        self._ekf.set_gps(fault)
+
+    # ----------------------------------------------------------------------------------- links to the shore
+    def _watch_links(self) -> None:
+        core = self._core
+        get = core.parameters.flag
+        if get("FS_THR_ENABLE"):
+            self._trigger(RADIO, is_lost=self._radio.has_failed)
+        if self._gcs_heard_s is not None and get("FS_GCS_ENABLE"):
+            self._trigger(STATION, is_lost=core.t_s - self._gcs_heard_s >= core.parameters.get("FS_GCS_TIMEOUT") - 1e-9)
+
+    def _trigger(self, link: int, *, is_lost: bool) -> None:
+        core, before = self._core, self._lost
+        self._lost = before | link if is_lost else before & ~link
+        if not before and self._lost:
+            self._lost_since_s = core.t_s
+        if self._acted and not self._lost:
+            core.voice.announce(mav.MAV_SEVERITY_INFO, f"{_NAMES[link]} Failsafe Cleared")
+        self._acted &= self._lost
+        waited = core.t_s - self._lost_since_s >= core.parameters.get("FS_TIMEOUT") - 1e-9
+        if self._acted or not self._lost or not waited or self._helm.mode in {Mode.RTL, Mode.HOLD}:
+            return
+        self._acted = self._lost
+        core.voice.announce(mav.MAV_SEVERITY_WARNING, f"{_NAMES[link]} Failsafe")
+        if self._helm.mode is Mode.AUTO and core.parameters.flag(_GOES_ON[link]) == 2:
+            core.voice.announce(mav.MAV_SEVERITY_WARNING, "Failsafe - Continuing Auto Mode")
+        else:
+            self._act(core.parameters.flag("FS_ACTION"))
+
+    # --------------------------------------------------------------------------------------------- battery
+    def _watch_battery(self) -> None:
+        core = self._core
+        if not core.is_armed:
+            return
+        level = 0
+        get = core.parameters.get
+        for n, (_, limit, _) in enumerate(_BATTERY, start=1):
+            if not 0.0 < core.battery_v < get(limit):
+                self._battery_since_s.pop(n, None)
+            elif core.t_s - self._battery_since_s.setdefault(n, core.t_s) >= get("BATT_LOW_TIMER") - 1e-9:
+                level = n
+        if level > self.battery_level:
+            self.battery_level = level
+            kind, _, action = _BATTERY[level - 1]
+            core.voice.announce(mav.MAV_SEVERITY_WARNING, f"Battery 1 is {kind} {core.battery_v:.2f}V used 0 mAh")
+            self._act_for_battery(core.parameters.flag(action))
+
+    def _act_for_battery(self, action: int) -> None:
+        before = self._battery_action
+        if before is not None and _BATTERY_ORDER.index(action) > _BATTERY_ORDER.index(before):
+            return
+        self._battery_action = action
+        self._act(action)
+
+    # ------------------------------------------------------------------------------------------ knock-down
+    def _watch_roll(self) -> None:
+        core = self._core
+        check, angle_deg = core.parameters.flag("FS_CRASH_CHECK"), core.parameters.flag("CRASH_ANGLE")
+        if not check or not angle_deg or not core.is_armed or self._helm.mode not in POSITION_MODES:
+            return
+        if abs(core.roll_rad) > math.radians(angle_deg):
+            core.voice.announce(mav.MAV_SEVERITY_EMERGENCY, "Crash: Going to HOLD")
+            with self._own_doing("crash"):
+                self._helm.set_mode(Mode.HOLD)
+                if check == 2:
+                    self._disarm()
+
+    @contextlib.contextmanager
+    def _own_doing(self, what: str) -> Iterator[None]:
+        """What the mode changes to in here is a failsafe's doing."""
+        self._acting = what
+        try:
+            yield
+        finally:
+            self._acting = ""
+
+    def _act(self, action: int) -> None:
+        with self._own_doing("action"):
+            self._take(action)
+
+    def _take(self, action: int) -> None:
+        helm = self._helm
+        if action in {_RTL, _SMART, 4} and helm.set_mode(Mode.SMART_RTL if action == 4 else Mode.RTL):
+            return
+        if action == 6 and helm.set_mode(Mode.LOITER):
+            return
+        if action in {1, 2, 3, 4, 6}:
+            helm.set_mode(Mode.HOLD)
+        elif action == 5:
+            self._disarm()
+
+    def _disarm(self) -> None:
+        self.stopped_by = self._acting
+        self._arming.disarm()
+        self._core.voice.after_ack()
+
+    # ----------------------------------------------------------------------------------------------- fence
+    def watch_fence(self) -> None:
+        """Look at the fence; when a breach begins, change mode by FENCE_ACTION."""
+        outside_m = self._fence.update()
+        if outside_m is None or not self._core.is_armed or self._core.t_s < self._recovery_until_s:
+            return
+        action = self._core.parameters.flag("FENCE_ACTION")
+        if action != 0:
+            self._act(action if outside_m <= GIVE_UP_M else 2)
+
+    def mode_changed(self) -> None:
+        """Leave ten seconds to whoever steers now, if the mode was changed outside the fence, by anybody."""
+        self.stopped_by = self._acting
+        if self._fence.is_breached:
+            self._recovery_until_s = self._core.t_s + RECOVERY_S
+            self._core.voice.announce(mav.MAV_SEVERITY_INFO, "Manual recovery started")

@@ -1,0 +1,1 @@
+"""What the autopilot understands and tells over MAVLink, message by message."""

@@ -1,0 +1,307 @@
+"""What the autopilot tells: one small function for each message that it streams."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from companion.geo.angles import wrap_two_pi
+from companion.messages import Mode
+from sitl.autopilot.boat import kernel as k
+from sitl.autopilot.links.link import Link
+from sitl.autopilot.pilot.core import INVALID_RESULT
+from sitl.autopilot.pilot.modes import POSITION_MODES
+from sitl.autopilot.pilot.pilot import Pilot
+
+# 2025-02-01T00:00:00Z: simulated calendars start at one moment, so that a voyage repeats bit for bit.
+EPOCH_S = 1738368000
+_SENSORS = 322034735
+_FENCE_BIT = 0x100000
+_SENSORS_ENABLED = 304185391
+_SENSORS_HEALTHY = 322011439
+_CAPABILITIES = 0xF1EF
+_VERSION = 0x04070000
+_NAN = (math.nan,) * 4
+
+
+def heartbeat(p: Pilot) -> Any:
+    """Return HEARTBEAT."""
+    armed = mav.MAV_MODE_FLAG_SAFETY_ARMED if p.core.is_armed else 0
+    kind = p.core.config.vehicle_type
+    if p.core.boot_s < 2.3:
+        return mav.MAVLink_heartbeat_message(kind, 3, 65, Mode.INITIALISING, mav.MAV_STATE_CALIBRATING, 3)
+    base = 65 | armed | (8 if p.helm.mode in POSITION_MODES else 0)
+    if p.failsafe.is_active:
+        status = mav.MAV_STATE_CRITICAL
+    else:
+        status = mav.MAV_STATE_STANDBY if p.helm.mode is Mode.HOLD else mav.MAV_STATE_ACTIVE
+    return mav.MAVLink_heartbeat_message(kind, 3, base, p.helm.mode, status, 3)
+
+
+def _sys_status(p: Pilot) -> Any:
+    fence = p.fence
+    present = (_SENSORS & ~_FENCE_BIT) | (_FENCE_BIT if fence.is_present else 0)
+    enabled = (_SENSORS_ENABLED & ~_FENCE_BIT) | (_FENCE_BIT if fence.is_enabled else 0)
+    healthy = (_SENSORS_HEALTHY & ~_FENCE_BIT) | (0 if fence.is_breached else _FENCE_BIT)
+    if p.ekf.gps_lost:
+        healthy &= ~mav.MAV_SYS_STATUS_SENSOR_GPS
+    if p.failsafe.battery_level:
+        healthy &= ~mav.MAV_SYS_STATUS_SENSOR_BATTERY
+    if p.radio.has_failed:
+        healthy &= ~mav.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+    percent = p.core.battery_percent
+    return mav.MAVLink_sys_status_message(
+        present, enabled, healthy, 0, round(p.core.battery_v * 1000), 0, percent, 0, 0,
+        0, INVALID_RESULT >> 16 if p.core.internal_errors else 0, 0, p.core.internal_errors
+    )
+
+
+def _attitude(p: Pilot) -> Any:
+    heading_rad, rate_radps = p.core.vehicle.heading, float(p.core.vehicle.state[k.S_RATE])
+    return mav.MAVLink_attitude_message(p.core.boot_ms, p.core.roll_rad, 0.0, heading_rad, 0.0, 0.0, rate_radps)
+
+
+def _global_position(p: Pilot) -> Any:
+    s = p.core.vehicle.state
+    heading = round(math.degrees(wrap_two_pi(p.core.vehicle.heading)) * 100) % 36000
+    lat, lon = p.core.latlon_e7 if p.core.has_origin else (0, 0)
+    return mav.MAVLink_global_position_int_message(
+        p.core.boot_ms, lat, lon, 0, 0, round(float(s[k.S_VN]) * 100), round(float(s[k.S_VE]) * 100), 0, heading
+    )
+
+
+def _local_position(p: Pilot) -> Any:
+    if not p.core.has_origin:
+        return None
+    s = p.core.vehicle.state
+    (east, north), (east_0, north_0) = p.core.vehicle.position, p.core.origin_en
+    return mav.MAVLink_local_position_ned_message(
+        p.core.boot_ms, north - north_0, east - east_0, 0.0, float(s[k.S_VN]), float(s[k.S_VE]), 0.0
+    )
+
+
+def _vfr_hud(p: Pilot) -> Any:
+    s = p.core.vehicle.state
+    speed = math.hypot(float(s[k.S_VE]), float(s[k.S_VN]))
+    heading = int(math.degrees(wrap_two_pi(p.core.vehicle.heading)))
+    return mav.MAVLink_vfr_hud_message(speed, speed, heading, 0, 0.0, 0.0)
+
+
+def _gps(p: Pilot) -> Any:
+    s = p.core.vehicle.state
+    if p.core.boot_s < 9.95 or p.ekf.gps_lost:
+        return mav.MAVLink_gps_raw_int_message(
+            p.core.boot_us, 0 if p.core.boot_s < 9.95 else 1, 0, 0, 0, 65535, 65535, 0, 0, 0, 0, 0, 0, 0, 0, 0
+        )
+    speed = math.hypot(float(s[k.S_VE]), float(s[k.S_VN]))
+    course = round(math.degrees(wrap_two_pi(math.atan2(float(s[k.S_VE]), float(s[k.S_VN])))) * 100) % 36000
+    lat, lon = p.core.latlon_e7
+    return mav.MAVLink_gps_raw_int_message(
+        p.core.boot_us, 6, lat, lon, 0, 121, 200, round(speed * 100), course, 10, 0, 300, 300, 0, 0, 0
+    )
+
+
+def _system_time(p: Pilot) -> Any:
+    unix_us = round((EPOCH_S + p.core.t_s) * 1e6) if p.core.boot_s >= 9.95 else 0
+    return mav.MAVLink_system_time_message(unix_us, p.core.boot_ms)
+
+
+def _wind(p: Pilot) -> Any:
+    twd, tws = p.core.vehicle.true_wind
+    return mav.MAVLink_wind_message(math.degrees(twd), tws, 0.0)
+
+
+def _nav(p: Pilot) -> Any:
+    if p.helm.mode not in POSITION_MODES:
+        return None
+    s = p.core.vehicle.state
+    steer = s[k.S_STEER]
+    if steer not in {k.STEER_LEG, k.STEER_LOITER}:
+        yaw = round(math.degrees(float(s[k.S_NAV_YAW])))
+        return mav.MAVLink_nav_controller_output_message(0.0, 0.0, yaw, yaw, 0, 0.0, 0.0, 0.0)
+    xtrack = float(s[k.S_XTRACK]) if steer == k.STEER_LEG else 0.0
+    nav = math.degrees(float(s[k.S_NAV_YAW])) if s[k.S_INDIRECT] else 0.0
+    return mav.MAVLink_nav_controller_output_message(
+        0.0, 0.0, int(nav), int(math.degrees(float(s[k.S_BEARING]))), min(65535, int(s[k.S_DIST])), 0.0, 0.0, xtrack
+    )
+
+
+def _target(p: Pilot) -> Any:
+    if p.helm.mode not in POSITION_MODES or p.core.vehicle.state[k.S_STEER] != k.STEER_LEG:
+        return None
+    lat, lon = p.core.chart.to_e7(p.core.vehicle.destination)
+    return mav.MAVLink_position_target_global_int_message(
+        p.core.boot_ms, 0, 65016, lat, lon, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
+
+
+def _servos(p: Pilot) -> Any:
+    s = p.core.vehicle.state
+    rudder = round(1500 + 500 * float(s[k.S_RUDDER]))
+    sail = round(1000 + 1000 * float(s[k.S_SAIL]) / (math.pi / 2.0))
+    return mav.MAVLink_servo_output_raw_message(
+        p.core.boot_us & 0xFFFFFFFF, 0, rudder, 0, 1500, sail, 1500, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0
+    )
+
+
+def _ekf(p: Pilot) -> Any:
+    if p.core.boot_s < 3.5:
+        return None
+    return mav.MAVLink_ekf_status_report_message(p.ekf.flags, 0.005, 0.002, 0.015, 0.0015, 0.0, 0.0)
+
+
+def _mission_current(p: Pilot) -> Any:
+    m = p.helm.mission
+    return mav.MAVLink_mission_current_message(
+        m.current_seq, m.total, m.mav_state, 1 if p.helm.mode is Mode.AUTO else 0
+    )
+
+
+def _home(p: Pilot) -> Any:
+    if p.core.home_en is None:
+        return None
+    lat, lon = p.core.chart.to_e7(p.core.home_en)
+    north, east = p.core.home_en[1] - p.core.origin_en[1], p.core.home_en[0] - p.core.origin_en[0]
+    return mav.MAVLink_home_position_message(lat, lon, 0, north, east, 0.0, _NAN, 0.0, 0.0, 0.0, p.core.boot_us)
+
+
+def _origin(p: Pilot) -> Any:
+    if not p.core.has_origin:
+        return None
+    lat, lon = p.core.chart.to_e7(p.core.origin_en)
+    return mav.MAVLink_gps_global_origin_message(lat, lon, 0, p.core.boot_us)
+
+
+def _battery(p: Pilot) -> Any:
+    volts = [round(p.core.battery_v * 1000), *([65535] * 9)]
+    percent = p.core.battery_percent
+    return mav.MAVLink_battery_status_message(0, 0, 0, 32767, volts, 0, 0, 0, percent, 0, 1)
+
+
+def _fence_status(p: Pilot) -> Any:
+    return p.fence.status_message() if p.fence.is_enabled else None
+
+
+def _simstate(p: Pilot) -> Any:
+    s = p.core.vehicle.state
+    lat, lon = p.core.chart.to_e7(p.core.vehicle.true_position)
+    return mav.MAVLink_simstate_message(
+        0.0, 0.0, float(s[k.S_YAW]), 0.0, 0.0, -9.80665, 0.0, 0.0, float(s[k.S_RATE]), lat, lon
+    )
+
+
+def _high_latency2(p: Pilot) -> Any:
+    s = p.core.vehicle.state
+    twd, tws = p.core.vehicle.true_wind
+    lat, lon = p.core.latlon_e7
+    heading = round(math.degrees(wrap_two_pi(p.core.vehicle.heading)) / 2) % 180
+    speed = round(math.hypot(float(s[k.S_VE]), float(s[k.S_VN])) * 5)
+    return mav.MAVLink_high_latency2_message(
+        p.core.boot_ms, 11, 3, int(p.helm.mode), lat, lon, 0, 0, heading, 0, min(65535, int(s[k.S_DIST] / 10)), 0, 0,
+        min(255, speed), 0, min(255, round(tws * 5)), round(math.degrees(twd) / 2) % 180, 24, 40, 20, 0,
+        p.core.battery_percent, p.helm.mission.current_seq, 0, 0, 0, 0,
+    )
+
+
+def _quaternion(p: Pilot) -> Any:
+    s = p.core.vehicle.state
+    half = p.core.vehicle.heading / 2.0
+    return mav.MAVLink_attitude_quaternion_message(
+        p.core.boot_ms, math.cos(half), 0.0, 0.0, math.sin(half), 0.0, 0.0, float(s[k.S_RATE])
+    )
+
+
+def autopilot_version(p: Pilot) -> Any:
+    """AUTOPILOT_VERSION of 4.7."""
+    custom = b"simulate"
+    capabilities = _CAPABILITIES if p.core.config.has_ftp else _CAPABILITIES & ~mav.MAV_PROTOCOL_CAPABILITY_FTP
+    return mav.MAVLink_autopilot_version_message(
+        capabilities, _VERSION, 0, 0, 0, custom, custom, custom, 0, 0, 0, p.core.config.uid.ljust(18, b"\x00")
+    )
+
+
+def apparent_wind(p: Pilot) -> tuple[Any, Any]:
+    """Return the two NAMED_VALUE_FLOAT that go with a WIND."""
+    awa, aws = p.core.vehicle.apparent
+    return (
+        mav.MAVLink_named_value_float_message(p.core.boot_ms, b"AppWndSpd", aws),
+        mav.MAVLink_named_value_float_message(p.core.boot_ms, b"AppWndDir", math.degrees(awa)),
+    )
+
+
+def _rc_channels(p: Pilot) -> Any:
+    channels = p.radio.channels_us
+    return mav.MAVLink_rc_channels_message(
+        p.core.boot_ms, len(channels), *channels, *([0] * (18 - len(channels))), 255
+    )
+
+
+BUILDERS: dict[int, Callable[[Pilot], Any]] = {
+    # These only fill their place: no instrument of the simulated boat is behind them.
+    mav.MAVLINK_MSG_ID_AHRS: lambda _: mav.MAVLink_ahrs_message(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    mav.MAVLINK_MSG_ID_POWER_STATUS: lambda _: mav.MAVLink_power_status_message(5000, 0, 0),
+    mav.MAVLINK_MSG_ID_MEMINFO: lambda _: mav.MAVLink_meminfo_message(0, 65535, 524288),
+    mav.MAVLINK_MSG_ID_RAW_IMU: lambda p: mav.MAVLink_raw_imu_message(
+        p.core.boot_us, 0, 0, -1001, 0, 0, 0, 198, 0, 445, 0, 2762
+    ),
+    mav.MAVLINK_MSG_ID_SCALED_IMU2: lambda p: mav.MAVLink_scaled_imu2_message(
+        p.core.boot_ms, 0, 0, -1001, 0, 0, 0, 198, 0, 445, 2762
+    ),
+    mav.MAVLINK_MSG_ID_SCALED_IMU3: lambda p: mav.MAVLink_scaled_imu3_message(
+        p.core.boot_ms, 0, 0, 0, 0, 0, 0, 198, 0, 445, 0
+    ),
+    mav.MAVLINK_MSG_ID_SCALED_PRESSURE: lambda p: mav.MAVLink_scaled_pressure_message(
+        p.core.boot_ms, 1013.25, 0.0, 3269
+    ),
+    mav.MAVLINK_MSG_ID_SCALED_PRESSURE2: lambda p: mav.MAVLink_scaled_pressure2_message(
+        p.core.boot_ms, 1013.25, 0.0, 3269
+    ),
+    mav.MAVLINK_MSG_ID_RC_CHANNELS_SCALED: lambda p: mav.MAVLink_rc_channels_scaled_message(
+        p.core.boot_ms, 0, *([0] * 8), 255
+    ),
+    mav.MAVLINK_MSG_ID_VIBRATION: lambda p: mav.MAVLink_vibration_message(p.core.boot_us, 0.003, 0.003, 0.003, 0, 0, 0),
+    mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda _: mav.MAVLink_extended_sys_state_message(
+        0, mav.MAV_LANDED_STATE_ON_GROUND
+    ),
+    # What there is.
+    mav.MAVLINK_MSG_ID_AHRS2: lambda p: mav.MAVLink_ahrs2_message(
+        0.0, 0.0, p.core.vehicle.heading, 0.0, *(p.core.latlon_e7 if p.core.has_origin else (0, 0))
+    ) if p.core.boot_s > 4.2 else None,
+    mav.MAVLINK_MSG_ID_RPM: lambda p: mav.MAVLink_rpm_message(p.core.vehicle.apparent[1], -1.0),
+    mav.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
+    mav.MAVLINK_MSG_ID_SYS_STATUS: _sys_status,
+    mav.MAVLINK_MSG_ID_ATTITUDE: _attitude,
+    mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _quaternion,
+    mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _global_position,
+    mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position,
+    mav.MAVLINK_MSG_ID_VFR_HUD: _vfr_hud,
+    mav.MAVLINK_MSG_ID_GPS_RAW_INT: _gps,
+    mav.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
+    mav.MAVLINK_MSG_ID_WIND: _wind,
+    mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: _nav,
+    mav.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _target,
+    mav.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: _servos,
+    mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
+    mav.MAVLINK_MSG_ID_MISSION_CURRENT: _mission_current,
+    mav.MAVLINK_MSG_ID_HOME_POSITION: _home,
+    mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: _origin,
+    mav.MAVLINK_MSG_ID_BATTERY_STATUS: _battery,
+    mav.MAVLINK_MSG_ID_FENCE_STATUS: _fence_status,
+    mav.MAVLINK_MSG_ID_RC_CHANNELS: _rc_channels,
+    mav.MAVLINK_MSG_ID_SIMSTATE: _simstate,
+    mav.MAVLINK_MSG_ID_HIGH_LATENCY2: _high_latency2,
+    mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
+}
+
+
+def send_once(p: Pilot, link: Link, msgid: int) -> bool:
+    """Send a message now; False if there is none of that kind, or none at this moment."""
+    builder = BUILDERS.get(msgid)
+    message = builder(p) if builder is not None else None
+    if message is None:
+        return False
+    link.send(message)
+    return True
