@@ -8,31 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.arguments import picture, wind
-from companion.commands.output import (
-    patience,
-)
+from companion.commands.output import patience
 
 if TYPE_CHECKING:
     from companion.geofence import Document, Mission
     from companion.planner import Plan, Problem
-
-_EPILOG = """\
-examples:
-  companion mission check missions/archipelago.toml --plot archipelago.png
-  companion mission new bay.toml --start 50.817,-1.31 --goal 50.8203,-1.31 --land islands.wkt --margin 12 --plot bay.png
-  companion mission new bay.toml --from drawn-in-qgroundcontrol.plan
-  companion mission convert bay.toml bay.plan          (also .gpx, .kml, .geojson)
-  companion mission convert bay.toml bay.waypoints --part mission
-  companion mission convert route.gpx route.waypoints
-  companion mission upload route.waypoints --link udpin:0.0.0.0:14550
-  companion mission download boat.plan --link /dev/ttyUSB0:57600
-
-A mission TOML holds goals and an area; the companion plans the way itself (companion run). Waypoint files are sailed
-by the autopilot as they are.
-Exit codes: 0 in order, 1 faults found or a failed transfer, 2 a file or option that cannot be believed.
-"""
-
-
 
 
 def preview_options(parser: argparse.ArgumentParser) -> None:

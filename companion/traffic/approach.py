@@ -11,7 +11,7 @@ import enum
 import math
 from dataclasses import dataclass
 
-from companion.geo.angles import wrap_pi, wrap_two_pi
+from companion.geo.angles import wrap_two_pi
 from companion.traffic.predict import predict
 from companion.traffic.vessel import Vessel
 
@@ -118,11 +118,6 @@ def alarm_of(approach: Approach, limits: AlarmLimits, growth_m: float = 0.0) -> 
     if near < limits.warn_cpa_m and approach.time_s < limits.warn_tcpa_s:
         return Alarm.WARN
     return Alarm.NONE
-
-
-def relative_bearing_rad(own: OwnShip, approach: Approach) -> float | None:
-    """Return where the other is seen from our bow [rad, -π..π), or None without a heading."""
-    return None if own.heading_rad is None else wrap_pi(approach.bearing_rad - own.heading_rad)
 
 
 def _gap(a: float, b: float, half_a: float, half_b: float) -> float:

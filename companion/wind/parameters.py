@@ -51,12 +51,6 @@ class VaneParameters:
         return 1.0 / (2.0 * math.pi * hz) if hz is not None and hz > 0.0 else 0.0
 
     @property
-    def apparent_tau_s(self) -> float:
-        """Time constant of the low pass on the apparent direction [s], 0 without one."""
-        hz = self.direction_filter_hz
-        return 1.0 / (2.0 * math.pi * hz) if hz is not None and hz > 0.0 else 0.0
-
-    @property
     def is_direction_invented(self) -> bool:
         """Whether there is no vane behind the direction (none, home heading, RC)."""
         return self.vane_type in {0, 1, 2}

@@ -32,7 +32,6 @@ from companion.geofence.mission.options import (
     RefugeOptions,
     RiskOptions,
     SkipperOptions,
-    StartOptions,
     TrafficOptions,
     WindOptions,
     tables,
@@ -388,8 +387,3 @@ def goal_options(goal: Goal) -> GoalOptions:
     side = goal.rounding if goal.rounding in {"port", "starboard"} else None
     return GoalOptions(lat=goal.point.lat_deg, lon=goal.point.lon_deg, radius_m=goal.radius_m,
                        rounding=side, name=goal.name)  # type: ignore[arg-type]
-
-
-def start_options(point: GeoPoint) -> StartOptions:
-    """Return a start as the file writes it."""
-    return StartOptions(lat=point.lat_deg, lon=point.lon_deg)

@@ -81,7 +81,13 @@ class VehicleAssembler:
         self._fence_told = (False, -1)
 
     def take(self, t_s: float, message: Message) -> list[Value]:
-        """Return the values that ``message``, heard at ``t_s`` [s], completes: none, one, or several texts."""
+        """Return the values that ``message``, heard at ``t_s`` [s], completes: none, one, or several texts.
+
+        Texts that lost a chunk and have waited too long for it come first, with [...] for what is missing.
+        """
+        return [*self._texts.expired(t_s), *self._completed(t_s, message)]
+
+    def _completed(self, t_s: float, message: Message) -> list[Value]:
         kind = message.get_type()
         component = message.get_srcComponent()
         try:
@@ -102,10 +108,6 @@ class VehicleAssembler:
         self.dropped[reason] += 1
         self.dropped_by_type[kind] += 1
         return []
-
-    def expire(self, t_s: float) -> list[StatusText]:
-        """Return texts that lost a chunk and will not be completed."""
-        return self._texts.expired(t_s)
 
     def _notice_boot(self, message: Message) -> None:
         boot_ms = getattr(message, "time_boot_ms", None)

@@ -32,7 +32,6 @@ _PLACELESS = frozenset({
 _HEADER = struct.Struct("<HHHHH")
 _ITEM = struct.Struct("<ffffiifHHBBBBBB")
 _MAGIC = 0x763D
-OPTION_NO_CLEAR = 1
 
 
 def canonical(item: MissionItem) -> MissionItem:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.kernels.jit import kernel
 
@@ -306,13 +305,3 @@ def simulate(  # type: ignore[no-untyped-def]
                     break
             if hits[i] >= 0:
                 break
-
-
-def as_legs(
-    start_s: NDArray[np.float64], end_s: NDArray[np.float64], twa_rad: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the three arrays as contiguous float64, for the kernels."""
-    return (
-        np.ascontiguousarray(start_s, dtype=np.float64), np.ascontiguousarray(end_s, dtype=np.float64),
-        np.ascontiguousarray(twa_rad, dtype=np.float64),
-    )

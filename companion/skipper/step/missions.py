@@ -188,11 +188,6 @@ def held_back(items: Sequence[MissionItem], route: Route) -> Route | None:
     return None
 
 
-def remaining_points(route: Route, index: int) -> tuple[PointEn, ...]:
-    """Return the waypoints after item ``index``, without the safe end."""
-    return route.points_en_m[index + 1:-1]
-
-
 def common_prefix(a: Sequence[MissionItem], b: Sequence[MissionItem]) -> int:
     """Return how many leading items are identical."""
     n = 0

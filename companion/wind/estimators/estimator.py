@@ -102,11 +102,6 @@ class Base:
         """Whether there has been a reading."""
         return self._t_s is not None
 
-    @property
-    def last_update_s(self) -> float | None:
-        """Time of the last reading [s]."""
-        return self._t_s
-
     def update(
         self, t_s: float, direction_rad: float, speed_mps: float, *, weight: float = 1.0,
         speed_weight: float | None = None,
