@@ -11,7 +11,7 @@ from companion.planner import Problem
 from companion.skipper.planning.autopilot_beats import problem_beat
 from companion.skipper.planning.errands import Errand, errand, gate_for, homeward
 from companion.skipper.planning.ladder import Rung, rungs
-from companion.skipper.planning.problem import Aim, Start, aim_at, problem_dict, repaired
+from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.planning.vessels import shares
 from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan, Severity
 from companion.skipper.step.missions import path_length_m

@@ -12,7 +12,7 @@ from companion.boat import Boat, ardurover_sitl
 from companion.planner import Problem, plan
 from companion.planner.problem.defects import defect_of
 from companion.skipper.planning.ladder import rungs
-from companion.skipper.planning.problem import Aim, Start, aim_at, problem_dict, repaired, wind_part
+from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired, wind_part
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.judge import half_width_rad, judge, predicted_beat
