@@ -106,11 +106,12 @@ def implied(edges: Mapping[str, Iterable[str]]) -> set[tuple[str, str]]:
         if name in way:
             raise ValueError("a circle: " + " -> ".join((*way[way.index(name):], name)))
         if name not in below:
-            below[name] = set()
             below[name] = {far for near in edges.get(name, ()) for far in {near} | reach(near, (*way, name))}
         return below[name]
 
-    return {(a, c) for a in edges for c in edges[a] for b in edges[a] if b != c and c in reach(b, (a,))}
+    for name in edges:
+        reach(name, ())
+    return {(a, c) for a in edges for c in edges[a] if any(c in below[b] for b in edges[a])}
 
 
 def draw(floors: Sequence[Sequence[Box]], edges: Iterable[tuple[str, str]]) -> Drawing:

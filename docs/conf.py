@@ -30,17 +30,16 @@ exclude_patterns = [".*", "build", "voyages"]  # not walked
 html_theme = "furo"
 html_title = project
 html_extra_path = ["site"]    # the index.html that leads from the site's top to docs/index.html
+html_static_path = ["static"]
+html_css_files = ["wide.css"]
 html_show_sourcelink = False
 html_copy_source = False
-pygments_style = "default"
 
 myst_heading_anchors = 4      # GitHub's anchors: other pages link to them
-myst_links_external_new_tab = False
 
 autodoc_default_options = {"members": True, "undoc-members": True, "member-order": "bysource"}
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
-autodoc_use_type_comments = False
 autodoc_preserve_defaults = True
 maximum_signature_line_length = 80
 python_use_unqualified_type_names = True

@@ -69,3 +69,10 @@ def test_a_site_that_would_ask_another_host_is_refused(conf, tmp_path, text):
 def test_a_link_that_a_reader_may_follow_is_no_request(conf, tmp_path):
     (tmp_path / "page.html").write_text('<a href="https://example.org">there</a><img src="b.png"><link href="a.css">')
     assert conf.foreign_requests(tmp_path) == []
+
+
+@pytest.mark.parametrize("page", ["README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))])
+def test_every_file_that_a_page_names_is_there(page):
+    folders = "companion|sitl|tests|bench|missions|deploy|docs"
+    named = re.findall(rf"`((?:{folders})/[\w/.-]+\.\w+)", (ROOT / page).read_text())
+    assert [name for name in named if not (ROOT / name).exists()] == []
