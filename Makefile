@@ -4,15 +4,16 @@ VENV ?= .venv
 EXTRAS ?=
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .PHONY: env demo test check docs slowest campaign bench figures clean
-env: $(STAMP) $(EXTRAS:%=$(VENV)/.installed-%)
+env: $(ENV)
 
-# What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment (dev is always in it).
+# What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
 KNOWN := $(filter-out dev,$(patsubst requirements-%.lock,%,$(wildcard requirements-*.lock)))
-$(if $(filter-out $(KNOWN),$(EXTRAS)),$(error \
-  EXTRAS=$(EXTRAS): there is no $(firstword $(filter-out $(KNOWN),$(EXTRAS))). Known: $(KNOWN) (tests, checks and docs are always in)))
+UNKNOWN := $(firstword $(filter-out $(KNOWN),$(EXTRAS)))
+$(if $(UNKNOWN),$(error EXTRAS=$(EXTRAS): there is no $(UNKNOWN). Known: $(KNOWN) (tests, checks and docs are always in)))
 
 # Why $(PYTHON) cannot make an environment, with the remedy; nothing where it can.
 WHY_NOT = $(shell \
@@ -40,17 +41,17 @@ $(STAMP): requirements-dev.lock pyproject.toml
 	$(PIP) --no-deps --no-build-isolation -e .
 	@touch $(STAMP)
 
-$(VENV)/.installed-%: requirements-%.lock $(STAMP)
+$(STAMP)-%: requirements-%.lock $(STAMP)
 	$(PIP) --require-hashes -r $<
 	@touch $@
 
-demo: $(STAMP)
+demo: $(ENV)
 	$(BIN)/sitl run sitl/scenarios/demo.toml --live
 
-test: $(STAMP)
+test: $(ENV)
 	$(BIN)/python -m pytest -n 2
 
-check: $(STAMP)
+check: $(ENV)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
@@ -58,24 +59,24 @@ check: $(STAMP)
 	@! grep -nE '^-|://' requirements*.lock  # neither a host nor an option: names, versions and hashes only
 
 # The documentation, from docs/ and the docstrings: strict, offline, whole in itself.
-docs: $(STAMP)
+docs: $(ENV)
 	$(BIN)/python -m sphinx -q -E -W --keep-going -c docs . build/docs
 	@echo "build/docs/index.html"
 
 # The ten slowest tests, and what their fixtures take.
-slowest: $(STAMP)
+slowest: $(ENV)
 	$(BIN)/python -m pytest -n 2 --durations=10
 
-campaign: $(STAMP)
+campaign: $(ENV)
 	$(BIN)/sitl campaign sitl/scenarios/demo.toml --runs 50
 
 # The planners on the problem set (OMPL too, after make env EXTRAS=bench), and risk against winds.
-bench: $(STAMP)
+bench: $(ENV)
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench.reliability
 
 # The papers' figures and the pictures of the rooms, into docs/figures.
-figures: $(STAMP)
+figures: $(ENV)
 	$(BIN)/python -m bench.rooms
 	$(BIN)/python -m bench.figures
 
