@@ -1,42 +1,84 @@
-# make demo, make test, make check; each makes its own environment first.
+# make demo, make test, make check; each makes its own environment first (EXTRAS=bench adds the library planners).
 PYTHON ?= python3
 VENV ?= .venv
+EXTRAS ?=
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test check campaign bench figures clean
-env: $(STAMP)
+.PHONY: env demo test check docs slowest campaign bench figures clean
+env: $(ENV)
+
+# What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
+KNOWN := $(filter-out dev,$(patsubst requirements-%.lock,%,$(wildcard requirements-*.lock)))
+UNKNOWN := $(firstword $(filter-out $(KNOWN),$(EXTRAS)))
+$(if $(UNKNOWN),$(error EXTRAS=$(EXTRAS): there is no $(UNKNOWN). Known: $(KNOWN) (tests, checks and docs are always in)))
+
+# Why $(PYTHON) cannot make an environment, with the remedy; nothing where it can.
+WHY_NOT = $(shell \
+  version=$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || \
+    { echo "there is no $(PYTHON) here. Name a Python of 3.11 or newer: make PYTHON=python3.11"; exit; }; \
+  $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+    { echo "Python 3.11 or newer is needed; $(PYTHON) is $$version. Try: make PYTHON=python3.11"; exit; }; \
+  $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
+    { echo "$(PYTHON) makes no environments. Try: sudo apt install python$$version-venv"; exit; }; \
+  [ -e $(VENV)/pyvenv.cfg ] || [ -z "$$(ls -A $(VENV) 2>/dev/null)" ] || \
+    echo "$(VENV) is there and is no environment. Name another place: make VENV=.venv")
+
+# An environment is whole when its stamp stands and its Python runs. What is not whole (make was interrupted, the system's
+# Python went) is cleared and made anew.
+WHOLE := $(shell [ -e $(STAMP) ] && $(BIN)/python -c 'print("yes")' 2>/dev/null)
+ifeq ($(WHOLE),)
+.PHONY: $(STAMP)
+endif
 
 $(STAMP): requirements-dev.lock pyproject.toml
-	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Python 3.11 or newer is needed; this is " + sys.version.split()[0] + ". Try: make PYTHON=python3.11")'
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(if $(WHY_NOT),$(error $(WHY_NOT)))
+	@$(if $(WHOLE),rm -f $(STAMP)*,[ ! -e $(VENV) ] || echo "$(VENV) is half built: it is cleared and made anew.")
+	$(PYTHON) -m venv $(if $(WHOLE),,--clear) $(VENV)
+	$(PIP) --require-hashes -r requirements-dev.lock
+	$(PIP) --no-deps --no-build-isolation -e .
 	@touch $(STAMP)
 
-demo: $(STAMP)
+$(STAMP)-%: requirements-%.lock $(STAMP)
+	$(PIP) --require-hashes -r $<
+	@touch $@
+
+demo: $(ENV)
 	$(BIN)/sitl run sitl/scenarios/demo.toml --live
 
-test: $(STAMP)
+test: $(ENV)
 	$(BIN)/python -m pytest -n 2
 
-check: $(STAMP)
+check: $(ENV)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+	@$(MAKE) --no-print-directory docs
 	@! grep -nE '^-|://' requirements*.lock  # neither a host nor an option: names, versions and hashes only
 
-campaign: $(STAMP)
+# The documentation, from docs/ and the docstrings: strict, offline, whole in itself.
+docs: $(ENV)
+	$(BIN)/python -m sphinx -q -E -W --keep-going -c docs . build/docs
+	@echo "build/docs/index.html"
+
+# The ten slowest tests, and what their fixtures take.
+slowest: $(ENV)
+	$(BIN)/python -m pytest -n 2 --durations=10
+
+campaign: $(ENV)
 	$(BIN)/sitl campaign sitl/scenarios/demo.toml --runs 50
 
-# The planners on the problem set (OMPL too, where requirements-bench.lock is installed), and risk against winds.
-bench: $(STAMP)
+# The planners on the problem set (OMPL too, after make env EXTRAS=bench), and risk against winds.
+bench: $(ENV)
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench.reliability
 
-# The papers' figures, into docs/figures.
-figures: $(STAMP)
+# The papers' figures and the pictures of the rooms, into docs/figures.
+figures: $(ENV)
+	$(BIN)/python -m bench.rooms
 	$(BIN)/python -m bench.figures
 
 clean:
-	rm -rf $(VENV) build dist
+	rm -rf $(VENV) build dist docs/api

@@ -247,10 +247,10 @@ def main(argv=None):
         show(summary([row for name in args.table for row in json.loads(Path(name).read_text())["rows"]]))
         return 0
     if not has_ompl and any(p.startswith("ompl-") for p in args.planners):
-        print("bench: OMPL is not installed: install requirements-bench.lock or leave it out", file=sys.stderr)
+        print("bench: OMPL is not installed: make env EXTRAS=bench, or leave it out", file=sys.stderr)
         return 2
     if not has_ompl:
-        print("OMPL is not installed (requirements-bench.lock): left out", file=sys.stderr)
+        print("OMPL is not installed (make env EXTRAS=bench): left out", file=sys.stderr)
     warm()
     rows, lines = [], []
     if not args.scaling:

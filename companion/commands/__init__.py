@@ -1,1 +1,1 @@
-"""commands."""
+"""The companion's commands, one module each."""

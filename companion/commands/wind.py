@@ -48,7 +48,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument(
         "record", metavar="RECORD", nargs="+", type=Path, help="CSV, tlog, ArduPilot .bin, or a folder of CSV")
     parser.add_argument(
-        "--estimator", default="default", metavar="NAME", help="default, kalman, ou, arma, garch, mean90, mean5 or all")
+        "--estimator", default="default", metavar="NAME", help="its name, or all; an unknown one is told the names")
     parser.add_argument(
         "--plot", type=picture, metavar="P.png", help="draw the (first) record, its forecasts and their scores")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the figures")

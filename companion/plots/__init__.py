@@ -1,1 +1,1 @@
-"""plots."""
+"""Pictures of plans, winds and voyages."""

@@ -1,10 +1,11 @@
-"""All formats behind two functions: ``read`` looks at the content, ``write`` at the name it is given."""
+"""All formats in one table, behind two functions: ``read`` looks at the content, ``write`` at the name it is given."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -36,16 +37,148 @@ from companion.messages import GeoPoint
 
 FAR_M = 50_000.0  # what lies farther from the mission is a mistake
 
-EXTENSIONS = {
-    ".wkt": "wkt", ".ewkt": "ewkt", ".geojson": "geojson", ".json": "geojson", ".plan": "plan",
-    ".waypoints": "waypoints", ".txt": "waypoints", ".fen": "fen", ".poly": "poly", ".rally": "rally", ".ral": "rally",
-    ".gpx": "gpx", ".kml": "kml", ".kmz": "kmz",
-}
 _WKT_WORD = re.compile(
     r"\b(POINT|LINESTRING|LINEARRING|POLYGON|TRIANGLE|TIN|MULTI\w+|GEOMETRYCOLLECTION|POLYHEDRALSURFACE|"
     r"CURVEPOLYGON|CIRCULARSTRING|COMPOUNDCURVE)\s*+((ZM|Z|M)\s*+)?(\(|EMPTY)", re.IGNORECASE,
 )
 _PAIR = re.compile(r"\s*+-?\d++([.,]\d*+)?[\s;,]++-?\d")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Content:
+    """The bytes of a file, and what a reader is told beside them (see ``read``)."""
+
+    data: bytes
+    source: str
+    extension: str = ""
+    kind: ZoneKind = ZoneKind.EXCLUSION
+    axis: str = "auto"
+    areas: bool = False
+
+    @property
+    def is_zip(self) -> bool:
+        """Is it a compressed folder, as a KMZ is?"""
+        return self.data.startswith(b"PK")
+
+    @cached_property
+    def text(self) -> str:
+        """The bytes as text; raises InputError where they are none."""
+        return decode(self.data, self.source)
+
+    @cached_property
+    def head(self) -> str:
+        """The first 4 kB that are not blank."""
+        return self.text.lstrip()[:4096]
+
+    @cached_property
+    def lines(self) -> str:
+        """The text without its comments (#)."""
+        return "\n".join(line.split("#", 1)[0] for line in self.text.split("\n")).strip()
+
+    @cached_property
+    def is_json(self) -> bool:
+        """Does it begin as JSON does?"""
+        return self.head[:1] in {"{", "["}
+
+    @cached_property
+    def xml_tag(self) -> str:
+        """Its root, gpx or kml; empty for any other."""
+        tag = re.search(r"<(?:\w+:)?(gpx|kml)\b", self.head, re.IGNORECASE) if self.head[:1] == "<" else None
+        return tag.group(1).lower() if tag else ""
+
+    @cached_property
+    def has_names(self) -> bool:
+        """Does it begin with the line that names a region?"""
+        return re.match(r"Name\s*:", self.lines, re.IGNORECASE) is not None
+
+    @cached_property
+    def pairs(self) -> list[str]:
+        """Its lines, where each of them begins with two numbers; empty where one does not."""
+        rows = [" ".join(row.split()) for row in self.lines.split("\n") if row.strip()]
+        return rows if all(_PAIR.match(row) for row in rows) else []
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """A format: what people call it, how its files end, how it is known by its content, read and written.
+
+    ``knows`` is asked in the order of the table, ``write`` is given the document and the part that is wanted.
+    """
+
+    name: str
+    said: str
+    endings: tuple[str, ...]
+    knows: Callable[[Content], bool]
+    read: Callable[[Content], Document]
+    write: Callable[[Document, str], Written]
+
+
+def _is_plan(content: Content) -> bool:
+    if not content.is_json:
+        return False
+    root = parse_json(content.text, content.source).value
+    return isinstance(root, dict) and "fileType" in root
+
+
+def _is_fen(content: Content) -> bool:
+    if content.extension == ".fen":
+        return True
+    rows = content.pairs
+    return content.extension != ".poly" and not content.has_names and len(rows) > 3 and rows[1] == rows[-1]
+
+
+def _read_kml(content: Content) -> Document:
+    return read_kml(content.data, content.source, kind=content.kind, areas=content.areas)
+
+
+def _read_kmz(content: Content) -> Document:
+    inside = replace(content, data=unzip_kmz(content.data, content.source))
+    return replace(_read_kml(inside), format="kmz")
+
+
+def _read_wkt(content: Content) -> Document:
+    return read_wkt(content.text, content.source, kind=content.kind, latlon=content.axis == "latlon")
+
+
+def _write_wkt(document: Document, *, srid: bool = False) -> Written:
+    losses = Losses()
+    leave_out(losses, document, {"zones", "marks", "names"})
+    for zone in document.zones:
+        if isinstance(zone.shape, Circle):
+            losses.add(Severity.NOTE, f"the circle {zone.name or '(unnamed)'} is drawn as a polygon")
+    return Written(write_wkt(document, srid=srid).encode(), tuple(losses))
+
+
+F = Format
+# In the order in which a file's content is asked about them: what is certain first, what looks alike last.
+FORMATS: tuple[Format, ...] = (
+    F(name="kmz", said="KMZ", endings=(".kmz",), knows=lambda c: c.is_zip,
+      read=_read_kmz, write=lambda d, _: write_kmz(d)),
+    F(name="plan", said=".plan", endings=(".plan",), knows=_is_plan,
+      read=lambda c: read_plan(c.text, c.source), write=lambda d, _: write_plan(d)),
+    F(name="geojson", said="GeoJSON", endings=(".geojson", ".json"), knows=lambda c: c.is_json,
+      read=lambda c: read_geojson(c.text, c.source, kind=c.kind, areas=c.areas), write=lambda d, _: write_geojson(d)),
+    F(name="gpx", said="GPX", endings=(".gpx",), knows=lambda c: c.xml_tag == "gpx",
+      read=lambda c: read_gpx(c.data, c.source, kind=c.kind, areas=c.areas), write=lambda d, _: write_gpx(d)),
+    F(name="kml", said="KML", endings=(".kml",), knows=lambda c: c.xml_tag == "kml",
+      read=_read_kml, write=lambda d, _: write_kml(d)),
+    F(name="waypoints", said=".waypoints", endings=(".waypoints", ".txt"), knows=lambda c: c.head.startswith("QGC WPL"),
+      read=lambda c: read_waypoints(c.text, c.source), write=lambda d, part: write_waypoints(d, part=part)),
+    F(name="rally", said=".rally", endings=(".rally", ".ral"), knows=lambda c: c.lines.upper().startswith("RALLY"),
+      read=lambda c: read_rally(c.text, c.source), write=lambda d, _: write_rally(d)),
+    F(name="wkt", said="WKT", endings=(".wkt",),
+      knows=lambda c: c.extension in {".wkt", ".ewkt"} or _WKT_WORD.search(c.lines) is not None,
+      read=_read_wkt, write=lambda d, _: _write_wkt(d)),
+    F(name="ewkt", said="EWKT", endings=(".ewkt",), knows=lambda _: False,  # read as WKT
+      read=_read_wkt, write=lambda d, _: _write_wkt(d, srid=True)),
+    F(name="fen", said=".fen", endings=(".fen",), knows=_is_fen,
+      read=lambda c: read_fen(c.text, c.source), write=lambda d, _: write_fen(d)),
+    F(name="poly", said=".poly", endings=(".poly",),
+      knows=lambda c: c.extension == ".poly" or c.has_names or bool(c.pairs),
+      read=lambda c: read_poly(c.text, c.source, kind=c.kind), write=lambda d, _: write_poly(d)),
+)
+_BY_NAME = {row.name: row for row in FORMATS}
+_BY_ENDING = {ending: row for row in FORMATS for ending in row.endings}
 
 
 def read(
@@ -69,69 +202,30 @@ def parse(
     data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, axis: str = "auto", areas: bool = False,
     extension: str = "",
 ) -> Document:
-    """Return what the bytes of a file hold; see ``read``."""
-    if data.startswith(b"PK"):
-        return replace(read_kml(unzip_kmz(data, source), source, kind=kind, areas=areas), format="kmz")
-    name = sniff(data, source, extension)
-    if name == "kml":
-        return read_kml(data, source, kind=kind, areas=areas)
-    if name == "gpx":
-        return read_gpx(data, source, kind=kind, areas=areas)
-    text = decode(data, source)
-    if name == "wkt":
-        return read_wkt(text, source, kind=kind, latlon=axis == "latlon")
-    if name == "geojson":
-        return read_geojson(text, source, kind=kind, areas=areas)
-    if name == "poly":
-        return read_poly(text, source, kind=kind)
-    plain: dict[str, Callable[[str, str], Document]] = {
-        "plan": read_plan, "waypoints": read_waypoints, "fen": read_fen, "rally": read_rally,
-    }
-    return plain[name](text, source)
-
-
-def sniff(data: bytes, source: str, extension: str = "") -> str:
-    """Return the format of a file's content; the extension only decides between .fen and .poly.
-
-    Raises InputError when it is none of ours.
-    """
-    text = decode(data, source)
-    head = text.lstrip()[:4096]
-    if not head:
+    """Return what the bytes of a file hold; see ``read``. The extension only decides between what looks alike."""
+    content = Content(data=data, source=source, extension=extension, kind=kind, axis=axis, areas=areas)
+    if not content.is_zip and not content.head:
         raise InputError(source, "", "is empty", "an empty file is not 'no obstacles'")
-    if head[0] in "{[":
-        root = parse_json(text, source)
-        return "plan" if isinstance(root.value, dict) and "fileType" in root.value else "geojson"
-    if head[0] == "<":
-        tag = re.search(r"<(?:\w+:)?(gpx|kml)\b", head, re.IGNORECASE)
-        if tag:
-            return tag.group(1).lower()
+    if not content.is_zip and content.head[0] == "<" and not content.xml_tag:
         raise InputError(source, "line 1", "is XML, but neither GPX nor KML")
-    if head.startswith("QGC WPL"):
-        return "waypoints"
-    content = "\n".join(line.split("#", 1)[0] for line in text.split("\n")).strip()
-    if content.upper().startswith("RALLY"):
-        return "rally"
-    if _WKT_WORD.search(content) or extension in {".wkt", ".ewkt"}:
-        return "wkt"
-    if extension == ".fen":
-        return "fen"
-    if extension == ".poly" or re.match(r"Name\s*:", content, re.IGNORECASE):
-        return "poly"
-    rows = [" ".join(r.split()) for r in content.split("\n") if r.strip()]
-    if rows and all(_PAIR.match(r) for r in rows):
-        return "fen" if len(rows) > 3 and rows[1] == rows[-1] else "poly"
-    known = "WKT, GeoJSON, .plan, .waypoints, .fen, .poly, GPX, KML or KMZ"
-    raise InputError(source, "line 1", f"starts with {head.splitlines()[0][:40]!r}: not {known}")
+    for row in FORMATS:
+        if row.knows(content):
+            return row.read(content)
+    raise InputError(source, "line 1", f"starts with {content.head.splitlines()[0][:40]!r}: not {_any_of(FORMATS)}")
 
 
-def format_of(path: str | Path, among: Sequence[str] = tuple(EXTENSIONS)) -> str:
-    """Return the format that a file name asks for. Raises InputError for an extension that is not ``among`` those."""
+def _any_of(rows: Sequence[Format]) -> str:
+    return ", ".join(row.said for row in rows[:-1]) + " or " + rows[-1].said
+
+
+def format_of(path: str | Path, among: Sequence[str] = ()) -> str:
+    """Return the format that a file name asks for. Raises InputError for one not ``among`` those (none: any)."""
     suffix = Path(path).suffix.lower()
-    if suffix not in among:
+    known = among or tuple(_BY_ENDING)
+    if suffix not in known:
         raise InputError(str(path), "", f"{suffix or 'no extension'!r} is not a format that this can be written in",
-                         "use " + ", ".join(among))
-    return EXTENSIONS[suffix]
+                         "use " + ", ".join(known))
+    return _BY_ENDING[suffix].name
 
 
 def write(document: Document, path: str | Path, *, format_name: str = "", part: str = "") -> Written:
@@ -139,21 +233,7 @@ def write(document: Document, path: str | Path, *, format_name: str = "", part: 
 
     ``part`` (mission, fence, rally) chooses what goes into a .waypoints file.
     """
-    name = format_name or format_of(path)
-    if name in {"wkt", "ewkt"}:
-        losses = Losses()
-        leave_out(losses, document, {"zones", "marks", "names"})
-        for zone in document.zones:
-            if isinstance(zone.shape, Circle):
-                losses.add(Severity.NOTE, f"the circle {zone.name or '(unnamed)'} is drawn as a polygon")
-        return Written(write_wkt(document, srid=name == "ewkt").encode(), tuple(losses))
-    if name == "waypoints":
-        return write_waypoints(document, part=part)
-    writers: dict[str, Callable[[Document], Written]] = {
-        "geojson": write_geojson, "plan": write_plan, "fen": write_fen, "poly": write_poly, "rally": write_rally,
-        "gpx": write_gpx, "kml": write_kml, "kmz": write_kmz,
-    }
-    return writers[name](document)
+    return _BY_NAME[format_name or format_of(path)].write(document, part)
 
 
 def check_place(document: Document, near: GeoPoint) -> Document:

@@ -310,3 +310,8 @@ def test_a_cut_file_is_never_a_smaller_fence_without_a_word(extension):
             a == b or a.shape.equals(b.shape) for a, b in zip(part.zones, whole.zones, strict=True)
         )
         assert errors or same, good[:at]
+
+
+def test_xml_of_another_kind_is_not_taken_for_the_wkt_that_it_quotes():
+    with pytest.raises(InputError, match="neither GPX nor KML"):
+        parse(b"<svg><desc>POINT (1 2)</desc></svg>", "drawing.svg", extension=".svg")

@@ -16,8 +16,10 @@ from companion.geofence.shapes import Circle, ZoneKind
 from tests.geofence.strategies import QUIET, documents
 
 SETTINGS = settings(**QUIET, max_examples=40)
-EXTENSION = {"wkt": ".wkt", "ewkt": ".wkt", "geojson": ".geojson", "plan": ".plan", "waypoints": ".waypoints",
-             "fen": ".fen", "poly": ".poly", "gpx": ".gpx", "kml": ".kml", "kmz": ".kmz", "rally": ".rally"}
+EXTENSION = {
+    "wkt": ".wkt", "ewkt": ".wkt", "geojson": ".geojson", "plan": ".plan", "waypoints": ".waypoints", "fen": ".fen",
+    "poly": ".poly", "gpx": ".gpx", "kml": ".kml", "kmz": ".kmz", "rally": ".rally",
+}
 
 
 def there_and_back(document: Document, name: str, **options) -> tuple[Document, tuple]:

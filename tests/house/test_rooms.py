@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 MOST = 15   # modules in a folder, its __init__ aside
 CODE = sorted(p for top in ("companion", "sitl") for p in (ROOT / top).rglob("*.py"))
 ROOMS = sorted({p.parent for p in CODE})

@@ -1,0 +1,78 @@
+"""The documents against the code: what is made of it is current, what they name is there, no page is lost."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from bench import rooms
+from bench.layered import implied
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def conf():
+    """docs/conf.py, as Sphinx reads it."""
+    spec = importlib.util.spec_from_file_location("docs_conf", ROOT / "docs" / "conf.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("root", rooms.PICTURES)
+def test_the_pictures_of_the_rooms_are_current(root):
+    assert rooms.PICTURES[root].read_text() == rooms.picture(root), "run: python -m bench.rooms"
+
+
+def test_the_list_of_rooms_is_current():
+    text = rooms.PAGE.read_text()
+    assert text == rooms.page(text), "run: python -m bench.rooms"
+
+
+def test_an_arrow_is_left_out_where_a_longer_way_says_it():
+    assert implied({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == {("a", "c")}
+
+
+def test_rooms_in_a_circle_are_told():
+    with pytest.raises(ValueError, match="a circle: a -> b -> a"):
+        implied({"a": {"b"}, "b": {"a"}})
+
+
+def test_every_name_in_the_glossary_is_in_the_code():
+    source = "\n".join(file.read_text() for root in ("companion", "sitl") for file in (ROOT / root).rglob("*.py"))
+    words = set(re.findall(r"\w+", source))
+    rows = [line.split("|")[-2] for line in (ROOT / "docs" / "glossary.md").read_text().splitlines()
+            if line.startswith("| ") and not line.startswith("|---")]
+    names = {name for row in rows for name in re.findall(r"`([^`]+)`", row) if not name.startswith("_en")}
+    assert len(names) > 40
+    assert names <= words
+
+
+def test_every_page_is_in_the_navigation(conf):
+    pages = {f"{path.stem}" for path in (ROOT / "docs").glob("*.md")} - {"index"}
+    listed = set(re.findall(r"<(?:\.\./)?([\w-]+)>", conf.navigation((ROOT / "docs" / "index.md").read_text())))
+    assert listed == pages | {"README", "CONTRIBUTING", "CHANGELOG"}
+
+
+@pytest.mark.parametrize("text", [
+    '<script src="https://cdn.example/x.js">', "<link rel='stylesheet' href='//fonts.example/a.css'>",
+    '<img alt="" src="http://badge.example/b.svg">', "body{background:url(https://example/c.png)}",
+    '@import "//example/d.css";',
+])
+def test_a_site_that_would_ask_another_host_is_refused(conf, tmp_path, text):
+    (tmp_path / "page.html").write_text(text)
+    assert len(conf.foreign_requests(tmp_path)) == 1
+
+
+def test_a_link_that_a_reader_may_follow_is_no_request(conf, tmp_path):
+    (tmp_path / "page.html").write_text('<a href="https://example.org">there</a><img src="b.png"><link href="a.css">')
+    assert conf.foreign_requests(tmp_path) == []
+
+
+@pytest.mark.parametrize("page", ["README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))])
+def test_every_file_that_a_page_names_is_there(page):
+    folders = "companion|sitl|tests|bench|missions|deploy|docs"
+    named = re.findall(rf"`((?:{folders})/[\w/.-]+\.\w+)", (ROOT / page).read_text())
+    assert [name for name in named if not (ROOT / name).exists()] == []
