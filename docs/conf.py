@@ -73,21 +73,30 @@ def _toctree(pages: list[str], caption: str = "") -> str:
 API = ROOT / "docs" / "api"
 
 
-def faces() -> list[str]:
-    """Name the modules that others import from: ``companion.messages`` and every package that has ``__all__``."""
-    found = ["companion.messages"]
+def faces() -> dict[str, list[str]]:
+    """Name the modules that others import from, and what they list: every package that has ``__all__``, and messages."""
+    found: dict[str, list[str]] = {"companion.messages": []}
     for file in sorted((ROOT / "companion").rglob("__init__.py")):
-        names = [target.id for node in ast.parse(file.read_text()).body if isinstance(node, ast.Assign)
-                 for target in node.targets if isinstance(target, ast.Name)]
-        if "__all__" in names:
-            found.append(".".join(file.parent.relative_to(ROOT).parts))
+        assigned = [node for node in ast.parse(file.read_text()).body if isinstance(node, ast.Assign)]
+        for node in assigned:
+            if any(isinstance(target, ast.Name) and target.id == "__all__" for target in node.targets):
+                found[".".join(file.parent.relative_to(ROOT).parts)] = ast.literal_eval(node.value)
     return found
+
+
+def page_of(face: str, listed: dict[str, list[str]]) -> str:
+    """Return a face's page; what the room around it lists too is described there."""
+    above = listed.get(face.rpartition(".")[0], [])
+    shared = [name for name in listed[face] if name in above]
+    option = f"   :exclude-members: {', '.join(shared)}\n" if shared else ""
+    return f"# {face}\n\n```{{eval-rst}}\n.. automodule:: {face}\n{option}```\n"
 
 
 def write_api(_app: Sphinx) -> None:
     """Write one page a face into docs/api, and leave those alone that say so already."""
     API.mkdir(exist_ok=True)
-    wanted = {f"{face}.md": f"# {face}\n\n```{{eval-rst}}\n.. automodule:: {face}\n```\n" for face in faces()}
+    listed = faces()
+    wanted = {f"{face}.md": page_of(face, listed) for face in listed}
     for file in API.iterdir():
         if file.name not in wanted:
             file.unlink()
