@@ -74,7 +74,7 @@ API = ROOT / "docs" / "api"
 
 
 def faces() -> dict[str, list[str]]:
-    """Name the modules that others import from, and what they list: every package that has ``__all__``, and messages."""
+    """Name the modules that others import from, and what they list: packages with ``__all__``, and messages."""
     found: dict[str, list[str]] = {"companion.messages": []}
     for file in sorted((ROOT / "companion").rglob("__init__.py")):
         assigned = [node for node in ast.parse(file.read_text()).body if isinstance(node, ast.Assign)]
