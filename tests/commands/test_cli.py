@@ -34,6 +34,21 @@ def test_every_sitl_command_has_help(command, capsys):
     assert f"sitl {command}" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("words", "meant"), [
+    (["convert", "a.wkt", "b.plan"], "did you mean `companion fence convert` or `companion mission convert`?"),
+    (["new", "a.toml"], "did you mean `companion mission new`?"),
+    (["replai", "v"], "did you mean `companion replay`?"),
+    (["sail"], "there are run, plan, wind"),
+    (["doctor", "--link", "udpin:127.0.0.1:1", "syd.toml"], "a mission is given as --mission syd.toml"),
+    (["doctor", "--link", "udpin:127.0.0.1:1", "--aply"], "did you mean --apply?"),
+])
+def test_who_slips_is_told_in_one_line_what_was_meant(words, meant, capsys):
+    assert cli.main(words) == 2
+    error = capsys.readouterr().err
+    assert meant in error
+    assert error.count("\n") == 1
+
+
 def test_no_command_is_bad_usage():
     assert cli.main([]) == 2
 
