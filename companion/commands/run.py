@@ -111,7 +111,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
         parse_feed(name)
     mission = require_sailable(load_mission(args.mission)).with_feeds(*args.feed).with_system(args.system)
     for finding in mission.findings:
-        err.write(f"companion run: note: {finding}\n")
+        err.write(f"companion run: {finding.line(str(args.mission))}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
     transport = open_link(args.link, seed=seed)
     name = file_name(mission.name)
