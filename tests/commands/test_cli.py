@@ -102,15 +102,15 @@ def test_a_bad_mission_is_one_line_and_nothing_is_sent(tmp_path, capsys, what, t
                 autopilot.recv(2000)
 
 
-def test_what_is_found_in_a_mission_is_told_in_the_words_of_its_check(tmp_path, capsys):
+def test_what_is_found_in_a_mission_is_told_in_the_words_of_its_check(tmp_path, capfd):
     """`run` printed "note: Finding(severity=<Severity.NOTE ...": what Python calls it."""
     path = mission(tmp_path, re.sub("(?m)^name = .*", 'name = "a/b"', GOOD, count=1))
     assert cli.main(["run", str(path), "--link", f"udpin:127.0.0.1:{free_port()}", "--out", str(tmp_path / "v"),
                      "--wait", "1"]) == 1
-    said = capsys.readouterr().err.splitlines()[0]
+    said = capfd.readouterr().err.splitlines()[0]
     assert said.startswith(f"companion run: {path}: name: warning: 'a/b' cannot be part of a file's name")
     cli.main(["mission", "check", str(path)])
-    assert capsys.readouterr().out.splitlines()[0] == said.removeprefix("companion run: ")
+    assert capfd.readouterr().out.splitlines()[0] == said.removeprefix("companion run: ")
 
 
 def test_a_link_that_never_answers_is_one_line(tmp_path, capsys):
