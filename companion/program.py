@@ -8,12 +8,14 @@ for numba.
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NoReturn
+from types import MappingProxyType
+from typing import Any, NoReturn
 
 from companion import __version__
 from companion.disk import reason
@@ -26,7 +28,29 @@ _NEGATIVE = re.compile(r"-\.?\d")
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that says what is wrong in one line, without reciting its usage."""
+    """A parser that says what is wrong in one line, without reciting its usage, and what was meant."""
+
+    commands: Mapping[str, Parser] = MappingProxyType({})
+
+    def add_subparsers(self, **kwargs: Any) -> Any:
+        """Return the subparsers, and keep them by their names."""
+        subparsers = super().add_subparsers(**kwargs)
+        self.commands = subparsers.choices
+        return subparsers
+
+    def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:   # type: ignore[override]
+        """Take every argument; raise InputError in the name of the command that has no use for one."""
+        values, rest = super().parse_known_args(args, namespace)
+        if rest:
+            self.error(f"unrecognized arguments: {' '.join(rest)}{self._meant(rest[0])}")
+        return values, rest
+
+    def _meant(self, argument: str) -> str:
+        if argument.endswith(".toml") and "--mission" in self._option_string_actions:
+            return f"; a mission is given as --mission {argument}"
+        option = argument.partition("=")[0]
+        near = difflib.get_close_matches(option, self._option_string_actions, n=1) if option.startswith("--") else []
+        return f"; did you mean {near[0]}?" if near else ""
 
     def error(self, message: str) -> NoReturn:
         """Raise InputError."""
@@ -42,7 +66,7 @@ class Program:
     package: str
     commands: Mapping[str, str]
 
-    def parser(self, command: str | None = None) -> argparse.ArgumentParser:
+    def parser(self, command: str | None = None) -> Parser:
         """Return the parser; only ``command``'s own options are loaded, or all of them when it is None."""
         parser = Parser(
             prog=self.name, description=self.description,
@@ -63,7 +87,9 @@ class Program:
         arguments = with_negative_values(sys.argv[1:] if argv is None else argv)
         command = next((a for a in arguments if not a.startswith("-")), None)
         try:
-            args = self.parser(command if command in self.commands else "").parse_args(arguments)
+            if command is not None and command not in self.commands:
+                raise self._unknown(command)
+            args = self.parser(command or "").parse_args(arguments)
         except InputError as error:
             sys.stderr.write(f"{error}\n")
             return error.exit_code
@@ -82,6 +108,15 @@ class Program:
                 raise
             sys.stderr.write(f"{self.name} {args.command}: {error.filename}: {reason(error)}\n")
             return CompanionError.exit_code
+
+    def _unknown(self, word: str) -> InputError:
+        """Return what to raise for a command that there is not: it may be a verb of one, or a slip of the pen."""
+        whole = [f"{name} {word}" for name, parser in self.parser().commands.items() if word in parser.commands]
+        meant = whole or difflib.get_close_matches(word, self.commands, n=1)
+        remedy = f"there are {', '.join(self.commands)}; '{self.name} --help' says more"
+        if meant:
+            remedy = f"did you mean {' or '.join(f'`{self.name} {words}`' for words in meant)}?"
+        return InputError(self.name, "", f"there is no command {word[:40]!r}", remedy)
 
 
 def with_negative_values(argv: Sequence[str]) -> list[str]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.compose import config_of, estimator_of, target_limits_of, voyage_of
+from companion.errors import InputError
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.tlog import read_tlog
@@ -49,6 +50,7 @@ from companion.telemetry.folder import (
     require_files,
 )
 from companion.wind import WindRoom
+from companion.words import counted
 
 TOLERANCE = 1e-6
 # Fields of a record that say when it was written, not what was decided.
@@ -66,11 +68,16 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayReport:
-    """What a replay did. ``unrecorded`` steps came after a gap in the records, and could not be folded again."""
+    """What a replay did.
+
+    ``unrecorded`` steps came after a gap in the records, and could not be folded again. ``lost`` messages were counted
+    by the steps, and are not in the telemetry log.
+    """
 
     steps: int
     unrecorded: int
     messages: int
+    lost: int
     actions: int
     restarts: int
     differences: tuple[Difference, ...]
@@ -84,7 +91,7 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
         mission_path: the mission file, where it is not at the recorded place any more.
 
     Raises:
-        InputError: a file is missing or is not one of a voyage.
+        InputError: a file is missing or is not one of a voyage, or the telemetry log holds nothing of it.
     """
     require_files(folder, VOYAGE, TLOG, DECISIONS, TRACK)
     description = read_description(folder)
@@ -103,7 +110,7 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
         ] or [(-1e18, None, ())]
     ends = [*(start[0] for start in starts[1:]), 1e18]
     differences: list[Difference] = []
-    steps = unrecorded = messages = actions = 0
+    steps = unrecorded = messages = lost = actions = 0
     for (start_s, persisted, known), end_s, gap_s in zip(starts, ends, _gaps(decisions), strict=True):
         fold = VoyageFold(
             skipper, WindRoom(estimator=estimator_of(mission)), permissions, persisted, known=known,
@@ -125,8 +132,11 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
                 unrecorded += 1
                 continue
             # A power cut may take the last line of one file and leave the row that counted it in another.
+            unread = n_messages
             for at_s, message in itertools.islice(heard, n_messages):
                 fold.message(at_s, message)
+                unread -= 1
+            lost += unread
             for record in itertools.islice(outcomes, n_outcomes):
                 with believed(folder / DECISIONS, f"t_s = {record['t_s']}"):
                     outcome = _outcome(record)
@@ -145,8 +155,12 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             steps, messages, actions = steps + 1, messages + n_messages, actions + len(mine)
             if not _same(mine, theirs):
                 differences.append(Difference(t_s=t_s, recorded=theirs, replayed=mine))
+    if lost and lost == messages:
+        raise InputError(
+            str(folder / TLOG), "", f"holds none of the {counted(messages, 'message')} that the steps heard",
+            "nothing can be folded without them: copy the voyage's folder again")
     return ReplayReport(
-        steps=steps, unrecorded=unrecorded, messages=messages, actions=actions, restarts=len(starts) - 1,
+        steps=steps, unrecorded=unrecorded, messages=messages, lost=lost, actions=actions, restarts=len(starts) - 1,
         differences=tuple(differences))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -15,6 +16,15 @@ def counted(number: int, word: str, plural: str = "") -> str:
     ('1 leg', '2 gybes', '0 ways', '2 losses')
     """
     return f"{number} {word if number == 1 else plural or word + 's'}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as one enumerates them.
+
+    >>> listed(["A"]), listed(["A", "B", "C"])
+    ('A', 'A, B and C')
+    """
+    return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
 
 def file_name(name: str) -> str:

@@ -187,8 +187,8 @@ def _check(args: argparse.Namespace) -> int:
     area = area_of(document, point_radius_m(args))
     bad = print_findings(document.findings, args.file)
     bad |= print_findings(check_area(area, Conditions(
-        start=start, goals=goals, margin_m=margin_m, no_go_half_rad=math.radians(args.no_go),
-        twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
+        start=start, goals=goals, near=args.near or document.home, drawing=Path(args.file).stem, margin_m=margin_m,
+        no_go_half_rad=math.radians(args.no_go), twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
     )), args.file)
     if args.plot:
         from companion.plots.mission import save_area

@@ -149,7 +149,7 @@ def _convert(args: argparse.Namespace) -> int:
     if args.part is not None:
         document = _only(document, args.part)
     write_out(write(document, args.out), args.out, lossy=args.lossy, force=args.force,
-              remedy="choose another format, or what to write with --part,")
+              remedy="choose another format, or what to write with --part")
     print(f"{args.out}: written: {summary(read(args.out))}")   # what is in it, not what was meant to be
     return 0
 

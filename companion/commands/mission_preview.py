@@ -87,7 +87,8 @@ def leg_problem(
         "id": mission.name, "title": title,
         "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
         "goal": {"x": goal_en[0], "y": goal_en[1], "radius": radius_m},
-        "obstacles": local.obstacles_wkt(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here_en),
+        "obstacles": local.obstacles_wkt(mission.margin_m),
+        "obstacle_names": local.obstacle_names(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here_en),
         "wind": {"from_deg": from_deg, "speed_mps": tws_mps, "sigma": {"model": "none"}},
         "boat": boat_of(mission).problem_boat(tws_mps), "delta_s": mission.risk.delta_s,
     })

@@ -49,7 +49,7 @@ def summary(document: Document) -> str:
     ]
     vertices = sum(1 if isinstance(z.shape, Circle) else len(z.shape.exterior.coords) - 1 for z in document.zones)
     words = ", ".join(counted(n, word) for n, word in counts if n)
-    return (words or "nothing") + (f" ({vertices} fence items)" if document.zones else "")
+    return (words or "nothing") + (f" ({counted(vertices, 'fence item')})" if document.zones else "")
 
 
 def write_out(
@@ -62,7 +62,7 @@ def write_out(
     if written.is_empty:
         raise JobError(f"{out}: not written: it would be empty; {remedy}")
     if any(f.severity is Severity.ERROR for f in written.losses) and not lossy:
-        raise JobError(f"{out}: not written: zones would be missing; {remedy} or say --lossy")
+        raise JobError(f"{out}: not written: zones would be missing; {remedy}, or say --lossy")
     write_files({out: written.data}, force=force)
 
 

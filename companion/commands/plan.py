@@ -18,6 +18,7 @@ from companion.planner.problem import evaluate
 from companion.words import counted
 
 if TYPE_CHECKING:
+    from companion.geofence import Mission
     from companion.planner import Plan, Problem
 
 _EPILOG = """\
@@ -63,8 +64,11 @@ def run(args: argparse.Namespace) -> int:
     """Plan, print, write and draw; return the exit code."""
     from companion.planner import PlanStatus, Problem
 
+    ground: dict[str, Any] = {}
     if Path(args.problem).suffix.lower() == ".toml":
-        answers = _sail_through(args)
+        mission = _mission(args)
+        answers = _sail_through(mission, args)
+        ground = {"area": mission.area.local(mission.frame()), "margin_m": mission.margin_m}
     elif args.wind is not None:
         raise InputError("--wind", "", "a problem has a wind of its own", "leave it out, or plan a mission TOML")
     else:
@@ -80,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
             raise InputError("--plot", str(args.plot), "one plan is drawn, and this mission wants several",
                              "companion mission check --plot draws them all")
         with patience("drawing"):
-            save_plan(*answers[0], args.plot)
+            save_plan(*answers[0], args.plot, **ground)
     if args.json:
         sys.stdout.write(text)
     else:
@@ -108,15 +112,22 @@ def _answer(problem: Problem, args: argparse.Namespace) -> tuple[Problem, Plan]:
     return problem, _completed(problem, answer)
 
 
-def _sail_through(args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
-    """Return the problems and plans of a mission from goal to goal, to the first that has no path."""
-    from companion.commands.mission_preview import leg_problem
+def _mission(args: argparse.Namespace) -> Mission:
+    """Return the mission that is to be planned from its start."""
     from companion.geofence import load_mission
     from companion.sailable import require_sailable
 
     mission = require_sailable(load_mission(args.problem))
     if mission.start is None:
         raise InputError(args.problem, "[start]", "is missing", "a plan begins somewhere: add lat and lon")
+    return mission
+
+
+def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
+    """Return the problems and plans of a mission from goal to goal, to the first that has no path."""
+    from companion.commands.mission_preview import leg_problem
+
+    assert mission.start is not None
     tws_mps, from_deg = args.wind or (mission.wind.preview_speed_mps, mission.wind.preview_from_deg)
     frame = mission.frame()
     here = frame.en_from_geo(mission.start)

@@ -32,6 +32,9 @@ def run(args: argparse.Namespace) -> int:
     print(f"{counted(report.steps, 'step')}, {counted(report.messages, 'message')}, "
           f"{counted(report.actions, 'action')}, {counted(report.restarts, 'restart')}: "
           f"{counted(len(report.differences), 'difference')}")
+    if report.lost:
+        print(f"{counted(report.lost, 'message')} that the steps heard are not in the telemetry log: what differs may "
+              "be for want of them")
     if report.unrecorded:
         print(f"{counted(report.unrecorded, 'more step')} came after a gap in the records, and were not compared")
     for difference in report.differences[:SHOWN]:

@@ -111,7 +111,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
         parse_feed(name)
     mission = require_sailable(load_mission(args.mission)).with_feeds(*args.feed).with_system(args.system)
     for finding in mission.findings:
-        err.write(f"companion run: note: {finding}\n")
+        err.write(f"companion run: {finding.line(str(args.mission))}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
     transport = open_link(args.link, seed=seed)
     name = file_name(mission.name)
@@ -152,11 +152,13 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
     if summary["arrived_before"]:
         # an order that gets no better by trying again
         return 2, f"not sailed: {name} had arrived before this start; --again sails it again"
-    end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
-    text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {counted(summary['tacks'], 'tack')}, "
-    text += counted(summary["replans"], "replan")
     if summary["arrived"] and not summary["plans"] and not summary["uploads"]:
-        text += "; no plan was needed: she was there, or on her way there, when this began"
+        text = (f"arrived, with nothing sailed anew: at this start she lay at the goal of {name} already, or the "
+                "mission on board led her there; to sail it, begin away from its goal")
+    else:
+        end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
+        text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {counted(summary['tacks'], 'tack')}, "
+        text += counted(summary["replans"], "replan")
     if not summary["arrived"] and summary["left_behind"]:
         text += f"\n{summary['left_behind']}"
     if summary["records_dropped"]:

@@ -70,8 +70,15 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
 
         def take(t_s: float, message: Any) -> None:
             vehicle.take(t_s, message)
-            if reader.take(t_s, message):
-                heard.set()
+            reader.take(t_s, message)
+            heard.set()
+
+        def has_enough() -> bool:
+            """To be printed: anything of a companion; where that is all that is printed, everything."""
+            report = reader.report(now_s())
+            if report is None or not args.once:
+                return report is not None
+            return report.has_packed and vehicle.status is not None and vehicle.status.mode is not None
 
         link.subscribe(take)
         until_s = now_s() + args.timeout
@@ -82,9 +89,8 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
             return EXIT_NO_LINK
         try:
             async with asyncio.timeout_at(until_s):
-                await heard.wait()
-                # The parts take turns on the air; a moment more brings the packed one.
-                while args.once and not _has_packed(reader.report(now_s())):
+                # The parts take turns on the air; a moment more brings the packed one and a heartbeat.
+                while not has_enough():
                     heard.clear()
                     await heard.wait()
         except TimeoutError:
@@ -102,10 +108,6 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
             if args.once:
                 return exit_code(document, args.max_age)
             await asyncio.sleep(args.every)
-
-
-def _has_packed(report: Any) -> bool:
-    return report is not None and bool(report.has_packed)
 
 
 def exit_code(document: dict[str, Any], max_age_s: float) -> int:
@@ -218,10 +220,12 @@ def _write_text(d: dict[str, Any], units: str) -> None:
         return "-" if value is None else format(value * scale, form)
 
     w, wind, plan, goal, pilot = d["waypoint"], d["wind"], d["plan"], d["goal"], d["autopilot"]
-    armed = {None: "?", True: "ARMED", False: "disarmed"}[pilot["armed"]]
+    state = d["state"].upper() or "state not heard yet"
+    helm = "autopilot's mode not heard yet" if pilot["mode"] is None else \
+        f"{pilot['mode']} {'ARMED' if pilot['armed'] else 'disarmed'}"
     replans = "- replans" if plan["replans"] is None else counted(plan["replans"], "replan")
     safe = None if plan["promised_risk"] is None else 1.0 - plan["promised_risk"]
-    print(f"{d['state'].upper()}  {pilot['mode'] or '?'} {armed}  (age {d['age_s']:.1f} s)  {d['alert']['text']}")
+    print(f"{state}  {helm}  (age {d['age_s']:.1f} s)  {d['alert']['text']}")
     print(f"  WP {show(w['seq'])}/{show(w['count'])} {show(w['distance_m'])} m  xt {show(w['cross_track_m'], '+.1f')} m"
           f"  next tack {show(w['next_tack_s'])} s | goal {show(goal['distance_m'])} m"
           f"  ({(goal['index'] or 0) + 1} of {show(goal['count'])})")

@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.geo.frame import LocalFrame
 from companion.geofence.shapes import Obstacle, Zone, ZoneKind, polygon_en
+from companion.words import listed
 
 if TYPE_CHECKING:
     from companion.geo.segments import PolygonIndex
@@ -213,6 +214,15 @@ class LocalArea:
         """Return the obstacles, grown by the margin and merged, as the WKT polygons of a planning problem."""
         merged = self.buffered(margin_m) if self.polygons else MultiPolygon()
         return [shapely.to_wkt(p, rounding_precision=4) for p in parts(merged)]
+
+    def obstacle_names(self, margin_m: float = 0.0) -> list[str]:
+        """Return what each of ``obstacles_wkt`` is called: by the obstacles that have grown into it."""
+        out = []
+        for part in parts(self.buffered(margin_m)) if self.polygons else []:
+            shapely.prepare(part)
+            names = [name for name, p in zip(self.names, self.polygons, strict=True) if shapely.intersects(part, p)]
+            out.append(listed(names[:3]) if len(names) <= 3 else f"{', '.join(names[:2])} and {len(names) - 2} more")
+        return out
 
     def fence_wkt(self, margin_m: float = 0.0, near_en: tuple[float, float] | None = None) -> str | None:
         """Return the limits less the margin as a WKT polygon, None without a fence.

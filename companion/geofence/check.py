@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,18 +21,26 @@ from companion.geofence.formats.fence_items import MAX_FENCE_ITEMS, zones_to_ite
 from companion.geofence.formats.rings import Findings
 from companion.geofence.shapes import Circle, Zone, ZoneKind, center_of, polygon_en
 from companion.messages import GeoPoint
+from companion.words import counted
 
 MAX_GAPS = 20       # reported; a coast of skerries has thousands
 MAX_OBSTACLES = 2000  # above this gaps are not looked for
+# What people call the edge of the water they sail on, at the end of a name: "shore", "north-lake".
+_SHORE = re.compile(r"(.*[\W_])?(shore|shoreline|coast|lake|pond|bay|limits?|boundary|fence|water)", re.IGNORECASE)
 SEA_ROUND_M = 500.0   # open water round everything, without a fence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conditions:
-    """What the area is checked for: places, margin and wind. None leaves the check that needs it out."""
+    """What the area is checked for: places, margin and wind. None leaves the check that needs it out.
+
+    ``near`` is a place that should lie on the water, as a drawing's home; ``drawing`` the name of the file.
+    """
 
     start: GeoPoint | None = None
     goals: tuple[GeoPoint, ...] = ()
+    near: GeoPoint | None = None
+    drawing: str = ""
     margin_m: float | None = None
     twd_from_rad: float | None = None
     no_go_half_rad: float = math.radians(47.0)
@@ -49,6 +58,7 @@ def check_area(area: Area, conditions: Conditions) -> tuple[Finding, ...]:
     _inclusions(area, frame, findings)
     _holes(area, findings)
     _places(local, conditions, findings)
+    _round_the_water(local, conditions, findings)
     _sticking_out(local, findings)
     if conditions.margin_m is not None:
         _way_through(local, conditions, findings)
@@ -120,6 +130,30 @@ def _places(local: LocalArea, conditions: Conditions, findings: Findings) -> Non
                 f"has {clearance_m:.1f} m of free water, less than the margin of {conditions.margin_m:g} m",
                 "move it off, or lower the margin",
             )
+
+
+def _round_the_water(local: LocalArea, conditions: Conditions, findings: Findings) -> None:
+    """Mention that the largest obstacle of an area without a fence looks like a shore with the water inside it."""
+    if local.limits is not None or not local.polygons:
+        return
+    index = max(range(len(local.polygons)), key=lambda i: local.polygons[i].area)
+    largest = local.polygons[index]
+    others = [p for i, p in enumerate(local.polygons) if i != index]
+    within = int(np.count_nonzero(shapely.covers(largest, others))) if others else 0
+    places = [p for p in (conditions.start, *conditions.goals, conditions.near) if p is not None]
+    name = local.names[index] if others else conditions.drawing or local.names[index]
+    if any(shapely.covers(largest, shapely.points(local.frame.en_from_geo(p))) for p in places):
+        why = "a place that should lie on the water lies in it"
+    elif 2 * within > len(others):
+        why = f"{within} of {counted(len(others), 'other obstacle')} {'lies' if within == 1 else 'lie'} in it"
+    elif not places and (_SHORE.fullmatch(local.names[index]) or _SHORE.fullmatch(name)):
+        why = "is called like the edge of the water"
+    else:
+        return
+    findings.add(
+        Severity.NOTE, Code.ROUND_THE_WATER, name, f"is a keep-out zone, and {why}",
+        "if the water is inside it, read it with --kind inclusion (mission new: --fence; a mission: [area] fence)",
+    )
 
 
 def _sticking_out(local: LocalArea, findings: Findings) -> None:

@@ -35,6 +35,7 @@ class Code(enum.Enum):
     START_OUTSIDE = "start outside"
     GOAL_OUTSIDE = "goal outside"
     UNREACHABLE = "no water between start and goal"
+    ROUND_THE_WATER = "keep-out zone round the water"
     NARROW_GAP = "gap too narrow"
     ANTIMERIDIAN = "antimeridian"
     OBSTACLE_OUTSIDE_FENCE = "obstacle outside the fence"

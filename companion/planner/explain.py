@@ -93,7 +93,8 @@ def leg_bounds(problem: Problem, leg: Leg) -> dict[str, Any]:
             at_start = shapely.distance(shape, start) <= reach
             where = "along it" if at_end and at_start else "turns at it" if at_end else "leaves it" if at_start \
                 else "brushes it"
-            binds.append({"by": "obstacle", "obstacle": i, "where": where, "around_en": _around(shape)})
+            binds.append({"by": "obstacle", "obstacle": i, "name": problem.obstacle_name(i), "where": where,
+                          "around_en": _around(shape)})
     if problem.fence_polygon is not None and shapely.distance(problem.fence_polygon.boundary, line) <= TOUCH_M:
         binds.append({"by": "fence"})
     return {
@@ -204,7 +205,7 @@ def _bind_in_words(bind: dict[str, Any]) -> str:
         east, north = bind["around_en"]
         verb = {"along it": "along", "turns at it": "up to a turn at", "leaves it": "from a turn at",
                 "brushes it": "brushing"}[bind["where"]]
-        return f"{verb} obstacle {bind['obstacle'] + 1} (around {east:.0f} E, {north:.0f} N)"
+        return f"{verb} {bind['name']} (around {east:.0f} E, {north:.0f} N)"
     if bind["by"] == "fence":
         return "along or up to the fence"
     return f"as deep as the boat may go, {bind['angle_deg']:.0f}°"

@@ -84,7 +84,7 @@ def decisive_side(problem: Problem, plan: Plan) -> Side | None:
         outward = on_path - inside
         if float(np.hypot(*outward)) > 1e-9:
             return Side(anchor_en=_pair(inside), outward_en=_pair(outward / np.hypot(*outward)),
-                         obstacle=nearest, words=f"{_compass(outward)} of obstacle {nearest + 1}")
+                         obstacle=nearest, words=f"{_compass(outward)} of {problem.obstacle_name(nearest)}")
     foot = start + line * float(np.clip(np.dot(corner - start, line) / length**2, 0.02, 0.98))
     across = np.array([line[1], -line[0]]) / length * math.copysign(1.0, float(off[i]))
     return Side(anchor_en=_pair(foot), outward_en=_pair(across), obstacle=None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from companion.disk import reason
 from companion.errors import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -78,7 +80,9 @@ def legend_above(axes: Any, *, columns: int = 4) -> None:
                     borderaxespad=0.1)
 
 
-def legend_below(axes: Any, *, columns: int = 4) -> None:
-    """Put the legend of a chart under it."""
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.07), ncols=columns, fontsize=8, frameon=False)
+def legend_below(axes: Any, *, columns: int = 4, more: Sequence[Artist] = ()) -> None:
+    """Put the legend of a chart under it: what is labelled in it, behind ``more``."""
+    handles = [*more, *axes.get_legend_handles_labels()[0]]
+    if handles:
+        axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.07), ncols=columns, fontsize=8,
+                    frameon=False)

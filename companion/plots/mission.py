@@ -138,7 +138,7 @@ def draw_area(axes: Axes, local: LocalArea, margin_m: float) -> list[Handle]:
             closed = shapely.intersection(shapely.union(closed, shapely.difference(water, inner)), water)
         if not closed.is_empty:
             axes.add_patch(PathPatch(outline(closed), fc=MARGIN, alpha=0.35, ec=MARGIN, lw=0.8, zorder=2))
-            handles.append(Patch(fc=MARGIN, alpha=0.5, label=f"margin of {margin_m:g} m: no plan enters"))
+            handles.append(Patch(fc=MARGIN, alpha=0.35, label=f"margin of {margin_m:g} m: no plan enters"))
     if local.polygons:
         axes.add_patch(PathPatch(outline(local.solid), fc=LAND, ec=LAND_EDGE, lw=0.9, zorder=3))
         handles.append(Patch(fc=LAND, ec=LAND_EDGE, label="obstacles"))

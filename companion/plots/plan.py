@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,37 +22,54 @@ from matplotlib.path import Path as DrawnPath
 
 from companion.planner.courses import courses
 from companion.plots.chart import legend_below, save, scale_bar
+from companion.plots.mission import draw_area
 from companion.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from companion.geofence.area import LocalArea
     from companion.planner import Plan, Problem
 
 LAND, LAND_EDGE = "#d9cfb4", "#8d7f5a"
-SEA, TREE = "#f2f7fa", "#9db4c4"
-PATH, FAN, WIDER, START, GOAL = "#c1272d", "#eda94e", "#8e44ad", "#00a3b4", "#2e8b3d"
+SEA, TREE, MARGIN = "#f2f7fa", "#9db4c4", "#d98c5f"
+PATH, START, GOAL = "#c1272d", "#00a3b4", "#2e8b3d"
+# Pale, and opaque: where they lie over one another they stay the colours of the legend.
+FAN, WIDER = "#efcc9b", "#caafdb"
 FANS_MOST = 14
 
 
-def save_plan(problem: Problem, plan: Plan, path: str | Path) -> None:
+def save_plan(
+    problem: Problem, plan: Plan, path: str | Path, *, area: LocalArea | None = None, margin_m: float = 0.0,
+) -> None:
     """Draw a plan and save it.
+
+    Args:
+        problem: What was planned.
+        plan: Its plan, with or without a path.
+        path: The picture.
+        area: What the problem's obstacles are without the margin that they have grown by.
+        margin_m: That margin [m].
 
     Raises:
         InputError: the file cannot be written or its kind is unknown.
     """
     figure, axes = plt.subplots(figsize=(8.0, 8.6), layout="constrained")
-    draw_plan(axes, problem, plan)
+    handles = [] if area is None else draw_area(axes, area, margin_m)
+    draw_plan(axes, problem, plan, solids=area is None)
     scale_bar(axes)
-    legend_below(axes, columns=3)
+    legend_below(axes, columns=3, more=handles)
     save(figure, path)
 
 
-def draw_plan(axes: Axes, problem: Problem, plan: Plan, *, title: str | None = None, fans: bool = True) -> None:
+def draw_plan(
+    axes: Axes, problem: Problem, plan: Plan, *, title: str | None = None, fans: bool = True, solids: bool = True,
+) -> None:
     """Draw problem, search, path, fans and a wind arrow into axes in local metres."""
     x0, y0, x1, y1 = _frame(problem, plan)
     axes.set_facecolor(SEA)
-    draw_solids(axes, problem)
+    if solids:
+        draw_solids(axes, problem)
     tree = plan.trace.get("tree") if plan.trace else None
     if tree is not None and len(tree):
         segments = np.asarray(tree, dtype=np.float64).reshape(-1, 2, 2)
@@ -88,11 +106,16 @@ def draw_plan(axes: Axes, problem: Problem, plan: Plan, *, title: str | None = N
 
 
 def draw_solids(axes: Axes, problem: Problem) -> None:
-    """Draw obstacles and, with a fence, the forbidden water outside it."""
-    for shape in shapely.get_parts(problem.obstacle_union):
+    """Draw obstacles, what they are grown by and, with a fence, the edge of the water inside it."""
+    bare = replace(problem, clearance_floor_m=0.0).obstacle_union
+    for shape in shapely.get_parts(bare):
         axes.add_patch(PathPatch(_outline(shape), fc=LAND, ec=LAND_EDGE, lw=0.8, zorder=3))
     if problem.obstacles:
         axes.plot([], [], "s", color=LAND, mec=LAND_EDGE, label="obstacle")
+    if problem.obstacles and problem.clearance_floor_m > 0.0:
+        for shape in shapely.get_parts(problem.obstacle_union):
+            axes.add_patch(PathPatch(_outline(shape), fc="none", ec=MARGIN, lw=0.8, zorder=3))
+        axes.plot([], [], color=MARGIN, lw=0.8, label=f"clearance of {problem.clearance_floor_m:g} m")
     if problem.fence_polygon is not None:
         for shape in shapely.get_parts(problem.fence_polygon):
             axes.add_patch(PathPatch(_outline(shape), fc="none", ec="#555555", ls=(0, (6, 3)), lw=1.1, zorder=3))
@@ -127,8 +150,11 @@ def _fans(axes: Axes, problem: Problem, plan: Plan, radius_m: float) -> None:
         return
     windward_deg = 90.0 - math.degrees(problem.wind.twd_from_rad)
     own = math.degrees(problem.boat.no_go_half_rad)
-    for colour, label in ((WIDER, "no-go zone as widened by then"), (FAN, "no-go zone of the boat")):
-        axes.plot([], [], "s", color=colour, alpha=0.55, label=label)
+    entries = [(FAN, "no-go zone of the boat")]
+    if problem.no_go_half_rad(total) > problem.boat.no_go_half_rad:
+        entries.append((WIDER, "no-go zone as widened by then"))
+    for colour, label in entries:
+        axes.plot([], [], "s", color=colour, label=label)
     for t in np.linspace(0.0, total, FANS_MOST):
         leg = next((item for item in plan.legs if t <= item.end_s), plan.legs[-1])
         span = leg.end_s - leg.start_s
@@ -136,9 +162,9 @@ def _fans(axes: Axes, problem: Problem, plan: Plan, radius_m: float) -> None:
         at = (leg.from_en[0] + share * (leg.to_en[0] - leg.from_en[0]),
               leg.from_en[1] + share * (leg.to_en[1] - leg.from_en[1]))
         wide = min(180.0, math.degrees(problem.no_go_half_rad(float(t))))
-        for half, colour, alpha in ((wide, WIDER, 0.40), (own, FAN, 0.55)):
-            axes.add_patch(Wedge(at, radius_m, windward_deg - half, windward_deg + half, fc=colour, alpha=alpha, lw=0,
-                                 zorder=4))
+        for half, colour, zorder in ((wide, WIDER, 0.6), (own, FAN, 0.7)):
+            axes.add_patch(Wedge(at, radius_m, windward_deg - half, windward_deg + half, fc=colour, lw=0,
+                                 zorder=zorder))
 
 
 def _frame(problem: Problem, plan: Plan) -> tuple[float, float, float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -82,11 +83,30 @@ def draw(folder: Path) -> None:
         sys.stderr.write(f"sitl run: the picture could not be drawn: {error!r}\n")
 
 
+def words(figure: Any) -> str:
+    """Return a figure of a verdict, or what was wanted of it, as a person reads it.
+
+    >>> words([]), words(["TRAFFIC", "WIND"]), words(True), words({"ferry": 41.27}), words(float("inf"))
+    ('none', 'TRAFFIC, WIND', 'yes', 'ferry 41.3', 'nothing near')
+    """
+    if figure is None:
+        return "not measured"
+    if isinstance(figure, bool):
+        return "yes" if figure else "no"
+    if isinstance(figure, float):
+        return f"{figure:.1f}" if math.isfinite(figure) else "nothing near"
+    if isinstance(figure, dict):
+        figure = [f"{name} {words(value)}" for name, value in figure.items()]
+    if isinstance(figure, list):
+        return ", ".join(words(part) for part in figure) or "none"
+    return str(figure)
+
+
 def print_verdict(verdict: Any) -> None:
     """Print the checks, each with its figure."""
     for check in verdict.checks:
-        figure = f"{check.figure:.1f}" if isinstance(check.figure, float) else check.figure
-        print(f"{'pass' if check.passed else 'FAIL'}  {check.name}: {figure} ({check.required})")
+        print(f"{'pass' if check.passed else 'FAIL'}  {check.name}: {words(check.figure)} "
+              f"(wanted: {words(check.required)})")
     f = verdict.figures
     print(f"{'PASSED' if verdict.passed else 'FAILED'}  {verdict.scenario} seed {verdict.seed}: "
           f"{f['time_s']:.0f} s, {f['distance_m']:.0f} m, {counted(f['tacks'], 'tack')}, "

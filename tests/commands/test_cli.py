@@ -1,6 +1,7 @@
 """The command lines: help for everything, one line for what is wrong, the exit code that was promised."""
 
 import json
+import re
 import socket
 import subprocess
 import sys
@@ -32,6 +33,21 @@ def test_every_sitl_command_has_help(command, capsys):
         sitl_cli.main([command, "--help"])
     assert end.value.code == 0
     assert f"sitl {command}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("words", "meant"), [
+    (["convert", "a.wkt", "b.plan"], "did you mean `companion fence convert` or `companion mission convert`?"),
+    (["new", "a.toml"], "did you mean `companion mission new`?"),
+    (["replai", "v"], "did you mean `companion replay`?"),
+    (["sail"], "there are run, plan, wind"),
+    (["doctor", "--link", "udpin:127.0.0.1:1", "syd.toml"], "a mission is given as --mission syd.toml"),
+    (["doctor", "--link", "udpin:127.0.0.1:1", "--aply"], "did you mean --apply?"),
+])
+def test_who_slips_is_told_in_one_line_what_was_meant(words, meant, capsys):
+    assert cli.main(words) == 2
+    error = capsys.readouterr().err
+    assert meant in error
+    assert error.count("\n") == 1
 
 
 def test_no_command_is_bad_usage():
@@ -84,6 +100,17 @@ def test_a_bad_mission_is_one_line_and_nothing_is_sent(tmp_path, capsys, what, t
             assert len(error.strip().splitlines()) == 1, error
             with pytest.raises(BlockingIOError):
                 autopilot.recv(2000)
+
+
+def test_what_is_found_in_a_mission_is_told_in_the_words_of_its_check(tmp_path, capfd):
+    """`run` printed "note: Finding(severity=<Severity.NOTE ...": what Python calls it."""
+    path = mission(tmp_path, re.sub("(?m)^name = .*", 'name = "a/b"', GOOD, count=1))
+    assert cli.main(["run", str(path), "--link", f"udpin:127.0.0.1:{free_port()}", "--out", str(tmp_path / "v"),
+                     "--wait", "1"]) == 1
+    said = capfd.readouterr().err.splitlines()[0]
+    assert said.startswith(f"companion run: {path}: name: warning: 'a/b' cannot be part of a file's name")
+    cli.main(["mission", "check", str(path)])
+    assert capfd.readouterr().out.splitlines()[0] == said.removeprefix("companion run: ")
 
 
 def test_a_link_that_never_answers_is_one_line(tmp_path, capsys):

@@ -114,6 +114,25 @@ def test_convert_simplify_writes_the_autopilots_fence(capsys, tmp_path):
     assert rows <= 84
 
 
+def test_rally_points_go_from_format_to_format(capsys, tmp_path):
+    """They were dropped (issue 13, point 7); what a format does not carry is said, in a whole sentence."""
+    plan, rally, again = (str(tmp_path / name) for name in ("a.plan", "r.waypoints", "b.plan"))
+    (tmp_path / "a.plan").write_text(json.dumps(PLAN), encoding="utf-8")
+    assert main(["mission", "convert", plan, rally, "--part", "rally"]) == 0
+    assert "also holds" in capsys.readouterr().out
+    for name in ("b.plan", "c.rally", "d.gpx", "e.kml", "f.geojson"):
+        assert main(["mission", "convert", rally, str(tmp_path / name)]) == 0
+        assert capsys.readouterr().out == f"{tmp_path / name}: written: 1 rally point\n"
+        back = read(str(tmp_path / name)).rally
+        assert [(r.lat_e7, r.lon_e7) for r in back] == [(508172000, -13102000)]
+    assert main(["mission", "convert", again, str(tmp_path / "g.wkt")]) == 1
+    said = capsys.readouterr()
+    assert "1 rally point is not carried by this format" in said.out
+    assert said.err.rstrip().endswith("choose another format, or what to write with --part")
+    assert main(["fence", "convert", plan, str(tmp_path / "h.waypoints")]) == 0
+    assert "1 rally point is not carried by this format" in capsys.readouterr().out
+
+
 def test_mission_new_from_a_start_goals_and_land(capsys, tmp_path):
     out_file = tmp_path / "bay.toml"
     code, out, _ = run(

@@ -50,6 +50,22 @@ def test_options_there_and_back(path):
     assert parse_options(dump_options(options), "again") == options
 
 
+@pytest.mark.parametrize(("name", "called", "words"), [
+    ("", "m", "is empty: the mission is called 'm'"),
+    ("  ", "m", "is empty"),
+    ("lake/north", "lake/north", "voyages and state are called 'lake-north'"),
+    ("..", "..", "voyages and state are called 'voyage'"),
+    ("Lake North", "Lake North", None),
+    (None, "m", None),
+])
+def test_a_name_that_names_nothing_is_found(tmp_path, name, called, words):
+    """An empty one, or one with a slash in it, was "in order" (issue 13, what still made him stop)."""
+    mission = load(tmp_path, GOOD if name is None else f'name = "{name}"\n{GOOD}')
+    assert mission.name == called
+    assert [f.place for f in mission.findings] == ([] if words is None else ["name"])
+    assert words is None or words in mission.findings[0].text
+
+
 def test_defaults(tmp_path):
     mission = load(tmp_path)
     assert (mission.operator.arm, mission.operator.set_auto, mission.operator.guided) == (False, False, False)

@@ -2,12 +2,17 @@
 
 import json
 import math
+from dataclasses import replace
 
+import msgspec
 import pytest
 
 from companion import cli
+from companion.commands.mission_preview import leg_problem
+from companion.geofence import load_mission
 from companion.planner import Problem
 from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.json_write import to_dict
 
 GOOD = {
     "id": "pond", "title": "Across the pond", "start": {"x": 0, "y": 0, "heading_deg": 0},
@@ -76,6 +81,31 @@ def test_explain_adds_reasons(capsys, file):
     code, out, _ = run(capsys, file(), "--budget", "0.3", "--explain", "--explain-budget", "1")
     assert code == 0
     assert "Course" in out
+
+
+def test_an_obstacle_is_called_by_its_name(capsys, file, tmp_path):
+    """Of a mission's "Shark Island" it said "obstacle 1"."""
+    _, out, _ = run(capsys, file(obstacle_names=["Duck Rock"]), "--expansions", "1500", "--explain",
+                    "--explain-budget", "0.5")
+    assert "of Duck Rock" in out
+    assert "obstacle 1" not in out
+    assert to_dict(Problem.from_json(file(obstacle_names=["Duck Rock"])))["obstacle_names"] == ["Duck Rock"]
+    assert run(capsys, file(obstacle_names=["Duck Rock", "another"]))[0] == 2
+
+
+def test_a_missions_obstacles_keep_their_names_in_its_problem():
+    mission = load_mission("missions/two-channels.toml")
+    frame = mission.frame()
+    goal = frame.en_from_geo(mission.goals[0].point)
+
+    def names(margin_m):
+        grown = replace(mission, options=msgspec.structs.replace(
+            mission.options, area=msgspec.structs.replace(mission.options.area, margin_m=margin_m)))
+        problem = leg_problem(grown, (0.0, 0.0), 0.0, goal, 10.0, tws_mps=5.0, from_deg=0.0)
+        return [problem.obstacle_name(i) for i in range(len(problem.obstacles))]
+
+    assert sorted(names(1.0)) == ["East bank", "Middle bank", "West bank"]
+    assert "Middle bank and East bank" in names(30.0)   # grown together
 
 
 def test_no_plan_is_exit_1_with_the_reason(capsys, file, tmp_path):

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.boat import Hull
+from sitl.commands.run import print_verdict
 from sitl.scene.clearance import HullTrack
 from sitl.scene.scenario import EventSpec, ExpectSpec, is_ordinary
 from sitl.scene.verdict import Truth, count_roundings, count_tacks, judge, longest_silence_s
@@ -24,6 +25,21 @@ LONG = Hull(length_m=8.0, beam_m=2.0)
 def hulls(en_m, heading_deg=0.0, hull=DOT):
     en_m = np.asarray(en_m, dtype=float).reshape(-1, 2)
     return HullTrack(en_m=en_m, heading_rad=np.radians(np.broadcast_to(heading_deg, len(en_m))), hull=hull)
+
+
+def test_a_verdict_is_printed_in_words(capsys):
+    """It printed "pass  no unhandled error: [] ([])" (issue 13, what still made him stop)."""
+    print_verdict(judge(
+        scenario="x", seed=1, expect=ExpectSpec(arrived=True, contacts=0, min_clearance_m=2.0, alerts=("irons",)),
+        truth=_truth([45.0] * 20), solid=shapely.Polygon(), hull=DOT, goal_en_m=(100.0, 0.0),
+        summary={"arrived": True, "replans": 0}, status_times_s=[0.0], alerts=[], ordered=[],
+    ))
+    out = capsys.readouterr().out
+    assert "pass  no unhandled error: none (wanted: none)" in out
+    assert "pass  arrived: yes (wanted: yes)" in out
+    assert "FAIL  announced irons: none (wanted: irons)" in out
+    assert "clearance, m: nothing near (wanted: at least 2.0)" in out
+    assert not [mark for mark in ("[", "{", "None", "inf") if mark in out]
 
 
 def test_a_track_across_an_island_touches_once_even_between_samples():

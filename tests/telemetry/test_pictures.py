@@ -9,6 +9,8 @@ import gpxpy
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
+from matplotlib.patches import Wedge
 
 from companion import cli
 from companion.clock import run_virtual
@@ -97,6 +99,25 @@ def test_the_missions_picture_names_its_goals_and_marks(drawn, tmp_path, capsys)
         assert "50°49." in figure.get_suptitle()
 
 
+def test_the_plans_picture_tells_obstacles_from_their_margin_and_keeps_the_colours_of_its_legend(
+    drawn, tmp_path, capsys,
+):
+    """It drew obstacles grown by the margin, called them obstacles, and its no-go colours were in no legend."""
+    assert cli.main(["plan", str(MISSIONS / "two-channels.toml"), "--plot", str(tmp_path / "p.png"),
+                     "--expansions", "500", "--algorithm", "rrtstar"]) == 0
+    names, said, _ = words(drawn[0])
+    assert {"obstacles", "margin of 10 m: no plan enters", "no-go zone of the boat"} <= names
+    assert "obstacle" not in names
+    assert "West bank" in said
+    axes = drawn[0].axes[0]
+    legend = axes.get_legend()
+    shown = {text.get_text(): handle for text, handle in zip(legend.get_texts(), legend.legend_handles, strict=True)}
+    wedges = [p for p in axes.patches if isinstance(p, Wedge)]
+    assert wedges
+    assert {to_rgba(w.get_facecolor()) for w in wedges if w.zorder > 0.6} == {
+        to_rgba(shown["no-go zone of the boat"].get_color())}
+
+
 def test_the_report_tells_the_voyage_and_writes_its_track(sailed, tmp_path, capsys):
     tracks = [tmp_path / f"t.{kind}" for kind in ("gpx", "kml", "geojson")]
     options = [part for track in tracks for part in ("--track", str(track))]
@@ -116,7 +137,7 @@ def test_the_report_tells_the_voyage_and_writes_its_track(sailed, tmp_path, caps
     assert (times[-1].time - times[0].time).total_seconds() == pytest.approx(
         c["t_s"][known][-1] - c["t_s"][known][0], abs=0.01)
     assert cli.main(["report", str(sailed), "--track", str(tracks[0])]) == 2   # not without --force
-    assert cli.main(["report", str(sailed), "--track", str(tmp_path / "t.wkt")]) == 1
+    assert cli.main(["report", str(sailed), "--track", str(tmp_path / "t.wkt")]) == 2
 
 
 def test_what_takes_long_says_why(monkeypatch, capsys):

@@ -131,6 +131,10 @@ def test_a_mission_that_has_arrived_says_what_would_sail_it_again(short, tmp_pat
     first = json.loads((tmp_path / "summary.json").read_bytes())
     assert last_words("reach", first)[0] == 0
     assert last_words("reach", first)[1].startswith("arrived; ")
+    # Another state file, the boat in the loiter of this list: it takes the list over and is there ("arrived; 1 s").
+    code, said = last_words("reach", first | {"plans": 0, "uploads": 0, "time_s": 2.0, "tacks": 0})
+    assert code == 0
+    assert said.startswith("arrived, with nothing sailed anew: at this start she lay at the goal of reach already")
     sail(short, tmp_path)      # another boat, the same state
     again = json.loads((tmp_path / "summary.json").read_bytes())
     assert again["arrived_before"] is True

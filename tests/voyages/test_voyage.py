@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from companion import cli
 from companion.clock import run_virtual
 from companion.plots.voyage import plot_voyage
 from companion.replay import replay
@@ -111,6 +112,22 @@ def test_a_changed_record_does_not_replay(voyage, tmp_path):
     assert len(kept) < len(lines)
     (tmp_path / "decisions.jsonl").write_text("\n".join(kept) + "\n")
     assert replay(tmp_path).differences
+
+
+def test_an_empty_telemetry_log_is_called_one_and_a_short_one_is_mentioned(voyage, tmp_path, capsys):
+    """Every step differed, and nothing said why (issue 13, what still made him stop)."""
+    folder, log = tmp_path / "v", tmp_path / "v" / "telemetry.tlog"
+    shutil.copytree(voyage[1], folder)
+    whole = log.read_bytes()
+    log.write_bytes(b"")
+    assert cli.main(["replay", str(folder)]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith(f"companion replay: {log}: holds none of the ")
+    log.write_bytes(whole[: len(whole) // 2])
+    assert cli.main(["replay", str(folder)]) == 1
+    assert "that the steps heard are not in the telemetry log" in capsys.readouterr().out
+    assert replay(voyage[1]).lost == 0
 
 
 def test_the_picture_is_drawn(voyage, tmp_path):

@@ -22,6 +22,7 @@ from companion.geofence.document import Document
 from companion.geofence.findings import Finding, Severity
 from companion.geofence.formats.registry import read
 from companion.geofence.formats.text import decode, read_bytes
+from companion.geofence.mission.names import called, name_findings
 from companion.geofence.mission.options import (
     AreaOptions,
     AutopilotOptions,
@@ -81,7 +82,7 @@ class Mission:
     @property
     def name(self) -> str:
         """The mission's name, or its file's."""
-        return self.options.name or self.path.stem
+        return called(self.options.name, self.path)
 
     @property
     def origin(self) -> GeoPoint:
@@ -183,7 +184,8 @@ def load_mission(path: str | Path) -> Mission:
             for g in options.goal
         ),
         start=GeoPoint(lat_deg=options.start.lat, lon_deg=options.start.lon) if options.start else None,
-        area=area, path=path, findings=findings, refuges=tuple(_refuge(r, n) for n, r in enumerate(options.refuge)),
+        area=area, path=path, findings=(*name_findings(options.name, path), *findings),
+        refuges=tuple(_refuge(r, n) for n, r in enumerate(options.refuge)),
     )
     if mission.polar_path is not None:
         _require(mission.polar_path, source, "[boat] polar",

@@ -166,7 +166,7 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """The whole file."""
 
     goal: Annotated[tuple[GoalOptions, ...], Meta(min_length=1)]
-    name: str = ""
+    name: str | None = None
     description: str = ""
     start: StartOptions | None = None
     refuge: tuple[RefugeOptions, ...] = ()

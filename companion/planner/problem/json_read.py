@@ -153,6 +153,9 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
     obstacles = raw.get("obstacles") or []
     if not isinstance(obstacles, (list, tuple)):
         raise InputError(source, "obstacles", "is not a list", "write a list of WKT polygons")
+    names = raw.get("obstacle_names") or []
+    if not isinstance(names, (list, tuple)) or (names and len(names) != len(obstacles)):
+        raise InputError(source, "obstacle_names", "is not a list as long as obstacles", "write one name for each")
     fence = raw.get("fence")
     current = _Reader(raw.get("current") or {}, source, "current")
     targets = raw.get("targets") or []
@@ -160,7 +163,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         raise InputError(source, "targets", "is not a list", "write a list of objects")
     twa, mps = _parse_speed(boat.child("speed"))
     known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
-             "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat"}
+             "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat", "obstacle_names"}
     fields: dict[str, Any] = dict(  # noqa: C408, the names of Problem's fields
         id=top.text("id", ""),
         title=top.text("title", ""),
@@ -170,6 +173,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         goal_en=(goal.number("x"), goal.number("y")),
         goal_radius_m=goal.number("radius"),
         obstacles=tuple(_polygon(w, source, f"obstacles[{i}]") for i, w in enumerate(obstacles)),
+        obstacle_names=tuple(str(name) for name in names),
         fence=None if fence is None else _polygon(fence, source, "fence"),
         wind=Wind(
             twd_from_rad=math.radians(wind.number("from_deg")),

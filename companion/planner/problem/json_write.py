@@ -68,6 +68,8 @@ def to_dict(p: Problem) -> dict[str, Any]:
         },
         "delta_s": p.delta_s,
     }
+    if p.obstacle_names:
+        out["obstacle_names"] = list(p.obstacle_names)
     if p.notes:
         out["notes"] = p.notes
     if p.current.drift_mps:

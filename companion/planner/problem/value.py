@@ -44,6 +44,7 @@ class Problem:
     goal_en: tuple[float, float]
     goal_radius_m: float
     obstacles: tuple[shapely.Geometry, ...] = ()
+    obstacle_names: tuple[str, ...] = ()
     fence: shapely.Geometry | None = None
     wind: Wind
     boat: BoatLimits
@@ -67,6 +68,11 @@ class Problem:
 
         """
         return cls(**read_fields(source))
+
+    def obstacle_name(self, index: int) -> str:
+        """Return what an obstacle is called: by its name, else by its number from 1."""
+        names = self.obstacle_names[index:index + 1]
+        return names[0] if names and names[0] else f"obstacle {index + 1}"
 
     # ----------------------------------------------------------------------------------------- no-go
     @property

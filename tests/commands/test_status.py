@@ -1,0 +1,66 @@
+"""``companion status`` on a link: what it waits for before it speaks, and what it says is not heard."""
+
+import socket
+import threading
+import time
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
+from companion import cli
+from companion.mavlink.trust import census
+from companion.mavlink.wire.frames import Codec
+from companion.mavlink.wire.status import status_messages
+from companion.messages import CompanionStatus
+from sitl.scene.ships import free_port
+
+MANUAL, DISARMED, STANDBY = 0, wire.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, wire.MAV_STATE_STANDBY
+
+STATUS = CompanionStatus(t_s=1.0, state="standard", tws_mps=5.0, twd_from_rad=0.0)
+
+
+@pytest.fixture
+def air(monkeypatch):
+    """Return a port on which an autopilot's heartbeats and a companion's status are heard."""
+    monkeypatch.setattr(census, "LISTEN_S", 0.3)   # the autopilot's heartbeat before that counts it, and no more
+    port, stop = free_port(), threading.Event()
+    threads = []
+
+    def begin(beats, kinds):
+        def send():
+            autopilot, companion = Codec(system=1, component=1), Codec(system=1, component=191)
+            began, sent = time.monotonic(), 0
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+                while not stop.wait(0.02):
+                    if sent < len(beats) and time.monotonic() - began >= beats[sent]:
+                        sent += 1
+                        beat = wire.MAVLink_heartbeat_message(
+                            wire.MAV_TYPE_SURFACE_BOAT, wire.MAV_AUTOPILOT_ARDUPILOTMEGA, DISARMED, MANUAL, STANDBY, 3)
+                        udp.sendto(autopilot.pack(beat), ("127.0.0.1", port))
+                    for message in status_messages(STATUS, 1.0, 3):   # the packed one, and the wind
+                        if kinds is None or message.get_type() in kinds:
+                            udp.sendto(companion.pack(message), ("127.0.0.1", port))
+
+        threads.append(threading.Thread(target=send))
+        threads[-1].start()
+        return port
+
+    yield begin
+    stop.set()
+    for thread in threads:
+        thread.join()
+
+
+def _once(port, timeout="4"):
+    return cli.main(["status", "--link", f"udpin:127.0.0.1:{port}", "--once", "--timeout", timeout])
+
+
+def test_one_status_waits_for_the_autopilots_mode(air, capsys):
+    """It printed "STANDARD  ? ?" (issue 13, what still made him stop)."""
+    assert _once(air([0.1, 0.7], None)) == 0
+    assert capsys.readouterr().out.startswith("STANDARD  MANUAL disarmed  (age ")
+
+
+def test_what_was_not_heard_in_time_is_said(air, capsys):
+    assert _once(air([0.1], {"WIND_COV"}), "1.2") == 0
+    assert capsys.readouterr().out.startswith("state not heard yet  ")
