@@ -91,7 +91,7 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
         mission_path: the mission file, where it is not at the recorded place any more.
 
     Raises:
-        InputError: a file is missing or is not one of a voyage, or the telemetry log holds nothing of it.
+        InputError: a file is missing or is not one of a voyage, or the telemetry log is empty.
     """
     require_files(folder, VOYAGE, TLOG, DECISIONS, TRACK)
     description = read_description(folder)
@@ -155,9 +155,9 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             steps, messages, actions = steps + 1, messages + n_messages, actions + len(mine)
             if not _same(mine, theirs):
                 differences.append(Difference(t_s=t_s, recorded=theirs, replayed=mine))
-    if lost and lost == messages:
+    if lost and next(iter(read_tlog(folder / TLOG)), None) is None:
         raise InputError(
-            str(folder / TLOG), "", f"holds none of the {counted(messages, 'message')} that the steps heard",
+            str(folder / TLOG), "", f"is empty, and the steps heard {counted(messages, 'message')}",
             "nothing can be folded without them: copy the voyage's folder again")
     return ReplayReport(
         steps=steps, unrecorded=unrecorded, messages=messages, lost=lost, actions=actions, restarts=len(starts) - 1,

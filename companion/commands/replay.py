@@ -33,8 +33,8 @@ def run(args: argparse.Namespace) -> int:
           f"{counted(report.actions, 'action')}, {counted(report.restarts, 'restart')}: "
           f"{counted(len(report.differences), 'difference')}")
     if report.lost:
-        print(f"{counted(report.lost, 'message')} that the steps heard are not in the telemetry log: what differs may "
-              "be for want of them")
+        print(f"{counted(report.lost, 'message')} that the steps heard were not found in the telemetry log: "
+              "what differs may be for want of them")
     if report.unrecorded:
         print(f"{counted(report.unrecorded, 'more step')} came after a gap in the records, and were not compared")
     for difference in report.differences[:SHOWN]:

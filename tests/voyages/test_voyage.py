@@ -123,10 +123,10 @@ def test_an_empty_telemetry_log_is_called_one_and_a_short_one_is_mentioned(voyag
     assert cli.main(["replay", str(folder)]) == 2
     said = capsys.readouterr()
     assert said.out == ""
-    assert said.err.startswith(f"companion replay: {log}: holds none of the ")
+    assert said.err.startswith(f"companion replay: {log}: is empty, and the steps heard ")
     log.write_bytes(whole[: len(whole) // 2])
     assert cli.main(["replay", str(folder)]) == 1
-    assert "that the steps heard are not in the telemetry log" in capsys.readouterr().out
+    assert "that the steps heard were not found in the telemetry log" in capsys.readouterr().out
     assert replay(voyage[1]).lost == 0
 
 
