@@ -8,10 +8,10 @@ from companion.geofence.formats.fence_items import (
     zones_to_items,
 )
 from companion.geofence.formats.losses import Written
+from companion.geofence.formats.raw.text import MAX_BYTES, MAX_POSITIONS
 from companion.geofence.formats.registry import format_of, write
 from companion.geofence.formats.rings import Findings
 from companion.geofence.formats.routes import lines_as_route
-from companion.geofence.formats.text import MAX_BYTES, MAX_POSITIONS
 
 __all__ = [
     "MAX_BYTES", "MAX_FENCE_ITEMS", "MAX_POSITIONS", "STORAGE_BYTES", "Findings", "Written", "format_of",

@@ -15,11 +15,11 @@ from shapely.geometry import LineString, Point, Polygon
 from companion.errors import InputError
 from companion.geofence.document import Document, Mark, Track
 from companion.geofence.findings import Code, Severity
-from companion.geofence.formats.json_node import JsonNode, parse_json
 from companion.geofence.formats.losses import Losses, Written, leave_out
+from companion.geofence.formats.raw.json_node import JsonNode, parse_json
+from companion.geofence.formats.raw.text import MAX_DEPTH, MAX_POSITIONS
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.formats.routes import RoutePoint, items_of, pins_as_dangers, pins_as_route
-from companion.geofence.formats.text import MAX_DEPTH, MAX_POSITIONS
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 

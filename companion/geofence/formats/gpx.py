@@ -21,10 +21,10 @@ from companion.geofence.document import Document, Mark, Track
 from companion.geofence.findings import Code, Severity
 from companion.geofence.formats.fence_items import ring_of
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out, without_holes
+from companion.geofence.formats.raw.text import MAX_POSITIONS, printable
+from companion.geofence.formats.raw.xml_safe import parse_xml
 from companion.geofence.formats.rings import Findings
 from companion.geofence.formats.routes import RoutePoint, items_of, line_as_area, pins_as_route, route_of
-from companion.geofence.formats.text import MAX_POSITIONS, printable
-from companion.geofence.formats.xml_safe import parse_xml
 from companion.geofence.shapes import Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 

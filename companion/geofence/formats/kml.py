@@ -19,6 +19,8 @@ from companion.errors import InputError
 from companion.geofence.document import Document, Mark, Track
 from companion.geofence.findings import Code, Severity
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out
+from companion.geofence.formats.raw.text import MAX_BYTES, MAX_POSITIONS, number, printable
+from companion.geofence.formats.raw.xml_safe import child_text, local_name, parse_xml
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.formats.routes import (
     RoutePoint,
@@ -28,9 +30,7 @@ from companion.geofence.formats.routes import (
     route_of,
     track_points,
 )
-from companion.geofence.formats.text import MAX_BYTES, MAX_POSITIONS, number, printable
 from companion.geofence.formats.wpl import decimal
-from companion.geofence.formats.xml_safe import child_text, local_name, parse_xml
 from companion.geofence.shapes import Zone, ZoneKind, unwrapped, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 

@@ -13,8 +13,8 @@ from companion.geofence.document import Document
 from companion.geofence.findings import Code, Severity
 from companion.geofence.formats.fence_items import ring_of
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out, without_holes
+from companion.geofence.formats.raw.text import MAX_POSITIONS, number, point_commas
 from companion.geofence.formats.rings import Findings, polygons_from_rings
-from companion.geofence.formats.text import MAX_POSITIONS, number, point_commas
 from companion.geofence.formats.wpl import decimal
 from companion.geofence.shapes import Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem

@@ -17,7 +17,6 @@ from companion.geofence.document import Document
 from companion.geofence.findings import Code, Finding, Severity
 from companion.geofence.formats.geojson import read_geojson, write_geojson
 from companion.geofence.formats.gpx import read_gpx, write_gpx
-from companion.geofence.formats.json_node import parse_json
 from companion.geofence.formats.kml import read_kml, unzip_kmz, write_kml, write_kmz
 from companion.geofence.formats.losses import Losses, Written, leave_out
 from companion.geofence.formats.mission_planner import (
@@ -29,7 +28,8 @@ from companion.geofence.formats.mission_planner import (
     write_rally,
 )
 from companion.geofence.formats.qgc_plan import read_plan, write_plan
-from companion.geofence.formats.text import decode, read_bytes
+from companion.geofence.formats.raw.json_node import parse_json
+from companion.geofence.formats.raw.text import decode, read_bytes
 from companion.geofence.formats.wkt import read_wkt, write_wkt
 from companion.geofence.formats.wpl import read_waypoints, write_waypoints
 from companion.geofence.shapes import Circle, ZoneKind, center_of

@@ -21,8 +21,8 @@ from shapely.geometry.base import BaseGeometry
 from companion.errors import InputError
 from companion.geofence.document import Document, Mark
 from companion.geofence.findings import Code, Severity
+from companion.geofence.formats.raw.text import MAX_POSITIONS, require_shallow
 from companion.geofence.formats.rings import Findings, polygons_from_rings
-from companion.geofence.formats.text import MAX_POSITIONS, require_shallow
 from companion.geofence.shapes import Zone, ZoneKind, drawn, wrap_lon_deg
 
 Coordinates = list[tuple[float, float]]

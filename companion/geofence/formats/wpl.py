@@ -18,8 +18,8 @@ from companion.geofence.document import Document
 from companion.geofence.findings import Code, Severity
 from companion.geofence.formats.fence_items import FENCE_COMMANDS, items_to_zones, zones_to_items
 from companion.geofence.formats.losses import Losses, Written, leave_out
+from companion.geofence.formats.raw.text import MAX_POSITIONS, number, point_commas
 from companion.geofence.formats.rings import Findings
-from companion.geofence.formats.text import MAX_POSITIONS, number, point_commas
 from companion.messages import Command, GeoPoint, MissionItem
 
 HEADER = "QGC WPL 110"

@@ -20,8 +20,8 @@ from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Document
 from companion.geofence.findings import Finding, Severity
+from companion.geofence.formats.raw.text import decode, read_bytes
 from companion.geofence.formats.registry import read
-from companion.geofence.formats.text import decode, read_bytes
 from companion.geofence.mission.names import called, name_findings
 from companion.geofence.mission.options import (
     AreaOptions,

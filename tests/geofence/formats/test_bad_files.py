@@ -189,8 +189,8 @@ def test_entity_bombs_are_refused(root):
 
 
 def test_nesting_and_size_are_limited(tmp_path):
+    from companion.geofence.formats.raw.text import MAX_BYTES
     from companion.geofence.formats.registry import read
-    from companion.geofence.formats.text import MAX_BYTES
 
     deep = b"<kml>" + b"<Folder>" * 5000 + b"</Folder>" * 5000 + b"</kml>"
     with pytest.raises(InputError, match="nest deeper"):

@@ -177,4 +177,4 @@ def test_what_is_left_out_is_announced():
     losses = write(document, "b.fen").losses
     assert {f.severity for f in losses} >= {Severity.ERROR}
     assert any("keep-in ring" in f.text for f in losses)
-    assert any("point and line" in f.text for f in losses)
+    assert any("point or line" in f.text for f in losses)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import msgspec
 
 from companion.errors import InputError
-from companion.geofence.formats.text import MAX_POSITIONS
+from companion.geofence.formats.raw.text import MAX_POSITIONS
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import defusedxml
 from defusedxml import ElementTree
 
 from companion.errors import InputError
-from companion.geofence.formats.text import MAX_DEPTH, MAX_POSITIONS
+from companion.geofence.formats.raw.text import MAX_DEPTH, MAX_POSITIONS
 
 
 def parse_xml(data: bytes, source: str) -> Any:
