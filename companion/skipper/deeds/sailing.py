@@ -32,6 +32,7 @@ from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.manoeuvre import bear_away_rad
 from companion.traffic.plans import MIN_INTERVAL_S
 
+HAIR_M = 0.5
 STEER_S = 25.0               # bearing away longer than this has failed
 SAILS_MPS = 0.8              # out of irons
 SAILS_TWA_RAD = math.radians(60.0)
@@ -101,13 +102,14 @@ def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
         turn.phase(Phase.HOLDING, "the way on board is clear: waiting for AUTO, a new plan follows under way")
         return
     bound = errand(turn)
-    if bound is not None and not bound.has_place and not is_at_rest(turn):
-        _stay(turn, bound)
+    stays = bound is not None and not bound.has_place
+    if bound is not None and stays and not (is_at_rest(turn) and (_is_outside(turn) or _is_way_clear(turn))):
+        _stay(turn, bound, anew=True)
     elif turn.state.pending_upload is None:
         _consider(turn, fresh)
     if turn.state.pending_plan is not None or turn.state.pending_upload is not None:
         turn.phase(Phase.HOLDING, "waiting for the plan from where the boat has drifted to, and for its upload")
-    elif turn.state.after_operator and (turn.is_way_shut or _is_outside(turn)):
+    elif turn.state.after_operator and not stays and (turn.is_way_shut or _is_outside(turn)):
         wait_s = turn.state.plan_retry.not_before_s - turn.t_s
         again = f"; trying again in {wait_s:.0f} s" if wait_s > 0.0 else ""
         turn.phase(Phase.HOLDING, f"no plan yet from where the boat has drifted to: waiting for one{again}")
@@ -122,12 +124,21 @@ def _goes_on_at_once(turn: Turn) -> bool:
     RTL and SmartRTL turn her, at full speed, towards whatever lies between her and home, in the three seconds or more
     that a plan and its upload take; AUTO takes one, and a plan made under way begins where she will be.
     """
-    boat, state = turn.boat_en, turn.state
-    if state.own_mode not in HOMEWARD or boat is None or state.pending_upload is not None or _is_outside(turn):
+    state = turn.state
+    return state.own_mode in HOMEWARD and state.pending_upload is None and bool(turn.ahead()) and (
+        not _is_outside(turn) and _is_way_clear(turn))
+
+
+def _is_way_clear(turn: Turn) -> bool:
+    """Return whether what is left of the way on board, straight from where she is, comes no nearer than it may.
+
+    That is the margin's floor, or what she has about her now where that is less.
+    """
+    boat, leg, area = turn.boat_en, turn.leg(), turn.voyage.area
+    if boat is None or leg is None:
         return False
-    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
-    ahead = turn.ahead()
-    return bool(ahead) and turn.voyage.area.path_clearance_m([boat, *ahead]) >= floor_m
+    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m, float(area.clearance_m([boat])[0]) - HAIR_M)
+    return area.path_clearance_m([boat, leg[1], *turn.ahead()[1:]]) >= max(0.0, floor_m)
 
 
 def _is_outside(turn: Turn) -> bool:
@@ -136,10 +147,10 @@ def _is_outside(turn: Turn) -> bool:
     return here is not None and float(turn.voyage.area.clearance_m([here])[0]) <= 0.0
 
 
-def _stay(turn: Turn, bound: Errand) -> None:
-    """Loiter where there is room near by."""
+def _stay(turn: Turn, bound: Errand, *, anew: bool = False) -> None:
+    """Loiter where there is room near by; ``anew``: the loiter on board cannot be sailed to from here."""
     if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
-        hold(turn, bound.sentence)
+        hold(turn, bound.sentence, anew=anew)
     turn.phase(Phase.HOLDING, f"{bound.sentence}; waiting for the loiter's upload")
 
 

@@ -96,12 +96,14 @@ def _tail_only(turn: Turn) -> bool:
     return boat is not None and leg is not None and _is_sound(turn, [boat, leg[1]])
 
 
-def hold(turn: Turn, why: str) -> None:
-    """Loiter in the roomiest place near the boat, by a mission that ends there at once."""
+def hold(turn: Turn, why: str, *, anew: bool = False) -> None:
+    """Loiter in the roomiest place near by, in a mission that ends there at once; ``anew``: out of another loiter."""
     boat, wind, state = turn.boat_en, turn.wind_mean, turn.state
     turn.phase(Phase.HOLDING if state.sailing else Phase.WAITING, f"waiting for a plan: {why}")
-    if boat is None or not state.sailing or state.route is None or state.index >= len(state.route.items) - 1:
-        return   # not under way, or already in the safe end of the mission
+    if boat is None or not state.sailing or state.route is None:
+        return   # not under way
+    if state.index >= len(state.route.items) - 1 and not anew:
+        return   # already in the safe end of the mission
     place, room = loiter_place(turn.voyage, turn.known_config, boat, wind[0] if wind else 0.0)
     keep = state.index
     end = waypoint(turn.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)

@@ -1,12 +1,13 @@
 """Whose doing is it that she is not being sailed? Signs, sticks, what is answered, and what is said of a drift."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 from shapely.geometry import box
 
-from companion.messages import Mode, StatusText
+from companion.messages import Command, Mode, StatusText
 from companion.skipper.step import actions as act
 from companion.skipper.step.causes import TABLE, Answer
 from companion.skipper.step.state import Phase
@@ -343,3 +344,28 @@ def test_sailed_home_where_the_way_on_board_is_shut_a_plan_comes_first():
     asked = [a for _, a in world.actions[before:] if isinstance(a, (act.SetMode, act.RequestPlan))]
     assert asked
     assert isinstance(asked[0], act.RequestPlan)
+
+
+def test_a_loiter_laid_where_she_lies_is_sailed_to_before_she_drifts_onto_what_is_near():
+    """It is the plan that she waits for; while another was waited for she drifted onto the rock."""
+    world = under_way(obstacles=(box(130, -60, 170, 60),))
+    world.position, world.heading, world.speed = (112.0, 0.0), math.pi / 2.0, 0.6
+    stop(world, battery_failed=True)
+    text(world, "Battery 1 is low 10.20V used 0 mAh")
+    assert world.run(8, lambda w: w.mode is Mode.AUTO)
+    assert world.mission[-1].command is Command.NAV_LOITER_UNLIM
+    world.run(60)
+    assert world.skipper.voyage.area.clearance_m([world.position])[0] > 5.0
+
+
+def test_a_loiter_that_cannot_be_sailed_to_any_more_is_laid_anew():
+    world = under_way(obstacles=(box(130, -60, 170, 60),))
+    stop(world, battery_failed=True)
+    assert world.run(8, lambda w: w.mode is Mode.AUTO)
+    world.position = (195.0, 0.0)   # set behind the island, and held there once more
+    world.heading = math.pi / 2.0
+    before = len(world.actions)
+    stop(world)
+    text(world, "Battery 1 is critical 9.10V used 0 mAh")
+    assert world.run(60, lambda w: w.mode is Mode.AUTO)   # a position that leapt is not believed at once
+    assert any(isinstance(a, act.UploadMission) for _, a in world.actions[before:])
