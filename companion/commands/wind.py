@@ -59,7 +59,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 def run(args: argparse.Namespace) -> int:
     """Score, print, write and draw; return the exit code."""
     from companion.wind.estimators import NAMES, make
-    from companion.wind.study import fit
+    from companion.wind.study import fit_ar1
 
     names = list(NAMES) if args.estimator == "all" else [args.estimator]
     for name in names:
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         for i, record in enumerate(records):
             drawn = wanted if i == 0 else names
             scores.append([_score(record, name, advance) for name in drawn])
-            fits.append(fit(record))
+            fits.append(fit_ar1(record))
     for record, found, ar1 in zip(records, scores, fits, strict=True):
         _print_record(record, found[:len(names)], ar1)
     if len(records) > 1:

@@ -46,3 +46,15 @@ def test_a_sub_room_is_entered_by_its_face():
     ]
     assert wrong == []
     assert len(faced) > 15
+
+
+def test_no_name_of_a_face_is_hidden_by_a_module_that_is_loaded_later():
+    """A module's first import binds its name in the package: a function of the same name would be gone."""
+    hidden = []
+    for room in ROOMS:
+        face = ast.parse((room / "__init__.py").read_text(encoding="utf-8"))
+        loaded = {n.module for n in ast.walk(face) if isinstance(n, ast.ImportFrom)}
+        for node in (n for n in ast.walk(face) if isinstance(n, ast.ImportFrom) and n.module is not None):
+            hidden += [f"{name_of(room)}.{a.name}" for a in node.names
+                       if (room / f"{a.name}.py").exists() and f"{name_of(room)}.{a.name}" not in loaded]
+    assert hidden == []

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from companion.errors import InputError
 from companion.wind import make
-from companion.wind.study.ar1 import fit
+from companion.wind.study.ar1 import fit_ar1
 from companion.wind.study.records import NOISE_RADPS, RHO_HZ, Record, equation_17, parse_csv, weather
 from companion.wind.study.score import crps_circular, crps_normal, score
 
@@ -67,7 +67,7 @@ def test_equation_17_does_not_depend_on_the_step_of_the_observer():
 def test_ar1_is_recovered_within_its_errors(dt_s):
     off = []
     for seed in range(6):
-        found = fit(equation_17(seed, seconds=14400.0, dt_s=dt_s, mean_rad=3.1))
+        found = fit_ar1(equation_17(seed, seconds=14400.0, dt_s=dt_s, mean_rad=3.1))
         keep = (1.0 - RHO_HZ) ** dt_s
         rho = (1.0 - keep) / dt_s
         stationary = NOISE_RADPS / math.sqrt(1.0 - (1.0 - RHO_HZ) ** 2)
@@ -86,13 +86,13 @@ def test_ar1_takes_irregular_steps():
         name="thin", t_s=record.t_s[keep], twd_from_rad=record.twd_from_rad[keep], tws_mps=record.tws_mps[keep],
         turning=record.turning[keep],
     )
-    found = fit(thin)
+    found = fit_ar1(thin)
     assert 1.0 / found.correlation_time_s == pytest.approx(-math.log(1.0 - RHO_HZ), rel=0.35)
 
 
 def test_ar1_wants_a_record():
     with pytest.raises(InputError, match="at least 100"):
-        fit(equation_17(1, seconds=50.0))
+        fit_ar1(equation_17(1, seconds=50.0))
 
 
 # --------------------------------------------------------------------------------------------------- scores

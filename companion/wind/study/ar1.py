@@ -42,7 +42,7 @@ class Ar1Fit:
     count: int
 
 
-def fit(record: Record) -> Ar1Fit:
+def fit_ar1(record: Record) -> Ar1Fit:
     """Return the fit to the record's direction. Raises InputError for fewer than 100 readings."""
     if len(record) < 100:
         raise InputError(record.name, "", f"{len(record)} readings", "the AR(1) fit needs at least 100")

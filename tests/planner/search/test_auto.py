@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.json_write import to_dict
 from companion.planner.search.anneal import anneal
 from companion.planner.search.gauge import make_gauge
 from companion.planner.search.kernels import is_free
@@ -105,7 +106,7 @@ def test_a_tack_that_costs_is_avoided_by_gybing():
 
 
 def test_a_leg_must_save_what_the_problem_asks():
-    raw = load("open-beat-kalman").to_dict()
+    raw = to_dict(load("open-beat-kalman"))
     many, few = (plan(Problem.from_json(raw | {"leg_saving": s}), expansions=60_000) for s in (1e-5, 1e-3))
     assert len(many.legs) > len(few.legs)
     assert many.cost_s < few.cost_s
