@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from dataclasses import replace
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
@@ -184,66 +185,70 @@ class VehicleAssembler:
         if kind == "HEARTBEAT":
             if not codec.is_autopilot_heartbeat(message):
                 return []
-            before = self._status or AutopilotStatus(t_s=t_s)
-            if self._believes_beat(t_s, message) or self._status is None:
-                before = replace(
-                    before, mode=codec.mode(message), is_armed=codec.is_armed(message), vehicle_type=int(message.type))
-            self._status = replace(before, system_status=message.system_status)
         elif self._status is None:
             return []  # a status begins with a heartbeat
-        elif kind == "MISSION_CURRENT":
-            self._status = replace(
-                self._status, mission_seq=message.seq,
-                mission_total=None if message.total == 0xFFFF else message.total,
-                mission_state=_mission_state(message.mission_state),
-            )
-        elif kind == "MISSION_ITEM_REACHED":
-            self._status = replace(self._status, last_reached_seq=message.seq)
-        elif kind == "NAV_CONTROLLER_OUTPUT":
-            self._status = replace(
-                self._status, waypoint_distance_m=codec.waypoint_distance_m(message),
-                target_bearing_rad=codec.target_bearing_rad(message), cross_track_m=codec.cross_track_m(message),
-            )
-            self._nav_s = t_s
-        elif kind == "EKF_STATUS_REPORT":
-            self._status = replace(self._status, ekf_ok=codec.ekf_ok(message))
-        elif kind == "GPS_RAW_INT":
-            self._status = replace(self._status, gps_fix=int(message.fix_type))
-        elif kind == "SYS_STATUS":
-            self._status = replace(
-                self._status,
-                battery_v=None if message.voltage_battery == 0xFFFF else message.voltage_battery / 1e3,
-                battery_remaining=message.battery_remaining / 100.0 if 0 <= message.battery_remaining <= 100 else None,
-                battery_failed=codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_BATTERY),
-                receiver_lost=codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_RC_RECEIVER),
-            )
-        elif kind == "RC_CHANNELS":
-            self._status = replace(self._status, rc_us=codec.rc_us(message))
-        elif kind == "HOME_POSITION":
-            self._status = replace(self._status, home=codec.geo_point(message.latitude, message.longitude))
-        elif kind == "FENCE_STATUS":
-            # Two in a row that say the same: one alone may be damaged or forged.
-            now = bool(message.breach_status), int(message.breach_count)
-            last, self._fence_told, self._fence_s = self._fence_told, now, t_s
-            self._status = replace(
-                self._status, fence_breached=now[0] and last[0],
-                fence_breaches=now[1] if now[1] == last[1] else self._status.fence_breaches)
-        else:
+        told = self._told(t_s, kind, message)
+        if told is None:
             return []
-        self._status = replace(self._status, t_s=t_s, boot_s=self._boot_s)
-        self._quiet(t_s)
+        self._status = replace(
+            self._status or AutopilotStatus(t_s=t_s), **{**self._quiet(t_s), **told}, t_s=t_s, boot_s=self._boot_s)
         return [self._status]
 
-    def _quiet(self, t_s: float) -> None:
-        assert self._status is not None
+    def _told(self, t_s: float, kind: str, message: Message) -> dict[str, Any] | None:
+        """Return what a message tells of the status, None: nothing."""
+        if kind == "HEARTBEAT":
+            now: dict[str, Any] = {"system_status": message.system_status}
+            if self._believes_beat(t_s, message) or self._status is None:
+                now |= {
+                    "mode": codec.mode(message), "is_armed": codec.is_armed(message), "vehicle_type": int(message.type)}
+            return now
+        if kind == "MISSION_CURRENT":
+            return {
+                "mission_seq": message.seq, "mission_total": None if message.total == 0xFFFF else message.total,
+                "mission_state": _mission_state(message.mission_state),
+            }
+        if kind == "MISSION_ITEM_REACHED":
+            return {"last_reached_seq": message.seq}
+        if kind == "NAV_CONTROLLER_OUTPUT":
+            self._nav_s = t_s
+            return {
+                "waypoint_distance_m": codec.waypoint_distance_m(message),
+                "target_bearing_rad": codec.target_bearing_rad(message), "cross_track_m": codec.cross_track_m(message),
+            }
+        if kind == "EKF_STATUS_REPORT":
+            return {"ekf_ok": codec.ekf_ok(message)}
+        if kind == "GPS_RAW_INT":
+            return {"gps_fix": int(message.fix_type)}
+        if kind == "SYS_STATUS":
+            volts, remaining = message.voltage_battery, message.battery_remaining
+            return {
+                "battery_v": None if volts == 0xFFFF else volts / 1e3,
+                "battery_remaining": remaining / 100.0 if 0 <= remaining <= 100 else None,
+                "battery_failed": codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_BATTERY),
+                "receiver_lost": codec.has_failed(message, wire.MAV_SYS_STATUS_SENSOR_RC_RECEIVER),
+            }
+        if kind == "RC_CHANNELS":
+            return {"rc_us": codec.rc_us(message)}
+        if kind == "HOME_POSITION":
+            return {"home": codec.geo_point(message.latitude, message.longitude)}
+        if kind == "FENCE_STATUS":
+            # Two in a row that say the same: one alone may be damaged or forged.
+            fence = bool(message.breach_status), int(message.breach_count)
+            last, self._fence_told, self._fence_s = self._fence_told, fence, t_s
+            return {
+                "fence_breached": fence[0] and last[0], **({"fence_breaches": fence[1]} if fence[1] == last[1] else {})}
+        return None
+
+    def _quiet(self, t_s: float) -> dict[str, None]:
+        """Return what was told too long ago to be true of now."""
+        old: dict[str, None] = {}
         if self._nav_s is not None and t_s - self._nav_s > QUIET_S:
             self._nav_s = None
-            self._status = replace(
-                self._status, waypoint_distance_m=None, target_bearing_rad=None, cross_track_m=None
-            )
+            old |= {"waypoint_distance_m": None, "target_bearing_rad": None, "cross_track_m": None}
         if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
             self._fence_s = None
-            self._status = replace(self._status, fence_breached=None, fence_breaches=None)
+            old |= {"fence_breached": None, "fence_breaches": None}
+        return old
 
 
 class _Stale(Exception):  # noqa: N818 - a signal inside this module

@@ -321,19 +321,18 @@ def _leeward(b: Boat, axes: Floats) -> tuple[int, int]:
     if b.room == 0.0:
         return 0, 0
     sign = -1 if axes[0, 1] + axes[1, 1] > 0.0 else 1
-    best, chosen = math.inf, (0, 0)
     most = min(60, math.ceil(2.0 * b.room / min(float(np.hypot(*axes[0])), float(np.hypot(*axes[1])))) + 2)
-    for i in range(most):
-        for j in range(most):
-            dx, dy = (sign * (i * axes[0] + j * axes[1])).tolist()
-            length = math.hypot(dx, dy)
-            if not b.room <= length < best:
-                continue
-            a, v = track(b, dx, dy, 0.0)
-            turns = turn_time(b, -b.up, a) + turn_time(b, a, b.up) + turn_time(b, b.up, a) + turn_time(b, a, -b.up)
-            if v > 1e-9 and abs(a) <= b.max_twa and turns < math.inf:
-                best, chosen = length, (sign * i, sign * j)
-    return chosen
+    along = np.arange(most, dtype=np.float64)[:, None]
+    steps = sign * (along[:, None] * axes[0] + along[None] * axes[1])
+    lengths = np.hypot(steps[..., 0], steps[..., 1]).ravel()
+    for n in np.argsort(lengths, kind="stable")[np.count_nonzero(lengths < b.room):].tolist():
+        i, j = divmod(n, most)
+        dx, dy = steps[i, j].tolist()
+        a, v = track(b, dx, dy, 0.0)
+        turns = turn_time(b, -b.up, a) + turn_time(b, a, b.up) + turn_time(b, b.up, a) + turn_time(b, a, -b.up)
+        if v > 1e-9 and abs(a) <= b.max_twa and turns < math.inf:
+            return sign * i, sign * j
+    return 0, 0
 
 
 def run_lattice(

@@ -10,6 +10,7 @@ therefore changes no bit of what an estimator computes, only the reference that 
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from statistics import NormalDist
@@ -139,9 +140,15 @@ class Base:
         return wrap_pi(x + self._reference_rad), sigma, max(0.0, speed), max(sigma_speed, 1e-3)
 
     def interval(self, horizon_s: float, p: float) -> float:
-        """Return the half width [rad] of the central p-interval: a normal's, at most π."""
-        sigma = self.forecast(horizon_s)[1]
-        return min(math.pi, normal_half_width(p) * sigma)
+        """Return the half width [rad, 0..π] of the central interval that holds the direction with probability p."""
+        return self._half_width(horizon_s, p, self.forecast(horizon_s)[1])
+
+    def _half_width(self, horizon_s: float, p: float, sigma_rad: float) -> float:
+        return min(math.pi, sigma_rad * self._quantile(horizon_s, p))
+
+    def _quantile(self, horizon_s: float, p: float) -> float:  # noqa: ARG002 - others' depends on it
+        """Return the quantile of |error| / sigma: a normal's."""
+        return normal_half_width(p)
 
     @property
     def correlation_time_s(self) -> float:
@@ -157,7 +164,8 @@ class Base:
         age_s = max(0.0, t_s - self._t_s) if self._t_s is not None else 0.0
         rows = np.array([self.forecast(age_s + h) for h in horizon.tolist()], dtype=np.float64)
         half = np.array(
-            [[self.interval(age_s + h, p) for p in level.tolist()] for h in horizon.tolist()], dtype=np.float64,
+            [[self._half_width(age_s + h, p, row[1]) for p in level.tolist()]
+             for h, row in zip(horizon.tolist(), rows.tolist(), strict=True)], dtype=np.float64,
         ).reshape(horizon.size, level.size)
         return WindForecast(
             t_s=t_s, horizon_s=horizon, mean_twd_from_rad=rows[:, 0], sigma_twd_rad=rows[:, 1],
@@ -166,6 +174,7 @@ class Base:
         )
 
 
+@functools.lru_cache(maxsize=64)
 def normal_half_width(p: float) -> float:
     """Return z with P(|N(0, 1)| <= z) = p, for 0 <= p < 1."""
     if not 0.0 <= p < 1.0:

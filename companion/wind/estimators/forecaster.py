@@ -18,7 +18,6 @@ Everything is weighted by elapsed time, not by samples: the sampling rate does n
 from __future__ import annotations
 
 import functools
-import math
 
 import numpy as np
 
@@ -58,13 +57,9 @@ class Forecaster(Base):
         mean, sigma, speed, sigma_speed, _, _ = kernel.predict(self._state, self._constants, horizon_s)
         return mean, sigma, speed, sigma_speed
 
-    def interval(self, horizon_s: float, p: float) -> float:
-        """Return the half width [rad, 0..π] of the central interval that holds the direction with probability p.
-
-        From the tracked quantiles of |error| / sigma, between levels linear in the normal quantile (equation 5).
-        """
-        sigma = self.forecast(horizon_s)[1]
-        return min(math.pi, sigma * kernel.half_width_ratio(self._state, float(horizon_s), _Z, normal_half_width(p)))
+    def _quantile(self, horizon_s: float, p: float) -> float:
+        """Return the tracked quantile of |error| / sigma, between levels linear in the normal quantile (equation 5)."""
+        return kernel.half_width_ratio(self._state, float(horizon_s), _Z, normal_half_width(p))
 
     @property
     def correlation_time_s(self) -> float:

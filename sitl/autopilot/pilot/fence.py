@@ -21,27 +21,25 @@ _POLYGONS = {mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: 1.0, mav.MAV_CMD_NA
 _CIRCLES = {mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: 1.0, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: -1.0}
 
 
-@dataclass(frozen=True, slots=True)
 class Polygon:
     """``sign`` +1: stay inside; -1: stay outside. ``vertices_en`` is (n, 2) [m]."""
 
-    sign: float
-    vertices_en: NDArray[np.float64]
+    def __init__(self, sign: float, vertices_en: NDArray[np.float64]) -> None:
+        self.sign, self.vertices_en = sign, vertices_en
+        edges = np.roll(vertices_en, -1, axis=0) - vertices_en
+        self._edges = tuple(zip(*(column.tolist() for column in (*vertices_en.T, *edges.T)), strict=True))
 
     def clearance_m(self, east: float, north: float) -> float:
         """Return the distance [m] to the edge, negative on the forbidden side."""
-        a = self.vertices_en
-        d = np.roll(a, -1, axis=0) - a
-        px, py = east - a[:, 0], north - a[:, 1]
-        length2 = np.maximum(d[:, 0] ** 2 + d[:, 1] ** 2, 1e-12)
-        u = np.clip((px * d[:, 0] + py * d[:, 1]) / length2, 0.0, 1.0)
-        distance = math.sqrt(float(np.min((px - u * d[:, 0]) ** 2 + (py - u * d[:, 1]) ** 2)))
-        # even-odd rule: count the edges that a ray to the east crosses
-        crosses = (a[:, 1] > north) != (a[:, 1] + d[:, 1] > north)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            at_east = a[:, 0] + (north - a[:, 1]) / d[:, 1] * d[:, 0]
-        inside = int(np.count_nonzero(crosses & (at_east > east))) % 2 == 1
-        return distance * (1.0 if inside else -1.0) * self.sign
+        least2, is_inside = math.inf, False
+        for x, y, dx, dy in self._edges:
+            px, py = east - x, north - y
+            u = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
+            least2 = min(least2, (px - u * dx) ** 2 + (py - u * dy) ** 2)
+            # even-odd rule: count the edges that a ray to the east crosses
+            if (y > north) != (y + dy > north) and x + py / dy * dx > east:
+                is_inside = not is_inside
+        return math.sqrt(least2) * (1.0 if is_inside else -1.0) * self.sign
 
 
 @dataclass(frozen=True, slots=True)
