@@ -18,7 +18,8 @@ from companion.geofence.findings import Code, Severity
 from companion.geofence.formats.losses import Losses, Written, leave_out
 from companion.geofence.formats.raw.json_node import JsonNode, parse_json
 from companion.geofence.formats.raw.text import MAX_DEPTH, MAX_POSITIONS
-from companion.geofence.formats.rings import Findings, polygons_from_rings
+from companion.geofence.formats.reading import Reading
+from companion.geofence.formats.rings import polygons_from_rings
 from companion.geofence.formats.routes import RoutePoint, items_of, pins_as_dangers, pins_as_route
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
@@ -29,17 +30,11 @@ _KINDS = {
 }
 
 
-class _Reading:
+class _Reading(Reading):
     def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
-        self.source, self.kind, self.areas = source, kind, areas
-        self.findings = Findings()
-        self.zones: list[Zone] = []
-        self.marks: list[Mark] = []
+        super().__init__(source, kind, areas=areas)
         self.items: list[MissionItem] = []
         self.item_names: list[str] = []
-        self.pins: list[RoutePoint] = []
-        self.rally: list[MissionItem] = []
-        self.tracks: list[Track] = []
         self.home: GeoPoint | None = None
         self.return_point: GeoPoint | None = None
         self.positions = 0

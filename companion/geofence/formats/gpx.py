@@ -23,7 +23,7 @@ from companion.geofence.formats.fence_items import ring_of
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out, without_holes
 from companion.geofence.formats.raw.text import MAX_POSITIONS, printable
 from companion.geofence.formats.raw.xml_safe import parse_xml
-from companion.geofence.formats.rings import Findings
+from companion.geofence.formats.reading import Reading
 from companion.geofence.formats.routes import RoutePoint, items_of, line_as_area, pins_as_route, route_of
 from companion.geofence.shapes import Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
@@ -33,17 +33,11 @@ _KINDS = {k.value: k for k in ZoneKind}
 _MISSION, _TRACK = "mission", "track"
 
 
-class _Reading:
+class _Reading(Reading):
     def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
-        self.source, self.kind, self.areas = source, kind, areas
-        self.findings = Findings()
-        self.zones: list[Zone] = []
-        self.marks: list[Mark] = []
+        super().__init__(source, kind, areas=areas)
         self.route: list[RoutePoint] = []
-        self.tracks: list[Track] = []
         self.places: dict[str, GeoPoint] = {}
-        self.rally: list[MissionItem] = []
-        self.pins: list[RoutePoint] = []
 
     def point(self, node: Any, place: str) -> GeoPoint:
         lat_deg, lon_deg = node.latitude, node.longitude

@@ -21,7 +21,8 @@ from companion.geofence.findings import Code, Severity
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out
 from companion.geofence.formats.raw.text import MAX_BYTES, MAX_POSITIONS, number, printable
 from companion.geofence.formats.raw.xml_safe import child_text, local_name, parse_xml
-from companion.geofence.formats.rings import Findings, polygons_from_rings
+from companion.geofence.formats.reading import Reading
+from companion.geofence.formats.rings import polygons_from_rings
 from companion.geofence.formats.routes import (
     RoutePoint,
     items_of,
@@ -55,16 +56,10 @@ def unzip_kmz(data: bytes, source: str) -> bytes:
     return content
 
 
-class _Reading:
+class _Reading(Reading):
     def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
-        self.source, self.kind, self.areas = source, kind, areas
-        self.findings = Findings()
-        self.zones: list[Zone] = []
-        self.marks: list[Mark] = []
+        super().__init__(source, kind, areas=areas)
         self.route: list[RoutePoint] = []
-        self.tracks: list[Track] = []
-        self.rally: list[MissionItem] = []
-        self.pins: list[RoutePoint] = []
         self.places: dict[str, GeoPoint] = {}
         self.positions = 0
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from companion.messages import MissionState, Mode
 from companion.skipper.board.uploads import upload
-from companion.skipper.step.actions import Arm, RunMotor, SetCurrent, SetMode, Severity, Tack
+from companion.skipper.step.actions import Action, Arm, RunMotor, SetCurrent, SetMode, Severity, Tack
 from companion.skipper.step.turn import SHOWS_S, Turn
 
 ARMING, CURRENT = "arming", "set current"
@@ -21,62 +23,48 @@ def is_busy(turn: Turn, what: str) -> bool:
     return state.accepted is not None and state.accepted[0] == what and turn.t_s < state.accepted[1] + SHOWS_S
 
 
-def set_mode(turn: Turn, mode: Mode, text: str) -> bool:
-    """Ask for a mode; False when not permitted or not now."""
-    if is_busy(turn, mode.name) or not turn.snapshot.permissions.may_set_mode:
+def _ask(turn: Turn, what: str, order: Callable[[int], Action], **changes: object) -> bool:
+    """Give an order, and note ``changes`` with it; False when not permitted or not now."""
+    if is_busy(turn, what):
         return False
     number = turn.new_id()
-    if not turn.act(SetMode(command_id=number, mode=mode, text=text)):
+    if not turn.act(order(number)):
         return False
-    turn.update(pending_command=(number, turn.t_s, mode.name), own_mode=None if mode is Mode.AUTO else mode)
+    turn.update(pending_command=(number, turn.t_s, what), **changes)
     return True
+
+
+def set_mode(turn: Turn, mode: Mode, text: str) -> bool:
+    """Ask for a mode; False when not permitted or not now."""
+    return turn.snapshot.permissions.may_set_mode and _ask(
+        turn, mode.name, lambda number: SetMode(command_id=number, mode=mode, text=text),
+        own_mode=None if mode is Mode.AUTO else mode)
 
 
 def arm(turn: Turn) -> bool:
     """Ask for arming; False when not permitted or not now."""
-    if is_busy(turn, ARMING):
-        return False
-    number = turn.new_id()
-    if not turn.act(Arm(command_id=number)):
-        return False
-    turn.update(pending_command=(number, turn.t_s, ARMING))
-    return True
+    return _ask(turn, ARMING, lambda number: Arm(command_id=number))
 
 
 def tack(turn: Turn, text: str) -> bool:
     """Ask for a tack; False when not permitted or not now."""
-    if is_busy(turn, TACK):
+    if not _ask(turn, TACK, lambda number: Tack(command_id=number, text=text), tacked_s=turn.t_s):
         return False
-    number = turn.new_id()
-    if not turn.act(Tack(command_id=number, text=text)):
-        return False
-    turn.update(pending_command=(number, turn.t_s, TACK), tacked_s=turn.t_s)
     turn.say(Severity.NOTICE, "short tack", text)
     return True
 
 
 def run_motor(turn: Turn, *, on: bool, text: str) -> bool:
     """Ask for the motor to be run or not; False when not permitted or not now."""
-    what = MOTOR_ON if on else MOTOR_OFF
-    if is_busy(turn, what):
-        return False
-    number = turn.new_id()
-    if not turn.act(RunMotor(command_id=number, is_on=on, text=text)):
-        return False
-    turn.update(pending_command=(number, turn.t_s, what))
-    return True
+    return _ask(
+        turn, MOTOR_ON if on else MOTOR_OFF, lambda number: RunMotor(command_id=number, is_on=on, text=text))
 
 
 def make_current(turn: Turn, seq: int) -> bool:
     """Make an item current and the mission run (p2 = 1); False when not permitted or not now."""
-    if is_busy(turn, CURRENT):
-        return False
-    number = turn.new_id()
-    if not turn.act(SetCurrent(command_id=number, seq=seq, reset=True)):
-        return False
-    turn.update(
-        pending_command=(number, turn.t_s, CURRENT), current_asked_s=turn.t_s, asked_seq=seq, index=seq - 1)
-    return True
+    return _ask(
+        turn, CURRENT, lambda number: SetCurrent(command_id=number, seq=seq, reset=True),
+        current_asked_s=turn.t_s, asked_seq=seq, index=seq - 1)
 
 
 def check_current(turn: Turn) -> None:
