@@ -19,6 +19,7 @@ PROGRAM = Program(
         "fence": "check, convert, upload, download fences",
         "mission": "check, make, convert, upload, download missions",
         "doctor": "is this autopilot set up to be sailed?",
+        "key": "make a signing key, put it on the autopilot, take it off",
         "replay": "fold a recorded voyage again",
         "report": "pictures and a summary of a voyage",
     },

@@ -125,6 +125,9 @@ def signing(report: Report, seen: Examined) -> None:
             "the autopilot signs its messages and no key was given",
             "it answers unsigned ones on this port (as on USB), not on others: give --signing-key FILE" if answers else
             "it refuses what is not signed: give --signing-key FILE, to 'companion run' as well")
+    elif not seen.is_signed and not seen.has_key:
+        report.add(Level.INFO, "signing", "nothing is signed: whoever can send to the autopilot orders the boat",
+                   "where a stranger can (a telemetry radio), give it a key: 'companion key new', 'companion key set'")
 
 
 def version(report: Report, seen: Examined) -> None:

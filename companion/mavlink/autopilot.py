@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import TracebackType
@@ -109,6 +110,11 @@ class Autopilot:
             for callback in tuple(self._listeners):
                 self.link.guard(getattr(callback, "__qualname__", repr(callback)), callback, value)
         self._changed.set()
+
+    async def first_status(self) -> AutopilotStatus | None:
+        """Return the newest status; without one wait for it, a few heartbeats long."""
+        await self._wait_status(lambda _: True, -math.inf)
+        return self.status
 
     async def _wait_status(
         self, holds: Callable[[AutopilotStatus], bool], since_s: float, timeout_s: float = CONFIRM_S

@@ -416,6 +416,8 @@ class Link:
             return "it speaks MAVLink 1; set SERIALn_PROTOCOL 2 on the autopilot's port"
         if dropped[Drop.BAD_SIGNATURE]:
             return "its frames are not signed with this key"
+        if dropped[Drop.UNSIGNED]:
+            return "its frames are not signed; 'companion key set' puts a key on the autopilot"
         if self.stats.frames_in == 0:
             return f"{stats.bytes_in} bytes and no MAVLink frame among them; check the baud rate"
         census = self._reception.census

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import re
+import secrets
 import stat
 from pathlib import Path
 
-from companion.disk import Disk
+from companion.disk import Disk, reason
 from companion.errors import InputError, unreadable
 from companion.mavlink.wire.frames import SigningState
 
@@ -45,6 +47,27 @@ def read_key(path: Path) -> bytes:
     if not text:
         raise InputError(str(path), "", "the signing key is empty", "write 64 hex digits or a passphrase")
     return hashlib.sha256(text.encode("utf-8")).digest()
+
+
+def make_key(path: Path, passphrase: str = "") -> None:
+    """Write a new key that only its owner can read: a random one, or the passphrase's.
+
+    Raises:
+        InputError: there is something at ``path`` already, or it cannot be written.
+    """
+    try:
+        fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        try:
+            os.write(fd, f"{passphrase.strip() or secrets.token_hex(32)}\n".encode())
+            os.fsync(fd)
+        finally:
+            os.close(fd)
+        Disk().sync_folder(path.parent)
+    except FileExistsError:
+        raise InputError(
+            str(path), "", "is there already", "a key may be in use and is not written over: choose another") from None
+    except OSError as error:
+        raise InputError(str(path), "", f"cannot be written ({reason(error)})", "choose another place") from error
 
 
 class SigningStore:

@@ -33,7 +33,8 @@ class Drop(enum.Enum):
     NOISE = "bytes outside any frame"
     BAD_CRC = "frames with a wrong checksum"
     BAD_HEADER = "frames with flags or an id that do not exist"
-    BAD_SIGNATURE = "frames unsigned or with a wrong signature"
+    BAD_SIGNATURE = "frames with a wrong signature, or one of before"
+    UNSIGNED = "frames without a signature where there is a key"
     MAVLINK_1 = "frames of MAVLink 1"
     FOREIGN_SYSTEM = "messages of another system"
     OWN_IDS = "messages with our own ids: echoes, or a second companion"
@@ -166,7 +167,7 @@ class Codec:
             return self._mav.decode(frame)
         except wire.MAVError as error:
             if "signature" in str(error).lower():
-                self.dropped[Drop.BAD_SIGNATURE] += 1
+                self.dropped[Drop.BAD_SIGNATURE if frame[2] & _SIGNED else Drop.UNSIGNED] += 1
                 return False
             self.dropped[Drop.BAD_CRC] += 1
             return None

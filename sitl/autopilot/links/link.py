@@ -43,6 +43,7 @@ GROUPS: dict[int, tuple[int, ...]] = {
 MAX_BUFFER_BYTES = 65536
 MAX_UNREAD_BYTES = 1 << 20
 FIRST_STREAMS_S = 2.96
+SIGNING_AHEAD = 60 * 100_000   # of a key's timestamp when it is taken up [10 µs]
 
 
 class Link:
@@ -61,6 +62,16 @@ class Link:
         # messages of one rate are sent together: (interval, next due time, messages)
         self._buckets: list[tuple[float, float, tuple[int, ...]]] = []
         self.restart(0.0)
+
+    def sign(self, key: bytes, timestamp: int) -> None:
+        """Sign what is sent and demand it of what is heard, but on port 0, the USB; all zero: neither."""
+        signing = self._codec.signing
+        is_on = timestamp > 0 or any(key)
+        signing.secret_key, signing.sign_outgoing = (key, True) if is_on else (None, False)
+        signing.link_id, signing.timestamp = self.number, timestamp + SIGNING_AHEAD
+        signing.stream_timestamps.clear()
+        signing.allow_unsigned_callback = lambda _, msgid: (
+            self.number == 0 or msgid in {mav.MAVLINK_MSG_ID_RADIO_STATUS, mav.MAVLINK_MSG_ID_RADIO})
 
     # --------------------------------------------------------------------------------------------- bytes
     def hear(self, data: bytes) -> None:

@@ -17,6 +17,7 @@ class Voice:
         self.links: dict[int, Link] = {}
         self._text_id = 0
         self._late_texts: list[tuple[int, str]] = []
+        self._key: tuple[bytes, int] | None = None   # and its timestamp; kept over reboots
 
     @property
     def has_work(self) -> bool:
@@ -34,7 +35,15 @@ class Voice:
         if link is None:
             link = self.links[number] = Link(number, self._sysid)
             link.restart(t_s)
+            if self._key is not None:
+                link.sign(*self._key)
         return link
+
+    def take_key(self, key: bytes, timestamp: int) -> None:
+        """SETUP_SIGNING: from now on, on every port."""
+        self._key = key, timestamp
+        for link in self.links.values():
+            link.sign(key, timestamp)
 
     def restart(self, t_s: float) -> None:
         """A reboot: default rates, nothing waiting."""

@@ -84,6 +84,11 @@ class Ports:
             pilot.helm.set_mode(m.custom_mode)
         elif name == "REQUEST_DATA_STREAM":
             commands.send_group(pilot, m, link)
+        elif name == "SETUP_SIGNING":
+            if self._core.is_armed:
+                self._voice.announce(mav.MAV_SEVERITY_WARNING, "ERROR: Won't setup signing when armed")
+            else:
+                self._voice.take_key(bytes(m.secret_key), m.initial_timestamp)
         elif name == "TIMESYNC" and m.tc1 == 0:
             link.send(mav.MAVLink_timesync_message(self._core.boot_us * 1000, m.ts1))
 
