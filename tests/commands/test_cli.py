@@ -37,7 +37,7 @@ def test_every_sitl_command_has_help(command, capsys):
 
 @pytest.mark.parametrize(("words", "meant"), [
     (["convert", "a.wkt", "b.plan"], "did you mean `companion fence convert` or `companion mission convert`?"),
-    (["new", "a.toml"], "did you mean `companion mission new`?"),
+    (["new", "a.toml"], "did you mean `companion mission new`"),
     (["replai", "v"], "did you mean `companion replay`?"),
     (["sail"], "there are run, plan, wind"),
     (["doctor", "--link", "udpin:127.0.0.1:1", "syd.toml"], "a mission is given as --mission syd.toml"),
