@@ -12,6 +12,7 @@ PROGRAM = Program(
     description="A simulated ArduRover sailboat, weather, and scenarios for the companion.",
     package="sitl.commands",
     commands={
+        "demo": "the archipelago, with live progress: what a new user sees first",
         "boat": "the simulated autopilot alone, for any MAVLink client",
         "run": "sail a scenario: autopilot, weather, companion, verdict",
         "campaign": "a scenario over many seeds: success, risk, time",

@@ -42,20 +42,24 @@ Exit codes: 0 in order, 1 faults found or a failed transfer, 2 a file or option 
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
-    """Add the command with its five verbs."""
+    """Add the command with its six verbs."""
     from companion.commands.fence import link_options
 
     parser = subparsers.add_parser(
         "mission", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    verbs = parser.add_subparsers(dest="verb", metavar="check|new|convert|upload|download", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="check|new|example|convert|upload|download", required=True)
     check = verbs.add_parser("check", help="read a mission as the boat would and name what is wrong")
     check.add_argument("file", metavar="FILE")
     preview_options(check)
     check.set_defaults(run=_check)
 
     mission_new.add_parser(verbs)
+
+    example = verbs.add_parser("example", help="write the missions that come with the program, to begin from")
+    example.add_argument("folder", type=Path, metavar="DIR")
+    example.set_defaults(run=_example)
 
     convert = verbs.add_parser("convert", help="write a mission in another format and say what it does not carry")
     convert.add_argument("file", metavar="FILE")
@@ -79,6 +83,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     force_option(download)
     link_options(download)
     download.set_defaults(run=_download)
+
+
+def _example(args: argparse.Namespace) -> int:
+    from companion import examples
+    from companion.disk import Disk, reason
+
+    files = sorted(path for path in examples.folder().iterdir() if path.suffix in {".toml", ".wkt"})
+    there = [path.name for path in files if (args.folder / path.name).exists()]
+    if there:
+        raise InputError(str(args.folder), there[0], "is there already", "name another folder: nothing is written over")
+    try:
+        args.folder.mkdir(parents=True, exist_ok=True)
+        for path in files:
+            Disk().replace(args.folder / path.name, path.read_bytes())
+    except OSError as error:
+        raise InputError(str(args.folder), "", f"cannot be written ({reason(error)})", "name another folder") from error
+    missions = [path for path in files if path.suffix == ".toml"]
+    print(f"{counted(len(missions), 'mission')} in {args.folder}; next: companion mission check {args.folder}/"
+          f"archipelago.toml --plot archipelago.png")
+    return 0
 
 
 def _check(args: argparse.Namespace) -> int:

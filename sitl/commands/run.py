@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import math
 import sys
 from datetime import UTC, datetime
@@ -12,6 +13,20 @@ from typing import Any
 from companion.arguments import number, out_folder, whole
 from companion.words import counted, file_name
 
+OURS = {path.stem: path for path in (Path(__file__).resolve().parents[1] / "scenarios").rglob("*.toml")}
+
+
+def scenario_file(text: str) -> Path:
+    """Return the file, or the scenario of ours with that name."""
+    path = Path(text)
+    if path.exists() or path.suffix:
+        return path
+    if text not in OURS:
+        close = difflib.get_close_matches(text, OURS, n=1)
+        raise argparse.ArgumentTypeError(
+            f"there is neither a file nor a scenario {text}; {f'did you mean {close[0]}?' if close else 'see --help'}")
+    return OURS[text]
+
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
@@ -20,9 +35,15 @@ def add_parser(subparsers: Any, summary: str) -> None:
         description="Run a scenario: autopilot, weather, companion, and a verdict on what the boat really did. The "
         "embedded autopilot runs under the virtual clock in this process; with --live it is a process of its own "
         "over UDP, as is the companion; with --autopilot ardurover it is the real program.",
-        epilog="Example: sitl run sitl/scenarios/demo.toml --seed 3",
+        epilog="Examples: sitl run demo --seed 3, sitl run my-mission.toml --live",
     )
-    parser.add_argument("scenario", type=Path, metavar="SCENARIO.toml", help="a scenario or a mission file")
+    parser.add_argument("scenario", type=scenario_file, metavar="SCENARIO",
+                        help=f"a scenario or a mission file, or one of ours: {', '.join(sorted(OURS))}")
+    add_options(parser)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add all but the scenario."""
     parser.add_argument("--autopilot", choices=("embedded", "ardurover"), default="embedded")
     parser.add_argument("--ardurover", type=Path, metavar="PATH", help="the ArduRover program (default: $ARDUROVER, "
                         "the PATH, what `sitl fetch` brought)")

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import msgspec
 
+from companion import examples
 from companion.errors import InputError
 from companion.words import choices
 
@@ -182,8 +183,10 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)
 
     def mission_path(self, source: Path) -> Path:
-        """Return the mission file, which is named relative to the scenario."""
-        return (source.parent / self.mission).resolve()
+        """Return the mission file, which is named relative to the scenario; installed, ours are in the package."""
+        path = (source.parent / self.mission).resolve()
+        ours = examples.folder() / path.name
+        return ours if path.parent.name == ours.parent.name and ours.is_file() and not path.is_file() else path
 
 
 def load_scenario(path: Path) -> Scenario:

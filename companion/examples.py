@@ -1,0 +1,13 @@
+"""The missions that come with the program: inside it where it is installed, beside it in a checkout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_HERE = Path(__file__).resolve().parent
+
+
+def folder() -> Path:
+    """Return the folder of the missions and their areas."""
+    installed = _HERE / "missions"
+    return installed if installed.is_dir() else _HERE.parent / "missions"

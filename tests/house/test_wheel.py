@@ -1,0 +1,53 @@
+"""What is installed from a wheel works from an empty folder, without the checkout beside it."""
+
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """The wheel's content, and the libraries that it is installed beside; not the checkout."""
+    folder = tmp_path_factory.mktemp("wheel")
+    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)], check=True,
+                   capture_output=True)
+    wheel, = folder.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder / "site")
+    return folder / "site"
+
+
+def run(installed, folder, *words):
+    return subprocess.run(
+        [sys.executable, "-m", *words], cwd=folder, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(installed)})
+
+
+def test_it_holds_what_it_needs_and_nothing_else(installed):
+    assert {p.name for p in installed.iterdir() if not p.name.endswith(".dist-info")} == {"companion", "sitl"}
+    inside, beside = (sorted(p.name for p in folder.glob("*.toml"))
+                      for folder in (installed / "companion" / "missions", Path("missions")))
+    assert inside == beside
+    assert (installed / "companion" / "kernels.txt").is_file()
+
+
+def test_it_sails_from_an_empty_folder(installed, tmp_path):
+    written = run(installed, tmp_path, "companion.cli", "mission", "example", "mine")
+    assert written.returncode == 0, written.stderr
+    again = run(installed, tmp_path, "companion.cli", "mission", "example", "mine")
+    assert (again.returncode, again.stderr.count("\n")) == (2, 1)
+    assert run(installed, tmp_path, "companion.cli", "mission", "check", "mine/lake.toml").returncode == 0
+    sailed = run(installed, tmp_path, "sitl.cli", "run", "rocks", "--out", "v")
+    assert sailed.returncode == 0, sailed.stdout + sailed.stderr
+    assert "PASSED" in sailed.stdout
+    assert (tmp_path / "v" / "voyage.png").is_file()
+
+
+def test_a_scenario_that_nobody_knows_is_one_line(installed, tmp_path):
+    done = run(installed, tmp_path, "sitl.cli", "run", "rokcs")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "did you mean rocks?" in done.stderr
