@@ -17,7 +17,6 @@ from companion.skipper.step.snapshot import (
     CommandOutcome,
     CommandResult,
     Disbelieved,
-    OperatorWish,
     PlanOutcome,
     ReadOutcome,
     UploadOutcome,
@@ -85,7 +84,7 @@ def _take_command(turn: Turn, outcome: CommandOutcome) -> None:
 
 
 def take_events(turn: Turn) -> None:
-    """Take events: reboots, somebody else's uploads, the operator's wishes."""
+    """Take events: reboots, somebody else's uploads, what is not believed."""
     status = turn.snapshot.autopilot
     rebooted = any(isinstance(e, AutopilotRebooted) for e in turn.snapshot.events)
     if status is not None and status.boot_s is not None:
@@ -102,8 +101,6 @@ def take_events(turn: Turn) -> None:
             note(turn, event)
         elif isinstance(event, Disbelieved):
             turn.say(Severity.WARNING, event.what, event.text, every_s=0.0)
-        elif isinstance(event, OperatorWish):
-            turn.update(wish=event)
 
 
 def count_time(turn: Turn) -> None:
