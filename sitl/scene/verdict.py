@@ -251,6 +251,10 @@ def judge(
         there = np.flatnonzero(np.hypot(*(positions - goal_en_m).T) <= (expect.within_m or 0.0))
         on_the_way, _ = count_tacks(truth, int(there[0]) if len(there) else None)
         check("tacks on the way", on_the_way <= expect.max_tacks, on_the_way, f"at most {expect.max_tacks}")
+    if expect.held is not None:
+        stay = positions[[expect.held.from_s <= t <= expect.held.to_s for t in truth.t_s]]
+        radius_m = float(np.max(np.hypot(*(stay - stay.mean(axis=0)).T))) if len(stay) else math.inf
+        check("held within, m", radius_m <= expect.held.within_m, radius_m, f"at most {expect.held.within_m}")
     if expect.end_phase is not None:
         check("end phase", summary.get("end_phase") == expect.end_phase, summary.get("end_phase"), expect.end_phase)
     if expect.marks_rounded is not None:

@@ -53,7 +53,7 @@ def _answer(turn: Turn, order: Order) -> None:
         others = tuple(a for a in lately if a.order.source != order.source)
         turn.update(answered=(*others, Answered(order=order, answer=answer, t_s=turn.t_s))[-STATIONS:])
     source = order.source
-    turn.act(Acknowledge(kind=source.kind, system=source.system, component=source.component, command=order.command,
+    turn.act(Acknowledge(way=source.kind, system=source.system, component=source.component, command=order.command,
                          result=answer.result, text=answer.text))
     turn.say(Severity.NOTICE if answer.result is Result.DONE else Severity.WARNING, CODE,
              f"{lead_in(order.wanted)}{answer.text}", every_s=0.0)

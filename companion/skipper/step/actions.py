@@ -191,12 +191,12 @@ class StopOrders:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Acknowledge:
-    """Answer an order to who gave it: ``command`` with ``result``, to ``system`` and ``component`` on the way ``kind``.
+    """Answer an order to who gave it: ``command`` with ``result``, to ``system`` and ``component`` on the way that it came, ``way``.
 
     The sentence is announced beside it.
     """
 
-    kind: str
+    way: str
     system: int
     component: int
     command: int
