@@ -22,7 +22,7 @@ _BY_RESULT = {value: result for result, value in RESULTS.items()}
 
 def lead_in(wanted: Wanted) -> str:
     """Return how the sentence begins that answers an order."""
-    return f"order {wanted.verb}: "
+    return f"order {wanted.verb or 'unknown'}: "
 
 
 class OrderSend:
