@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Callable
 from typing import Any
 
 from companion.clock import now_s
@@ -13,6 +15,7 @@ from companion.skipper.step import Severity
 
 # What comes in one step beyond this is sent away: each order costs the radio an answer.
 MOST_WAITING = 4
+LOOK_S = 5.0
 
 
 class Crew:
@@ -24,7 +27,7 @@ class Crew:
     def __init__(self, link: Link, *, has_key: bool) -> None:
         self._link, self._authority = link, "signed" if has_key else "unsigned"
         self._waiting: list[Order] = []
-        self._is_open = self._has_told = False
+        self._is_open = False
         link.on_command = self._hear
 
     def begin(self) -> None:
@@ -41,14 +44,15 @@ class Crew:
         """How many commands to us were not signed with our key."""
         return self._link.dropped()[Drop.UNSIGNED_COMMAND]
 
-    def tell_unsigned(self, autopilot: Autopilot) -> str:
-        """Say once that somebody without the key gives commands, and return the words; empty: nobody, or it is said."""
-        if not self.unsigned or self._has_told:
-            return ""
-        self._has_told = True
+    async def watch(self, autopilot: Autopilot, record: Callable[[dict[str, Any]], None]) -> None:
+        """Say and record, once, that somebody without the key gives commands."""
         text = "somebody without this boat's key gives commands to the companion: they count for nothing"
-        autopilot.say(int(Severity.WARNING), text)
-        return text
+        while True:
+            if self.unsigned:
+                autopilot.say(int(Severity.WARNING), text)
+                record({"kind": "refusal", "what": "unsigned commands", "text": text})
+                return
+            await asyncio.sleep(LOOK_S)
 
     def _hear(self, message: Any) -> int:
         if message.command not in COMMANDS:

@@ -131,6 +131,7 @@ class _Shell:
                         group.create_task(keep_parameters(self.fold, autopilot), name="parameters"),
                         group.create_task(keep_fence(self.fold, autopilot, self.mission, self._record), name="fence"),
                         group.create_task(radio.run(), name="radio"),
+                        group.create_task(crew.watch(autopilot, self._record), name="crew"),
                         group.create_task(self._tend_records(), name="records"),
                         group.create_task(self._watch_loop(), name="loop watch"),
                     ]
@@ -299,17 +300,8 @@ class _Shell:
     async def _tend_records(self) -> None:
         while True:
             await asyncio.sleep(TEND_EVERY_S)
-            self._tell_unsigned()
             stamps = self.log.stamps(self.log.now_s())
             await self.options.offload(functools.partial(self.recorder.tend, stamps))
-
-    def _tell_unsigned(self) -> None:
-        """Say and record, once, that somebody without the key gives commands."""
-        if self._crew is None or self._autopilot is None:
-            return
-        text = self._crew.tell_unsigned(self._autopilot)
-        if text:
-            self._record({"kind": "refusal", "what": "unsigned commands", "text": text})
 
     # ---------------------------------------------------------------------------------------- files
     def _refuse(self, what: str, text: str) -> None:

@@ -191,8 +191,8 @@ def judge(
 
     ``hull`` is what touches. ``floor_m`` is the mission's, which the hull must keep in ordinary weather; None: not
     asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
-    ``ordered`` are the systems of other autopilots that were given orders, None where there was no other. ``began_s`` is
-    the scenario's beginning in the track's time.
+    ``ordered`` are the systems of other autopilots that were given orders, None where there was no other. The
+    scenario's beginning is ``began_s`` in the track's time.
     """
     ends = {"goal": [goal_en_m], "home": truth.en_m[:1], "refuge": refuges_en_m}[expect.ends_at]
     positions = truth.positions_m()

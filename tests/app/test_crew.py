@@ -60,8 +60,9 @@ def test_with_a_key_what_is_not_signed_with_it_is_counted_and_said_once(tmp_path
         assert (crew.unsigned, peer.of("COMMAND_ACK")) == (2, [])
         assert link.dropped()[Drop.BAD_SIGNATURE] == 4
         async with Autopilot(link) as autopilot:
-            assert "without this boat's key" in crew.tell_unsigned(autopilot)
-            assert crew.tell_unsigned(autopilot) == ""
+            told = []
+            await crew.watch(autopilot, told.append)
+            assert ["without this boat's key" in record["text"] for record in told] == [True]
         peer.end.write(Codec(255, 190, good).pack(command(8)))
         await asyncio.sleep(0.1)
         assert [(o.wanted.verb, o.authority) for o in crew.take()] == [(Verb.STOP, "signed")]

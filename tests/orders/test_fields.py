@@ -7,7 +7,19 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.orders import COMMANDS, RESULTS, TABLE, Place, Result, Verb, Wanted, mark_of, message_of, wanted_of, which
+from companion.orders import (
+    COMMANDS,
+    RESULTS,
+    TABLE,
+    Place,
+    Result,
+    Verb,
+    Wanted,
+    mark_of,
+    message_of,
+    wanted_of,
+    which,
+)
 from companion.orders.fields import GLOBAL_FRAMES, PLACE_COMMAND, VERB_COMMAND
 
 FLOAT32 = st.floats(width=32, allow_nan=True, allow_infinity=True)
@@ -23,7 +35,7 @@ def on_the_wire(message):
 def test_each_verb_has_a_number_of_its_own_and_a_row():
     assert {row.verb for row in TABLE} == set(Verb)
     assert [row.number for row in TABLE] == list(range(1, len(Verb) + 1))
-    assert COMMANDS == {31010, 31011}
+    assert {31010, 31011} == COMMANDS
     assert {Result.NO_ANSWER} == set(Result) - set(RESULTS)
 
 

@@ -1,4 +1,4 @@
-"""Orders over real MAVLink to a voyage on the simulated autopilot: another's client, restarts, what is not permitted."""
+"""Orders over real MAVLink to a voyage on the simulated autopilot: by another's client, over restarts, refused."""
 
 import asyncio
 import json

@@ -191,9 +191,9 @@ class StopOrders:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Acknowledge:
-    """Answer an order to who gave it: ``command`` with ``result``, to ``system`` and ``component`` on the way that it came, ``way``.
+    """Answer an order to who gave it: ``command`` with ``result``, to ``system`` and ``component``.
 
-    The sentence is announced beside it.
+    ``way`` is how the order came; the sentence is announced beside it.
     """
 
     way: str

@@ -75,7 +75,7 @@ def test_hold_is_here_and_lasts_until_told_to_go_on():
 
 def test_hold_on_the_way_to_the_loiter_that_ends_the_mission_is_here_too():
     world = sailing(A)
-    world.run(600, lambda w: is_done(w))
+    world.run(600, is_done)
     place = world.state.route.points_en_m[-1]
     for off_m in range(0, 95, 5):      # carried off
         world.position = (place[0] + off_m, place[1])
