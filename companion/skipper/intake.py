@@ -10,6 +10,7 @@ from companion.skipper.board.uploads import take_upload
 from companion.skipper.deeds.failsafe import note
 from companion.skipper.deeds.helm import MOTOR_OFF, MOTOR_ON
 from companion.skipper.planning.answers import take_plan
+from companion.skipper.planning.errands import errand
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.snapshot import (
@@ -133,6 +134,9 @@ def locate(turn: Turn) -> None:
         if guided and turn.config.guidance is Guidance.FIELD and turn.state.route is not None:
             # Steered to the gates themselves: the waypoints before a gate that is passed need not be.
             done = [n + 1 for n, g in enumerate(route.gate_of) if 0 <= g < turn.state.gate]
+            bound = errand(turn)
+            if bound is not None and bound.name == route.bound_for and distance_m(boat, bound.en_m) <= bound.radius_m:
+                done = [len(route.items) - 1]
             if done and done[-1] > turn.state.index:
                 turn.update(index=done[-1], own_index=done[-1])
         _remember(turn)

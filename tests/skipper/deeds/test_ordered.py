@@ -9,7 +9,7 @@ import pytest
 from companion.messages import Mode
 from companion.orders import Result, Verb
 from companion.skipper.step import actions as act
-from companion.skipper.step.config import ALL_PERMITTED, DRY_RUN
+from companion.skipper.step.config import ALL_PERMITTED, DRY_RUN, Guidance
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import distance_m
@@ -56,8 +56,9 @@ def geo(east_m, north_m):
 
 
 # -------------------------------------------------------------------------------------------- hold, go on
-def test_hold_is_here_and_lasts_until_told_to_go_on():
-    world = sailing()
+@pytest.mark.parametrize("guidance", list(Guidance))
+def test_hold_is_here_and_lasts_until_told_to_go_on(guidance):
+    world = sailing(config={"guidance": guidance})
     here = world.position
     given = answer(world, "hold")
     assert (given.result, given.system, given.component, given.command) == (Result.DONE, 255, 190, 31010)
@@ -139,8 +140,9 @@ def test_held_ashore_she_is_not_set_sailing():
 
 
 # ------------------------------------------------------------------------------------------------ places
-def test_home_is_planned_and_stayed_at():
-    world = sailing()
+@pytest.mark.parametrize("guidance", list(Guidance))
+def test_home_is_planned_and_stayed_at(guidance):
+    world = sailing(config={"guidance": guidance})
     assert answer(world, "home").text.startswith("to home, and stay there")
     assert world.run(400, lambda w: w.state.phase is Phase.HOLDING)
     world.run(120)
@@ -159,8 +161,9 @@ def test_a_refuge_by_name_by_number_and_the_nearest():
         assert distance_m(world.position, place) < 45.0
 
 
-def test_a_goal_is_sailed_to_and_the_others_follow():
-    world = sailing()
+@pytest.mark.parametrize("guidance", list(Guidance))
+def test_a_goal_is_sailed_to_and_the_others_follow(guidance):
+    world = sailing(config={"guidance": guidance})
     given = answer(world, geo(-150.0, 150.0))
     assert given.result is Result.DONE
     assert given.text.endswith("then on to A")
