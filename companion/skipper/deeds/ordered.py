@@ -159,8 +159,8 @@ def _skip_goal(turn: Turn, _: Order) -> Answer:
     following = gate.goal + 1
     if following >= len(turn.voyage.legs):
         return _not_now(f"{gate.name} is the last goal: {Verb.HOLD} to stay here, {Verb.HOME} or {Verb.REFUGE}")
-    if boat is None:
-        return _not_now("her position is not known")
+    if boat is None or turn.state.adoptable is not None:
+        return _not_now("her position is not known" if boat is None else "the mission on board is being compared")
     _let_go_of_plan(turn)
     turn.approach(Approach(goal=following, en_m=boat))
     text = f"{gate.name} is given up"
