@@ -255,8 +255,9 @@ def judge(
         check("tacks on the way", on_the_way <= expect.max_tacks, on_the_way, f"at most {expect.max_tacks}")
     if expect.held is not None:
         stay = positions[[expect.held.from_s <= t - began_s <= expect.held.to_s for t in truth.t_s]]
-        radius_m = float(np.max(np.hypot(*(stay - stay.mean(axis=0)).T))) if len(stay) else math.inf
-        check("held within, m", radius_m <= expect.held.within_m, radius_m, f"at most {expect.held.within_m}")
+        radius_m = float(np.max(np.hypot(*(stay - stay.mean(axis=0)).T))) if len(stay) else None
+        check("held within, m", radius_m is not None and radius_m <= expect.held.within_m, radius_m,
+              f"at most {expect.held.within_m}")
     if expect.end_phase is not None:
         check("end phase", summary.get("end_phase") == expect.end_phase, summary.get("end_phase"), expect.end_phase)
     if expect.marks_rounded is not None:
