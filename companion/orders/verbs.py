@@ -42,7 +42,7 @@ class Row:
 TABLE: tuple[Row, ...] = (
     Row(verb=Verb.HOLD, number=1, stands=True, button="Hold here",
         means="loiter here, where there is room near by, until told to go on",
-        refused="she is not under way, a person has her, the battery is critical"),
+        refused="a person has her, the battery or a failsafe comes first, uploading is not permitted"),
     Row(verb=Verb.GO_ON, number=2, button="Go on",
         means="the end of whatever order stands: on to the next goal", refused="never"),
     Row(verb=Verb.SKIP_GOAL, number=3, button="Skip this goal",
@@ -50,14 +50,15 @@ TABLE: tuple[Row, ...] = (
         refused="it is the last one: hold, home or a refuge say where to stay instead"),
     Row(verb=Verb.REFUGE, number=4, takes="[NAME]", stands=True, button="To the nearest refuge",
         means="sail to the refuge of that name, or the nearest, and stay there until told to go on",
-        refused="the mission has none of that name (they are listed); and as `hold`"),
+        refused="the mission has none of that name (they are listed); she is not under way; as `hold`"),
     Row(verb=Verb.HOME, number=5, stands=True, button="Home",
         means="sail to where she was armed and stay there until told to go on; planned like any leg, never RTL",
-        refused="the autopilot has not told where home is, or it is in no free water; and as `hold`"),
+        refused="the autopilot has not told where home is, or it is in no free water; she is not under way; as `hold`"),
     Row(verb=Verb.GOAL, number=6, takes="LAT LON", stands=True,
         means="sail to that place, then on to the goals that are left",
         refused="it is no position (0, 0; not a number; outside ±90 or ±180), on land, outside the fence, nearer to "
-        "something than the margin's floor, farther than 50 km, or latitude and longitude are swapped; and as `hold`"),
+        "something than the margin's floor, farther than 50 km, or latitude and longitude are swapped; she is not under "
+        "way; as `hold`"),
     Row(verb=Verb.REPLAN, number=7, button="Plan again",
         means="a new plan from where she is", refused="she is not sailing to anywhere"),
     Row(verb=Verb.STOP, number=8, stands=True, button="Give the boat up",
