@@ -16,6 +16,7 @@ PROGRAM = Program(
         "plan": "plan a path on a problem",
         "wind": "forecast a wind record and score the forecasts",
         "status": "what the companion says over the radio",
+        "order": "tell the companion on board what to do",
         "fence": "check, convert, upload, download fences",
         "mission": "check, make, convert, upload, download missions",
         "doctor": "is this autopilot set up to be sailed?",

@@ -9,6 +9,7 @@ from typing import Any
 from companion.boat import Boat, Hull, Polar, ardurover_sitl, constant, read_polar
 from companion.errors import InputError
 from companion.geofence import Mission
+from companion.orders import ALL, Verb, unknown
 from companion.skipper.step import Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.way import Goal, Refuge, Side, Voyage
 from companion.traffic import TargetLimits
@@ -105,9 +106,21 @@ def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
         return Permissions()
     operator = mission.operator
     return Permissions(
+        orders=orders_of(mission),
         may_upload=operator.set_auto, may_upload_fence=operator.upload_fence, may_arm=operator.arm,
         may_set_mode=operator.set_auto, may_steer=operator.guided, may_replace_foreign=operator.replace_foreign,
     )
+
+
+def orders_of(mission: Mission) -> tuple[str, ...]:
+    """Return the verbs that the crew may give by MAVLink. Raises InputError for a word that is none."""
+    given = mission.operator.orders
+    words = (given,) if isinstance(given, str) else given
+    for word in words:
+        if word != ALL and word not in set(Verb):
+            said, _, remedy = unknown(word).partition("; ")
+            raise InputError(str(mission.path), "[operator] orders", said, f'{remedy}, or "{ALL}"')
+    return tuple(words)
 
 
 def estimator_of(mission: Mission) -> Estimator:

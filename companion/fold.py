@@ -173,7 +173,7 @@ class VoyageFold:
         self._outcomes.append(outcome)
 
     def event(self, event: Event) -> None:
-        """Take something that happened outside the link: an operator's wish."""
+        """Take something that happened outside the autopilot's messages: an order of the crew."""
         self._events.append(event)
 
     def parameters(self, values: Mapping[str, float]) -> None:

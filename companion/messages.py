@@ -378,6 +378,8 @@ class CompanionStatus:
     position: GeoPoint | None = None
     bytes_out_per_s: float | None = None      # own traffic
     traffic: TrafficStatus | None = None      # None: no vessel was ever heard and there is no feed
+    order: str = ""                           # the verb of the order that stands; empty: none does
+    order_age_s: float | None = None
     alert_code: str = ""                      # the rule or watchdog that speaks; empty: all is well
     alert_text: str = ""
 
@@ -387,5 +389,5 @@ class CompanionStatus:
             cross_track_m=self.cross_track_m, clearance_m=self.clearance_m, twd_from_rad=self.twd_from_rad,
             twd_sigma_rad=self.twd_sigma_rad, tws_mps=self.tws_mps, tws_sigma_mps=self.tws_sigma_mps,
             next_tack_s=self.next_tack_s, promised_risk=self.promised_risk, plan_age_s=self.plan_age_s,
-            battery_v=self.battery_v, bytes_out_per_s=self.bytes_out_per_s,
+            battery_v=self.battery_v, bytes_out_per_s=self.bytes_out_per_s, order_age_s=self.order_age_s,
         )

@@ -22,6 +22,7 @@ from companion.mavlink.tlog import read_tlog
 from companion.mavlink.trust import OWN_COMPONENT
 from companion.mavlink.wire import Codec, Message
 from companion.messages import MissionItem
+from companion.orders import Order
 from companion.planner import Plan
 from companion.skipper import Skipper
 from companion.skipper.step import (
@@ -98,7 +99,8 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
     with believed(folder / VOYAGE, "[run], [mission] and [permissions]"):
         epoch_s = float(description["run"]["epoch_s"])
         recorded_path = _mission_path(folder, description["mission"])
-        permissions = Permissions(**description["permissions"])
+        permitted = description["permissions"]
+        permissions = Permissions(**{**permitted, "orders": tuple(permitted.get("orders", ()))})
     mission = load_mission(mission_path or recorded_path)
     skipper = Skipper(voyage=voyage_of(mission), config=config_of(mission))
     decisions = read_decisions(folder)
@@ -122,7 +124,7 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
         outcomes = iter([d for d in decisions if start_s <= d["t_s"] < end_s and d["kind"] in {"plan", "outcome"}])
         fed: dict[float, list[dict[str, Any]]] = {}
         for record in decisions:
-            if record["kind"] in {"ais", "others"}:
+            if record["kind"] in {"ais", "others", "order"}:
                 fed.setdefault(float(record["t_s"]), []).append(record)
         recorded = _actions_by_time([d for d in decisions if start_s <= d["t_s"] < end_s])
         for t_s, n_messages, n_outcomes in rows:
@@ -145,6 +147,8 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
                 with believed(folder / DECISIONS, f"t_s = {record['t_s']}"):
                     if record["kind"] == "ais":
                         fold.take(ais_of(record))
+                    elif record["kind"] == "order":
+                        fold.event(Order.from_dict(record["order"]))
                     else:
                         fold.others(tuple(record["neighbours"]), has_company=record["company"])
             step = fold.tick(t_s)

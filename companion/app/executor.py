@@ -18,8 +18,10 @@ from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.transfers import CommandAnswer
 from companion.mavlink.transfers import Outcome as WireOutcome
+from companion.orders import RESULTS
 from companion.planner import Plan, Problem
 from companion.skipper.step import (
+    Acknowledge,
     Action,
     Announce,
     Arm,
@@ -114,6 +116,9 @@ class Executor:
                 self._autopilot.steer_heading(action.heading_rad, thrust=action.thrust)
             elif isinstance(action, Announce):
                 self._autopilot.say(int(action.severity), action.text)
+            elif isinstance(action, Acknowledge):
+                self._autopilot.link.acknowledge(
+                    action.command, RESULTS[action.result], action.system, action.component)
             elif isinstance(action, StopOrders):
                 self._give_up(Action, action.text)
             else:

@@ -14,7 +14,7 @@ from companion.geofence.fence import FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.transfers import CommandAnswer
 from companion.mavlink.wire import RANGES
-from companion.skipper.step import Severity
+from companion.skipper.step import Severity, is_given_up
 
 LOOK_S = 1.0
 # A parameter that is not answered is asked for again after this long [s].
@@ -55,7 +55,7 @@ async def keep_fence(fold: VoyageFold, autopilot: Autopilot, mission: Mission, r
     upload: asyncio.Task[None] | None = None
     try:
         while fold.permissions.may_upload_fence:
-            is_ours = fold.state.is_ours
+            is_ours = fold.state.is_ours and not is_given_up(fold.state)
             if upload is None and is_ours:
                 upload = asyncio.create_task(_upload_fence(autopilot, mission, record), name="fence upload")
             elif upload is not None and upload.done():

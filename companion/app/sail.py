@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.app.company import NOBODY, make_way, others_on
+from companion.app.crew import Crew
 from companion.app.executor import Executor, Planner
 from companion.app.keepers import keep_fence, keep_identity, keep_parameters
 from companion.app.options import SailOptions
@@ -31,7 +32,7 @@ from companion.mavlink.wire import Drop
 from companion.messages import CompanionStatus
 from companion.skipper import Skipper
 from companion.skipper.step import Phase, Severity
-from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, outcome_record
+from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, order_record, outcome_record
 from companion.telemetry.progress import DISK, left_behind
 from companion.telemetry.radio import Radio
 from companion.telemetry.state_file import StateFile
@@ -95,6 +96,7 @@ class _Shell:
         self._system: int | None = None            # of our autopilot, as heard
         self._others = NOBODY
         self._autopilot: Autopilot | None = None
+        self._crew: Crew | None = None
         self._counted = LinkStats()
 
     async def run(self, transport: Transport) -> dict[str, Any]:
@@ -110,6 +112,7 @@ class _Shell:
                 contextlib.AsyncExitStack() as stack,
             ):
                 self._counted = link.stats
+                crew = self._crew = Crew(link, has_key=self.options.signing is not None)
                 link.subscribe(self._on_message)
                 await self._wait_autopilot(link)
                 autopilot = self._autopilot = await stack.enter_async_context(Autopilot(link))
@@ -128,9 +131,11 @@ class _Shell:
                         group.create_task(keep_parameters(self.fold, autopilot), name="parameters"),
                         group.create_task(keep_fence(self.fold, autopilot, self.mission, self._record), name="fence"),
                         group.create_task(radio.run(), name="radio"),
+                        group.create_task(crew.watch(autopilot, self._record), name="crew"),
                         group.create_task(self._tend_records(), name="records"),
                         group.create_task(self._watch_loop(), name="loop watch"),
                     ]
+                    crew.begin()
                     await self._steps(executor, link)
                     for task in tasks:
                         task.cancel()
@@ -204,6 +209,9 @@ class _Shell:
         for report in self.feeds.take():
             self.log.note(t_s, ais_record(report))
             self.fold.take(report)
+        for order in () if self._crew is None else self._crew.take():
+            self.log.note(t_s, order_record(order))
+            self.fold.event(order)
         return self.fold.tick(t_s)
 
     async def _steps(self, executor: Executor, link: Link) -> None:
@@ -321,6 +329,7 @@ class _Shell:
             "ais_dropped": self.feeds.dropped,
             "frames_disbelieved": sum(self._counted.dropped[why] for why in (Drop.WRONG_CLOCK, Drop.OUT_OF_STEP)),
             "listener_faults": dict(self._counted.faults),
+            "commands_unsigned": 0 if self._crew is None else self._crew.unsigned,
             "records_dropped": self.recorder.dropped,
             "disk_trouble": self._trouble(),
             "planner_restarts": self.planner.restarts,

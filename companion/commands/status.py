@@ -147,6 +147,9 @@ def status_document(report: Any, autopilot: Any, is_alive: bool, bytes_in: float
             "promised_risk": _round(s.promised_risk, 4), "clearance_m": _round(s.clearance_m),
             "age_s": _age(report, "status"),
         },
+        "order": None if not s.order else {
+            "verb": s.order, "stands_s": s.order_age_s, "age_s": _age(report, "status"),
+        },
         "traffic": None if s.traffic is None else _traffic(s.traffic) | {"age_s": _age(report, "traffic")},
         "position": None if s.position is None else {
             "lat_deg": s.position.lat_deg, "lon_deg": s.position.lon_deg, "age_s": _age(report, "status"),
@@ -233,6 +236,8 @@ def _write_text(d: dict[str, Any], units: str) -> None:
           f"  TWS {show(wind['tws_mps'], '.1f', factor)} {unit}  (age {show(wind['age_s'], '.1f')} s)"
           f" | P(safe) {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
           f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {replans}")
+    if d["order"] is not None:
+        print(f"  order {d['order']['verb']}, for {show(d['order']['stands_s'], '.0f', 1.0 / 60.0)} min")
     if d["traffic"] is not None:
         print(f"  {traffic_line(d['traffic'])}")
     link = d["link"]

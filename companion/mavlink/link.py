@@ -38,6 +38,8 @@ from companion.mavlink.wire.streams import DEFAULT_STREAMS, Stream, StreamMonito
 OnMessage = Callable[[float, Message], None]
 OnFrame = Callable[[float, bytes], None]
 OnCommand = Callable[[Message], int]
+# What ``on_command`` returns for a command that is answered later, with ``acknowledge``.
+LATER = -1
 
 HEARTBEAT_S = 1.0
 # Without a heartbeat of the autopilot for this long the link is silent [s].
@@ -236,6 +238,10 @@ class Link:
             if self._sink is not None:
                 self.guard("the tlog", self._sink, now, frame)
 
+    def acknowledge(self, command: int, result: int, system: int, component: int) -> None:
+        """Answer a command to who gave it."""
+        self.send(wire.MAVLink_command_ack_message(command, result, 0, 0, system, component))
+
     def started(self) -> None:
         """Say from now on that we are at work: a second companion gives way to us."""
         self._system_status = wire.MAV_STATE_ACTIVE
@@ -355,9 +361,8 @@ class Link:
         if self.on_command is not None:
             answer = self.guard("on_command", self.on_command, message)
             result = wire.MAV_RESULT_FAILED if answer is None else answer
-        self.send(wire.MAVLink_command_ack_message(
-            message.command, result, 0, 0, message.get_srcSystem(), message.get_srcComponent()
-        ))
+        if result != LATER:
+            self.acknowledge(message.command, result, message.get_srcSystem(), message.get_srcComponent())
 
     def _notice_boot(self, message: Message) -> None:
         boot_ms = getattr(message, "time_boot_ms", None)

@@ -10,6 +10,7 @@ from companion.skipper.board.uploads import take_upload
 from companion.skipper.deeds.failsafe import note
 from companion.skipper.deeds.helm import MOTOR_OFF, MOTOR_ON
 from companion.skipper.planning.answers import take_plan
+from companion.skipper.planning.errands import errand
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.snapshot import (
@@ -17,7 +18,6 @@ from companion.skipper.step.snapshot import (
     CommandOutcome,
     CommandResult,
     Disbelieved,
-    OperatorWish,
     PlanOutcome,
     ReadOutcome,
     UploadOutcome,
@@ -85,7 +85,7 @@ def _take_command(turn: Turn, outcome: CommandOutcome) -> None:
 
 
 def take_events(turn: Turn) -> None:
-    """Take events: reboots, somebody else's uploads, the operator's wishes."""
+    """Take events: reboots, somebody else's uploads, what is not believed."""
     status = turn.snapshot.autopilot
     rebooted = any(isinstance(e, AutopilotRebooted) for e in turn.snapshot.events)
     if status is not None and status.boot_s is not None:
@@ -102,8 +102,6 @@ def take_events(turn: Turn) -> None:
             note(turn, event)
         elif isinstance(event, Disbelieved):
             turn.say(Severity.WARNING, event.what, event.text, every_s=0.0)
-        elif isinstance(event, OperatorWish):
-            turn.update(wish=event)
 
 
 def count_time(turn: Turn) -> None:
@@ -136,6 +134,9 @@ def locate(turn: Turn) -> None:
         if guided and turn.config.guidance is Guidance.FIELD and turn.state.route is not None:
             # Steered to the gates themselves: the waypoints before a gate that is passed need not be.
             done = [n + 1 for n, g in enumerate(route.gate_of) if 0 <= g < turn.state.gate]
+            bound = errand(turn)
+            if bound is not None and bound.name == route.bound_for and distance_m(boat, bound.en_m) <= bound.radius_m:
+                done = [len(route.items) - 1]
             if done and done[-1] > turn.state.index:
                 turn.update(index=done[-1], own_index=done[-1])
         _remember(turn)

@@ -6,7 +6,7 @@ watchdogs, then act by who has the boat: nobody yet (start), somebody else (oper
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.messages import Mode
 from companion.skipper.board.custody import judge, stand_by
@@ -16,6 +16,7 @@ from companion.skipper.deeds.doubt import follow
 from companion.skipper.deeds.failsafe import follow_answer, follow_stops, take_over
 from companion.skipper.deeds.helm import is_busy
 from companion.skipper.deeds.launch import finished, launch, start
+from companion.skipper.deeds.ordered import holds_ashore, leaves_alone, take_orders
 from companion.skipper.deeds.sailing import sail
 from companion.skipper.intake import (
     count_time,
@@ -30,8 +31,8 @@ from companion.skipper.step.actions import Action, CancelPlan, Severity
 from companion.skipper.step.causes import PERSON
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.snapshot import OperatorWish, Snapshot
-from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState, saved_of
+from companion.skipper.step.snapshot import Snapshot
+from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState, saved_of, standing_saved
 from companion.skipper.step.turn import Turn
 from companion.skipper.watch.lookout import look_out
 from companion.skipper.watch.stopped import speak_of_stop
@@ -61,7 +62,7 @@ class Skipper:
             return SkipperState(why="the saved state is of another voyage", known=(*known, *persisted.names))
         return SkipperState(
             adoptable=persisted, known=known, under_way_s=persisted.under_way_s, arrived=persisted.arrived,
-            uid=persisted.uid, system=persisted.system)
+            uid=persisted.uid, system=persisted.system, standing=persisted.standing, skipped=persisted.skipped)
 
     def fits(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage."""
@@ -86,6 +87,7 @@ class Skipper:
         look_out(turn)
         count_time(turn)
         fresh = watch(turn)
+        take_orders(turn)
         _decide(turn, fresh)
         speak_of_stop(turn)
         remember_fix(turn)
@@ -103,7 +105,7 @@ class Skipper:
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
         if state.adoptable is not None and (state.foreign or not state.checked_mission):
-            return state.adoptable
+            return replace(state.adoptable, standing=standing_saved(state), skipped=state.skipped)
         return saved_of(state, self.voyage.name)
 
 
@@ -117,14 +119,14 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         phase = Phase.WAITING if not state.sailing else turn.state.phase
         turn.phase(phase, f"waiting to hear the autopilot: {heard}")
         return
-    if stand_by(turn) or _operator_has_it(turn):
+    if stand_by(turn) or leaves_alone(turn) or _operator_has_it(turn):
         return
     notice_truncation(turn)
     if not mission_is_known(turn):
         return
-    if turn.state.wish is OperatorWish.HOLD and not turn.state.sailing:
-        turn.phase(Phase.WAITING, "the operator asked to hold: waiting until he lets go on")
-    elif turn.gate is None and not turn.state.sailing:
+    if holds_ashore(turn):
+        return
+    if turn.gate is None and not turn.state.sailing:
         finished(turn)
     elif turn.state.route is None:
         start(turn)

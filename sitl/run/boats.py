@@ -16,7 +16,7 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from companion.errors import LinkError
+from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
 from companion.mavlink.autopilot import Autopilot
@@ -27,6 +27,7 @@ from companion.mavlink.wire import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import MOTOR, ArduRover, require
 from sitl.scene import EventSpec, Scenario, free_port
+from sitl.trouble import give_order
 from sitl.world import Wind
 
 # A warm simulated autopilot has been up for a minute when its simulation starts [s].
@@ -39,7 +40,7 @@ JUDGE_STREAMS = (
     Stream("ATTITUDE", 5.0, 3.0),
 )
 # What an operator and a ground station do, over any autopilot's link.
-OPERATORS = frozenset({"mode", "reboot", "foreign_mission"})
+OPERATORS = frozenset({"mode", "reboot", "foreign_mission", "order"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,6 +150,8 @@ class SimulatedBoat:
             await self._pilot.link.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0)
         elif event.kind == "foreign_mission":
             await _upload_foreign(self._judge_url, event, frame)
+        elif event.kind == "order":
+            await _order(self._judge_url, event, frame)
 
 
 class RealBoat:
@@ -194,6 +197,8 @@ class RealBoat:
             rover.reboot()
         elif event.kind == "foreign_mission":
             await _upload_foreign(rover.shore_link, event, frame)
+        elif event.kind == "order":
+            await _order(rover.shore_link, event, frame)
         elif event.kind in {"arm", "disarm"}:
             rover.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, float(event.kind == "arm"))
         elif event.kind == "radio_lost":
@@ -214,3 +219,14 @@ class RealBoat:
             await asyncio.sleep(event.for_s)
             rover.set_gps_jump(0.0, 0.0)
             rover.set_gps(is_lost=False)
+
+
+async def _order(url: str, event: EventSpec, frame: LocalFrame) -> None:
+    """Give an order as somebody ashore does, over a link of his own.
+
+    Raises:
+        JobError: it was not answered as the scenario expects.
+    """
+    trouble = await give_order(open_link(url), event, frame)
+    if trouble:
+        raise JobError(trouble)

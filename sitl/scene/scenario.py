@@ -47,6 +47,7 @@ EventKind = Literal[
     "station",           # for_s: a ground station is heard, from then on no more
     "knockdown",         # roll_deg, for_s
     "current",           # set_deg, drift_mps, for_s
+    "order",             # order: to the companion, in words (a goal at east_m, north_m); answer: what it must be
     "crew",              # anchors react_s after the companion first calls for it, weighs after for_s
     "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
     "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
@@ -86,6 +87,8 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     east_m: float = 0.0
     north_m: float = 0.0
     is_resisted: bool = False
+    order: str = ""
+    answer: Literal["done", "refused", "not now", "unknown", "no answer"] = "done"
     state: str | None = None
     value_deg: float = 0.0
     restart_after_s: float | None = None
@@ -117,7 +120,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 # What a boat must bear without coming nearer to anything than its mission allows.
 ORDINARY = frozenset({
     "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "vessel",
-    "neighbour", "disk"})
+    "neighbour", "disk", "order"})
 ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
 ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
 ORDINARY_LOSS = 0.3          # a link that loses more is none
@@ -140,6 +143,14 @@ def is_all_ordinary(events: Iterable[EventSpec]) -> bool:
     return all(is_ordinary(event) for event in events)
 
 
+class HeldSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """She must stay where she is: from and to these times [s after the simulation's start], within ``within_m``."""
+
+    from_s: float
+    to_s: float
+    within_m: float          # of her mean place meanwhile
+
+
 class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What must hold when it is over; a check that is not asked for is not made."""
 
@@ -156,6 +167,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     max_silence_s: float | None = 10.0        # without a status from the companion that says why
     max_replans_per_hour: float | None = None
     max_tacks: int | None = None              # before the boat first comes within ``within_m`` of the last goal
+    held: HeldSpec | None = None
     end_phase: str | None = None
     alerts: tuple[str, ...] = ()              # announced at least once, by code
     marks_rounded: int | None = None           # in order, each on its side

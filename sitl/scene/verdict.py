@@ -185,12 +185,14 @@ def judge(
     floor_m: float | None = None,
     called_at_s: Sequence[float] | None = None,
     ordered: Sequence[int] | None = None,
+    began_s: float = 0.0,
 ) -> Verdict:
     """Hold a run against what its scenario expects.
 
     ``hull`` is what touches. ``floor_m`` is the mission's, which the hull must keep in ordinary weather; None: not
     asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
-    ``ordered`` are the systems of other autopilots that were given orders, None where there was no other.
+    ``ordered`` are the systems of other autopilots that were given orders, None where there was no other. The
+    scenario's beginning is ``began_s`` in the track's time.
     """
     ends = {"goal": [goal_en_m], "home": truth.en_m[:1], "refuge": refuges_en_m}[expect.ends_at]
     positions = truth.positions_m()
@@ -251,6 +253,11 @@ def judge(
         there = np.flatnonzero(np.hypot(*(positions - goal_en_m).T) <= (expect.within_m or 0.0))
         on_the_way, _ = count_tacks(truth, int(there[0]) if len(there) else None)
         check("tacks on the way", on_the_way <= expect.max_tacks, on_the_way, f"at most {expect.max_tacks}")
+    if expect.held is not None:
+        stay = positions[[expect.held.from_s <= t - began_s <= expect.held.to_s for t in truth.t_s]]
+        radius_m = float(np.max(np.hypot(*(stay - stay.mean(axis=0)).T))) if len(stay) else None
+        check("held within, m", radius_m is not None and radius_m <= expect.held.within_m, radius_m,
+              f"at most {expect.held.within_m}")
     if expect.end_phase is not None:
         check("end phase", summary.get("end_phase") == expect.end_phase, summary.get("end_phase"), expect.end_phase)
     if expect.marks_rounded is not None:

@@ -20,6 +20,7 @@ from companion.mavlink.trust import LinkIdentity
 from companion.messages import GeoPoint, MissionItem, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryEnd, MemoryLink, VaneFault, VaneState, serve
 from sitl.scene import TRAFFIC, EventSpec, Motion, Others, Truth
+from sitl.trouble.crew import give_order
 from sitl.trouble.failsafes import FAILURES, PERSONS, play
 from sitl.trouble.forgeries import Forger, forgery_named
 from sitl.trouble.fragile import FragilePlanner, MortalPlanner
@@ -166,6 +167,14 @@ async def _neighbour(world: World, event: EventSpec) -> None:
                 world.ordered.append(event.system)
 
 
+async def _order(world: World, event: EventSpec) -> None:
+    await _begins(event)
+    async with world.stranger:
+        trouble = await give_order(world.shore.near, event, world.frame)
+    if trouble:
+        world.errors.append(trouble)
+
+
 async def _spoof(world: World, event: EventSpec) -> None:
     forger, forgery = Forger(listens=event.listens, seed=world.seed), forgery_named(event.forgery)
     world.forgers.append(forger)
@@ -227,6 +236,7 @@ _BY_KIND: dict[str, _Befall] = {
     "planner_starved": _at(lambda world, _: world.planner.starve()),
     "vane": _vane,
     "crew": _crew,
+    "order": _order,
     "foreign_mission": _foreign,
     "neighbour": _neighbour,
     "spoof": _spoof,

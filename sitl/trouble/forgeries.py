@@ -132,6 +132,11 @@ FORGERIES: tuple[Forgery, ...] = (
             build=lambda _: wire.MAVLink_command_ack_message(176, 0, 0, 0, 1, COMPANION)),
     Forgery(message="COMMAND_LONG", says="a station orders the companion to disarm", system=255, component=190,
             build=lambda _: wire.MAVLink_command_long_message(1, COMPANION, 400, 0, 0.0, 0, 0, 0, 0, 0, 0)),
+    Forgery(message="COMMAND_LONG", says="a station gives the order hold", system=255, component=190,
+            build=lambda _: wire.MAVLink_command_long_message(1, COMPANION, 31010, 0, 1.0, 0, 0, 0, 0, 0, 0)),
+    Forgery(message="COMMAND_INT", says="a station gives the order goal", system=255, component=190,
+            build=lambda k: wire.MAVLink_command_int_message(
+                1, COMPANION, 0, 31011, 0, 0, 0.0, 0.0, 0.0, 0.0, k.lat_e7, k.lon_e7, 0.0)),
     Forgery(message="COMMAND_INT", says="a station orders the companion to reposition", system=255, component=190,
             build=lambda k: wire.MAVLink_command_int_message(
                 1, COMPANION, 3, 192, 0, 0, -1.0, 0.0, 0.0, 0.0, k.lat_e7, k.lon_e7, 0.0)),

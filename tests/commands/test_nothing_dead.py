@@ -64,7 +64,8 @@ OTHER = {
              "gybe_loss_s": 3.0, "can_tack": False, "gybe_room_m": 40.0, "length_m": 3.0, "beam_m": 1.5, "motor": True},
     "autopilot": {"system": 7, "frame": "motor"},
     "wind": {"estimator": "mean90", "preview_from_deg": 40.0, "preview_speed_mps": 8.0},
-    "operator": {"arm": False, "set_auto": True, "guided": True, "upload_fence": True, "replace_foreign": True},
+    "operator": {"arm": False, "set_auto": True, "guided": True, "upload_fence": True, "replace_foreign": True,
+                 "orders": ["hold"]},
     "skipper": {"replan": "forecast", "end": "home", "autopilot_beats": False, "guidance": "field", "station_s": 60.0,
                 "laps": 2, "bandwidth_m": 90.0, "planning_budget_s": 1.0, "expansions": 123, "seed": 7,
                 "min_replan_s": 25.0, "max_replan_s": 700.0, "wind_shift_deg": 30.0, "off_track_m": 45.0,
@@ -181,7 +182,7 @@ def test_every_permission_can_be_given(tmp_path):
 
     folder_with(tmp_path)
     raw = tomllib.loads(MISSION)
-    raw["operator"] = dict.fromkeys(tables()["operator"], True)
+    raw["operator"] = {**OTHER["operator"], "arm": True}
     (tmp_path / "m.toml").write_text(tomli_w.dumps(raw))
     given = permissions_of(load_mission(tmp_path / "m.toml"))
     assert {f.name for f in fields(Permissions) if not getattr(given, f.name)} == set()

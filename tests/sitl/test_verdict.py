@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from companion.boat import Hull
 from sitl.commands.run import print_verdict
 from sitl.scene.clearance import HullTrack
-from sitl.scene.scenario import EventSpec, ExpectSpec, is_ordinary
+from sitl.scene.scenario import EventSpec, ExpectSpec, HeldSpec, is_ordinary
 from sitl.scene.verdict import Truth, count_roundings, count_tacks, judge, longest_silence_s
 
 ISLAND = shapely.Point(0.0, 0.0).buffer(10.0)
@@ -40,6 +40,25 @@ def test_a_verdict_is_printed_in_words(capsys):
     assert "FAIL  announced irons: none (wanted: irons)" in out
     assert "clearance, m: nothing near (wanted: at least 2.0)" in out
     assert not [mark for mark in ("[", "{", "None", "inf") if mark in out]
+
+
+@pytest.mark.parametrize(("held", "within_m"), [((10.0, 20.0), 0.0), ((0.0, 30.0), 75.0), ((100.0, 200.0), None)])
+def test_a_boat_that_is_to_hold_is_judged_by_how_far_she_goes_meanwhile(held, within_m):
+    """Away for ten seconds at 10 m/s, still for ten, on for ten; and never seen in the time that was asked for."""
+    truth = Truth()
+    for t_s in range(31):
+        truth.add(5.0 + t_s, (10.0 * (min(t_s, 10) + max(0, t_s - 20)), 0.0), 0.0, 1.0, (0.0, 5.0))
+    for limit_m in (1.0, 200.0):
+        verdict = judge(
+            scenario="x", seed=1, expect=ExpectSpec(held=HeldSpec(from_s=held[0], to_s=held[1], within_m=limit_m)),
+            truth=truth, solid=shapely.Polygon(), hull=DOT, goal_en_m=(0.0, 0.0), summary={"arrived": True},
+            status_times_s=None, alerts=[], began_s=5.0)
+        check = next(c for c in verdict.checks if c.name == "held within, m")
+        if within_m is None:
+            assert (check.passed, check.figure) == (False, None)
+        else:
+            assert within_m <= check.figure <= 110.0
+            assert check.passed is (check.figure <= limit_m)
 
 
 def test_a_track_across_an_island_touches_once_even_between_samples():

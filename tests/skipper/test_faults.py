@@ -7,11 +7,13 @@ import pytest
 
 from companion.messages import Mode, StatusText
 from companion.skipper.step.missions import ends_safely, is_same_mission
-from companion.skipper.step.snapshot import OperatorWish, UploadResult, WindHealth
+from companion.skipper.step.snapshot import UploadResult, WindHealth
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import moved
 from tests.skipper.test_voyage import ar1, is_done, make
 from tests.skipper.world import restarted
+
+ORDERS = ("replan", "hold", "go_on", "stop", "skip_goal", "home", "goal 51.1020 -1.3000")
 
 
 def trouble(world, rng):
@@ -40,7 +42,7 @@ def trouble(world, rng):
     elif kind == "text":
         world.events.append(StatusText(t_s=world.t, severity=6, text="Flight plan received"))
     elif kind == "wish":
-        world.events.append(rng.choice((OperatorWish.REPLAN, OperatorWish.HOLD, OperatorWish.GO_ON)))
+        world.order(rng.choice(ORDERS))
     else:
         strong, since = world.wind, world.t
         world.wind = lambda t: (strong(t)[0], 0.3 if since < t < since + 60.0 else strong(t)[1])
@@ -54,8 +56,8 @@ def relief(world):
     world.armed = True
     if world.mode is not Mode.AUTO and world.mission:
         world.set_mode(Mode.AUTO)
-    if world.state.phase is Phase.HOLDING or world.state.wish is OperatorWish.HOLD:
-        world.events.append(OperatorWish.GO_ON)
+    if world.state.phase is Phase.HOLDING or world.state.standing is not None:
+        world.order("go_on")
 
 
 def sail_in_trouble(seed):

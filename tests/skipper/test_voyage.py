@@ -16,7 +16,7 @@ from companion.planner.worker import failed
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
 from companion.skipper.step.missions import effective, ends_safely, is_same_mission
-from companion.skipper.step.snapshot import AutopilotRebooted, OperatorWish, UploadResult, WindHealth
+from companion.skipper.step.snapshot import AutopilotRebooted, UploadResult, WindHealth
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.manoeuvre import is_tack
@@ -202,7 +202,7 @@ def test_a_buoy_left_on_the_wrong_side_is_not_reached_before_it_is_rounded(kille
     world = regatta(position=(20.0, -40.0), config=config, **slow)
     assert world.run(600, lambda w: distance_m(w.position, buoy) < 60.0)
     carry_round(world, buoy, lambda w: turned(w, buoy) > math.radians(150.0))
-    world.events.append(OperatorWish.REPLAN)
+    world.order("replan")
     carry_round(world, buoy, lambda w: getattr(w.state, under_way) is not None)
     if killed:
         restarted(world)
@@ -341,7 +341,7 @@ def test_a_mission_that_the_operator_brought_is_his():
     assert world.mission == theirs
     assert world.state.phase is Phase.OPERATOR
     assert "not ours" in world.state.why
-    world.events.append(OperatorWish.REPLACE_FOREIGN)
+    world.order("replace")
     assert world.run(1500, is_done)
 
 
@@ -373,11 +373,11 @@ def test_a_foreign_mission_is_not_resumed_at_the_start():
 def test_hold_by_wish_and_go_on():
     world = make()
     world.run(60)
-    world.events.append(OperatorWish.HOLD)
+    world.order("hold")
     world.run(90)
     assert world.state.phase is Phase.HOLDING
     assert len(effective(world.mission)) == world.seq
-    world.events.append(OperatorWish.GO_ON)
+    world.order("go_on")
     assert world.run(1500, is_done)
 
 
@@ -515,7 +515,7 @@ def test_after_two_failed_tacks_it_gybes_round():
     world = make(obstacles=(), wind=lambda t: (0.0, 5.0), config={"no_go_patience_s": 1e9})
     assert world.run(60, is_sailing)
     world.state = replace(world.state, irons_s=(world.t - 60.0, world.t - 5.0))
-    world.events.append(OperatorWish.REPLAN)
+    world.order("replan")
     assert world.run(30, lambda w: said(w, "gybing round"))
     world.run(3)
     points = world.state.route.points_en_m[world.state.index:-1]

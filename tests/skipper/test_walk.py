@@ -20,7 +20,6 @@ from companion.skipper.step.snapshot import (
     CommandResult,
     Disbelieved,
     ModeChanged,
-    OperatorWish,
     PlanOutcome,
     ReadOutcome,
     UploadOutcome,
@@ -36,8 +35,11 @@ from companion.skipper.way.geometry import bearing_rad, moved
 from companion.skipper.way.voyage import Goal, Side
 from companion.traffic import TrafficPicture
 from tests.skipper.test_voyage import ISLANDS, make
-from tests.skipper.world import check_invariants
+from tests.skipper.world import check_invariants, order
 from tests.traffic.conftest import vessel
+
+ORDERS = ("hold", "go_on", "skip_goal", "refuge", "refuge 3", "refuge Nowhere", "home", "goal 51.1020 -1.3000",
+          "goal 10 10", "replan", "stop", "adopt", "replace", "why")
 
 
 # --------------------------------------------------------------------------------------------- states
@@ -75,9 +77,17 @@ def states():
     keep("comparing", taken)
     held = make()
     held.run(60)
-    held.events.append(OperatorWish.HOLD)
+    held.order("hold")
     held.run(60)
     keep("holding", held)
+    held.order("stop")
+    held.run(2)
+    keep("given up", held)
+    homeward = make()
+    homeward.run(60)
+    homeward.order("goal 51.1020 -1.3000")
+    homeward.run(20)
+    keep("to a place", homeward)
     near = make(Goal(en_m=(300.0, 0.0)), obstacles=(), heading=math.pi / 2)
     near.run(60)
     near.extra = {"traffic": on_collision_course(near.snapshot())}
@@ -217,12 +227,13 @@ EVENTS = {
     "90 degree shift": lambda s: wind(
         mean_twd_from_rad=(s.wind.mean_twd_from_rad or 0.0) + 1.6,
         present_twd_from_rad=(s.wind.present_twd_from_rad or 0.0) + 1.6)(s),
-    # events and wishes
+    # events and orders
     "waypoint reached": event(WaypointReached(seq=1)),
     "waypoint reached, nonsense": event(WaypointReached(seq=5000)),
     "mode changed": event(ModeChanged(before=Mode.AUTO, after=Mode.HOLD)),
-    **{f"wish {wish.value}": event(wish) for wish in OperatorWish},
-    "all at once": event(AutopilotRebooted(), OperatorWish.REPLAN, WaypointReached(seq=2)),
+    **{f"order {words}": event(order(words)) for words in ORDERS},
+    "two stations": event(order("hold"), order("home", by=(254, 190))),
+    "all at once": event(AutopilotRebooted(), order("replan"), WaypointReached(seq=2)),
     # outcomes
     "stale outcomes": lambda s: replace(s, outcomes=(
         PlanOutcome(request_id=77_777), UploadOutcome(upload_id=77_777, result=UploadResult.OK),

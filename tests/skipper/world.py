@@ -27,6 +27,7 @@ from companion.messages import (
     VehicleState,
     WindForecast,
 )
+from companion.orders import Order, Source, phrase
 from companion.planner import plan
 from companion.skipper.rules import Skipper
 from companion.skipper.step import actions as act
@@ -63,6 +64,12 @@ def voyage(*goals: Goal, obstacles=(), limits=None, laps=1, home=(0.0, 0.0), ref
     return Voyage(name="test", frame=FRAME, goals=goals or (Goal(en_m=(0.0, 300.0)),), laps=laps,
                   area=area(*obstacles, limits=limits), boat=boat, home_en_m=home,
                   refuges=tuple(Refuge(name=f"{n + 1}", en_m=p) for n, p in enumerate(refuges)))
+
+
+def order(words, t_s=0.0, *, by=(255, 190), command=31010) -> Order:
+    """Return an order as a station gives it; ``words`` as a person types them."""
+    return Order(wanted=phrase(words.split()), t_s=t_s, command=command,
+                 source=Source(kind="mavlink", system=by[0], component=by[1]))
 
 
 def forecast(t_s: float, twd_rad: float, tws_mps: float = 5.0, sigma_rad: float = 0.05) -> WindForecast:
@@ -314,6 +321,9 @@ class World:
         self.events = []
         return replace(out, **self.extra)
 
+    def order(self, words: str, by: tuple[int, int] = (255, 190)) -> None:
+        self.events.append(order(words, self.t, by=by))
+
     def step(self) -> None:
         snapshot = self.snapshot()
         assert self.state is not None
@@ -361,7 +371,8 @@ def check_invariants(before, after, snapshot, actions) -> None:
             if before.route is not None and after.pending_upload is not None:
                 assert action.items[: action.keep_first] == before.route.items[: action.keep_first]
         if after.phase is Phase.OPERATOR:
-            assert isinstance(action, (act.Announce, act.CancelPlan, act.ReadMission, act.StopOrders)), action
+            assert isinstance(action, (
+                act.Announce, act.Acknowledge, act.CancelPlan, act.ReadMission, act.StopOrders)), action
     assert after.why
     if after.phase in {Phase.WAITING, Phase.HOLDING}:
         assert "wait" in after.why, f"{after.phase.value}, and not said for what: {after.why}"

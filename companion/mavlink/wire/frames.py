@@ -23,6 +23,9 @@ _HEADER_BYTES = 10
 _CRC_BYTES = 2
 _SIGNATURE_BYTES = 13
 _SIGNED = 0x01
+# Commands, and where both have the component that they are for.
+_COMMANDS = frozenset({wire.MAVLINK_MSG_ID_COMMAND_LONG, wire.MAVLINK_MSG_ID_COMMAND_INT})
+_TARGET_COMPONENT = 31
 # A frame of MAVLink 1 that every autopilot sends: start, length 9, ..., HEARTBEAT (0).
 _V1_HEARTBEAT_BYTES = 17
 
@@ -35,6 +38,7 @@ class Drop(enum.Enum):
     BAD_HEADER = "frames with flags or an id that do not exist"
     BAD_SIGNATURE = "frames with a wrong signature, or one of before"
     UNSIGNED = "frames without a signature where there is a key"
+    UNSIGNED_COMMAND = "commands to us, of those two"
     MAVLINK_1 = "frames of MAVLink 1"
     FOREIGN_SYSTEM = "messages of another system"
     OWN_IDS = "messages with our own ids: echoes, or a second companion"
@@ -162,18 +166,26 @@ class Codec:
         try:
             if self._signing is not None and frame[2] & _SIGNED and not self._is_signed_by_us(frame):
                 # checked before pymavlink sees it: its check takes the timestamp of a forgery for good
-                self.dropped[Drop.BAD_SIGNATURE] += 1
+                self._unsigned(frame)
                 return None
             return self._mav.decode(frame)
         except wire.MAVError as error:
             if "signature" in str(error).lower():
-                self.dropped[Drop.BAD_SIGNATURE if frame[2] & _SIGNED else Drop.UNSIGNED] += 1
+                self._unsigned(frame)
                 return False
             self.dropped[Drop.BAD_CRC] += 1
             return None
         except Exception:  # a payload that pymavlink cannot digest is a bad frame, whatever it raises
             self.dropped[Drop.BAD_CRC] += 1
             return None
+
+    def _unsigned(self, frame: bytearray) -> None:
+        """Count a frame that is not signed with our key; a command to us is somebody's who wants to be heard."""
+        self.dropped[Drop.BAD_SIGNATURE if frame[2] & _SIGNED else Drop.UNSIGNED] += 1
+        kind = int.from_bytes(frame[7:10], "little")
+        payload = frame[_HEADER_BYTES:_HEADER_BYTES + frame[1]]
+        if kind in _COMMANDS and len(payload) > _TARGET_COMPONENT and payload[_TARGET_COMPONENT] == self.component:
+            self.dropped[Drop.UNSIGNED_COMMAND] += 1
 
     def _is_signed_by_us(self, frame: bytearray) -> bool:
         assert self._signing is not None

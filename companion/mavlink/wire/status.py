@@ -2,7 +2,7 @@
 
 ArduPilot forwards what the companion sends to its other links. Two forms go out:
 
-- TUNNEL, broadcast: the whole value packed into 63 bytes and its words, for ``companion status``;
+- TUNNEL, broadcast: the whole value packed into 66 bytes and its words, for ``companion status``;
 - WIND_COV and NAMED_VALUE_FLOATs ``co_twd co_tws co_sig co_psafe co_tack co_xt``: the wind with its uncertainty and the
   most wanted figures, for any ground station's plots and the autopilot's log. They take turns.
 
@@ -27,12 +27,13 @@ from companion.messages import CompanionStatus, TrafficStatus
 
 # TUNNEL payload types from 32768 on are free for private use; ours is read by nobody else.
 PAYLOAD_TYPE = 0xC05A
-VERSION = 1
+VERSION = 2
 COMPANION_COMPONENT = 191
 MAX_PAYLOAD_BYTES = 128
 # Version, time [0.1 s], four distances [m] and the risk, lat and lon [deg x 1e7]; then 16 bits each: angles [0.01 deg],
-# speeds [cm/s], seconds, counts, battery [10 mV], traffic [bytes/s]; then goals and the lengths of two words.
-_PACK = struct.Struct("<BIfffffii" + "H" * 13 + "BBBB")
+# speeds [cm/s], seconds, counts, battery [10 mV], traffic [bytes/s], an order's age [10 s]; then goals and the
+# lengths of three words.
+_PACK = struct.Struct("<BIfffffii" + "H" * 14 + "BBBBB")
 _NONE16 = 0xFFFF
 _NONE8 = 0xFF
 _STATE_BYTES, _CODE_BYTES = 24, 16
@@ -74,7 +75,8 @@ def pack_status(status: CompanionStatus) -> bytes:
     lat_e7, lon_e7 = e7(status.position) if status.position else (0, 0)
     state = status.state.encode("ascii", "replace")[:_STATE_BYTES]
     code = status.alert_code.encode("ascii", "replace")[:_CODE_BYTES]
-    room = MAX_PAYLOAD_BYTES - _PACK.size - len(state) - len(code)
+    order = status.order.encode("ascii", "replace")[:_CODE_BYTES]
+    room = MAX_PAYLOAD_BYTES - _PACK.size - len(state) - len(code) - len(order)
     text = status.alert_text.encode("ascii", "replace")[:room]
     head = _PACK.pack(
         VERSION, int(max(0.0, status.t_s) * 10.0) & 0xFFFFFFFF,
@@ -86,9 +88,10 @@ def pack_status(status: CompanionStatus) -> bytes:
         _u16(status.plan_id), _u16(status.plan_age_s), _u16(status.replans), _u16(status.tacks),
         _u16(status.battery_v, 100.0),
         _u16(status.waypoint_seq), _u16(status.waypoint_count), _u16(status.bytes_out_per_s),
-        _u8(status.goal_index), _u8(status.goal_count), len(state), len(code),
+        _u16(status.order_age_s, 0.1),
+        _u8(status.goal_index), _u8(status.goal_count), len(state), len(code), len(order),
     )
-    return head + state + code + text
+    return head + state + code + order + text
 
 
 def unpack_status(payload: bytes, t_s: float | None = None) -> CompanionStatus:
@@ -101,11 +104,13 @@ def unpack_status(payload: bytes, t_s: float | None = None) -> CompanionStatus:
         raise ValueError(f"status payload of {len(payload)} bytes, version {payload[0] if payload else None}")
     (
         _, tenths, waypoint_m, goal_m, cross_m, clearance_m, risk, lat_e7, lon_e7, twd, sigma, tws, tws_sigma, tack,
-        plan, age, replans, tacks, battery, seq, count, traffic, goal, goals, state_end, code_size,
+        plan, age, replans, tacks, battery, seq, count, traffic, order_age,
+        goal, goals, state_end, code_size, order_size,
     ) = _PACK.unpack_from(payload)
     words = payload[_PACK.size:]
     code_end = state_end + code_size
-    if code_end > len(words):
+    order_end = code_end + order_size
+    if order_end > len(words):
         raise ValueError("status payload is torn")
     sigma_deg = _scaled(sigma, 100.0)
     return CompanionStatus(
@@ -121,7 +126,8 @@ def unpack_status(payload: bytes, t_s: float | None = None) -> CompanionStatus:
         plan_id=_count(plan), plan_age_s=_scaled(age), replans=_count(replans), tacks=_count(tacks),
         battery_v=_scaled(battery, 100.0), bytes_out_per_s=_scaled(traffic),
         alert_code=words[state_end:code_end].decode("ascii", "replace"),
-        alert_text=words[code_end:].decode("ascii", "replace"),
+        order=words[code_end:order_end].decode("ascii", "replace"), order_age_s=_scaled(order_age, 0.1),
+        alert_text=words[order_end:].decode("ascii", "replace"),
     )
 
 

@@ -17,7 +17,6 @@ from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.missions import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
 from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.snapshot import OperatorWish
 from companion.skipper.step.state import Phase, saved_of
 from companion.skipper.step.turn import Turn
 
@@ -28,9 +27,6 @@ FOREIGN_REREAD_S = 30.0   # a mission that is not ours is read again this often
 def mission_is_known(turn: Turn) -> bool:
     """Make sure that the mission on the autopilot is ours, empty, or known not to be."""
     state = turn.state
-    if state.wish is OperatorWish.REPLACE_FOREIGN:
-        turn.update(wish=None, foreign="", adoptable=None, replace_foreign=True)
-        state = turn.state
     if state.foreign:
         if _may_replace(turn):
             turn.update(foreign="", route=None, adoptable=None, replace_foreign=True)

@@ -20,6 +20,7 @@ from companion.field.values import Habits, Intent, Obstacle, Situation
 from companion.messages import Mode
 from companion.skipper.deeds.helm import hand_back, is_busy, set_mode
 from companion.skipper.planning.asking import request
+from companion.skipper.planning.errands import errand
 from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
 from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.step.config import Guidance
@@ -113,10 +114,14 @@ def habits(turn: Turn, tws_mps: float) -> Habits:
 
 
 def intent(turn: Turn, seen: Situation) -> Intent:
-    """Return where to go: to the gate by field alone, else back to the leg of the plan; what stands still is in it."""
-    leg, gate = turn.leg(), turn.gate
-    if turn.config.guidance is Guidance.FIELD and gate is not None:
-        wanted = go_to(gate.en_m, seen.twd_from_rad or 0.0)
+    """Return where to go: by field alone to the gate or an errand's place, else back to the plan's leg.
+
+    What stands still is in it.
+    """
+    leg, gate, bound = turn.leg(), turn.gate, errand(turn)
+    place = bound.en_m if bound is not None and bound.has_place else gate.en_m if gate is not None else None
+    if turn.config.guidance is Guidance.FIELD and place is not None:
+        wanted = go_to(place, seen.twd_from_rad or 0.0)
     elif leg is not None and distance_m(*leg) > 1.0:
         wanted = follow_line(*leg)
     else:

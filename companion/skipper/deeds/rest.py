@@ -22,17 +22,20 @@ HOW_LONG = {
     "battery": "until a person takes her and gives AUTO back",
     "shore link": "until the link to the shore is back, or a person gives AUTO",
 }
+UNTIL_TOLD = "until told to go on"
 
 
 def comes_to_rest(turn: Turn, bound: Errand) -> bool:
     """Lie at the end of an errand; True while she does."""
     if not is_at_rest(turn) or turn.state.own_mode in STOPPING:
         return False
-    if turn.is_raised(OUT_OF_TIME) and not turn.state.answering and not turn.is_raised("battery critical"):
+    if turn.is_raised(OUT_OF_TIME) and not (
+        turn.state.answering or turn.is_raised("battery critical") or bound.is_ordered
+    ):
         reached = len(turn.state.reached)
         _end(turn, f"out of time: {reached} of {len(turn.voyage.legs)} goals reached", arrived=False)
         return True
-    if bound.kind is Kind.HOME and turn.gate is None and not turn.state.answering:
+    if bound.kind is Kind.HOME and turn.gate is None and not turn.state.answering and not bound.is_ordered:
         turn.update(home_reached=True)
         rest(turn)
         return True
@@ -44,7 +47,8 @@ def comes_to_rest(turn: Turn, bound: Errand) -> bool:
     hand_back(turn)
     where = "staying near by" if bound.kind is Kind.STAY else f"at {bound.name}"
     key = "battery critical" if turn.is_raised("battery critical") else turn.state.answering
-    turn.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {HOW_LONG.get(key, 'for a person')}")
+    how_long = UNTIL_TOLD if bound.is_ordered else HOW_LONG.get(key, "for a person")
+    turn.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
     return True
 
 
@@ -59,6 +63,8 @@ def rest(turn: Turn) -> None:
         end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
         goals = len(turn.voyage.legs)
         reached = "the goal is reached" if goals == 1 else f"all {goals} goals reached"
+        if turn.state.skipped:
+            reached = f"{goals - turn.state.skipped} of {goals} goals reached, {turn.state.skipped} given up by order"
         before = " before this start" if turn.state.arrived else ""
         _end(turn, f"{reached}{before}{home}{end}", arrived=not trouble)
         return

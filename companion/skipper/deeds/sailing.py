@@ -25,7 +25,6 @@ from companion.skipper.planning.vessels import near
 from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.step.causes import HOMEWARD, STOPPING
 from companion.skipper.step.config import Guidance
-from companion.skipper.step.snapshot import OperatorWish
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import distance_m
@@ -35,6 +34,7 @@ from companion.traffic.plans import MIN_INTERVAL_S
 HAIR_M = 0.5
 STEER_S = 25.0               # bearing away longer than this has failed
 SAILS_MPS = 0.8              # out of irons
+IN_IRONS = "she was in irons"
 SAILS_TWA_RAD = math.radians(60.0)
 # Reasons that can wait among vessels, where plans must not follow each other fast (Büsser 5.2).
 ROUTINE = frozenset({
@@ -48,8 +48,6 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         if not (turn.state.over and stops_drift(turn)):
             rest(turn)
         return
-    if bound is not None and comes_to_rest(turn, bound):
-        return
     if stands_off(turn) or stops_drift(turn) or brakes(turn):
         return
     stopped = turn.state.own_mode in STOPPING
@@ -57,6 +55,8 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         _sail_on(turn, fresh)
         return
     if last_resort(turn):
+        return
+    if bound is not None and comes_to_rest(turn, bound):
         return
     if _steer(turn, fresh):
         return
@@ -80,11 +80,6 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         make_current(turn, turn.state.own_index + 1)
     if bound is not None and not bound.has_place:
         _stay(turn, bound)
-        return
-    if turn.state.wish is OperatorWish.HOLD:
-        if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
-            hold(turn, "the operator asked to hold")
-        turn.phase(Phase.HOLDING, "the operator asked to hold: waiting until he lets her go on")
         return
     if turn.state.pending_upload is None:
         _consider(turn, fresh)
@@ -189,9 +184,7 @@ def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
     if turn.t_s - state.last_plan_s < interval_s:
         return
     if request(turn, trigger.reason, from_index=trigger.from_index, text=trigger.text):
-        changes: dict[str, object] = {"after_operator": False}
-        if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:
-            changes["wish"] = None
+        changes: dict[str, object] = {"after_operator": False, "asked": ""}
         if trigger.from_index is not None:
             changes["replanned_index"] = trigger.from_index
         turn.update(**changes)
@@ -210,7 +203,7 @@ def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
             heading = bear_away_rad(boat, vehicle.heading_rad, wind[0], turn.voyage.area)
             turn.update(steering_until_s=turn.t_s + STEER_S, steering_heading_rad=heading)
         else:
-            turn.update(wish=OperatorWish.REPLAN)
+            turn.update(asked=IN_IRONS)
             return False
     heading_rad = turn.state.steering_heading_rad or 0.0
     until = turn.state.steering_until_s
@@ -221,7 +214,7 @@ def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
     if over and (refused or set_mode(turn, Mode.AUTO, "sailing again" if out else "bearing away took too long")):
         # The mode we asked for ourselves stays ours until AUTO shows.
         turn.update(
-            steering_until_s=None, steering_heading_rad=None, wish=OperatorWish.REPLAN,
+            steering_until_s=None, steering_heading_rad=None, asked=IN_IRONS,
             own_mode=None if refused else Mode.GUIDED)
         return False
     turn.act(SteerHeading(heading_rad=heading_rad, text="out of irons"))

@@ -1,6 +1,7 @@
 """Planning under way: why, from where, with which step of the ladder, and what is done with the answer."""
 
 from companion.skipper.planning.errands import HOME_RADIUS_M
+from companion.skipper.planning.next_tack import next_tack_s
 from companion.skipper.planning.vessels import (
     ALIKE_S,
     GIVE_UP_RISK,
@@ -12,5 +13,6 @@ from companion.skipper.planning.vessels import (
 )
 
 __all__ = [
-    "ALIKE_S", "GIVE_UP_RISK", "HOME_RADIUS_M", "HORIZON_S", "OWN_TIMING_MPS", "PART_BY_RUNG", "SETTLED_M", "soon",
+    "ALIKE_S", "GIVE_UP_RISK", "HOME_RADIUS_M", "HORIZON_S", "OWN_TIMING_MPS", "PART_BY_RUNG", "SETTLED_M",
+    "next_tack_s", "soon",
 ]

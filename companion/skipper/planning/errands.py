@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from companion.orders import Verb
 from companion.skipper.step.causes import BY_NAME, Answer
 from companion.skipper.step.config import SafeEnd
 from companion.skipper.step.turn import Turn
@@ -19,6 +20,7 @@ from companion.skipper.way.voyage import PointEn, Refuge, Side
 
 BATTERY, OUT_OF_TIME, DRAGGED = "battery critical", "out of time", "dragged off"   # watchdogs
 HOME, REST = "home", "the place to rest"
+GOAL_RADIUS_M = 10.0     # a place that is named under way: there within this
 HOME_RADIUS_M = 15.0     # home is where she was armed: a place in the water or at its edge, not a mark
 FAR_M = 50_000.0         # the local frame's reach: a home beyond it is not one of this water
 
@@ -29,6 +31,7 @@ class Kind(enum.Enum):
     REFUGE = "refuge"
     HOME = "home"
     REST = "rest"            # back to where she loitered
+    GOAL = "goal"            # a place that somebody named
     STAY = "stay"            # where there is room near by
 
 
@@ -41,6 +44,7 @@ class Errand:
     why: str
     en_m: PointEn = (0.0, 0.0)
     radius_m: float = HOME_RADIUS_M
+    is_ordered: bool = False     # it lasts until she is told to go on
 
     @property
     def has_place(self) -> bool:
@@ -55,6 +59,11 @@ class Errand:
 
 def errand(turn: Turn) -> Errand | None:
     """Return where she is bound for instead of the next goal, None: nowhere."""
+    return pressing(turn) or _ordered(turn) or _at_the_end(turn)
+
+
+def pressing(turn: Turn) -> Errand | None:
+    """Return the errand that comes before every order: the battery, or a failsafe that is answered."""
     state = turn.state
     cause = BY_NAME.get(state.answering)
     answer = cause.answer if cause is not None else None
@@ -67,6 +76,28 @@ def errand(turn: Turn) -> Errand | None:
     if answer is Answer.STAY:
         why = "the autopilot has lost its link to the shore"
         return (_home(turn, why) if state.sent_home else None) or _stay(turn, why)
+    return None
+
+
+def _ordered(turn: Turn) -> Errand | None:
+    """Return the errand of the order that stands, None: there is none, or she is given up."""
+    order = turn.state.standing
+    if order is None or order.verb is Verb.STOP:
+        return None
+    if order.verb is Verb.HOLD or order.en_m is None:
+        found = _stay(turn, order.why)
+        return None if found is None else replace(found, is_ordered=True)
+    kind, name, radius_m = {
+        Verb.REFUGE: (Kind.REFUGE, f"the refuge {order.name}".rstrip(), HOME_RADIUS_M),
+        Verb.HOME: (Kind.HOME, HOME, HOME_RADIUS_M),
+    }.get(order.verb, (Kind.GOAL, order.name, GOAL_RADIUS_M))
+    radius_m = next((r.radius_m for r in turn.voyage.refuges if r.en_m == order.en_m), radius_m)
+    return Errand(kind=kind, name=name, why=order.why, en_m=order.en_m, radius_m=radius_m, is_ordered=True)
+
+
+def _at_the_end(turn: Turn) -> Errand | None:
+    """Return where she is bound for when her time is up, the goals are reached, or she has been dragged off."""
+    state = turn.state
     if turn.is_raised(OUT_OF_TIME) and not state.over:
         why = "the voyage is out of time"
         home = _home(turn, why) if turn.config.safe_end is SafeEnd.RETURN else None
@@ -115,15 +146,20 @@ def home_trouble(turn: Turn) -> str:
     status = turn.snapshot.autopilot
     if status is None or status.home is None:
         return "the autopilot has not told where home is"
-    en_m = turn.voyage.frame.en_from_geo(status.home)
-    if max(abs(en_m[0]), abs(en_m[1])) > FAR_M:
-        return f"home is {math.hypot(*en_m) / 1000.0:.0f} km from this water"
+    return place_trouble(turn, HOME, turn.voyage.frame.en_from_geo(status.home))
+
+
+def place_trouble(turn: Turn, what: str, en_m: PointEn) -> str:
+    """Return why no way can be planned to a place (empty: one can be looked for)."""
+    if not math.hypot(*en_m) <= FAR_M:
+        return f"{what} is {math.hypot(*en_m) / 1000.0:.0f} km from this water"
     clearance = float(turn.voyage.area.clearance_m([en_m])[0])
     floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
     if clearance < floor_m:
-        near = turn.voyage.area.nearest_name(en_m)
-        where = "not in free water" if clearance <= 0.0 else f"{clearance:.0f} m from {near}"
-        return f"home is {where}: the margin's floor is {floor_m:g} m"
+        near, bare = turn.voyage.area.nearest_name(en_m), float(turn.voyage.area.unfenced.clearance_m([en_m])[0])
+        where = f"{clearance:.0f} m from {near}" if clearance > 0.0 else (
+            "outside the fence" if bare > 0.0 else f"not in free water but in {near}")
+        return f"{what} is {where}: the margin's floor is {floor_m:g} m"
     return ""
 
 

@@ -13,7 +13,6 @@ from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import Guidance, ReplanPolicy
 from companion.skipper.step.missions import NO_PLAN, path_length_m
 from companion.skipper.step.route import Route
-from companion.skipper.step.snapshot import OperatorWish
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
@@ -61,8 +60,8 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
     changed = _errand(turn, bound)
     if changed is not None:
         return changed
-    if state.wish in {OperatorWish.REPLAN, OperatorWish.GO_ON}:
-        return Trigger(reason=ReplanReason.OPERATOR_WISH, text="the operator asked for it")
+    if state.asked:
+        return Trigger(reason=ReplanReason.ORDER, text=state.asked)
     if state.missed_s is not None and bound is None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     if "fence breach" in fresh:
@@ -76,7 +75,8 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
     return trigger or _extension(turn, bound) or _wind(turn) or _waypoint(turn)
 
 
-REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST}
+REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST,
+           Kind.GOAL: ReplanReason.ORDER}
 
 
 def _errand(turn: Turn, bound: Errand | None) -> Trigger | None:

@@ -1,6 +1,7 @@
 """One step: what the skipper sees, remembers, may do and asks for, and the step in the making."""
 
 from companion.skipper.step.actions import (
+    Acknowledge,
     Action,
     Announce,
     Arm,
@@ -39,13 +40,14 @@ from companion.skipper.step.snapshot import (
     WindHealth,
     WindView,
 )
-from companion.skipper.step.state import Phase, SkipperState
+from companion.skipper.step.standing import Standing
+from companion.skipper.step.state import Phase, SkipperState, is_given_up
 
 __all__ = [
-    "Action", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome", "CommandResult", "Disbelieved",
-    "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome", "Permissions", "Persisted", "Phase", "PlanOutcome",
-    "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd", "SetCurrent",
-    "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot", "SteerHeading", "StopOrders", "Tack",
-    "UploadFence", "UploadMission", "UploadOutcome", "UploadResult", "WaypointReached", "WindHealth", "WindView",
-    "ends_safely",
+    "Acknowledge", "Action", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome", "CommandResult",
+    "Disbelieved", "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome", "Permissions", "Persisted", "Phase",
+    "PlanOutcome", "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd",
+    "SetCurrent", "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot", "Standing", "SteerHeading",
+    "StopOrders", "Tack", "UploadFence", "UploadMission", "UploadOutcome", "UploadResult", "WaypointReached",
+    "WindHealth", "WindView", "ends_safely", "is_given_up",
 ]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from companion.messages import MissionItem, Mode
+from companion.orders import Result
 
 
 class ReplanReason(enum.Enum):
@@ -28,7 +29,7 @@ class ReplanReason(enum.Enum):
     REFUGE = "refuge"                  # the battery is critical, or the voyage out of time
     HOME = "home"                      # all goals are reached, or the autopilot wants her home
     REST = "rest"                      # dragged off the place where she loiters
-    OPERATOR_WISH = "operator_wish"
+    ORDER = "order"                    # somebody asked for it, or she has come out of irons
     RETRY = "retry"                    # a step of the ladder after nothing was found
     MISMATCH = "mismatch"              # the mission on the autopilot is not the one that was uploaded
 
@@ -188,7 +189,22 @@ class StopOrders:
     text: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Acknowledge:
+    """Answer an order to who gave it: ``command`` with ``result``, to ``system`` and ``component``.
+
+    ``way`` is how the order came; the sentence is announced beside it.
+    """
+
+    way: str
+    system: int
+    component: int
+    command: int
+    result: Result
+    text: str
+
+
 Action = (
     RequestPlan | CancelPlan | UploadMission | UploadFence | ReadMission | SetMode | Arm | SetCurrent
-    | Tack | RunMotor | SteerHeading | Announce | StopOrders
+    | Tack | RunMotor | SteerHeading | Announce | Acknowledge | StopOrders
 )

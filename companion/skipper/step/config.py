@@ -9,6 +9,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from companion.orders import ALL
+
 
 class ReplanPolicy(enum.Enum):
     """When a new plan is made at a waypoint."""
@@ -42,11 +44,12 @@ class Permissions:
     may_set_mode: bool = False         # AUTO to begin with, and the modes of the watchdogs
     may_steer: bool = False            # GUIDED headings (out of irons, buoys by heading)
     may_replace_foreign: bool = False  # a mission that is not ours may be overwritten before setting sail
+    orders: tuple[str, ...] = ()       # verbs that the crew may give, or "all" (``companion.orders``)
 
 
 DRY_RUN = Permissions()
 ALL_PERMITTED = Permissions(
-    may_upload=True, may_upload_fence=True, may_arm=True, may_set_mode=True, may_steer=True,
+    may_upload=True, may_upload_fence=True, may_arm=True, may_set_mode=True, may_steer=True, orders=(ALL,),
 )
 
 

@@ -8,7 +8,9 @@ from typing import Any
 
 from companion.mavlink.wire import mission_hash
 from companion.messages import MissionItem, Mode
+from companion.orders import BY_VERB, Verb
 from companion.skipper.step.route import Route
+from companion.skipper.step.standing import Standing
 from companion.skipper.way.gates import Approach
 
 FORMAT = 1
@@ -45,6 +47,8 @@ class Persisted:
     system: int | None = None          # ... its system id
     approaches: tuple[Approach, ...] = ()   # the numbering of the gates hangs on them
     quarters: int = 0                  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
+    standing: Standing | None = None   # the order that stands
+    skipped: int = 0                   # goals given up by order
 
     @property
     def lists(self) -> tuple[Route, ...]:
@@ -65,6 +69,7 @@ class Persisted:
             "motor": self.motor, "under_way_s": self.under_way_s, "arrived": self.arrived, "uid": self.uid,
             "system": self.system,
             "approaches": [[a.goal, *a.en_m, a.turn_rad] for a in self.approaches], "quarters": self.quarters,
+            "standing": _standing_to_dict(self.standing), "skipped": self.skipped,
         }
 
     @classmethod
@@ -91,9 +96,29 @@ class Persisted:
                              turn_rad=None if turn is None else _number(turn))
                     for goal, e, n, turn in data.get("approaches", ())[:MAX_GOALS + 1]),
                 quarters=_whole(data.get("quarters", 0), -MAX_QUARTERS, MAX_QUARTERS),
+                standing=_standing_from_dict(data.get("standing")),
+                skipped=_whole(data.get("skipped", 0), 0, MAX_GOALS),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
+
+
+def _standing_to_dict(order: Standing | None) -> dict[str, Any] | None:
+    if order is None:
+        return None
+    return {"verb": order.verb.value, "by": order.by, "name": order.name, "before_s": order.before_s,
+            "en_m": None if order.en_m is None else list(order.en_m)}
+
+
+def _standing_from_dict(data: dict[str, Any] | None) -> Standing | None:
+    if data is None:
+        return None
+    verb, place = Verb(data["verb"]), data["en_m"]
+    en_m = None if place is None else (_number(place[0]), _number(place[1]))
+    if not BY_VERB[verb].stands or (en_m is None and verb not in {Verb.HOLD, Verb.STOP}):
+        raise ValueError(f"it is damaged: no order stands as {verb}")
+    return Standing(verb=verb, by=_words(data["by"]), name=_words(data["name"]), en_m=en_m,
+                    before_s=_number(data["before_s"]))
 
 
 def _route_to_dict(route: Route | None) -> dict[str, Any] | None:

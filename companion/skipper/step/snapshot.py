@@ -13,6 +13,7 @@ from typing import Any
 from companion.boat import AutopilotLimits
 from companion.mavlink.trust import Identity
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
+from companion.orders import Order
 from companion.skipper.step.config import DRY_RUN, Permissions
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import TrafficPicture
@@ -72,15 +73,6 @@ class AutopilotRebooted:
     """The autopilot's boot time went back."""
 
 
-class OperatorWish(enum.Enum):
-    """What the operator may ask of the companion."""
-
-    REPLAN = "replan"
-    REPLACE_FOREIGN = "replace_foreign"        # overwrite the mission that is not ours
-    HOLD = "hold"
-    GO_ON = "go_on"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disbelieved:
     """Something heard that cannot be, or that could not be digested: said once, and not used."""
@@ -89,7 +81,7 @@ class Disbelieved:
     text: str
 
 
-Event = WaypointReached | ModeChanged | AutopilotRebooted | StatusText | OperatorWish | Disbelieved
+Event = WaypointReached | ModeChanged | AutopilotRebooted | StatusText | Order | Disbelieved
 
 
 # ----------------------------------------------------------------------------------------- outcomes

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from companion.field.guidance import LastResort
 from companion.field.station import StationState
 from companion.field.values import GuidanceState
 from companion.messages import MissionItem, Mode
+from companion.orders import Answer, Order, Verb
 from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.snapshot import OperatorWish
+from companion.skipper.step.standing import Standing
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Assessment
@@ -144,6 +145,15 @@ class ByField:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Answered:
+    """An order and its answer, and when."""
+
+    order: Order
+    answer: Answer
+    t_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SkipperState:
     """Everything that ``step`` needs from before. ``Skipper.initial`` makes the first."""
 
@@ -190,7 +200,10 @@ class SkipperState:
     good_wind_since_s: float | None = None
     no_go_since_s: float | None = None
     tacked_s: float = float("-inf")     # when a tack was last asked for
-    wish: OperatorWish | None = None    # the operator's last wish, until it is answered
+    standing: Standing | None = None    # the order that stands until she is told to go on
+    answered: tuple[Answered, ...] = ()  # the last order of each who gave one lately
+    asked: str = ""                     # why a new plan is wanted at once, until it is asked for; empty: it is not
+    skipped: int = 0                    # goals given up by order
     read_items: tuple[MissionItem, ...] | None = None      # the mission as last read
     read_t_s: float = float("-inf")
     approaches: tuple[Approach, ...] = ()   # where the way to a goal began, see companion.skipper.way.gates
@@ -234,6 +247,19 @@ class SkipperState:
     wants: tuple[str, ...] = ()                    # what is missing, in words
 
 
+def is_given_up(state: SkipperState) -> bool:
+    """Return whether the boat was given up by order: nothing is asked of her."""
+    return state.standing is not None and state.standing.verb is Verb.STOP
+
+
+def standing_saved(state: SkipperState) -> Standing | None:
+    """Return the order that stands as it is saved: its age in whole minutes."""
+    order = state.standing
+    if order is None:
+        return None
+    return replace(order, since_s=None, before_s=60.0 * (order.age_s(state.last_step_s) // 60.0))
+
+
 def saved_of(state: SkipperState, voyage: str) -> Persisted:
     """Return what of a state survives a kill."""
     return Persisted(
@@ -242,4 +268,5 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         unsure=state.unsure_route, own_mode=state.own_mode, motor=state.adrift.motor,
         under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived, uid=state.uid, system=state.system,
         approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
+        standing=standing_saved(state), skipped=state.skipped,
     )

@@ -30,7 +30,7 @@ from companion.skipper.step.config import Guidance, Permissions, SkipperConfig
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import Snapshot, wind_mean, wind_now
-from companion.skipper.step.state import Phase, Retry, SkipperState
+from companion.skipper.step.state import Phase, Retry, SkipperState, is_given_up
 from companion.skipper.way.gates import Approach, Gate, gates_of
 from companion.skipper.way.voyage import PointEn, Voyage
 
@@ -81,9 +81,12 @@ class Turn:
         return number
 
     def act(self, action: Action) -> bool:
-        """Ask for an action; False (and nothing asked) when it is not permitted, or the autopilot not ours."""
-        is_order = isinstance(action, UploadMission | UploadFence | SetMode | Arm | SetCurrent | SteerHeading)
-        if (is_order and not self.state.is_ours) or not permitted(action, self.snapshot.permissions):
+        """Ask for an action; False (nothing is asked) when it is not permitted, the autopilot not ours, or given up."""
+        is_order = isinstance(
+            action, UploadMission | UploadFence | SetMode | Arm | SetCurrent | SteerHeading | Tack | RunMotor)
+        if is_order and (self.is_given_up or not self.state.is_ours):
+            return False
+        if not permitted(action, self.snapshot.permissions):
             return False
         self.actions.append(action)
         return True
@@ -239,6 +242,11 @@ class Turn:
         if status.is_armed and self.is_leaving:
             return False
         return not status.is_armed or status.mode not in {None, Mode.AUTO, Mode.INITIALISING, self.state.own_mode}
+
+    @property
+    def is_given_up(self) -> bool:
+        """Whether she was given up by order: nothing is asked of her."""
+        return is_given_up(self.state)
 
     @property
     def is_leaving(self) -> bool:

@@ -1,6 +1,7 @@
 """The way: the voyage's goals and gates, legs and points, what a path is worth in a wind. Values and geometry."""
 
+from companion.skipper.way.gates import gates_of
 from companion.skipper.way.geometry import cross_track_m, moved
 from companion.skipper.way.voyage import Goal, PointEn, Refuge, Side, Voyage
 
-__all__ = ["Goal", "PointEn", "Refuge", "Side", "Voyage", "cross_track_m", "moved"]
+__all__ = ["Goal", "PointEn", "Refuge", "Side", "Voyage", "cross_track_m", "gates_of", "moved"]

@@ -13,6 +13,7 @@ from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.mavlink.wire import mission_hash
 from companion.messages import AisReport, GeoPoint
+from companion.orders import Order
 from companion.skipper.step import (
     Action,
     Outcome,
@@ -88,6 +89,11 @@ def ais_of(record: dict[str, Any]) -> AisReport:
     if "position" in values:
         values["position"] = GeoPoint(**values["position"])
     return AisReport(**values)
+
+
+def order_record(order: Order) -> dict[str, Any]:
+    """Return an order of the crew as it came: a replay takes it back with ``Order.from_dict``."""
+    return {"kind": "order", "order": order.to_dict()}
 
 
 def outcome_record(outcome: Outcome) -> dict[str, Any]:

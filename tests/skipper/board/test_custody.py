@@ -11,7 +11,6 @@ from companion.mavlink.trust.identity import Identity
 from companion.messages import MissionItem, Mode
 from companion.skipper.step import actions as act
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.snapshot import OperatorWish
 from companion.skipper.step.state import Phase
 from tests.skipper.test_voyage import is_done, is_sailing, make, said
 
@@ -152,7 +151,7 @@ def test_what_was_ours_is_given_up_when_the_strangers_mission_is_replaced():
     world.state = replace(world.state, checked_mission=False, read_since_s=world.t)
     world.run(20)
     old = world.skipper.persisted(world.state).route
-    world.events.append(OperatorWish.REPLACE_FOREIGN)
+    world.order("replace")
     assert world.run(60, lambda w: w.mission != THEIRS)
     world.run(5)
     saved = world.skipper.persisted(world.state)

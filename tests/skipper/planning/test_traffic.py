@@ -13,7 +13,6 @@ from companion.planner.worker import failed
 from companion.skipper.planning.vessels import HORIZON_S, UNKNOWN_S, meetings, near, shares
 from companion.skipper.step import actions as act
 from companion.skipper.step.actions import ReplanReason
-from companion.skipper.step.snapshot import OperatorWish
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import distance_m
@@ -141,7 +140,7 @@ def test_among_ships_a_safe_route_is_replaced_by_a_clearly_faster_one_only(faste
         if world.t == 90.0:
             armed.append(True)
             before = len([a for _, a in world.actions if isinstance(a, act.UploadMission)])
-            world.events.append(OperatorWish.REPLAN)
+            world.order("replan")
         world.step()
     uploads = [a for _, a in world.actions if isinstance(a, act.UploadMission)][before:]
     assert asked(world)[-1][1].problem.targets

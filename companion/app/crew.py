@@ -1,0 +1,65 @@
+"""The crew on the link: their orders as they come in, for the next step, and the answers that go back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from companion.clock import now_s
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.link import LATER, Link
+from companion.mavlink.wire import Drop
+from companion.orders import COMMANDS, RESULTS, Order, Result, Source, wanted_of
+from companion.skipper.step import Severity
+
+# What comes in one step beyond this is sent away: each order costs the radio an answer.
+MOST_WAITING = 4
+LOOK_S = 5.0
+
+
+class Crew:
+    """Takes the commands that are orders, from whoever names us; other commands stay unsupported.
+
+    Before ``begin`` they are sent away: nobody would answer them.
+    """
+
+    def __init__(self, link: Link, *, has_key: bool) -> None:
+        self._link, self._authority = link, "signed" if has_key else "unsigned"
+        self._waiting: list[Order] = []
+        self._is_open = False
+        link.on_command = self._hear
+
+    def begin(self) -> None:
+        """Hear orders from now on."""
+        self._is_open = True
+
+    def take(self) -> list[Order]:
+        """Return the orders since the last step, in the order in which they came."""
+        orders, self._waiting = self._waiting, []
+        return orders
+
+    @property
+    def unsigned(self) -> int:
+        """How many commands to us were not signed with our key."""
+        return self._link.dropped()[Drop.UNSIGNED_COMMAND]
+
+    async def watch(self, autopilot: Autopilot, record: Callable[[dict[str, Any]], None]) -> None:
+        """Say and record, once, that somebody without the key gives commands."""
+        text = "somebody without this boat's key gives commands to the companion: they count for nothing"
+        while True:
+            if self.unsigned:
+                autopilot.say(int(Severity.WARNING), text)
+                record({"kind": "refusal", "what": "unsigned commands", "text": text})
+                return
+            await asyncio.sleep(LOOK_S)
+
+    def _hear(self, message: Any) -> int:
+        if message.command not in COMMANDS:
+            return RESULTS[Result.UNKNOWN]
+        if not self._is_open or len(self._waiting) >= MOST_WAITING:
+            return RESULTS[Result.NOT_NOW]
+        self._waiting.append(Order(
+            wanted=wanted_of(message), t_s=now_s(), command=int(message.command), authority=self._authority,
+            source=Source(kind="mavlink", system=message.get_srcSystem(), component=message.get_srcComponent())))
+        return LATER

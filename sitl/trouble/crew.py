@@ -1,0 +1,30 @@
+"""The crew ashore: gives the orders of a scenario over real MAVLink, as ``companion order`` does."""
+
+from __future__ import annotations
+
+from companion.geo.frame import LocalFrame
+from companion.mavlink.link import Link
+from companion.mavlink.transports import Transport
+from companion.orders import GIVER, Place, Verb, Wanted, give, phrase
+from sitl.scene import EventSpec
+
+HEARD_S = 30.0   # for the boat's autopilot to be heard
+
+
+def wanted_by(event: EventSpec, frame: LocalFrame) -> Wanted:
+    """Return what an event orders; a goal without a position is at its ``east_m`` and ``north_m``."""
+    if event.order.strip() != Verb.GOAL:
+        return phrase(event.order.split())
+    there = frame.geo_from_en(event.east_m, event.north_m)
+    return Wanted(verb=Verb.GOAL, place=Place(lat_deg=there.lat_deg, lon_deg=there.lon_deg))
+
+
+async def give_order(transport: Transport, event: EventSpec, frame: LocalFrame) -> str:
+    """Give an event's order; return what was wrong with its answer, empty: it was the one that is expected."""
+    wanted = wanted_by(event, frame)
+    async with Link(transport, identity=GIVER, streams=(), is_quiet=True) as link:
+        await link.wait_autopilot(HEARD_S)
+        answer = await give(link, wanted)
+    if answer.result.value == event.answer:
+        return ""
+    return f"the order {wanted.words} at {event.at_s:g} s was answered {answer.result.value!r}: {answer.text}"
