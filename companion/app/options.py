@@ -42,6 +42,7 @@ class SailOptions:
         disk: what is written to.
         shelf: the older voyages beside this one and what all may take together; None: they are left alone.
         is_again: sail the mission again although the saved state says that it has arrived.
+        known: hashes of missions on the autopilot that ours may take the place of: the drawing that is sailed.
         signing: key and timestamp for a signed link.
         token: 32 bits that tell our heartbeat from a second companion's; on the boat they are drawn by lot.
         budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
@@ -61,6 +62,7 @@ class SailOptions:
     disk: Disk = field(default_factory=Disk)
     shelf: Shelf | None = None
     is_again: bool = False
+    known: tuple[str, ...] = ()
     signing: SigningStore | None = None
     token: int = 1
     budget_scale: float = 1.0

@@ -146,7 +146,7 @@ class _Shell:
         """Begin the fold with what is known from before, and write that down."""
         options = self.options
         skipper = Skipper(voyage=self.voyage, config=self.config)
-        persisted, known = self.state_file.load(), self.state_file.known()
+        persisted, known = self.state_file.load(), (*self.state_file.known(), *options.known)
         if persisted is not None and skipper.has_arrived(persisted):
             self._arrived_before = not options.is_again
             if options.is_again:

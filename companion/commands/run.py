@@ -35,9 +35,15 @@ def add_parser(subparsers: Any, summary: str) -> None:
         description="Sail a mission: estimate the wind, plan, upload, and plan again at each waypoint. Nothing is "
         "sent to the boat that the mission's [operator] table does not allow.",
         epilog="Exit codes: 0 arrived, 1 not, 2 an order that gets no better by trying again, 66 a file that is not "
-        "there or cannot be read. Example: companion run missions/archipelago.toml --link udpin:127.0.0.1:14551",
+        "there or cannot be read, a drawing that is not there or cannot be sailed. Examples: companion run "
+        "missions/archipelago.toml --link udpin:127.0.0.1:14551; companion run --from-autopilot boat.toml --link "
+        "udpin:127.0.0.1:14551",
     )
-    parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="the mission file")
+    parser.add_argument("mission", type=Path, nargs="?", metavar="MISSION.toml",
+                        help="the mission file; beside a drawing its boat, margins, wind and permissions")
+    parser.add_argument("--from-autopilot", action="store_true",
+                        help="sail what was drawn in a ground station and uploaded: waypoints are goals, the fence is "
+                        "the area, rally points are refuges (in the file: from_autopilot = true)")
     parser.add_argument("--link", required=True, metavar="LINK",
                         help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
     parser.add_argument("--system", type=system_id, metavar="N",
@@ -101,20 +107,23 @@ def _outliving_the_terminal() -> Iterator[None]:
 
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     from companion.clock import run as run_loop
+    from companion.commands.run_drawn import Sailed, read_drawn, settings_of
     from companion.geofence import load_mission
-    from companion.mavlink.transports import open_link
+    from companion.geofence.mission import NO_NAME
+    from companion.mavlink.transports import open_link, parse_link
     from companion.sailable import require_sailable
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
     from companion.traffic.feeds import parse_feed
 
     for name in args.feed:
         parse_feed(name)
-    mission = require_sailable(load_mission(args.mission)).with_feeds(*args.feed).with_system(args.system)
-    for finding in mission.findings:
-        err.write(f"companion run: {finding.line(str(args.mission))}\n")
-    seed = mission.skipper.seed if args.seed is None else args.seed
-    transport = open_link(args.link, seed=seed)
-    name = file_name(mission.name)
+    parse_link(args.link)
+    settings, sailed = settings_of(args), None
+    if settings is None:
+        named = require_sailable(load_mission(args.mission))
+        sailed, name = Sailed(mission=named), file_name(named.name)
+    else:
+        name = file_name(settings.name or NO_NAME)
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{name}"
     state_path = args.state or (folder.parent / f"{name}.state.json")
     signing = _signing(args.signing_key)
@@ -122,7 +131,16 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     if args.out is None or args.keep_gb is not None:
         shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
     with _alone(state_path, folder, err):
-        again = args.again or _asked(mission, state_path, err)
+        if settings is not None:
+            sailed = read_drawn(args, settings, folder, state_path, _signing(args.signing_key), err)
+        if sailed is None:
+            return NOT_THERE
+        mission, known = sailed.mission.with_feeds(*args.feed).with_system(args.system), sailed.known
+        for finding in mission.findings:
+            err.write(f"companion run: {finding.line(str(mission.path))}\n")
+        seed = mission.skipper.seed if args.seed is None else args.seed
+        transport = open_link(args.link, seed=seed)
+        again = args.again or sailed.is_new or _asked(mission, state_path, err)
         if again is None:
             return 0
 
@@ -133,8 +151,8 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
                 seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
                 expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
                 wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
-                exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, command=" ".join(sys.argv),
-                token=secrets.randbelow(0xFFFFFFFF) + 1,
+                exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=known,
+                command=" ".join(sys.argv), token=secrets.randbelow(0xFFFFFFFF) + 1,
             )
 
         summary = run_loop(_sail(mission, transport, folder, options, out), speedup=args.speedup)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.geofence.formats.raw.text import decode
-from companion.geofence.mission.mission import dump_options, parse_options
+from companion.geofence.mission.text import dump_options, parse_options
 from companion.geofence.mission.options import tables
 from tests.geofence.strategies import QUIET
 
