@@ -177,7 +177,7 @@ def keep(document: Document, plan: Path, disk: Disk, *, is_durable: bool = True)
         disk.make_folder(plan.parent)
         disk.replace(plan, kept(document).data, is_durable=is_durable)
     except OSError as error:
-        raise UnreadableError(str(plan), "", f"the drawing cannot be kept ({reason(error)}), and our plan takes its place",
+        raise UnreadableError(str(plan), "", f"the drawing cannot be kept: {reason(error)}; our plan takes its place",
                               "make room, or name another place with --state") from error
 
 

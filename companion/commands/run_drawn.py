@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from companion.geofence.mission import MissionOptions
     from companion.telemetry.console import Console
 
-NOTHING_PERMITTED = """without a mission file nothing is permitted, and nothing will be sent to the boat; write boat.toml:
+NOTHING_PERMITTED = """without a mission file nothing is permitted, nothing will be sent to the boat; write boat.toml:
   from_autopilot = true
   [operator]
   set_auto = true    # upload the plan and set AUTO; arm = true: arm her, too
