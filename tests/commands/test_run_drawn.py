@@ -10,7 +10,7 @@ import pytest
 from companion.geofence import read
 from tests.sitl.boats import boat_process
 
-PACE = 40
+PACE = 20
 COMPANION = [sys.executable, "-m", "companion.cli", "run"]
 BOAT = """
 [area]
@@ -78,8 +78,8 @@ def said(tmp_path_factory):
         out["dry"] = run("--from-autopilot", "boat.toml", "--dry-run", "--limit", "30")
         out["is kept"] = (folder / "voyages" / "boat.drawn.plan").exists()
         out["alone"] = run("--from-autopilot", "--limit", "30")
-        out["sailed"] = run("--from-autopilot", "boat.toml", "--exit-on-arrival")
-        out["again"] = run("--from-autopilot", "boat.toml", "--exit-on-arrival")
+        out["sailed"] = run("--from-autopilot", "boat.toml", "--exit-on-arrival", "--limit", "900")
+        out["again"] = run("--from-autopilot", "boat.toml", "--exit-on-arrival", "--limit", "900")
     return folder, out
 
 
