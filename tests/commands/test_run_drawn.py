@@ -1,13 +1,20 @@
 """``companion run --from-autopilot`` as a process: MAVSDK draws and uploads, the companion sails."""
 
+import asyncio
 import json
+import math
 import subprocess
 import sys
 import textwrap
 
 import pytest
 
+from companion import clock
 from companion.geofence import read
+from sitl.ardurover.program import find
+from sitl.ardurover.simulation import ArduRover
+from sitl.autopilot import HOME
+from sitl.world.wind import Constant
 from tests.sitl.boats import boat_process
 
 PACE = 20
@@ -30,7 +37,7 @@ _DRAW = textwrap.dedent("""
 
     logging.log_subscribe(lambda *a: True)
     m = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
-    assert int(m.add_any_connection(f"udpout://{sys.argv[1]}:{sys.argv[2]}")) in (0, 1), "connection"
+    assert int(m.add_any_connection(sys.argv[1])) in (0, 1), "connection"
     system = m.first_autopilot(10.0)
     assert system is not None and system.has_autopilot(), "no autopilot"
     raw = MissionRaw(system)
@@ -41,7 +48,7 @@ _DRAW = textwrap.dedent("""
 
     drawn = [item(0, 16, (0.0, 0.0)), item(1, 16, (30.0, 0.0)), item(2, 16, (60.0, 15.0)),
              item(3, 177, None, p1=1.0, p2=1.0, frame=2), item(4, 17, (40.0, 25.0))]
-    if sys.argv[3] == "bad":
+    if sys.argv[2] == "bad":
         drawn[3] = item(3, 178, None, p1=1.0, p2=3.0, frame=2)
     raw.upload_mission(drawn)
     ring = [(-80.0, -80.0), (180.0, -80.0), (180.0, 120.0), (-80.0, 120.0)]
@@ -52,9 +59,9 @@ _DRAW = textwrap.dedent("""
 """)
 
 
-def draw(host, udp, what):
-    done = subprocess.run([sys.executable, "-c", _DRAW, host, str(udp), what], capture_output=True, text=True,
-                          timeout=60, check=False)
+def draw(url, what):
+    command = [sys.executable, "-c", _DRAW, url, what]   # a process of its own: MAVSDK keeps threads
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -72,9 +79,9 @@ def said(tmp_path_factory):
     options = ("--speedup", str(PACE), "--warm", "--moored", "--heading", "90", "--wind", "6@0")
     with boat_process(*options) as (host, tcp, udp):
         out = {"none": run("--from-autopilot")}
-        draw(host, udp, "bad")
+        draw(f"udpout://{host}:{udp}", "bad")
         out["bad"] = run("--from-autopilot", "boat.toml")
-        draw(host, udp, "good")
+        draw(f"udpout://{host}:{udp}", "good")
         out["dry"] = run("--from-autopilot", "boat.toml", "--dry-run", "--limit", "30")
         out["is kept"] = (folder / "voyages" / "boat.drawn.plan").exists()
         out["alone"] = run("--from-autopilot", "--limit", "30")
@@ -133,3 +140,30 @@ def test_neither_a_mission_nor_a_drawing_is_asked_for():
     done = subprocess.run([*COMPANION, "--link", "tcp:127.0.0.1:1"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "there is no mission; name a mission file, or sail what is drawn on the autopilot" in done.stderr
+
+
+@pytest.mark.ardurover
+@pytest.mark.skipif(find() is None, reason="no ardurover: run 'sitl fetch' or set $ARDUROVER")
+def test_a_drawing_of_mavsdk_is_sailed_on_the_real_ardurover(tmp_path):
+    (tmp_path / "boat.toml").write_text(BOAT)
+
+    async def call(*command):
+        process = await asyncio.create_subprocess_exec(
+            *command, cwd=tmp_path, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE)
+        out, err = await process.communicate()
+        return process.returncode, out.decode(), err.decode()
+
+    async def main():
+        async with ArduRover(find(), HOME, Constant(0.0, 6.0), heading_rad=math.pi / 2, speedup=PACE / 2) as rover:
+            shore = rover.shore_link.replace("tcp:", "tcpout://")
+            await asyncio.to_thread(draw, shore, "good")
+            options = ("--link", rover.link, "--speedup", str(PACE // 2), "--limit", "900")
+            sailed = await call(*COMPANION, "--from-autopilot", "boat.toml", "--exit-on-arrival", *options)
+            return sailed, await call(*COMPANION, "--from-autopilot", "boat.toml", "--exit-on-arrival", *options)
+
+    (code, out, err), again = clock.run(main(), speedup=PACE / 2)
+    assert code == 0, out + err
+    assert "all 5 goals reached" in out
+    assert "sailing the drawing kept at" in again[2]
+    mission = (tmp_path / out.split()[-1] / "mission" / "mission.toml").read_text()
+    assert "rally 1" in mission
