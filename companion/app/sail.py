@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from companion.app.adoption import Adoption
 from companion.app.company import NOBODY, make_way, others_on
 from companion.app.executor import Executor, Planner
 from companion.app.keepers import keep_fence, keep_identity, keep_parameters
@@ -45,6 +46,8 @@ LOOP_WATCH_S = 0.1
 # With ``exit_on_arrival`` the loiter is watched for a moment before the program ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
+
+ADOPTED = "adopted"   # how a voyage ends that gives way to what was drawn under way
 
 OnStatus = Callable[[CompanionStatus, Step], None]
 
@@ -87,6 +90,7 @@ class _Shell:
         self.status: CompanionStatus | None = None
         self._step: Step | None = None
         self.end_reason = "stopped"
+        self._adopted = asyncio.Event()            # a drawing: this voyage gives way to it
         self.loop_held_s = 0.0
         self._arrived_before = False
         self._named = mission.autopilot.system     # of our autopilot: as named, or as of the voyage that goes on
@@ -117,13 +121,16 @@ class _Shell:
                     self._refuse("AIS feed", text)
                 for text in self._refusals:
                     autopilot.say(int(Severity.WARNING), text)
+                adoption = Adoption(autopilot, self.options.settings, self._adopted.set)
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
                                     expansions=self.options.expansions,
-                                    budget_scale=self.options.budget_scale, config=self.config)
+                                    budget_scale=self.options.budget_scale, config=self.config,
+                                    on_adopt=adoption.ask)
                 radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
                 async with asyncio.TaskGroup() as group:
                     tasks = [
                         group.create_task(executor.run(), name="executor"),
+                        group.create_task(adoption.run(), name="adoption"),
                         group.create_task(keep_identity(self.fold, autopilot), name="identity"),
                         group.create_task(keep_parameters(self.fold, autopilot), name="parameters"),
                         group.create_task(keep_fence(self.fold, autopilot, self.mission, self._record), name="fence"),
@@ -226,6 +233,9 @@ class _Shell:
                 done_s = None
             if self.options.limit_s is not None and t_s - started_s >= self.options.limit_s:
                 self.end_reason = "out of time"
+                return
+            if self._adopted.is_set():
+                self.end_reason = ADOPTED
                 return
             next_s = max(next_s + STEP_S, now_s())
             with contextlib.suppress(TimeoutError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import itertools
 import os
 import secrets
 import signal
@@ -20,6 +21,7 @@ from companion.program import INTERRUPTED
 from companion.words import counted, file_name
 
 if TYPE_CHECKING:
+    from companion.commands.run_drawn import Sailed
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
     from companion.telemetry.service import ServiceManager
@@ -106,13 +108,11 @@ def _outliving_the_terminal() -> Iterator[None]:
 
 
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
-    from companion.clock import run as run_loop
     from companion.commands.run_drawn import Sailed, read_drawn, settings_of
     from companion.geofence import load_mission
     from companion.geofence.mission import NO_NAME
-    from companion.mavlink.transports import open_link, parse_link
+    from companion.mavlink.transports import parse_link
     from companion.sailable import require_sailable
-    from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
     from companion.traffic.feeds import parse_feed
 
     for name in args.feed:
@@ -124,45 +124,68 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
         sailed, name = Sailed(mission=named), file_name(named.name)
     else:
         name = file_name(settings.name or NO_NAME)
-    folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{name}"
+    folder = _new_folder(args.out, name, 1)
     state_path = args.state or (folder.parent / f"{name}.state.json")
+    with _alone(state_path, folder, err):
+        for number in itertools.count(2):
+            if settings is not None:
+                sailed = read_drawn(args, settings, folder, state_path, _signing(args.signing_key), err)
+            if sailed is None:
+                return NOT_THERE
+            code = _voyage(args, sailed, folder, state_path, out, err)
+            if code is not None:
+                return code
+            folder = _new_folder(args.out, name, number)
+    return 0
+
+
+def _new_folder(named: Path | None, name: str, number: int) -> Path:
+    """Return the folder of this start's voyage of that number: behind one that gives way to a drawing is another."""
+    if named is not None:
+        return named if number == 1 else named.with_name(f"{named.name}-{number}")
+    return Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{name}"
+
+
+def _voyage(
+    args: argparse.Namespace, sailed: Sailed, folder: Path, state_path: Path, out: Console, err: Console,
+) -> int | None:
+    """Sail; return the exit code, None when the voyage has given way to what was drawn under way."""
+    from companion.clock import run as run_loop
+    from companion.mavlink.transports import open_link
+    from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
+
     signing = _signing(args.signing_key)
     shelf = None   # a folder that was named is not ours to tidy
     if args.out is None or args.keep_gb is not None:
         shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
-    with _alone(state_path, folder, err):
-        if settings is not None:
-            sailed = read_drawn(args, settings, folder, state_path, _signing(args.signing_key), err)
-        if sailed is None:
-            return NOT_THERE
-        mission, known = sailed.mission.with_feeds(*args.feed).with_system(args.system), sailed.known
-        for finding in mission.findings:
-            err.write(f"companion run: {finding.line(str(mission.path))}\n")
-        seed = mission.skipper.seed if args.seed is None else args.seed
-        transport = open_link(args.link, seed=seed)
-        again = args.again or sailed.is_new or _asked(mission, state_path, err)
-        if again is None:
-            return 0
+    mission = sailed.mission.with_feeds(*args.feed).with_system(args.system)
+    for finding in mission.findings:
+        err.write(f"companion run: {finding.line(str(mission.path))}\n")
+    seed = mission.skipper.seed if args.seed is None else args.seed
+    transport = open_link(args.link, seed=seed)
+    again = args.again or sailed.is_new or _asked(mission, state_path, err)
+    if again is None:
+        return 0
 
-        def options() -> Any:
-            from companion.app.options import SailOptions
+    def options() -> Any:
+        from companion.app.options import SailOptions
 
-            return SailOptions(
-                seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
-                expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
-                wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
-                exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=known,
-                command=" ".join(sys.argv), token=secrets.randbelow(0xFFFFFFFF) + 1,
-            )
+        return SailOptions(
+            seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
+            expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
+            wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
+            exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
+            settings=sailed.settings, command=" ".join(sys.argv), token=secrets.randbelow(0xFFFFFFFF) + 1,
+        )
 
-        summary = run_loop(_sail(mission, transport, folder, options, out), speedup=args.speedup)
+    summary = run_loop(_sail(mission, transport, folder, options, out), speedup=args.speedup)
     if summary is None:
         return INTERRUPTED
     if not summary["arrived_before"]:
         _report(folder, err)
     code, text = last_words(mission.name, summary)
     out.write(f"{text}\n{folder}\n")
-    return code
+    return None if summary["end_reason"] == "adopted" else code
 
 
 def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from companion.errors import InputError
 
 if TYPE_CHECKING:
+    from companion.app.adoption import Settings
     from companion.geofence import Mission
     from companion.geofence.mission import MissionOptions
     from companion.telemetry.console import Console
@@ -29,20 +30,26 @@ class Sailed:
     mission: Mission
     known: tuple[str, ...] = ()
     is_new: bool = False
+    settings: Settings | None = None   # where it is drawn
 
 
 def settings_of(args: argparse.Namespace) -> MissionOptions | None:
     """Return the settings of a mission that is drawn on the autopilot, None where the goals are the file's own."""
+    import msgspec
+
     from companion.geofence.mission import MissionOptions, load_settings, read_options
 
+    settings: MissionOptions | None = None
     if args.mission is None:
         if not args.from_autopilot:
             raise InputError("companion run", "", "there is no mission",
                              "name a mission file, or sail what is drawn on the autopilot: --from-autopilot")
-        return MissionOptions(from_autopilot=True)
-    if not args.from_autopilot and not read_options(args.mission).from_autopilot:
-        return None
-    return load_settings(args.mission)
+        settings = MissionOptions(from_autopilot=True)
+    elif args.from_autopilot or read_options(args.mission).from_autopilot:
+        settings = load_settings(args.mission)
+    if settings is None or args.system is None:
+        return settings
+    return msgspec.structs.replace(settings, autopilot=msgspec.structs.replace(settings.autopilot, system=args.system))
 
 
 def read_drawn(
@@ -54,6 +61,7 @@ def read_drawn(
         InputError: the settings cannot be sailed with, or there is no drawing.
         LinkError: the autopilot's lists cannot be read.
     """
+    from companion.app.adoption import Settings
     from companion.app.drawn import find_on, keep, plan_path
     from companion.clock import run as run_loop
     from companion.disk import Disk
@@ -84,4 +92,5 @@ def read_drawn(
     say(f"sailing {found.text}; it is kept at {found.plan}" if found.is_new else f"sailing {found.text}")
     if args.mission is None and not args.dry_run:
         say(NOTHING_PERMITTED)
-    return Sailed(mission=mission, known=(found.board,), is_new=found.is_new)
+    return Sailed(mission=mission, known=(found.board,), is_new=found.is_new,
+                  settings=Settings(options=settings, path=args.mission, state_path=state_path))

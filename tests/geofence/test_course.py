@@ -123,7 +123,7 @@ def test_any_list_ends_in_bounded_goals_or_a_refusal(items):
     if not course.refusals and not any(i.command == Command.DO_JUMP for i in items):
         drawn = [n for n, i in enumerate(items, start=1) if i.command != Command.NAV_RETURN_TO_LAUNCH]
         assert [s.number for s in course.stops] == drawn, "nothing is passed over in silence"
-    offer(items)
+    offer(items, adopts=True)
 
 
 # ---------------------------------------------------------------------------------------- the whole drawing
@@ -231,7 +231,8 @@ def test_a_plan_from_a_file_and_from_the_autopilot_are_one_voyage(tmp_path):
 
 
 def test_the_offer_says_how_many_items_and_what_is_in_the_way():
-    assert offer([A, B, C, A, B]) == "a mission of 5 items was drawn: adopt it by the order adopt"
-    assert offer([A, order(178)]) == (
+    assert offer([A, B, C, A, B], adopts=True) == "a mission of 5 items was drawn: adopt it by the order adopt"
+    assert offer([A], adopts=False) == "a mission of 1 item was drawn: companion run --from-autopilot sails such"
+    assert offer([A, order(178)], adopts=True) == (
         "a mission of 2 items was drawn that cannot be adopted: item 2: DO_CHANGE_SPEED is nothing that a voyage does")
-    assert offer([RTL]) == "a mission of 1 item was drawn that leads nowhere"
+    assert offer([RTL], adopts=True) == "a mission of 1 item was drawn that cannot be adopted: it leads nowhere"

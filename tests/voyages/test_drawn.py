@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import pytest
 
+from companion.app.adoption import Settings
 from companion.app.drawn import find_on, keep, plan_path
 from companion.app.options import SailOptions, at_once
 from companion.app.sail import sail
@@ -24,7 +25,9 @@ from companion.mavlink.link import Link
 from companion.mavlink.wire.codec import mission_item
 from companion.messages import GeoPoint, waypoint
 from companion.replay import replay
+from companion.skipper.board.adoption import adopt
 from companion.skipper.board.mark import are_marked, marked
+from companion.skipper.board.on_board import mission_is_known
 from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.trouble.fragile import FragilePlanner
 from sitl.world.wind import AR1
@@ -100,7 +103,8 @@ class Bay:
 
         settings = {"epoch_s": 1.78e9, "offload": at_once, "is_durable": False, "limit_s": 500.0, "expansions": 2000,
                     "state_path": self.state_path, "known": (found.board,), "is_again": found.is_new,
-                    "exit_on_arrival": True}
+                    "exit_on_arrival": True,
+                    "settings": Settings(options=load_settings(self.path), path=self.path, state_path=self.state_path)}
         return await sail(found.drawn.mission, self.line.near, FragilePlanner(), folder or self.folder,
                           SailOptions(**settings | options), on_status=look)
 
@@ -198,6 +202,43 @@ def test_a_new_drawing_under_way_is_offered_and_she_stands_by(tmp_path):
     assert "a mission of 5 items was drawn: adopt it by the order adopt" in bay.announced()
     assert sum(text.startswith("a mission of 5") for text in bay.announced()) == 1
     assert (found.is_new, len(found.drawn.mission.goals), found.drawn.mission.skipper.end) == (True, 4, "home")
+
+
+@pytest.mark.parametrize("can_be_sailed", [True, False])
+def test_a_drawing_adopted_under_way_ends_the_voyage_for_its_own(tmp_path, monkeypatch, can_be_sailed):
+    """By ``board.adoption.adopt``, as the crew's order does; one that cannot be sailed ends nothing."""
+    bay = Bay(tmp_path)
+    other = [(40.0, 40.0), (70.0, 40.0) if can_be_sailed else (105.0, 0.0)]
+    answers = []
+
+    def known(turn):
+        is_known = mission_is_known(turn)
+        if len(answers) < 2 and not is_known and turn.state.foreign:
+            answers.append(adopt(turn))
+        return is_known
+
+    async def work():
+        await bay.draw()
+        life = asyncio.create_task(bay.sail(limit_s=200.0))
+        await asyncio.sleep(70.0)
+        monkeypatch.setattr("companion.skipper.rules.mission_is_known", known)
+        assert await bay.station.upload(other) == 0
+        first = await life
+        if not can_be_sailed:
+            return first, None
+        monkeypatch.undo()
+        return first, await bay.sail(folder=tmp_path / "voyages" / "second")
+
+    first, second = bay.run(work)
+    assert answers[0] == ""
+    if not can_be_sailed:
+        assert first["end_reason"] == "out of time"
+        assert any(t.startswith("the drawing is not adopted: item 2: ") for t in bay.station.texts())
+        return
+    assert (first["arrived"], first["end_reason"]) == (False, "adopted")
+    assert (second["arrived"], second["goals"], second["goals_reached"]) == (True, 2, 2)
+    assert second["mission"] != first["mission"]
+    assert [i.command for i in read(bay.plan).items] == [16, 16], "the new one is kept"
 
 
 def test_an_upload_of_ours_that_was_cut_short_over_the_drawing_is_known(tmp_path):

@@ -85,7 +85,7 @@ def drawn_mission(document: Document, settings: MissionOptions, path: Path, plan
     if refusals:
         return Drawn(mission=None, refusals=tuple(refusals))
     options = msgspec.structs.replace(
-        settings, name=f"{settings.name or NO_NAME} {tag(document)}", from_autopilot=False,
+        settings, name=f"{settings.name or NO_NAME} {tag(document)}", from_autopilot=True,
         goal=tuple(GoalOptions(lat=s.point.lat_deg, lon=s.point.lon_deg, name=f"item {s.number}")
                    for s in course.stops),
         refuge=(*settings.refuge, *(RefugeOptions(
@@ -115,15 +115,21 @@ def tag(document: Document) -> str:
     return hashlib.sha256(write_plan(content).data).hexdigest()[:_TAG_DIGITS]
 
 
-def offer(items: Sequence[MissionItem]) -> str:
-    """Return what is said of a mission that somebody has uploaded under way."""
-    count = f"a mission of {counted(len(items), 'item')} was drawn"
+def hindrance(items: Sequence[MissionItem]) -> str:
+    """Return why a mission that somebody has uploaded cannot be sailed by its items, empty where they can be."""
     course = course_of(items)
     if course.refusals:
-        return f"{count} that cannot be adopted: {course.refusals[0].place}: {course.refusals[0].text}"
-    if not course.stops:
-        return f"{count} that leads nowhere"
-    return f"{count}: adopt it by the order adopt"
+        return f"{course.refusals[0].place}: {course.refusals[0].text}"
+    return "" if course.stops else "it leads nowhere"
+
+
+def offer(items: Sequence[MissionItem], *, adopts: bool) -> str:
+    """Return what is said of a mission that somebody has uploaded; ``adopts``: this voyage may go on by it."""
+    count = f"a mission of {counted(len(items), 'item')} was drawn"
+    trouble = hindrance(items)
+    if trouble:
+        return f"{count} that cannot be adopted: {trouble}"
+    return f"{count}: adopt it by the order adopt" if adopts else f"{count}: companion run --from-autopilot sails such"
 
 
 def _refusal(place: str, text: str, remedy: str = REDRAW) -> Finding:

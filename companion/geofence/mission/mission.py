@@ -164,7 +164,7 @@ def load_mission(path: str | Path) -> Mission:
     """
     path = Path(path)
     options = read_options(path)
-    if options.from_autopilot:
+    if options.from_autopilot and not options.goal:
         raise InputError(str(path), "from_autopilot", "the goals of this mission are drawn on the autopilot, not here",
                          "companion run reads them there and sails them")
     if not options.goal:

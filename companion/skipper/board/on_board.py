@@ -127,7 +127,7 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
     turn.update(foreign=text, route=None, unsure_route=None, adoptable=saved or saved_of(state, turn.voyage.name))
     if not state.foreign:
         turn.say(Severity.ERROR, "foreign mission", f"{text}; {REMEDY}", every_s=0.0)
-        turn.say(Severity.WARNING, "drawn mission", offer(items), every_s=0.0)
+        turn.say(Severity.WARNING, "drawn mission", offer(items, adopts=turn.config.adopts), every_s=0.0)
     turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{text}; {REMEDY}")
     return False
 

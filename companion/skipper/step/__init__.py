@@ -2,6 +2,7 @@
 
 from companion.skipper.step.actions import (
     Action,
+    AdoptDrawing,
     Announce,
     Arm,
     CancelPlan,
@@ -42,10 +43,10 @@ from companion.skipper.step.snapshot import (
 from companion.skipper.step.state import Phase, SkipperState
 
 __all__ = [
-    "Action", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome", "CommandResult", "Disbelieved",
-    "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome", "Permissions", "Persisted", "Phase", "PlanOutcome",
-    "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd", "SetCurrent",
-    "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot", "SteerHeading", "StopOrders", "Tack",
-    "UploadFence", "UploadMission", "UploadOutcome", "UploadResult", "WaypointReached", "WindHealth", "WindView",
-    "ends_safely",
+    "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome", "CommandResult",
+    "Disbelieved", "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome", "Permissions", "Persisted",
+    "Phase", "PlanOutcome", "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor",
+    "SafeEnd", "SetCurrent", "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot", "SteerHeading",
+    "StopOrders", "Tack", "UploadFence", "UploadMission", "UploadOutcome", "UploadResult", "WaypointReached",
+    "WindHealth", "WindView", "ends_safely",
 ]
