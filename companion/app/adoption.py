@@ -17,6 +17,8 @@ from companion.mavlink.autopilot import Autopilot
 from companion.sailable import require_sailable
 from companion.skipper.step import Severity
 
+ADOPTED = "adopted"   # how a voyage ends that gives way to what was drawn under way
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from companion.app.adoption import Adoption
+from companion.app.adoption import ADOPTED, Adoption
 from companion.app.company import NOBODY, make_way, others_on
 from companion.app.executor import Executor, Planner
 from companion.app.keepers import keep_fence, keep_identity, keep_parameters
@@ -46,8 +46,6 @@ LOOP_WATCH_S = 0.1
 # With ``exit_on_arrival`` the loiter is watched for a moment before the program ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
-
-ADOPTED = "adopted"   # how a voyage ends that gives way to what was drawn under way
 
 OnStatus = Callable[[CompanionStatus, Step], None]
 
@@ -175,7 +173,7 @@ class _Shell:
         })
         if self.state_file.refusal:
             self._refuse("saved state", self.state_file.refusal)
-        elif persisted is not None and self.fold.state.adoptable is None:
+        elif persisted is not None and self.fold.state.adoptable is None and not options.is_again:
             self._refuse("saved state", f"{self.state_file.path.name} is not used: {self.fold.state.why}")
 
     # -------------------------------------------------------------------------------------- inputs

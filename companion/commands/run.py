@@ -109,6 +109,7 @@ def _outliving_the_terminal() -> Iterator[None]:
 
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     from companion.commands.run_drawn import Sailed, read_drawn, settings_of
+    from companion.commands.run_start import alone
     from companion.geofence import load_mission
     from companion.geofence.mission import NO_NAME
     from companion.mavlink.transports import parse_link
@@ -126,7 +127,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
         name = file_name(settings.name or NO_NAME)
     folder = _new_folder(args.out, name, 1)
     state_path = args.state or (folder.parent / f"{name}.state.json")
-    with _alone(state_path, folder, err):
+    with alone(state_path, folder, err):
         for number in itertools.count(2):
             if settings is not None:
                 sailed = read_drawn(args, settings, folder, state_path, _signing(args.signing_key), err)
@@ -150,7 +151,9 @@ def _voyage(
     args: argparse.Namespace, sailed: Sailed, folder: Path, state_path: Path, out: Console, err: Console,
 ) -> int | None:
     """Sail; return the exit code, None when the voyage has given way to what was drawn under way."""
+    from companion.app.adoption import ADOPTED
     from companion.clock import run as run_loop
+    from companion.commands.run_start import asked
     from companion.mavlink.transports import open_link
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
 
@@ -163,7 +166,7 @@ def _voyage(
         err.write(f"companion run: {finding.line(str(mission.path))}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
     transport = open_link(args.link, seed=seed)
-    again = args.again or sailed.is_new or _asked(mission, state_path, err)
+    again = args.again or sailed.is_new or asked(mission, state_path, err)
     if again is None:
         return 0
 
@@ -185,11 +188,13 @@ def _voyage(
         _report(folder, err)
     code, text = last_words(mission.name, summary)
     out.write(f"{text}\n{folder}\n")
-    return None if summary["end_reason"] == "adopted" else code
+    return None if summary["end_reason"] == ADOPTED else code
 
 
 def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
     """Return the exit code and what is said of a voyage at its end."""
+    from companion.app.adoption import ADOPTED
+
     if summary["arrived_before"]:
         # an order that gets no better by trying again
         return 2, f"not sailed: {name} had arrived before this start; --again sails it again"
@@ -198,69 +203,16 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
                 "mission on board led her there; to sail it, begin away from its goal")
     else:
         end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
+        if summary["end_reason"] == ADOPTED:
+            end = "given up for the mission that was drawn under way"
         text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {counted(summary['tacks'], 'tack')}, "
         text += counted(summary["replans"], "replan")
-    if not summary["arrived"] and summary["left_behind"]:
+    if not summary["arrived"] and summary["left_behind"] and summary["end_reason"] != ADOPTED:
         text += f"\n{summary['left_behind']}"
     if summary["records_dropped"]:
         missing = f"{summary['records_dropped']} records are missing"
         text += "\n" + "; ".join(part for part in (missing, summary["disk_trouble"]) if part)
     return 0 if summary["arrived"] else 1, text
-
-
-@contextlib.contextmanager
-def _alone(state_path: Path, folder: Path, err: Console) -> Iterator[None]:
-    """Hold the lock on the folder of the state: it is one boat's, and one companion commands a boat.
-
-    A state within the voyage's own folder is guarded by whoever records there.
-    """
-    from companion.disk import Disk, is_mistake, reason
-    from companion.errors import InputError, JobError
-    from companion.lock import FolderLock
-
-    if state_path.is_dir():
-        raise InputError("--state", str(state_path), "is a folder", "name a file")
-    if state_path.parent.resolve() == folder.resolve():
-        yield
-        return
-    lock = FolderLock(state_path.parent)
-    try:
-        Disk().make_folder(state_path.parent)
-        is_alone = lock.take()
-    except OSError as error:
-        if is_mistake(error):
-            raise InputError(str(state_path.parent), "", f"cannot hold the state: {reason(error)}",
-                             "name another place with --state or --out") from error
-        err.write(f"companion run: {state_path.parent} cannot be locked: {reason(error)}; sailing all the same\n")
-        is_alone = True
-    if not is_alone:
-        raise JobError(f"{state_path.parent}: another companion is sailing with the state kept here, and two must not "
-                       "command one boat; end that one, or keep another boat's state elsewhere with --state")
-    try:
-        yield
-    finally:
-        lock.release()
-
-
-def _asked(mission: Any, state_path: Path, err: Console) -> bool | None:
-    """Return whether a mission that has arrived is sailed again: what a terminal answers; None: it is not wanted."""
-    if not (state_path.is_file() and sys.stdin is not None and sys.stdin.isatty() and err.isatty()):
-        return False
-    from companion.compose import config_of, voyage_of
-    from companion.skipper import Skipper
-    from companion.telemetry.state_file import read_state
-
-    try:
-        saved = read_state(state_path)
-    except (OSError, ValueError):
-        return False   # the voyage says what is wrong with it
-    if not Skipper(voyage=voyage_of(mission), config=config_of(mission)).has_arrived(saved):
-        return False
-    day = datetime.fromtimestamp(state_path.stat().st_mtime, UTC)
-    err.write(f"{mission.name} has arrived already ({day:%d %b %Y %H:%M} UTC). Sail it again? [y/N] ")
-    if sys.stdin.readline().strip().lower() in {"y", "yes"}:
-        return True
-    return None
 
 
 async def _sail(
