@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-import itertools
 import os
 import secrets
 import signal
@@ -114,6 +113,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     from companion.geofence.mission import NO_NAME
     from companion.mavlink.transports import parse_link
     from companion.sailable import require_sailable
+    from companion.telemetry.service import ServiceManager
     from companion.traffic.feeds import parse_feed
 
     for name in args.feed:
@@ -127,17 +127,19 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
         name = file_name(settings.name or NO_NAME)
     folder = _new_folder(args.out, name, 1)
     state_path = args.state or (folder.parent / f"{name}.state.json")
-    with alone(state_path, folder, err):
-        for number in itertools.count(2):
+    # one for all voyages of this start: it tells the service manager that the program ends
+    with alone(state_path, folder, err), ServiceManager(os.environ) as manager:
+        number = 1
+        while True:
             if settings is not None:
-                sailed = read_drawn(args, settings, folder, state_path, _signing(args.signing_key), err)
+                sailed = read_drawn(args, settings, folder, state_path, _signing(args.signing_key), manager, err)
             if sailed is None:
                 return NOT_THERE
-            code = _voyage(args, sailed, folder, state_path, out, err)
+            code = _voyage(args, sailed, folder, state_path, manager, out, err)
             if code is not None:
                 return code
+            number += 1
             folder = _new_folder(args.out, name, number)
-    return 0
 
 
 def _new_folder(named: Path | None, name: str, number: int) -> Path:
@@ -148,7 +150,8 @@ def _new_folder(named: Path | None, name: str, number: int) -> Path:
 
 
 def _voyage(
-    args: argparse.Namespace, sailed: Sailed, folder: Path, state_path: Path, out: Console, err: Console,
+    args: argparse.Namespace, sailed: Sailed, folder: Path, state_path: Path, manager: ServiceManager, out: Console,
+    err: Console,
 ) -> int | None:
     """Sail; return the exit code, None when the voyage has given way to what was drawn under way."""
     from companion.app.adoption import ADOPTED
@@ -181,10 +184,10 @@ def _voyage(
             settings=sailed.settings, command=" ".join(sys.argv), token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
-    summary = run_loop(_sail(mission, transport, folder, options, out), speedup=args.speedup)
+    summary = run_loop(_sail(mission, transport, folder, options, manager, out), speedup=args.speedup)
     if summary is None:
         return INTERRUPTED
-    if not summary["arrived_before"]:
+    if not summary["arrived_before"] and summary["end_reason"] != ADOPTED:   # the next voyage waits for no picture
         _report(folder, err)
     code, text = last_words(mission.name, summary)
     out.write(f"{text}\n{folder}\n")
@@ -216,35 +219,33 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 
 async def _sail(
-    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], out: Console,
+    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager, out: Console,
 ) -> dict[str, Any] | None:
     """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker
-    from companion.telemetry.service import ServiceManager
 
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for end in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
             loop.add_signal_handler(end, stop.set)
-    with ServiceManager(os.environ) as manager:
-        async with PlannerWorker() as planner:
-            # The child loads its kernels while this process imports the rest.
-            from companion.app.sail import sail
-            from companion.telemetry.progress import ProgressLine
+    async with PlannerWorker() as planner:
+        # The child loads its kernels while this process imports the rest.
+        from companion.app.sail import sail
+        from companion.telemetry.progress import ProgressLine
 
-            if not await _is_ready(planner, stop, out, manager):
-                return None
-            chosen = options()
+        if not await _is_ready(planner, stop, out, manager):
+            return None
+        chosen = options()
 
-            with ProgressLine(out, chosen.epoch_s) as progress:
-                def show(status: Any, step: Any) -> None:
-                    progress.show(status, step)
-                    manager.alive(f"{step.state.phase.value}: {step.state.why}")
+        with ProgressLine(out, chosen.epoch_s) as progress:
+            def show(status: Any, step: Any) -> None:
+                progress.show(status, step)
+                manager.alive(f"{step.state.phase.value}: {step.state.why}")
 
-                return await sail(
-                    mission, transport, planner, folder, chosen, on_status=show, stop=stop,
-                    on_refusal=lambda text: out.write(f"note: {text}\n"))
+            return await sail(
+                mission, transport, planner, folder, chosen, on_status=show, stop=stop,
+                on_refusal=lambda text: out.write(f"note: {text}\n"))
 
 
 async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, manager: ServiceManager) -> bool:

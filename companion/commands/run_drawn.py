@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import os
+import asyncio
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +15,15 @@ if TYPE_CHECKING:
     from companion.geofence import Mission
     from companion.geofence.mission import MissionOptions
     from companion.telemetry.console import Console
+    from companion.telemetry.service import ServiceManager
 
 NOTHING_PERMITTED = """without a mission file nothing is permitted, nothing will be sent to the boat; write boat.toml:
   from_autopilot = true
   [operator]
   set_auto = true    # upload the plan and set AUTO; arm = true: arm her, too
 and start: companion run boat.toml --link LINK"""
+
+BEAT_S = 5.0   # of the words to the service manager, whose watchdog waits for 30 s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +56,8 @@ def settings_of(args: argparse.Namespace) -> MissionOptions | None:
 
 
 def read_drawn(
-    args: argparse.Namespace, settings: MissionOptions, folder: Path, state_path: Path, signing: Any, err: Console,
+    args: argparse.Namespace, settings: MissionOptions, folder: Path, state_path: Path, signing: Any,
+    manager: ServiceManager, err: Console,
 ) -> Sailed | None:
     """Return the mission that is drawn on the autopilot, kept on the disk; None when it was refused, line by line.
 
@@ -62,13 +66,12 @@ def read_drawn(
         LinkError: the autopilot's lists cannot be read.
     """
     from companion.app.adoption import Settings
-    from companion.app.drawn import find_on, keep, plan_path
+    from companion.app.drawn import Found, find_on, keep, plan_path
     from companion.clock import run as run_loop
     from companion.disk import Disk
     from companion.geofence.mission import NO_NAME
     from companion.mavlink.transports import open_link
     from companion.sailable import require_sailable
-    from companion.telemetry.service import ServiceManager
 
     def say(text: str) -> None:
         err.write(f"companion run: {text}\n")
@@ -76,11 +79,16 @@ def read_drawn(
     kept = plan_path(state_path)
     # A dry run must not take the place of the drawing of a voyage that is interrupted.
     keep_at = folder / f"{NO_NAME}.plan" if args.dry_run else kept
-    with ServiceManager(os.environ) as manager:
-        manager.starting("reading the drawing on the autopilot")
-        found = run_loop(
-            find_on(open_link(args.link), settings, args.mission, state_path, keep_at, say,
-                    wait_s=args.wait * args.speedup, signing=signing), speedup=args.speedup)
+
+    async def read() -> Found:
+        patience = asyncio.create_task(_ask_for_patience(manager, BEAT_S * args.speedup))
+        try:
+            return await find_on(open_link(args.link), settings, args.mission, state_path, keep_at, say,
+                                 wait_s=args.wait * args.speedup, signing=signing)
+        finally:
+            patience.cancel()
+
+    found = run_loop(read(), speedup=args.speedup)
     for finding in (*found.drawn.refusals, *found.drawn.notes):
         say(finding.line(found.document.source))
     if found.drawn.mission is None:
@@ -94,3 +102,9 @@ def read_drawn(
         say(NOTHING_PERMITTED)
     return Sailed(mission=mission, known=(found.board,), is_new=found.is_new,
                   settings=Settings(options=settings, path=args.mission, state_path=state_path))
+
+
+async def _ask_for_patience(manager: ServiceManager, every_s: float) -> None:
+    while True:
+        manager.starting("reading the drawing on the autopilot")
+        await asyncio.sleep(every_s)

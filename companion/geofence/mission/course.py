@@ -76,65 +76,85 @@ def command_name(command: int) -> str:
 
 def course_of(items: Sequence[MissionItem]) -> Course:
     """Return the voyage that mission items (without home) ask for, as ArduPilot would go through them."""
-    found: dict[tuple[int, str], Finding] = {}
-
-    def say(number: int, text: str, remedy: str = REDRAW, severity: Severity = Severity.ERROR) -> None:
-        found.setdefault((number, text), Finding(
-            severity=severity, code=Code.NOT_CARRIED if severity is Severity.ERROR else Code.DROPPED,
-            place=f"item {number}", text=text, remedy=remedy))
-
-    jumps: dict[int, tuple[int, int]] = {}   # number -> (target, how often)
-    for number, item in enumerate(items, start=1):
-        name = command_name(item.command)
-        if item.command == Command.DO_JUMP:
-            problem, remedy = _jump_trouble(items, number, item)
-            if problem:
-                say(number, f"{name} {problem}", remedy)
-            else:
-                jumps[number] = int(item.params[0]), int(item.params[1])
-        elif item.command == Command.NAV_LOITER_TURNS:
-            say(number, f"{name}: a sailboat does not sail circles", "draw NAV_LOITER_UNLIM, or a waypoint")
-        elif item.command not in _STOPS and item.command != Command.NAV_RETURN_TO_LAUNCH:
-            say(number, f"{name} is nothing that a voyage does", "take it out of the drawing and upload it again")
-        if item.command in _STOPS and item.frame not in GLOBAL_FRAMES:
-            say(number, f"{name} is in frame {item.frame}, which has no latitude and longitude",
-                "draw it in a global frame")
-        elif item.command in _STOPS and not _has_place(item):
-            say(number, f"{name} has no place (0, 0)", "place it on the map and upload again")
+    found = _Found(items)
+    jumps = _judged(items, found)
     walked, is_whole = _walk(items, jumps)
     if not is_whole:
-        say(max(jumps), f"with this DO_JUMP the voyage has more than {MAX_GOALS} goals", "draw fewer repeats")
+        found.say(max(jumps), f"with this DO_JUMP the voyage has more than {MAX_GOALS} goals", "draw fewer repeats")
         walked, _ = _walk(items, {})
     last = walked[-1] if walked else 0
     ending = items[last - 1].command if last else None
-    end: Literal["loiter", "home"] | None = None
+    end: Literal["loiter", "home"] | None = "loiter" if ending in _LOITERS else None
     if ending == Command.NAV_RETURN_TO_LAUNCH:
         end, walked = "home", walked[:-1]
-    elif ending in _LOITERS:
-        end = "loiter"
     if ending in _ENDS and last < len(items):
-        say(last + 1, f"stands behind item {last} ({command_name(items[last - 1].command)}), where the mission ends: "
-            "it would never be sailed", "take one of them out")
-    for position, number in enumerate(walked):
-        item = items[number - 1]
-        wait_s = item.params[0] if item.command in {Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME} else 0.0
-        is_last = position == len(walked) - 1 and end != "home"
-        if wait_s > 0.0 and not is_last:
-            say(number, f"{command_name(item.command)} stays for {wait_s:g} s before the voyage's end",
-                "draw a waypoint without hold time, or let it be the last")
-    station_s = 0.0
-    if walked and end != "home":
-        final = items[walked[-1] - 1]
-        if final.command != Command.NAV_LOITER_UNLIM and final.command in _STOPS and final.params[0] > 0.0:
-            station_s = float(final.params[0])
-            say(walked[-1], f"{command_name(final.command)} of {station_s:g} s is the last: she stays until told", "",
-                Severity.NOTE)
+        found.say(last + 1, f"stands behind item {last} ({found.name(last)}), where the mission ends: it would never "
+                  "be sailed", "take one of them out")
+    final = walked[-1] if walked and end != "home" else None
+    for number in walked if final is None else walked[:-1]:
+        stay_s = _stay_s(items[number - 1])
+        if stay_s > 0.0:
+            found.say(number, f"{found.name(number)} stays for {stay_s:g} s before the voyage's end",
+                      "draw a waypoint without hold time, or let it be the last")
+    station_s = 0.0 if final is None else max(0.0, _stay_s(items[final - 1]))
+    if final is not None and station_s > 0.0:
+        found.say(final, f"{found.name(final)} of {station_s:g} s is the last: she stays until told", "", Severity.NOTE)
     stops = [Stop(number=n, point=items[n - 1].point) for n in walked if _has_place(items[n - 1])]
-    lap = next((p for p in range(1, len(stops) + 1) if len(stops) % p == 0 and stops == stops[:p] * (len(stops) // p)),
-               1)
-    ordered = sorted(found.values(), key=lambda f: int(f.place.split()[1]))
-    return Course(stops=tuple(stops[:lap]), laps=max(1, len(stops) // lap), end=end, station_s=station_s,
-                  findings=tuple(ordered))
+    lap = _lap(stops) if jumps else len(stops)
+    return Course(stops=tuple(stops[:lap]), laps=len(stops) // lap if lap else 1, end=end, station_s=station_s,
+                  findings=found.ordered())
+
+
+class _Found:
+    """What is found in items, each thing once."""
+
+    def __init__(self, items: Sequence[MissionItem]) -> None:
+        self._items = items
+        self._findings: dict[tuple[int, str], Finding] = {}
+
+    def name(self, number: int) -> str:
+        return command_name(self._items[number - 1].command)
+
+    def say(self, number: int, text: str, remedy: str = REDRAW, severity: Severity = Severity.ERROR) -> None:
+        code = Code.NOT_CARRIED if severity is Severity.ERROR else Code.DROPPED
+        self._findings.setdefault((number, text), Finding(
+            severity=severity, code=code, place=f"item {number}", text=text, remedy=remedy))
+
+    def ordered(self) -> tuple[Finding, ...]:
+        return tuple(self._findings[key] for key in sorted(self._findings, key=lambda key: key[0]))
+
+
+def _judged(items: Sequence[MissionItem], found: _Found) -> dict[int, tuple[int, int]]:
+    """Refuse what no voyage does; return the jumps that can be made: number -> (target, how often)."""
+    jumps: dict[int, tuple[int, int]] = {}
+    for number, item in enumerate(items, start=1):
+        name = found.name(number)
+        if item.command == Command.DO_JUMP:
+            problem, remedy = _jump_trouble(items, number, item)
+            if problem:
+                found.say(number, f"{name} {problem}", remedy)
+            else:
+                jumps[number] = int(item.params[0]), int(item.params[1])
+        elif item.command == Command.NAV_LOITER_TURNS:
+            found.say(number, f"{name}: a sailboat does not sail circles", "draw NAV_LOITER_UNLIM, or a waypoint")
+        elif item.command not in _STOPS and item.command != Command.NAV_RETURN_TO_LAUNCH:
+            found.say(number, f"{name} is nothing that a voyage does", "take it out of the drawing and upload it again")
+        if item.command in _STOPS and item.frame not in GLOBAL_FRAMES:
+            found.say(number, f"{name} is in frame {item.frame}, which has no latitude and longitude",
+                      "draw it in a global frame")
+        elif item.command in _STOPS and not _has_place(item):
+            found.say(number, f"{name} has no place (0, 0)", "place it on the map and upload again")
+    return jumps
+
+
+def _stay_s(item: MissionItem) -> float:
+    return item.params[0] if item.command in {Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME} else 0.0
+
+
+def _lap(stops: list[Stop]) -> int:
+    """Return how many stops are one lap: all of them, where they do not repeat."""
+    return next((p for p in range(1, len(stops)) if len(stops) % p == 0 and stops == stops[:p] * (len(stops) // p)),
+                len(stops))
 
 
 def _has_place(item: MissionItem) -> bool:
