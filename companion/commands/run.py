@@ -20,7 +20,7 @@ from companion.program import INTERRUPTED
 from companion.words import counted, file_name
 
 if TYPE_CHECKING:
-    from companion.commands.run_drawn import Sailed
+    from companion.commands.starting import Sailed
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
     from companion.telemetry.service import ServiceManager
@@ -107,8 +107,7 @@ def _outliving_the_terminal() -> Iterator[None]:
 
 
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
-    from companion.commands.run_drawn import Sailed, read_drawn, settings_of
-    from companion.commands.run_start import alone
+    from companion.commands.starting import Sailed, alone, read_drawn, settings_of
     from companion.geofence import load_mission
     from companion.geofence.mission import NO_NAME
     from companion.mavlink.transports import parse_link
@@ -119,7 +118,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     for name in args.feed:
         parse_feed(name)
     parse_link(args.link)
-    settings, sailed = settings_of(args), None
+    settings, sailed = settings_of(args.mission, is_drawn=args.from_autopilot, system=args.system), None
     if settings is None:
         named = require_sailable(load_mission(args.mission))
         sailed, name = Sailed(mission=named), file_name(named.name)
@@ -156,7 +155,7 @@ def _voyage(
     """Sail; return the exit code, None when the voyage has given way to what was drawn under way."""
     from companion.app.adoption import ADOPTED
     from companion.clock import run as run_loop
-    from companion.commands.run_start import asked
+    from companion.commands.starting import asked
     from companion.mavlink.transports import open_link
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
 

@@ -8,7 +8,7 @@ import pytest
 
 from companion.app.options import at_once
 from companion.clock import run_virtual
-from companion.commands.run_start import alone, asked
+from companion.commands.starting import alone, asked
 from companion.disk import Disk
 from companion.errors import InputError, JobError
 from companion.geofence import load_mission

@@ -36,23 +36,23 @@ class Sailed:
     settings: Settings | None = None   # where it is drawn
 
 
-def settings_of(args: argparse.Namespace) -> MissionOptions | None:
+def settings_of(path: Path | None, *, is_drawn: bool, system: int | None) -> MissionOptions | None:
     """Return the settings of a mission that is drawn on the autopilot, None where the goals are the file's own."""
     import msgspec
 
     from companion.geofence.mission import MissionOptions, load_settings, read_options
 
     settings: MissionOptions | None = None
-    if args.mission is None:
-        if not args.from_autopilot:
+    if path is None:
+        if not is_drawn:
             raise InputError("companion run", "", "there is no mission",
                              "name a mission file, or sail what is drawn on the autopilot: --from-autopilot")
         settings = MissionOptions(from_autopilot=True)
-    elif args.from_autopilot or read_options(args.mission).from_autopilot:
-        settings = load_settings(args.mission)
-    if settings is None or args.system is None:
+    elif is_drawn or read_options(path).from_autopilot:
+        settings = load_settings(path)
+    if settings is None or system is None:
         return settings
-    return msgspec.structs.replace(settings, autopilot=msgspec.structs.replace(settings.autopilot, system=args.system))
+    return msgspec.structs.replace(settings, autopilot=msgspec.structs.replace(settings.autopilot, system=system))
 
 
 def read_drawn(
