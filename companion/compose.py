@@ -87,6 +87,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "replan_policy": ReplanPolicy(options.replan),
         "guidance": Guidance(options.guidance),
         "station_s": options.station_s,
+        "adopts": mission.options.from_autopilot,
         "voyage_timeout_s": options.voyage_timeout_s,
         "min_replan_interval_s": options.min_replan_s,
         "traffic_clearance_m": mission.traffic.safe_distance_m,

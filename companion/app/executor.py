@@ -23,6 +23,7 @@ from companion.planner import Plan, Problem
 from companion.skipper.step import (
     Acknowledge,
     Action,
+    AdoptDrawing,
     Announce,
     Arm,
     CancelPlan,
@@ -91,10 +92,12 @@ class Executor:
     def __init__(
         self, autopilot: Autopilot, planner: Planner, on_outcome: Callable[[Outcome], None], *,
         seed: int = 0, expansions: int | None = None, budget_scale: float = 1.0, config: SkipperConfig | None = None,
+        on_adopt: Callable[[], None] = lambda: None,
     ) -> None:
         self._autopilot, self._planner, self._on_outcome = autopilot, planner, on_outcome
         self._seed, self._expansions, self._budget_scale = seed, expansions, budget_scale
         self._config = config or SkipperConfig()
+        self._on_adopt = on_adopt
         self._orders: deque[tuple[float, Action]] = deque()
         self._order_wanted = asyncio.Event()
         self._order: tuple[Action, asyncio.Task[Outcome]] | None = None   # under way
@@ -121,6 +124,8 @@ class Executor:
                     action.command, RESULTS[action.result], action.system, action.component)
             elif isinstance(action, StopOrders):
                 self._give_up(Action, action.text)
+            elif isinstance(action, AdoptDrawing):
+                self._on_adopt()
             else:
                 self._enqueue(action)
 

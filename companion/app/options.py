@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from companion.app.adoption import Settings
 from companion.disk import Disk
 from companion.mavlink.transports import SigningStore
 from companion.telemetry.folder import Shelf
@@ -42,6 +43,8 @@ class SailOptions:
         disk: what is written to.
         shelf: the older voyages beside this one and what all may take together; None: they are left alone.
         is_again: sail the mission again although the saved state says that it has arrived.
+        settings: what a drawing that is adopted under way is sailed with; None: none is adopted.
+        known: hashes of missions on the autopilot that ours may take the place of: the drawing that is sailed.
         signing: key and timestamp for a signed link.
         token: 32 bits that tell our heartbeat from a second companion's; on the boat they are drawn by lot.
         budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
@@ -61,6 +64,8 @@ class SailOptions:
     disk: Disk = field(default_factory=Disk)
     shelf: Shelf | None = None
     is_again: bool = False
+    settings: Settings | None = None
+    known: tuple[str, ...] = ()
     signing: SigningStore | None = None
     token: int = 1
     budget_scale: float = 1.0

@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from companion.app.adoption import ADOPTED, Adoption
 from companion.app.company import NOBODY, make_way, others_on
 from companion.app.crew import Crew
 from companion.app.executor import Executor, Planner
@@ -88,6 +89,7 @@ class _Shell:
         self.status: CompanionStatus | None = None
         self._step: Step | None = None
         self.end_reason = "stopped"
+        self._adopted = asyncio.Event()            # a drawing: this voyage gives way to it
         self.loop_held_s = 0.0
         self._arrived_before = False
         self._named = mission.autopilot.system     # of our autopilot: as named, or as of the voyage that goes on
@@ -120,13 +122,16 @@ class _Shell:
                     self._refuse("AIS feed", text)
                 for text in self._refusals:
                     autopilot.say(int(Severity.WARNING), text)
+                adoption = Adoption(autopilot, self.options.settings, self._adopted.set)
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
                                     expansions=self.options.expansions,
-                                    budget_scale=self.options.budget_scale, config=self.config)
+                                    budget_scale=self.options.budget_scale, config=self.config,
+                                    on_adopt=adoption.ask)
                 radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
                 async with asyncio.TaskGroup() as group:
                     tasks = [
                         group.create_task(executor.run(), name="executor"),
+                        group.create_task(adoption.run(), name="adoption"),
                         group.create_task(keep_identity(self.fold, autopilot), name="identity"),
                         group.create_task(keep_parameters(self.fold, autopilot), name="parameters"),
                         group.create_task(keep_fence(self.fold, autopilot, self.mission, self._record), name="fence"),
@@ -151,7 +156,7 @@ class _Shell:
         """Begin the fold with what is known from before, and write that down."""
         options = self.options
         skipper = Skipper(voyage=self.voyage, config=self.config)
-        persisted, known = self.state_file.load(), self.state_file.known()
+        persisted, known = self.state_file.load(), (*self.state_file.known(), *options.known)
         if persisted is not None and skipper.has_arrived(persisted):
             self._arrived_before = not options.is_again
             if options.is_again:
@@ -173,7 +178,7 @@ class _Shell:
         })
         if self.state_file.refusal:
             self._refuse("saved state", self.state_file.refusal)
-        elif persisted is not None and self.fold.state.adoptable is None:
+        elif persisted is not None and self.fold.state.adoptable is None and not options.is_again:
             self._refuse("saved state", f"{self.state_file.path.name} is not used: {self.fold.state.why}")
 
     # -------------------------------------------------------------------------------------- inputs
@@ -234,6 +239,9 @@ class _Shell:
                 done_s = None
             if self.options.limit_s is not None and t_s - started_s >= self.options.limit_s:
                 self.end_reason = "out of time"
+                return
+            if self._adopted.is_set():
+                self.end_reason = ADOPTED
                 return
             next_s = max(next_s + STEP_S, now_s())
             with contextlib.suppress(TimeoutError):

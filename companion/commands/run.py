@@ -20,6 +20,7 @@ from companion.program import INTERRUPTED
 from companion.words import counted, file_name
 
 if TYPE_CHECKING:
+    from companion.commands.starting import Sailed
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
     from companion.telemetry.service import ServiceManager
@@ -35,9 +36,15 @@ def add_parser(subparsers: Any, summary: str) -> None:
         description="Sail a mission: estimate the wind, plan, upload, and plan again at each waypoint. Nothing is "
         "sent to the boat that the mission's [operator] table does not allow.",
         epilog="Exit codes: 0 arrived, 1 not, 2 an order that gets no better by trying again, 66 a file that is not "
-        "there or cannot be read. Example: companion run missions/archipelago.toml --link udpin:127.0.0.1:14551",
+        "there or cannot be read, a drawing that is not there or cannot be sailed. Examples: companion run "
+        "missions/archipelago.toml --link udpin:127.0.0.1:14551; companion run --from-autopilot boat.toml --link "
+        "udpin:127.0.0.1:14551",
     )
-    parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="the mission file")
+    parser.add_argument("mission", type=Path, nargs="?", metavar="MISSION.toml",
+                        help="the mission file; beside a drawing its boat, margins, wind and permissions")
+    parser.add_argument("--from-autopilot", action="store_true",
+                        help="sail what was drawn in a ground station and uploaded: waypoints are goals, the fence is "
+                        "the area, rally points are refuges (in the file: from_autopilot = true)")
     parser.add_argument("--link", required=True, metavar="LINK",
                         help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
     parser.add_argument("--system", type=system_id, metavar="N",
@@ -100,55 +107,96 @@ def _outliving_the_terminal() -> Iterator[None]:
 
 
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
-    from companion.clock import run as run_loop
+    from companion.commands.starting import Sailed, alone, read_drawn, settings_of
     from companion.geofence import load_mission
-    from companion.mavlink.transports import open_link
+    from companion.geofence.mission import NO_NAME
+    from companion.mavlink.transports import parse_link
     from companion.sailable import require_sailable
-    from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
+    from companion.telemetry.service import ServiceManager
     from companion.traffic.feeds import parse_feed
 
     for name in args.feed:
         parse_feed(name)
-    mission = require_sailable(load_mission(args.mission)).with_feeds(*args.feed).with_system(args.system)
-    for finding in mission.findings:
-        err.write(f"companion run: {finding.line(str(args.mission))}\n")
-    seed = mission.skipper.seed if args.seed is None else args.seed
-    transport = open_link(args.link, seed=seed)
-    name = file_name(mission.name)
-    folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{name}"
+    parse_link(args.link)
+    settings, sailed = settings_of(args.mission, is_drawn=args.from_autopilot, system=args.system), None
+    if settings is None:
+        named = require_sailable(load_mission(args.mission))
+        sailed, name = Sailed(mission=named), file_name(named.name)
+    else:
+        name = file_name(settings.name or NO_NAME)
+    folder = _new_folder(args.out, name, 1)
     state_path = args.state or (folder.parent / f"{name}.state.json")
+    # one for all voyages of this start: it tells the service manager that the program ends
+    with alone(state_path, folder, err), ServiceManager(os.environ) as manager:
+        number = 1
+        while True:
+            if settings is not None:
+                sailed = read_drawn(args, settings, folder, state_path, _signing(args.signing_key), manager, err)
+            if sailed is None:
+                return NOT_THERE
+            code = _voyage(args, sailed, folder, state_path, manager, out, err)
+            if code is not None:
+                return code
+            number += 1
+            folder = _new_folder(args.out, name, number)
+
+
+def _new_folder(named: Path | None, name: str, number: int) -> Path:
+    """Return the folder of this start's voyage of that number: behind one that gives way to a drawing is another."""
+    if named is not None:
+        return named if number == 1 else named.with_name(f"{named.name}-{number}")
+    return Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{name}"
+
+
+def _voyage(
+    args: argparse.Namespace, sailed: Sailed, folder: Path, state_path: Path, manager: ServiceManager, out: Console,
+    err: Console,
+) -> int | None:
+    """Sail; return the exit code, None when the voyage has given way to what was drawn under way."""
+    from companion.app.adoption import ADOPTED
+    from companion.clock import run as run_loop
+    from companion.commands.starting import asked
+    from companion.mavlink.transports import open_link
+    from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
+
     signing = _signing(args.signing_key)
     shelf = None   # a folder that was named is not ours to tidy
     if args.out is None or args.keep_gb is not None:
         shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
-    with _alone(state_path, folder, err):
-        again = args.again or _asked(mission, state_path, err)
-        if again is None:
-            return 0
+    mission = sailed.mission.with_feeds(*args.feed).with_system(args.system)
+    for finding in mission.findings:
+        err.write(f"companion run: {finding.line(str(mission.path))}\n")
+    seed = mission.skipper.seed if args.seed is None else args.seed
+    transport = open_link(args.link, seed=seed)
+    again = args.again or sailed.is_new or asked(mission, state_path, err)
+    if again is None:
+        return 0
 
-        def options() -> Any:
-            from companion.app.options import SailOptions
+    def options() -> Any:
+        from companion.app.options import SailOptions
 
-            return SailOptions(
-                seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
-                expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
-                wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
-                exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, command=" ".join(sys.argv),
-                token=secrets.randbelow(0xFFFFFFFF) + 1,
-            )
+        return SailOptions(
+            seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
+            expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
+            wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
+            exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
+            settings=sailed.settings, command=" ".join(sys.argv), token=secrets.randbelow(0xFFFFFFFF) + 1,
+        )
 
-        summary = run_loop(_sail(mission, transport, folder, options, out), speedup=args.speedup)
+    summary = run_loop(_sail(mission, transport, folder, options, manager, out), speedup=args.speedup)
     if summary is None:
         return INTERRUPTED
-    if not summary["arrived_before"]:
+    if not summary["arrived_before"] and summary["end_reason"] != ADOPTED:   # the next voyage waits for no picture
         _report(folder, err)
     code, text = last_words(mission.name, summary)
     out.write(f"{text}\n{folder}\n")
-    return code
+    return None if summary["end_reason"] == ADOPTED else code
 
 
 def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
     """Return the exit code and what is said of a voyage at its end."""
+    from companion.app.adoption import ADOPTED
+
     if summary["arrived_before"]:
         # an order that gets no better by trying again
         return 2, f"not sailed: {name} had arrived before this start; --again sails it again"
@@ -157,9 +205,11 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
                 "mission on board led her there; to sail it, begin away from its goal")
     else:
         end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
+        if summary["end_reason"] == ADOPTED:
+            end = "given up for the mission that was drawn under way"
         text = f"{end}; {summary['time_s'] or 0.0:.0f} s, {counted(summary['tacks'], 'tack')}, "
         text += counted(summary["replans"], "replan")
-    if not summary["arrived"] and summary["left_behind"]:
+    if not summary["arrived"] and summary["left_behind"] and summary["end_reason"] != ADOPTED:
         text += f"\n{summary['left_behind']}"
     if summary["records_dropped"]:
         missing = f"{summary['records_dropped']} records are missing"
@@ -167,91 +217,34 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
     return 0 if summary["arrived"] else 1, text
 
 
-@contextlib.contextmanager
-def _alone(state_path: Path, folder: Path, err: Console) -> Iterator[None]:
-    """Hold the lock on the folder of the state: it is one boat's, and one companion commands a boat.
-
-    A state within the voyage's own folder is guarded by whoever records there.
-    """
-    from companion.disk import Disk, is_mistake, reason
-    from companion.errors import InputError, JobError
-    from companion.lock import FolderLock
-
-    if state_path.is_dir():
-        raise InputError("--state", str(state_path), "is a folder", "name a file")
-    if state_path.parent.resolve() == folder.resolve():
-        yield
-        return
-    lock = FolderLock(state_path.parent)
-    try:
-        Disk().make_folder(state_path.parent)
-        is_alone = lock.take()
-    except OSError as error:
-        if is_mistake(error):
-            raise InputError(str(state_path.parent), "", f"cannot hold the state: {reason(error)}",
-                             "name another place with --state or --out") from error
-        err.write(f"companion run: {state_path.parent} cannot be locked: {reason(error)}; sailing all the same\n")
-        is_alone = True
-    if not is_alone:
-        raise JobError(f"{state_path.parent}: another companion is sailing with the state kept here, and two must not "
-                       "command one boat; end that one, or keep another boat's state elsewhere with --state")
-    try:
-        yield
-    finally:
-        lock.release()
-
-
-def _asked(mission: Any, state_path: Path, err: Console) -> bool | None:
-    """Return whether a mission that has arrived is sailed again: what a terminal answers; None: it is not wanted."""
-    if not (state_path.is_file() and sys.stdin is not None and sys.stdin.isatty() and err.isatty()):
-        return False
-    from companion.compose import config_of, voyage_of
-    from companion.skipper import Skipper
-    from companion.telemetry.state_file import read_state
-
-    try:
-        saved = read_state(state_path)
-    except (OSError, ValueError):
-        return False   # the voyage says what is wrong with it
-    if not Skipper(voyage=voyage_of(mission), config=config_of(mission)).has_arrived(saved):
-        return False
-    day = datetime.fromtimestamp(state_path.stat().st_mtime, UTC)
-    err.write(f"{mission.name} has arrived already ({day:%d %b %Y %H:%M} UTC). Sail it again? [y/N] ")
-    if sys.stdin.readline().strip().lower() in {"y", "yes"}:
-        return True
-    return None
-
-
 async def _sail(
-    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], out: Console,
+    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager, out: Console,
 ) -> dict[str, Any] | None:
     """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker
-    from companion.telemetry.service import ServiceManager
 
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for end in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
             loop.add_signal_handler(end, stop.set)
-    with ServiceManager(os.environ) as manager:
-        async with PlannerWorker() as planner:
-            # The child loads its kernels while this process imports the rest.
-            from companion.app.sail import sail
-            from companion.telemetry.progress import ProgressLine
+    async with PlannerWorker() as planner:
+        # The child loads its kernels while this process imports the rest.
+        from companion.app.sail import sail
+        from companion.telemetry.progress import ProgressLine
 
-            if not await _is_ready(planner, stop, out, manager):
-                return None
-            chosen = options()
+        if not await _is_ready(planner, stop, out, manager):
+            return None
+        chosen = options()
 
-            with ProgressLine(out, chosen.epoch_s) as progress:
-                def show(status: Any, step: Any) -> None:
-                    progress.show(status, step)
-                    manager.alive(f"{step.state.phase.value}: {step.state.why}")
+        with ProgressLine(out, chosen.epoch_s) as progress:
+            def show(status: Any, step: Any) -> None:
+                progress.show(status, step)
+                manager.alive(f"{step.state.phase.value}: {step.state.why}")
 
-                return await sail(
-                    mission, transport, planner, folder, chosen, on_status=show, stop=stop,
-                    on_refusal=lambda text: out.write(f"note: {text}\n"))
+            return await sail(
+                mission, transport, planner, folder, chosen, on_status=show, stop=stop,
+                on_refusal=lambda text: out.write(f"note: {text}\n"))
 
 
 async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, manager: ServiceManager) -> bool:

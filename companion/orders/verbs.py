@@ -64,8 +64,9 @@ TABLE: tuple[Row, ...] = (
     Row(verb=Verb.STOP, number=8, stands=True, button="Give the boat up",
         means="nothing more is asked of the boat until told to go on: what is on board the autopilot sails on",
         refused="never"),
-    Row(verb=Verb.ADOPT, number=9,
-        means="sail the mission that somebody has drawn and uploaded", refused="nothing drawn is on offer"),
+    Row(verb=Verb.ADOPT, number=9, button="Sail what was drawn",
+        means="end this voyage, and sail the mission that somebody has drawn and uploaded",
+        refused="nothing drawn is on offer, it cannot be sailed, or this voyage's goals are in its mission file"),
     Row(verb=Verb.REPLACE, number=10, button="Replace the mission on board",
         means="overwrite a mission on the autopilot that is not ours", refused="the mission on board is ours, or "
         "uploading is not permitted"),

@@ -42,8 +42,12 @@ class ServiceManager:
             self._socket = None
 
     def starting(self, doing: str) -> None:
-        """Say what is done before it is ready, and ask for patience: the first start compiles for minutes on a Pi."""
-        self._send(f"STATUS={' '.join(doing.split())[:STATUS_CHARACTERS]}\nEXTEND_TIMEOUT_USEC={PATIENCE_S * 10**6}")
+        """Say what is done before a voyage, and ask for patience: the first start compiles for minutes on a Pi.
+
+        It may be ready already: a voyage that gives way to a drawing has another behind it.
+        """
+        patience = "WATCHDOG=1" if self._is_ready else f"EXTEND_TIMEOUT_USEC={PATIENCE_S * 10**6}"
+        self._send(f"STATUS={' '.join(doing.split())[:STATUS_CHARACTERS]}\n{patience}")
 
     def alive(self, doing: str) -> None:
         """Say that the loop turns, and what it is doing in one line; the first time also that it is ready."""

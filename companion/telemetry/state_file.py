@@ -68,17 +68,7 @@ class StateFile:
 
     def known(self) -> tuple[str, ...]:
         """Return the hashes of the lists that other missions, whose states lie beside this one, may have left."""
-        found: list[tuple[float, Path]] = []
-        with contextlib.suppress(OSError):
-            for entry in os.scandir(self.path.parent):
-                if entry.name.endswith("state.json") and entry.name != self.path.name:
-                    with contextlib.suppress(OSError):
-                        found.append((entry.stat().st_mtime, Path(entry.path)))
-        names: list[str] = []
-        for _, path in sorted(found, reverse=True)[:MOST_OTHERS]:
-            with contextlib.suppress(OSError, ValueError):
-                names += [name for name in read_state(path).names if name not in names]
-        return tuple(names)
+        return known_beside(self.path)
 
     def _put_aside(self) -> str:
         """Keep a damaged file under another name, for whoever wants to know; the next save takes its place."""
@@ -138,3 +128,18 @@ def read_state(path: Path) -> Persisted:
     except ValueError as error:
         raise ValueError(f"it is damaged: {str(error)[:80]}") from None
     return Persisted.from_dict(values)
+
+
+def known_beside(path: Path) -> tuple[str, ...]:
+    """Return the hashes of the lists of all states that lie beside the one at ``path``."""
+    found: list[tuple[float, Path]] = []
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(path.parent):
+            if entry.name.endswith("state.json") and entry.name != path.name:
+                with contextlib.suppress(OSError):
+                    found.append((entry.stat().st_mtime, Path(entry.path)))
+    names: list[str] = []
+    for _, other in sorted(found, reverse=True)[:MOST_OTHERS]:
+        with contextlib.suppress(OSError, ValueError):
+            names += [name for name in read_state(other).names if name not in names]
+    return tuple(names)

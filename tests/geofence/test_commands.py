@@ -163,7 +163,7 @@ def test_mission_new_from_a_qgroundcontrol_plan(capsys, tmp_path, plan):
     assert mission.start.lat_deg == 50.817
     assert len(mission.area.obstacles) == 1
     assert len(mission.area.fence.inclusions) == 1
-    assert "1 mission command is not carried" in out  # the DO_JUMP: a mission TOML has laps
+    assert "item 4: DO_JUMP repeats without end (-1): not carried over" in out
     assert (tmp_path / "drawn-obstacles.geojson").exists()  # a circle, which WKT would have to draw
 
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.geofence.formats.raw.text import decode
-from companion.geofence.mission.mission import dump_options, parse_options
 from companion.geofence.mission.options import tables
+from companion.geofence.mission.text import dump_options, parse_options
 from tests.geofence.strategies import QUIET
 
 MISSIONS = sorted((pathlib.Path(__file__).parents[2] / "missions").glob("*.toml"))

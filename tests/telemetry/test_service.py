@@ -53,6 +53,18 @@ def test_it_is_ready_once_alive_each_time_and_says_when_it_stops(manager):
     assert last == "STOPPING=1"
 
 
+def test_between_two_voyages_its_watchdog_is_answered(manager):
+    """A voyage that gives way to a drawing has another behind it: it is ready by then, and reads and compiles."""
+    environment, listening = manager
+    with ServiceManager(environment) as service:
+        service.starting("reading the drawing")
+        service.alive("waiting: for wind")
+        service.starting("reading the drawing")
+    before, _, between, _ = heard(listening)
+    assert before == "STATUS=reading the drawing\nEXTEND_TIMEOUT_USEC=120000000"
+    assert between == "STATUS=reading the drawing\nWATCHDOG=1"
+
+
 def test_without_a_manager_or_with_one_that_is_gone_nothing_happens(tmp_path):
     with ServiceManager({}) as service:
         service.alive("nobody hears this")

@@ -1,10 +1,22 @@
 """A mission: goals, area and options, read from TOML, made from drawings, checked before anything believes it."""
 
+from companion.geofence.mission.drawn import (
+    NO_NAME,
+    Drawn,
+    drawing_of,
+    drawn_mission,
+    hindrance,
+    kept,
+    offer,
+    read_kept,
+)
 from companion.geofence.mission.files import MissionFiles, document_of, goal_losses, mission_files, zones_only
-from companion.geofence.mission.mission import load_mission
-from companion.geofence.mission.options import AreaOptions, WindOptions
+from companion.geofence.mission.mission import load_mission, load_settings
+from companion.geofence.mission.options import AreaOptions, MissionOptions, WindOptions
+from companion.geofence.mission.text import read_options
 
 __all__ = [
-    "AreaOptions", "MissionFiles", "WindOptions", "document_of", "goal_losses", "load_mission", "mission_files",
-    "zones_only",
+    "NO_NAME", "AreaOptions", "Drawn", "MissionFiles", "MissionOptions", "WindOptions", "document_of", "drawing_of",
+    "drawn_mission", "goal_losses", "hindrance", "kept", "load_mission", "load_settings", "mission_files", "offer",
+    "read_kept", "read_options", "zones_only",
 ]

@@ -9,8 +9,17 @@ from companion.geofence.document import Document
 from companion.geofence.findings import Finding, Severity
 from companion.geofence.formats.losses import Losses, Written
 from companion.geofence.formats.registry import write
-from companion.geofence.mission.mission import Mission, dump_options
-from companion.geofence.mission.options import AreaOptions, GoalOptions, MissionOptions, RefugeOptions, StartOptions
+from companion.geofence.mission.course import course_of
+from companion.geofence.mission.mission import Mission
+from companion.geofence.mission.options import (
+    AreaOptions,
+    GoalOptions,
+    MissionOptions,
+    RefugeOptions,
+    SkipperOptions,
+    StartOptions,
+)
+from companion.geofence.mission.text import dump_options
 from companion.geofence.shapes import Circle, Zone, ZoneKind
 from companion.messages import Command, GeoPoint, waypoint
 
@@ -76,7 +85,14 @@ def mission_files(
     are refuges. Its zones, and those of ``land``, become the area. Raises ValueError when there is no goal.
     """
     losses = Losses()
-    goal_options = [GoalOptions(lat=g.lat_deg, lon=g.lon_deg) for g in goals] or _goals(document, losses)
+    course = course_of(() if goals else document.items)
+    for finding in course.findings:
+        is_loss = finding.severity is Severity.ERROR
+        losses.add(Severity.WARNING if is_loss else Severity.NOTE,
+                   f"{finding.place}: {finding.text}" + (": not carried over" if is_loss else ""))
+    names = document.item_names or ("",) * len(document.items)
+    goal_options = [GoalOptions(lat=g.lat_deg, lon=g.lon_deg) for g in goals] or [
+        GoalOptions(lat=s.point.lat_deg, lon=s.point.lon_deg, name=names[s.number - 1]) for s in course.stops]
     if not goal_options:
         raise ValueError("there is no goal: give --goal, or draw waypoints")
     if radius_m is not None:
@@ -109,23 +125,9 @@ def mission_files(
             margin_floor_m=min(defaults.margin_floor_m if floor_m is None else floor_m, margin),
             point_radius_m=point_radius_m if point_radius_m is not None else defaults.point_radius_m,
         ),
+        skipper=course.skipper(SkipperOptions()),
     )
     return MissionFiles(toml=(dump_options(options) + PERMITS).encode(), files=files, losses=tuple(losses))
-
-
-def _goals(document: Document, losses: Losses) -> list[GoalOptions]:
-    names = document.item_names or ("",) * len(document.items)
-    out = []
-    other = 0
-    for item, name in zip(document.items, names, strict=True):
-        if item.command not in {Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TIME,
-                                Command.NAV_LOITER_TURNS} or not (item.lat_e7 or item.lon_e7):
-            other += 1
-            continue
-        out.append(GoalOptions(lat=item.lat_e7 / 1e7, lon=item.lon_e7 / 1e7, name=name))
-        other += item.command != Command.NAV_WAYPOINT
-    losses.drop("mission command", other, why="a mission TOML holds goals")
-    return out
 
 
 def _area_file(document: Document, stem: str) -> tuple[str, Written]:

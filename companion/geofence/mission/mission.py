@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-import datetime as dt
-import difflib
-import re
-import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
 import shapely
-import tomli_w
 
 from companion.errors import InputError, unreadable
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Document
 from companion.geofence.findings import Finding, Severity
-from companion.geofence.formats.raw.text import decode, read_bytes
 from companion.geofence.formats.registry import read
 from companion.geofence.mission.names import called, name_findings
 from companion.geofence.mission.options import (
     AreaOptions,
     AutopilotOptions,
     BoatOptions,
-    GoalOptions,
     MissionOptions,
     OperatorOptions,
     RefugeOptions,
@@ -35,13 +28,11 @@ from companion.geofence.mission.options import (
     SkipperOptions,
     TrafficOptions,
     WindOptions,
-    tables,
 )
+from companion.geofence.mission.text import read_options
 from companion.geofence.shapes import Obstacle, Zone, ZoneKind
 from companion.messages import GeoPoint
-from companion.words import choices
 
-MAX_TOML_BYTES = 1024 * 1024
 RANGE_M = 50_000.0  # the frame is below 1 m wrong to here; what lies farther off is a mistake
 
 
@@ -172,11 +163,39 @@ def load_mission(path: str | Path) -> Mission:
     free water.
     """
     path = Path(path)
-    source = str(path)
-    options = parse_options(decode(read_bytes(path, max_bytes=MAX_TOML_BYTES), source), source)
+    options = read_options(path)
+    if options.from_autopilot and not options.goal:
+        raise InputError(str(path), "from_autopilot", "the goals of this mission are drawn on the autopilot, not here",
+                         "companion run reads them there and sails them")
+    if not options.goal:
+        raise InputError(str(path), "goal", "is missing", "add [[goal]] with lat and lon")
+    mission = assembled(options, path)
+    check_places(mission)
+    return mission
+
+
+def load_settings(path: str | Path) -> MissionOptions:
+    """Read a mission TOML whose goals are drawn on the autopilot: all but the goals. Raises InputError."""
+    path = Path(path)
+    options = read_options(path)
+    if options.goal:
+        raise InputError(str(path), "[[goal]]", "the goals are those that are drawn on the autopilot",
+                         "take them out of this file, or sail it without --from-autopilot")
+    return msgspec.structs.replace(options, name=called(options.name, path), from_autopilot=True)
+
+
+def assembled(options: MissionOptions, path: Path, drawn: Document | None = None) -> Mission:
+    """Return the mission of ``options`` with the files that they name, which lie relative to ``path``.
+
+    The zones of ``drawn`` belong to its area. Whether its places lie in free water is not looked at. Raises InputError.
+    """
     place = options.start or options.goal[0]
     origin = GeoPoint(lat_deg=place.lat, lon_deg=place.lon)
     area, findings = load_area(options.area, path, origin)
+    if drawn is not None:
+        limits = tuple(z for z in drawn.zones if z.kind is ZoneKind.INCLUSION)
+        area = Area(obstacles=(*area.obstacles, *drawn.as_obstacles(options.area.point_radius_m)),
+                    fence=Fence(zones=(*area.fence.zones, *limits)))
     mission = Mission(
         options=options,
         goals=tuple(
@@ -188,133 +207,14 @@ def load_mission(path: str | Path) -> Mission:
         refuges=tuple(_refuge(r, n) for n, r in enumerate(options.refuge)),
     )
     if mission.polar_path is not None:
-        _require(mission.polar_path, source, "[boat] polar",
+        _require(mission.polar_path, str(path), "[boat] polar",
                  'write a file beside the mission, "ardurover" or a speed in m/s')
-    check_places(mission)
     return mission
 
 
 def _refuge(refuge: RefugeOptions, number: int) -> RefugePoint:
     point = GeoPoint(lat_deg=refuge.lat, lon_deg=refuge.lon)
     return RefugePoint(point=point, radius_m=refuge.radius_m, name=refuge.name or f"{number + 1}")
-
-
-def parse_options(text: str, source: str) -> MissionOptions:
-    """Return the options of a mission TOML text. Raises InputError with the key and the nearest known spelling."""
-    try:
-        raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        what, _, where = str(error).partition(" (at ")
-        raise InputError(source, where.rstrip(")") or "", f"is not TOML: {what[:1].lower()}{what[1:]}") from None
-    except RecursionError:
-        raise InputError(source, "", "is nested too deeply") from None
-    except ValueError as error:  # a number of thousands of digits
-        raise InputError(source, "", f"is not TOML: {str(error)[:60]}") from None
-    _refuse_odd_numbers(raw, source, "")
-    try:
-        return msgspec.convert(raw, MissionOptions)
-    except msgspec.ValidationError as error:
-        raise _input_error(str(error), source, raw) from None
-
-
-def dump_options(options: MissionOptions) -> str:
-    """Return the options as TOML, leaving out what has its default."""
-    data = _without_defaults(options)
-    order = [
-        "name", "description", "start", "goal", "refuge", "area", "wind", "risk", "boat", "autopilot",
-        "operator", "skipper", "traffic"]
-    return tomli_w.dumps({k: data[k] for k in order if k in data})
-
-
-def _without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
-    out: dict[str, Any] = {}
-    for field in msgspec.structs.fields(struct):
-        value = getattr(struct, field.name)
-        if value is None or (field.default is not msgspec.NODEFAULT and value == field.default):
-            continue
-        if isinstance(value, msgspec.Struct):
-            out[field.name] = _without_defaults(value)
-        elif isinstance(value, tuple):
-            out[field.name] = [_without_defaults(v) if isinstance(v, msgspec.Struct) else v for v in value]
-        else:
-            out[field.name] = value
-    return out
-
-
-def _refuse_odd_numbers(value: object, source: str, place: str) -> None:
-    """Raise for NaN and infinities, which TOML has and no range check of msgspec refuses."""
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            _refuse_odd_numbers(inner, source, f"{place}.{key}" if place else str(key))
-    elif isinstance(value, list):
-        for index, inner in enumerate(value):
-            _refuse_odd_numbers(inner, source, f"{place}[{index}]")
-    elif isinstance(value, float) and not np.isfinite(value):
-        raise InputError(source, _place("$." + place), f"{value} is not a finite number")
-
-
-def _place(path: str) -> str:
-    """Return msgspec's ``$.goal[0].lat`` as ``[[goal]] 1 lat`` and ``$.area.margin_m`` as ``[area] margin_m``."""
-    match = re.fullmatch(r"\$\.(\w+)(?:\[(\d+|\.\.\.)\])?(?:\.(\w+))?(.*)", path)
-    if not match:
-        return ""
-    table, index, key, rest = match.groups()
-    if index is not None and table in {"goal", "refuge"}:
-        number = f" {int(index) + 1}" if index.isdigit() else ""
-        return f"[[{table}]]{number} {key or ''}{rest}".rstrip()
-    if key is None and table not in tables():
-        return f"{table}{f'[{index}]' if index else ''}"
-    return f"[{table}] {key or ''}{rest}".rstrip()
-
-
-def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
-    problem, _, path = message.partition(" - at `")
-    path = path.rstrip("`")
-    place = _place(path) if path else ""
-    known = tables()
-    unknown = re.search(r"unknown field `(.+)`", problem)
-    if unknown:
-        key = unknown.group(1)
-        table = re.sub(r"^\$\.?", "", path)
-        table = re.sub(r"[\[.].*", "", table)
-        fields = known.get(table, ())
-        near = difflib.get_close_matches(key, fields, n=1, cutoff=0.5)
-        elsewhere = [t for t, keys in known.items() if key in keys and t != table]
-        remedy = (
-            f"did you mean {near[0]!r}?" if near
-            else f"it belongs in [{elsewhere[0]}]" if elsewhere and elsewhere[0]
-            else "known keys: " + ", ".join(fields)
-        )
-        return InputError(source, f"{place} {key}".strip(), "unknown key", remedy)
-    missing = re.search(r"missing required field `(.+)`", problem)
-    if missing:
-        key = missing.group(1)
-        remedy = "add [[goal]] with lat and lon" if key == "goal" else "add it"
-        return InputError(source, f"{place} {key}".strip(), "is missing", remedy)
-    if problem.startswith("Invalid enum value"):
-        return InputError(source, place, f"{_short(_value_at(raw, path))} is none of the choices",
-                          "write " + " or ".join(f'"{choice}"' for choice in choices(MissionOptions, path)))
-    value = _value_at(raw, path)
-    shown = f"{_short(value)} is wrong: " if value is not None and not isinstance(value, dict | list) else ""
-    swap = ""
-    if place.endswith(" lat") and isinstance(value, int | float) and abs(value) > 90.0:
-        swap = "are lat and lon swapped? write degrees within ±90"
-    return InputError(source, place, shown + problem[:1].lower() + problem[1:], swap)
-
-
-def _short(value: object) -> str:
-    text = str(value) if isinstance(value, dt.date | dt.time) else repr(value)
-    return text if len(text) <= 40 else text[:40] + "..."
-
-
-def _value_at(raw: dict[str, Any], path: str) -> object:
-    value: object = raw
-    for part in re.findall(r"\.(\w+)|\[(\d+)\]", path):
-        try:
-            value = value[part[0]] if part[0] else value[int(part[1])]  # type: ignore[index]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return value
 
 
 def _require(path: Path, source: str, place: str, remedy: str) -> None:
@@ -355,9 +255,14 @@ def load_area(options: AreaOptions, mission_path: Path, origin: GeoPoint) -> tup
 
 def check_places(mission: Mission) -> None:
     """Raise InputError if the start, a goal or a refuge is too far off, in an obstacle, or outside the fence."""
+    for place, problem, remedy in place_troubles(mission):
+        raise InputError(str(mission.path), place, problem, remedy)
+
+
+def place_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
+    """Yield (place in the file, what is wrong, remedy) for the start, goals and refuges that are not in free water."""
     frame = mission.frame()
     local = mission.area.local(frame)
-    source = str(mission.path)
     places = [(f"[[goal]] {i + 1}", g.point) for i, g in enumerate(mission.goals)]
     places += [(f"[[refuge]] {i + 1}", r.point) for i, r in enumerate(mission.refuges)]
     if mission.start is not None:
@@ -365,12 +270,13 @@ def check_places(mission: Mission) -> None:
     for place, point in places:
         east_m, north_m = frame.en_from_geo(point)
         if max(abs(east_m), abs(north_m)) > RANGE_M:
-            raise InputError(source, place, f"is {np.hypot(east_m, north_m) / 1000.0:.0f} km from the origin",
-                             "are lat and lon swapped? the local frame holds 50 km")
+            yield (place, f"is {np.hypot(east_m, north_m) / 1000.0:.0f} km from the origin",
+                   "are lat and lon swapped? the local frame holds 50 km")
+            continue
         problem = trouble_at(local, (east_m, north_m))
         if problem:
-            raise InputError(source, place, f"{point.lat_deg:.6f}, {point.lon_deg:.6f} {problem}",
-                             "move it into free water or correct the area's files")
+            yield (place, f"{point.lat_deg:.6f}, {point.lon_deg:.6f} {problem}",
+                   "move it into free water or correct the area's files")
 
 
 def trouble_at(local: LocalArea, point_en: tuple[float, float]) -> str:
@@ -382,10 +288,3 @@ def trouble_at(local: LocalArea, point_en: tuple[float, float]) -> str:
     if local.limits is not None and not shapely.covers(local.limits, point):
         return "is outside the fence"
     return ""
-
-
-def goal_options(goal: Goal) -> GoalOptions:
-    """Return a goal as the file writes it."""
-    side = goal.rounding if goal.rounding in {"port", "starboard"} else None
-    return GoalOptions(lat=goal.point.lat_deg, lon=goal.point.lon_deg, radius_m=goal.radius_m,
-                       rounding=side, name=goal.name)  # type: ignore[arg-type]

@@ -167,9 +167,11 @@ class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The whole file."""
 
-    goal: Annotated[tuple[GoalOptions, ...], Meta(min_length=1)]
+    goal: tuple[GoalOptions, ...] = ()
     name: str | None = None
     description: str = ""
+    from_autopilot: bool = False
+    """Goals, fence and refuges are those that were drawn and uploaded to the autopilot: there is no ``[[goal]]``."""
     start: StartOptions | None = None
     refuge: tuple[RefugeOptions, ...] = ()
     area: AreaOptions = AreaOptions()

@@ -30,11 +30,23 @@ def marked(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
 def are_marked(items: Sequence[MissionItem]) -> bool:
     """Return whether every item that can be sailed, and has a place, bears our mark; False when there is none."""
     places = [item for item in effective(items) if _has_place(item)]
-    return bool(places) and all(int(item.alt_m * 100.0 + 0.5) == _mark_cm(item) for item in places)
+    return bool(places) and all(_is_marked(item) for item in places)
+
+
+def is_remnant(items: Sequence[MissionItem], drawn: Sequence[MissionItem]) -> bool:
+    """Return whether ``items`` are ours in part and for the rest of ``drawn``: an upload over it that was cut short."""
+    left = {(item.command, item.lat_e7, item.lon_e7) for item in drawn}
+    ours = [item for item in items if _has_place(item) and _is_marked(item)]
+    return bool(ours) and all(
+        item in ours or (item.command, item.lat_e7, item.lon_e7) in left for item in effective(items))
 
 
 def _has_place(item: MissionItem) -> bool:
     return item.command != Command.NAV_RETURN_TO_LAUNCH
+
+
+def _is_marked(item: MissionItem) -> bool:
+    return int(item.alt_m * 100.0 + 0.5) == _mark_cm(item)
 
 
 def _mark_cm(item: MissionItem) -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from companion.geofence.mission import offer
 from companion.mavlink.wire import mission_hash
 from companion.messages import Command, MissionItem, Mode
 from companion.skipper.board.mark import are_marked, marked
@@ -122,6 +123,7 @@ def _compare(turn: Turn, items: tuple[MissionItem, ...]) -> bool:
     turn.update(foreign=text, route=None, unsure_route=None, adoptable=saved or saved_of(state, turn.voyage.name))
     if not state.foreign:
         turn.say(Severity.ERROR, "foreign mission", f"{text}; {REMEDY}", every_s=0.0)
+        turn.say(Severity.WARNING, "drawn mission", offer(items, adopts=turn.config.adopts), every_s=0.0)
     turn.phase(Phase.OPERATOR if state.sailing else Phase.WAITING, f"{text}; {REMEDY}")
     return False
 
@@ -155,11 +157,11 @@ def _take_over(turn: Turn, items: tuple[MissionItem, ...], saved: Persisted | No
     if not _under_way(turn):
         _take_up(turn, saved)
         turn.update(route=None, unsure_route=None)
-        turn.say(Severity.NOTICE, "earlier mission", "the mission on board is an earlier one of ours: it is replaced",
-                 every_s=0.0)
+        turn.say(Severity.NOTICE, "earlier mission", "the mission on board is an earlier one of ours, or the drawing "
+                 "that is sailed: it is replaced", every_s=0.0)
         return
     turn.update(route=_route_of(turn, items), unsure_route=None)
-    _adopt(turn, saved, "an earlier one of ours: sailing on by it until there is a plan")
+    _adopt(turn, saved, "an earlier one of ours, or the drawing: sailing on by it until there is a plan")
 
 
 def _route_of(turn: Turn, items: tuple[MissionItem, ...]) -> Route:

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from companion.messages import Mode
 from companion.orders import Answer, Order, Result, Verb, lead_in, permitted
+from companion.skipper.board.adoption import adopt
 from companion.skipper.deeds.ordered_places import goal_place, home_place, refuge_place
 from companion.skipper.deeds.rest import UNTIL_TOLD
 from companion.skipper.planning.errands import Kind, errand, is_at_rest, pressing
@@ -217,8 +218,9 @@ def _stop(turn: Turn, order: Order) -> Answer:
     return _stand(turn, order, f"nothing more is asked of her until {Verb.GO_ON}{upload}; she is in {mode}")
 
 
-def _adopt(_: Turn, __: Order) -> Answer:
-    return _not_now("nothing drawn is on offer")
+def _adopt(turn: Turn, _: Order) -> Answer:
+    why = adopt(turn)
+    return _not_now(why) if why else _done("what was drawn is read, and this voyage ends for it if it can be sailed")
 
 
 def _replace(turn: Turn, _: Order) -> Answer:

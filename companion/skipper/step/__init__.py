@@ -3,6 +3,7 @@
 from companion.skipper.step.actions import (
     Acknowledge,
     Action,
+    AdoptDrawing,
     Announce,
     Arm,
     CancelPlan,
@@ -44,10 +45,10 @@ from companion.skipper.step.standing import Standing
 from companion.skipper.step.state import Phase, SkipperState, is_given_up
 
 __all__ = [
-    "Acknowledge", "Action", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome", "CommandResult",
-    "Disbelieved", "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome", "Permissions", "Persisted", "Phase",
-    "PlanOutcome", "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd",
-    "SetCurrent", "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot", "Standing", "SteerHeading",
-    "StopOrders", "Tack", "UploadFence", "UploadMission", "UploadOutcome", "UploadResult", "WaypointReached",
-    "WindHealth", "WindView", "ends_safely", "is_given_up",
+    "Acknowledge", "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome",
+    "CommandResult", "Disbelieved", "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome", "Permissions",
+    "Persisted", "Phase", "PlanOutcome", "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route",
+    "RunMotor", "SafeEnd", "SetCurrent", "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot", "Standing",
+    "SteerHeading", "StopOrders", "Tack", "UploadFence", "UploadMission", "UploadOutcome", "UploadResult",
+    "WaypointReached", "WindHealth", "WindView", "ends_safely", "is_given_up",
 ]

@@ -204,7 +204,14 @@ class Acknowledge:
     text: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdoptDrawing:
+    """End this voyage and begin the one that is drawn on board. Not answered: it ends, or why not is announced."""
+
+    text: str
+
+
 Action = (
     RequestPlan | CancelPlan | UploadMission | UploadFence | ReadMission | SetMode | Arm | SetCurrent
-    | Tack | RunMotor | SteerHeading | Announce | Acknowledge | StopOrders
+    | Tack | RunMotor | SteerHeading | Announce | Acknowledge | StopOrders | AdoptDrawing
 )

@@ -112,4 +112,5 @@ class SkipperConfig:
     # boat that loiters where it is.
     guidance: Guidance = Guidance.PLAN
     station_s: float = 0.0             # how long to stay at the last goal
+    adopts: bool = False               # the goals were drawn on the autopilot: others may be, under way
     voyage_timeout_s: float | None = None  # under way for longer than this the goals are given up; None: never

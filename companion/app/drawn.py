@@ -1,0 +1,209 @@
+"""What is drawn on the autopilot, read before a voyage: whose list is on board, which drawing it was made of.
+
+Our plan takes the place of the drawing on the autopilot, so the drawing is kept on the disk before anything is sent:
+beside the state for a restart, as a .plan that a ground station opens again. A list of ours on board is known by its
+content, and the drawing that was kept is the one that is sailed on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from companion.disk import Disk, reason
+from companion.errors import InputError, TransferError, UnreadableError
+from companion.geofence import Document
+from companion.geofence.mission import Drawn, MissionOptions, drawing_of, drawn_mission, kept, read_kept
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.link import Link
+from companion.mavlink.mission_lists import ReadResult
+from companion.mavlink.transports import SigningStore, Transport
+from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
+from companion.mavlink.wire import mission_hash
+from companion.messages import GeoPoint, MissionItem
+from companion.skipper.board.mark import are_marked, is_remnant
+from companion.telemetry.state_file import known_beside, read_state
+
+READ_TRIES = 5         # of one list; each has a patience of its own
+RETRY_S = 3.0
+SETTLE_S = 3.0         # between two readings that must agree: a ground station uploads one list after the other
+MOST_READINGS = 10
+PLAN = ".drawn.plan"
+MOST_SAID = 5          # of the refusals, on the radio; the console has them all
+RADIO_WARNING = 4      # MAV_SEVERITY
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lists:
+    """What the autopilot holds; the mission is without its home."""
+
+    mission: tuple[MissionItem, ...]
+    fence: tuple[MissionItem, ...] = ()
+    rally: tuple[MissionItem, ...] = ()
+    home: GeoPoint | None = None
+
+    def document(self) -> Document:
+        """Return the lists as a drawing."""
+        return drawing_of(self.mission, self.fence, self.rally, self.home)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """What is to be sailed.
+
+    Attributes:
+        document: the drawing.
+        drawn: what it was judged to be.
+        plan: where it is kept, or is to be.
+        is_new: it is on board now: the voyage begins with it; else a list of ours is, and the voyage goes on.
+        board: the hash of the mission on board, which our plan may take the place of.
+        text: which drawing it is, in words.
+    """
+
+    document: Document
+    drawn: Drawn
+    plan: Path
+    is_new: bool
+    board: str
+    text: str
+
+
+async def read_lists(autopilot: Autopilot, say: Say) -> Lists:
+    """Read mission, fence and rally points until two readings agree.
+
+    Raises:
+        TransferError: one of them cannot be read, or they do not come to rest.
+    """
+    before: Lists | None = None
+    for _ in range(MOST_READINGS):
+        mission = await _read("mission", autopilot.read_mission, say)
+        lists = Lists(
+            mission=mission.items or (), home=_place_of(mission.home),
+            fence=(await _read("fence", autopilot.read_fence, say)).items or (),
+            rally=(await _read("rally points", autopilot.read_rally, say)).items or ())
+        if lists == before:
+            return lists
+        if before is not None:
+            say("the drawing on the autopilot is changing: it is read again")
+        before = lists
+        await asyncio.sleep(SETTLE_S)
+    raise TransferError(f"the drawing on the autopilot did not come to rest in {MOST_READINGS} readings; "
+                        "end the upload and start again")
+
+
+async def _read(what: str, ask: Callable[[], Awaitable[ReadResult]], say: Say) -> ReadResult:
+    result = await ask()
+    for _ in range(READ_TRIES - 1):
+        if result.is_ok:
+            break
+        say(f"the {what} could not be read from the autopilot: {result.text}; trying again")
+        await asyncio.sleep(RETRY_S)
+        result = await ask()
+    if result.is_ok:
+        return result
+    raise TransferError(f"the {what} could not be read from the autopilot, {READ_TRIES} times: {result.text}; "
+                        "nothing was sent to the boat")
+
+
+def _place_of(home: MissionItem | None) -> GeoPoint | None:
+    return home.point if home is not None and (home.lat_e7 or home.lon_e7) else None
+
+
+def plan_path(state_path: Path) -> Path:
+    """Return where the drawing is kept whose voyage has its state at ``state_path``."""
+    return state_path.with_name(state_path.name.removesuffix(".json").removesuffix(".state") + PLAN)
+
+
+def find(lists: Lists, settings: MissionOptions, path: Path | None, state_path: Path, keep_at: Path) -> Found:
+    """Return what is to be sailed: the drawing on board, or the one that was kept where the list on board is ours.
+
+    Args:
+        lists: what is on board.
+        settings: all but the goals.
+        path: of the mission file that has them; None: there is none, all is as by default.
+        state_path: of the voyage's state: beside it the drawing was kept.
+        keep_at: where a new drawing will be kept.
+
+    Raises:
+        InputError: the list on board is ours and its drawing is not here any more, or the settings cannot be believed.
+    """
+    board, plan = mission_hash(lists.mission), plan_path(state_path)
+    before = _kept_before(plan)
+    own, others = _names(state_path)
+    is_ours = bool(lists.mission) and (
+        board in {*own, *others} or are_marked(lists.mission)
+        or (before is not None and is_remnant(lists.mission, before.items)))
+    if not is_ours:
+        document = lists.document()
+        return Found(document=document, drawn=drawn_mission(document, settings, path or keep_at, keep_at), plan=keep_at,
+                     is_new=True, board=board, text="the drawing on the autopilot")
+    if before is None or (board in others and board not in own):
+        where = "of another voyage" if before is not None else f"and no drawing is kept at {plan}"
+        raise UnreadableError("the autopilot", "", f"the mission on board is one of ours, {where}",
+                              "draw a mission and upload it")
+    day = datetime.fromtimestamp(plan.stat().st_mtime, UTC)
+    return Found(document=before, drawn=drawn_mission(before, settings, path or plan, plan), plan=plan, is_new=False,
+                 board=board, text=f"the drawing kept at {plan} ({day:%d %b %Y %H:%M} UTC): the list on board is ours")
+
+
+def _names(state_path: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the hashes of the lists that this voyage, and that others of ours, may have put on board."""
+    try:
+        own = read_state(state_path).names
+    except (OSError, ValueError):
+        own = ()
+    return own, known_beside(state_path)
+
+
+def _kept_before(plan: Path) -> Document | None:
+    try:
+        return read_kept(plan.read_text(encoding="utf-8"), str(plan))
+    except (OSError, ValueError, InputError):
+        return None
+
+
+def keep(document: Document, plan: Path, disk: Disk, *, is_durable: bool = True) -> None:
+    """Put a drawing on the disk, before our plan takes its place on the autopilot.
+
+    Raises:
+        UnreadableError: the disk does not take it.
+    """
+    try:
+        disk.make_folder(plan.parent)
+        disk.replace(plan, kept(document).data, is_durable=is_durable)
+    except OSError as error:
+        raise UnreadableError(str(plan), "", f"the drawing cannot be kept: {reason(error)}; our plan takes its place",
+                              "make room, or name another place with --state") from error
+
+
+async def find_on(
+    transport: Transport, settings: MissionOptions, path: Path | None, state_path: Path, keep_at: Path, say: Say, *,
+    wait_s: float, signing: SigningStore | None = None,
+) -> Found:
+    """Read what is drawn on the autopilot behind ``transport``, and find what is to be sailed; see ``find``.
+
+    What is refused is also said on the radio, to who drew it.
+
+    Raises:
+        LinkError: no autopilot was heard, or its lists cannot be read.
+        InputError: as of ``find``.
+    """
+    own = LinkIdentity(component=TOOL_COMPONENT)   # by ours a companion that sails would take this for a second one
+    async with Link(
+        transport, identity=own, target_system=settings.autopilot.system, streams=(), signing=signing,
+    ) as link:
+        await link.wait_autopilot(wait_s)
+        autopilot = Autopilot(link)
+        try:
+            found = find(await read_lists(autopilot, say), settings, path, state_path, keep_at)
+        except UnreadableError as error:
+            autopilot.say(RADIO_WARNING, f"nothing to sail: {error.problem}")
+            raise
+        for refusal in found.drawn.refusals[:MOST_SAID]:
+            autopilot.say(RADIO_WARNING, f"the drawing is refused: {refusal.place}: {refusal.text}")
+    return found

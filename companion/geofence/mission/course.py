@@ -1,0 +1,204 @@
+"""From the items of a drawn mission to the goals of a voyage: laps written out, the end, and what is refused by name.
+
+A ground station draws for an autopilot that sails straight lines. The voyage takes from it where to go; whatever else
+the items ask for is either what the voyage does, too, or refused: nothing that was drawn is passed over in silence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import msgspec
+
+from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.mission.options import SkipperOptions
+from companion.messages import Command, GeoPoint, MissionItem
+
+MAX_GOALS = 1000   # that laps may make of a drawing; a voyage of more is meant otherwise
+MAX_STEPS = 20 * MAX_GOALS   # jumps among jumps that pass no waypoint end here
+GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})   # MAV_FRAMEs whose x and y are latitude and longitude
+REDRAW = "change the drawing and upload it again"
+
+_LOITERS = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TIME, Command.NAV_LOITER_TURNS})
+_STOPS = _LOITERS | {Command.NAV_WAYPOINT}
+_ENDS = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """A place to reach, and the number of the item that it was drawn as (from 1: 0 is home)."""
+
+    number: int
+    point: GeoPoint
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Course:
+    """What a drawn mission says.
+
+    Attributes:
+        stops: in the order of the voyage, those of one lap.
+        laps: how often they are sailed.
+        end: what its last item asks for, None: nothing.
+        station_s: how long it asks to stay at the last goal [s], 0: until told, or not at all.
+        findings: what is refused (errors, each with the number of its item) and what is done otherwise (notes).
+    """
+
+    stops: tuple[Stop, ...] = ()
+    laps: int = 1
+    end: Literal["loiter", "home"] | None = None
+    station_s: float = 0.0
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def refusals(self) -> tuple[Finding, ...]:
+        """What of it cannot be sailed."""
+        return tuple(f for f in self.findings if f.severity is Severity.ERROR)
+
+
+    def skipper(self, options: SkipperOptions) -> SkipperOptions:
+        """Return the ``[skipper]`` table with laps, end and station as they are drawn; what is not drawn stays."""
+        drawn: dict[str, Any] = {"laps": self.laps, "end": self.end, "station_s": self.station_s}
+        plain = Course()
+        return msgspec.structs.replace(
+            options, **{name: value for name, value in drawn.items() if value != getattr(plain, name)})
+
+
+def command_name(command: int) -> str:
+    """Return what people call a command: ``DO_CHANGE_SPEED``; its number where it has no name."""
+    from pymavlink.dialects.v20 import ardupilotmega as wire
+
+    entry = wire.enums["MAV_CMD"].get(command)
+    return entry.name.removeprefix("MAV_CMD_") if entry is not None else f"command {command}"
+
+
+def course_of(items: Sequence[MissionItem]) -> Course:
+    """Return the voyage that mission items (without home) ask for, as ArduPilot would go through them."""
+    found = _Found(items)
+    jumps = _judged(items, found)
+    walked, is_whole = _walk(items, jumps)
+    if not is_whole:
+        found.say(max(jumps), f"with this DO_JUMP the voyage has more than {MAX_GOALS} goals", "draw fewer repeats")
+        walked, _ = _walk(items, {})
+    last = walked[-1] if walked else 0
+    ending = items[last - 1].command if last else None
+    end: Literal["loiter", "home"] | None = "loiter" if ending in _LOITERS else None
+    if ending == Command.NAV_RETURN_TO_LAUNCH:
+        end, walked = "home", walked[:-1]
+    if ending in _ENDS and last < len(items):
+        found.say(last + 1, f"stands behind item {last} ({found.name(last)}), where the mission ends: it would never "
+                  "be sailed", "take one of them out")
+    final = walked[-1] if walked and end != "home" else None
+    for number in walked if final is None else walked[:-1]:
+        stay_s = _stay_s(items[number - 1])
+        if stay_s > 0.0:
+            found.say(number, f"{found.name(number)} stays for {stay_s:g} s before the voyage's end",
+                      "draw a waypoint without hold time, or let it be the last")
+    station_s = 0.0 if final is None else max(0.0, _stay_s(items[final - 1]))
+    if final is not None and station_s > 0.0:
+        found.say(final, f"{found.name(final)} of {station_s:g} s is the last: she stays until told", "", Severity.NOTE)
+    stops = [Stop(number=n, point=items[n - 1].point) for n in walked if _has_place(items[n - 1])]
+    lap = _lap(stops) if jumps else len(stops)
+    return Course(stops=tuple(stops[:lap]), laps=len(stops) // lap if lap else 1, end=end, station_s=station_s,
+                  findings=found.ordered())
+
+
+class _Found:
+    """What is found in items, each thing once."""
+
+    def __init__(self, items: Sequence[MissionItem]) -> None:
+        self._items = items
+        self._findings: dict[tuple[int, str], Finding] = {}
+
+    def name(self, number: int) -> str:
+        return command_name(self._items[number - 1].command)
+
+    def say(self, number: int, text: str, remedy: str = REDRAW, severity: Severity = Severity.ERROR) -> None:
+        code = Code.NOT_CARRIED if severity is Severity.ERROR else Code.DROPPED
+        self._findings.setdefault((number, text), Finding(
+            severity=severity, code=code, place=f"item {number}", text=text, remedy=remedy))
+
+    def ordered(self) -> tuple[Finding, ...]:
+        return tuple(self._findings[key] for key in sorted(self._findings, key=lambda key: key[0]))
+
+
+def _judged(items: Sequence[MissionItem], found: _Found) -> dict[int, tuple[int, int]]:
+    """Refuse what no voyage does; return the jumps that can be made: number -> (target, how often)."""
+    jumps: dict[int, tuple[int, int]] = {}
+    for number, item in enumerate(items, start=1):
+        name = found.name(number)
+        if item.command == Command.DO_JUMP:
+            problem, remedy = _jump_trouble(items, number, item)
+            if problem:
+                found.say(number, f"{name} {problem}", remedy)
+            else:
+                jumps[number] = int(item.params[0]), int(item.params[1])
+        elif item.command == Command.NAV_LOITER_TURNS:
+            found.say(number, f"{name}: a sailboat does not sail circles", "draw NAV_LOITER_UNLIM, or a waypoint")
+        elif item.command not in _STOPS and item.command != Command.NAV_RETURN_TO_LAUNCH:
+            found.say(number, f"{name} is nothing that a voyage does", "take it out of the drawing and upload it again")
+        if item.command in _STOPS and item.frame not in GLOBAL_FRAMES:
+            found.say(number, f"{name} is in frame {item.frame}, which has no latitude and longitude",
+                      "draw it in a global frame")
+        elif item.command in _STOPS and not _has_place(item):
+            found.say(number, f"{name} has no place (0, 0)", "place it on the map and upload again")
+    return jumps
+
+
+def _stay_s(item: MissionItem) -> float:
+    return item.params[0] if item.command in {Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME} else 0.0
+
+
+def _lap(stops: list[Stop]) -> int:
+    """Return how many stops are one lap: all of them, where they do not repeat."""
+    return next((p for p in range(1, len(stops)) if len(stops) % p == 0 and stops == stops[:p] * (len(stops) // p)),
+                len(stops))
+
+
+def _has_place(item: MissionItem) -> bool:
+    return bool(item.lat_e7 or item.lon_e7)
+
+
+def _jump_trouble(items: Sequence[MissionItem], number: int, item: MissionItem) -> tuple[str, str]:
+    """Return what is wrong with a DO_JUMP, and the remedy; empty when nothing is."""
+    target, repeats = item.params[0], item.params[1]
+    if target == number:
+        return "jumps to itself", "let it jump to an earlier item"
+    if target != int(target) or not 1 <= target <= len(items):
+        return f"jumps to item {target:g}, which is not there", "let it jump to an earlier item"
+    if target > number:
+        return f"jumps forward to item {target:g}: what lies between would be passed over", \
+            "take out what shall not be sailed"
+    if repeats < 0:
+        return "repeats without end (-1)", f"write how often, up to {MAX_GOALS} goals in all"
+    if repeats > MAX_GOALS:
+        return f"repeats {repeats:g} times", f"write fewer: {MAX_GOALS} goals in all are the most"
+    return "", ""
+
+
+def _walk(items: Sequence[MissionItem], jumps: dict[int, tuple[int, int]]) -> tuple[list[int], bool]:
+    """Return the numbers of the items that are sailed, in their order, and whether these are all of them.
+
+    The count of a jump is not begun anew when an outer one comes by again: so ArduPilot has it.
+    """
+    walked: list[int] = []
+    done = dict.fromkeys(jumps, 0)
+    number = 1
+    for _ in range(len(items) + (MAX_STEPS if jumps else 1)):
+        if number > len(items):
+            return walked, True
+        item = items[number - 1]
+        if number in jumps and done[number] < jumps[number][1]:
+            done[number] += 1
+            number = jumps[number][0]
+            continue
+        if item.command in _ENDS:
+            return [*walked, number], True
+        if item.command in _STOPS:
+            walked.append(number)
+            if jumps and len(walked) > MAX_GOALS:
+                break
+        number += 1
+    return walked, False

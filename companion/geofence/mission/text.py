@@ -1,0 +1,145 @@
+"""The text of a mission TOML: its options read and written, and what is wrong in it by its place there."""
+
+from __future__ import annotations
+
+import datetime as dt
+import difflib
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import tomli_w
+
+from companion.errors import InputError
+from companion.geofence.formats.raw.text import decode, read_bytes
+from companion.geofence.mission.options import MissionOptions, tables
+from companion.words import choices
+
+MAX_TOML_BYTES = 1024 * 1024
+
+
+def read_options(path: Path) -> MissionOptions:
+    """Read the options of a mission TOML; no file that it names is looked at. Raises InputError."""
+    source = str(path)
+    return parse_options(decode(read_bytes(path, max_bytes=MAX_TOML_BYTES), source), source)
+
+
+def parse_options(text: str, source: str) -> MissionOptions:
+    """Return the options of a mission TOML text. Raises InputError with the key and the nearest known spelling."""
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        what, _, where = str(error).partition(" (at ")
+        raise InputError(source, where.rstrip(")") or "", f"is not TOML: {what[:1].lower()}{what[1:]}") from None
+    except RecursionError:
+        raise InputError(source, "", "is nested too deeply") from None
+    except ValueError as error:  # a number of thousands of digits
+        raise InputError(source, "", f"is not TOML: {str(error)[:60]}") from None
+    _refuse_odd_numbers(raw, source, "")
+    try:
+        return msgspec.convert(raw, MissionOptions)
+    except msgspec.ValidationError as error:
+        raise _input_error(str(error), source, raw) from None
+
+
+def dump_options(options: MissionOptions) -> str:
+    """Return the options as TOML, leaving out what has its default."""
+    data = _without_defaults(options)
+    order = [
+        "name", "description", "from_autopilot", "start", "goal", "refuge", "area", "wind", "risk", "boat", "autopilot",
+        "operator", "skipper", "traffic"]
+    return tomli_w.dumps({k: data[k] for k in order if k in data})
+
+
+def _without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for field in msgspec.structs.fields(struct):
+        value = getattr(struct, field.name)
+        if value is None or (field.default is not msgspec.NODEFAULT and value == field.default):
+            continue
+        if isinstance(value, msgspec.Struct):
+            out[field.name] = _without_defaults(value)
+        elif isinstance(value, tuple):
+            out[field.name] = [_without_defaults(v) if isinstance(v, msgspec.Struct) else v for v in value]
+        else:
+            out[field.name] = value
+    return out
+
+
+def _refuse_odd_numbers(value: object, source: str, place: str) -> None:
+    """Raise for NaN and infinities, which TOML has and no range check of msgspec refuses."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _refuse_odd_numbers(inner, source, f"{place}.{key}" if place else str(key))
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            _refuse_odd_numbers(inner, source, f"{place}[{index}]")
+    elif isinstance(value, float) and not np.isfinite(value):
+        raise InputError(source, _place("$." + place), f"{value} is not a finite number")
+
+
+def _place(path: str) -> str:
+    """Return msgspec's ``$.goal[0].lat`` as ``[[goal]] 1 lat`` and ``$.area.margin_m`` as ``[area] margin_m``."""
+    match = re.fullmatch(r"\$\.(\w+)(?:\[(\d+|\.\.\.)\])?(?:\.(\w+))?(.*)", path)
+    if not match:
+        return ""
+    table, index, key, rest = match.groups()
+    if index is not None and table in {"goal", "refuge"}:
+        number = f" {int(index) + 1}" if index.isdigit() else ""
+        return f"[[{table}]]{number} {key or ''}{rest}".rstrip()
+    if key is None and table not in tables():
+        return f"{table}{f'[{index}]' if index else ''}"
+    return f"[{table}] {key or ''}{rest}".rstrip()
+
+
+def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
+    problem, _, path = message.partition(" - at `")
+    path = path.rstrip("`")
+    place = _place(path) if path else ""
+    known = tables()
+    unknown = re.search(r"unknown field `(.+)`", problem)
+    if unknown:
+        key = unknown.group(1)
+        table = re.sub(r"^\$\.?", "", path)
+        table = re.sub(r"[\[.].*", "", table)
+        fields = known.get(table, ())
+        near = difflib.get_close_matches(key, fields, n=1, cutoff=0.5)
+        elsewhere = [t for t, keys in known.items() if key in keys and t != table]
+        remedy = (
+            f"did you mean {near[0]!r}?" if near
+            else f"it belongs in [{elsewhere[0]}]" if elsewhere and elsewhere[0]
+            else "known keys: " + ", ".join(fields)
+        )
+        return InputError(source, f"{place} {key}".strip(), "unknown key", remedy)
+    missing = re.search(r"missing required field `(.+)`", problem)
+    if missing:
+        key = missing.group(1)
+        remedy = "add [[goal]] with lat and lon" if key == "goal" else "add it"
+        return InputError(source, f"{place} {key}".strip(), "is missing", remedy)
+    if problem.startswith("Invalid enum value"):
+        return InputError(source, place, f"{_short(_value_at(raw, path))} is none of the choices",
+                          "write " + " or ".join(f'"{choice}"' for choice in choices(MissionOptions, path)))
+    value = _value_at(raw, path)
+    shown = f"{_short(value)} is wrong: " if value is not None and not isinstance(value, dict | list) else ""
+    swap = ""
+    if place.endswith(" lat") and isinstance(value, int | float) and abs(value) > 90.0:
+        swap = "are lat and lon swapped? write degrees within ±90"
+    return InputError(source, place, shown + problem[:1].lower() + problem[1:], swap)
+
+
+def _short(value: object) -> str:
+    text = str(value) if isinstance(value, dt.date | dt.time) else repr(value)
+    return text if len(text) <= 40 else text[:40] + "..."
+
+
+def _value_at(raw: dict[str, Any], path: str) -> object:
+    value: object = raw
+    for part in re.findall(r"\.(\w+)|\[(\d+)\]", path):
+        try:
+            value = value[part[0]] if part[0] else value[int(part[1])]  # type: ignore[index]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return value
