@@ -27,8 +27,7 @@ from companion.messages import GeoPoint
 from companion.skipper.deeds import TOLD_S
 from companion.skipper.step import Phase
 from companion.skipper.step import actions as act
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.scene import EPOCH_S
+from sitl.autopilot import EPOCH_S, Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.trouble.forgeries import FORGERIES, Forger, Forgery
 from sitl.trouble.fragile import FragilePlanner
 from sitl.trouble.signer import SignedEnd, Signer
