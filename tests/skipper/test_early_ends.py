@@ -54,7 +54,7 @@ def test_each_cause_leads_where_the_mission_says_and_on_when_it_is_over(cause, e
         assert world.state.arrived
         return
     assert world.run(400, lambda w: "; waiting until" in w.state.why)
-    assert distance_m(world.position, where or here) < (30.0 if where else 150.0)   # it may take half a minute to be believed
+    assert distance_m(world.position, where or here) < (30.0 if where else 150.0)   # darkness takes half a minute
     plans = world.count(RequestPlan)
     world.run(60)
     assert world.count(RequestPlan) == plans

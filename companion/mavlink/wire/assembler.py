@@ -82,6 +82,8 @@ class VehicleAssembler:
         self._nav_s: float | None = None
         self._fence_s: float | None = None
         self._fence_told = (False, -1)
+        self._leak_told: bool | None = None
+        self._leak_s: float | None = None
 
     def take(self, t_s: float, message: Message) -> list[Value]:
         """Return the values that ``message``, heard at ``t_s`` [s], completes: none, one, or several texts.
@@ -237,7 +239,10 @@ class VehicleAssembler:
             unix_s = message.time_unix_usec / 1e6
             return {"utc_at_boot_s": unix_s - message.time_boot_ms / 1e3} if unix_s > KNOWS_TIME_S else None
         if kind == "NAMED_VALUE_FLOAT":
-            return {"leaks": message.value > 0.5}
+            # Twice in a row, as the fence: nothing true would ever contradict one that was forged.
+            wet, before = message.value > 0.5, self._leak_told
+            self._leak_told, self._leak_s = wet, t_s
+            return {"leaks": wet} if wet == before else {}
         if kind == "FENCE_STATUS":
             # Two in a row that say the same: one alone may be damaged or forged.
             fence = bool(message.breach_status), int(message.breach_count)
@@ -255,6 +260,9 @@ class VehicleAssembler:
         if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
             self._fence_s = None
             old |= {"fence_breached": None, "fence_breaches": None}
+        if self._leak_s is not None and t_s - self._leak_s > QUIET_S:
+            self._leak_s = self._leak_told = None
+            old |= {"leaks": None}
         return old
 
 
