@@ -10,7 +10,7 @@ from companion.boat import Boat, Hull, Polar, ardurover_sitl, constant, read_pol
 from companion.errors import InputError
 from companion.geofence import Mission
 from companion.orders import ALL, Verb, unknown
-from companion.skipper.step import Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.step import End, Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.way import Goal, Refuge, Side, Voyage
 from companion.traffic import TargetLimits
 from companion.traffic.feeds import parse_feed
@@ -88,6 +88,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "guidance": Guidance(options.guidance),
         "station_s": options.station_s,
         "adopts": mission.options.from_autopilot,
+        "ends": _ends(mission),
         "voyage_timeout_s": options.voyage_timeout_s,
         "min_replan_interval_s": options.min_replan_s,
         "traffic_clearance_m": mission.traffic.safe_distance_m,
@@ -99,6 +100,16 @@ def config_of(mission: Mission) -> SkipperConfig:
     if options.max_replan_s is not None:
         changes["plan_age_s"] = options.max_replan_s
     return replace(SkipperConfig(), **changes)
+
+
+def _ends(mission: Mission) -> Ends:
+    safety = mission.safety
+    return Ends(
+        battery=End(safety.battery), battery_v=safety.battery_v, leak=End(safety.leak),
+        out_of_time=End(safety.out_of_time), dark=End(safety.dark),
+        dark_below_rad=math.radians(safety.dark_below_deg), shore_lost=End(safety.shore_lost),
+        shore_lost_s=safety.shore_lost_s,
+    )
 
 
 def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:

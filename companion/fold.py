@@ -91,6 +91,8 @@ class VoyageFold:
         self._uid_s = -float("inf")
         self._neighbours: tuple[str, ...] = ()
         self._has_company = False
+        self._has_shore = False
+        self._shore_s: float | None = None   # when a ground station was last heard
         self._parameters: dict[str, float] = {}
         self._in_doubt: dict[str, float] = {}
         self._answered: set[str] = set()
@@ -209,9 +211,9 @@ class VoyageFold:
         is_known = self._identity.is_confirmed and self.state.uid in {None, self._identity.uid}
         return not is_known or t_s - self._uid_s >= UID_EVERY_S
 
-    def others(self, neighbours: tuple[str, ...], *, has_company: bool) -> None:
-        """Take who else is heard: autopilots, where ours was not named, and another companion of this boat."""
-        self._neighbours, self._has_company = neighbours, has_company
+    def others(self, neighbours: tuple[str, ...], *, has_company: bool, has_shore: bool) -> None:
+        """Take who else is heard: autopilots, where ours was not named, another companion, a ground station."""
+        self._neighbours, self._has_company, self._has_shore = neighbours, has_company, has_shore
 
     def _disbelieve(self, what: str, text: str) -> None:
         """Say once that something heard is not used."""
@@ -251,6 +253,8 @@ class VoyageFold:
 
     def _snapshot(self, t_s: float) -> Snapshot:
         vehicle, autopilot = self._vehicle, self._autopilot
+        if self._has_shore:
+            self._shore_s = t_s
         return Snapshot(
             t_s=t_s,
             vehicle=vehicle,
@@ -266,6 +270,7 @@ class VoyageFold:
                 is_contested=self._witness.clock.is_contested(t_s)),
             neighbours=self._neighbours,
             has_company=self._has_company,
+            shore_age_s=None if self._shore_s is None else t_s - self._shore_s,
             limits=self._limits,
             permissions=self.permissions,
             planner_alive=self._planner_alive,

@@ -122,6 +122,8 @@ class AutopilotStatus:
     last_reached_seq: int | None = None
     rc_us: tuple[int, ...] = ()          # what the receiver hears, by channel from 1 [us]
     home: GeoPoint | None = None
+    utc_at_boot_s: float | None = None   # Unix time of its start, once it knows the time
+    leaks: bool | None = None            # a switch in the bilge, where a script of the autopilot's tells of one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -150,7 +150,8 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
                     elif record["kind"] == "order":
                         fold.event(Order.from_dict(record["order"]))
                     else:
-                        fold.others(tuple(record["neighbours"]), has_company=record["company"])
+                        fold.others(tuple(record["neighbours"]), has_company=record["company"],
+                                    has_shore=record.get("shore", False))
             step = fold.tick(t_s)
             mine = [
                 _plain(action_record(a, step.snapshot, skipper.config)) for a in step.actions

@@ -12,14 +12,16 @@ from companion.mavlink.trust import LISTEN_S, OWN_COMPONENT, type_words, yields_
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Others:
-    """Who else is heard: autopilots in words, where ours has no name, and a companion that is at work."""
+    """Who else is heard: autopilots in words, where ours has no name, a companion at work, a ground station."""
 
     neighbours: tuple[str, ...] = ()
     has_company: bool = False
+    has_shore: bool = False
 
     def to_record(self) -> dict[str, object]:
         """Return it as a record of the voyage."""
-        return {"kind": "others", "neighbours": list(self.neighbours), "company": self.has_company}
+        return {"kind": "others", "neighbours": list(self.neighbours), "company": self.has_company,
+                "shore": self.has_shore}
 
 
 NOBODY = Others()
@@ -46,4 +48,4 @@ def others_on(link: Link, *, named: int | None) -> Others:
     return Others(
         neighbours=() if named is not None else tuple(
             f"system {s.system}, {type_words(s.vehicle_type)}" for s in link.neighbours()),
-        has_company=other is not None and not other.is_starting)
+        has_company=other is not None and not other.is_starting, has_shore=link.hears_station)

@@ -210,7 +210,7 @@ class _Shell:
             if others != self._others:
                 self._others = others
                 self.log.note(t_s, others.to_record())
-                self.fold.others(others.neighbours, has_company=others.has_company)
+                self.fold.others(others.neighbours, has_company=others.has_company, has_shore=others.has_shore)
         for report in self.feeds.take():
             self.log.note(t_s, ais_record(report))
             self.fold.take(report)

@@ -195,6 +195,11 @@ class Link:
         """Return the other autopilots that are heard."""
         return self._reception.census.neighbours(now_s(), self.party.target_system)
 
+    @property
+    def hears_station(self) -> bool:
+        """Whether a ground station is heard."""
+        return self._reception.census.hears_station(now_s())
+
     def other_companion(self) -> OtherCompanion | None:
         """Return another program that speaks with our ids, None when there is none."""
         return self._reception.census.companion(now_s(), self.party.own_system)

@@ -24,6 +24,7 @@ READS: Mapping[str, tuple[str, ...]] = {
     "EKF_STATUS_REPORT": ("assembler",),
     "GPS_RAW_INT": ("assembler",),
     "SYS_STATUS": ("assembler",),
+    "SYSTEM_TIME": ("assembler",),
     "FENCE_STATUS": ("assembler",),
     "RC_CHANNELS": ("assembler",),
     "STATUSTEXT": ("assembler", "machines", "shore", "asking"),

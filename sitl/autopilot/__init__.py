@@ -23,12 +23,12 @@ The shell joins it to transports and to the event loop's clock, whatever that is
 
 from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.boat.parameters import check_parameters
-from sitl.autopilot.config import HOME, AutopilotConfig, GpsFault, Truth, VaneFault, VaneState
+from sitl.autopilot.config import EPOCH_S, HOME, AutopilotConfig, GpsFault, Truth, VaneFault, VaneState
 from sitl.autopilot.links.memory import PERFECT, FrameStream, Impairment, MemoryEnd, MemoryLink
 from sitl.autopilot.protocol.ais_list import Vessel
 from sitl.autopilot.server import Server, serve
 
 __all__ = [
-    "HOME", "PERFECT", "Autopilot", "AutopilotConfig", "FrameStream", "GpsFault", "Impairment", "MemoryEnd",
+    "EPOCH_S", "HOME", "PERFECT", "Autopilot", "AutopilotConfig", "FrameStream", "GpsFault", "Impairment", "MemoryEnd",
     "MemoryLink", "Server", "Truth", "VaneFault", "VaneState", "Vessel", "check_parameters", "serve",
 ]

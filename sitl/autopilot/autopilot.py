@@ -137,6 +137,10 @@ class Autopilot:
         """Change the battery's voltage."""
         self.core.battery_v = volts
 
+    def set_leak(self, *, leaks: bool) -> None:
+        """Wet or dry the switch in the bilge, which a script reads from now on."""
+        self.core.leaks = leaks
+
     def set_roll(self, roll_rad: float) -> None:
         """Knock the boat down, or right it; no other effect than what the autopilot makes of it."""
         self.core.roll_rad = roll_rad

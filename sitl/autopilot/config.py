@@ -11,6 +11,9 @@ from companion.messages import GeoPoint, Mode
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
 
+# 2026-06-09, 10:13 UTC. Unix time of every simulated voyage's start: stamps must not depend on when it was run.
+EPOCH_S = 1_781_000_000.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutopilotConfig:
@@ -30,6 +33,7 @@ class AutopilotConfig:
         has_ftp: offer MAVFTP; small boards are built without it.
         polar: of a boat that is not the simulator's own; None: hers.
         has_motor: an auxiliary motor, run by DO_AUX_FUNCTION 74.
+        epoch_s: Unix time of the start, as its GPS tells it.
         new_parameter_names: answer to ArduPilot 4.7's names (MAV_SYSID) instead of the older ones.
     """
 
@@ -46,6 +50,7 @@ class AutopilotConfig:
     has_ftp: bool = True
     polar: Polar | None = None
     has_motor: bool = False
+    epoch_s: float = EPOCH_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

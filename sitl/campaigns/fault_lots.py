@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from sitl.scene import EPOCH_S, EventSpec
+from sitl.autopilot import EPOCH_S
+from sitl.scene import EventSpec
 from sitl.trouble import FORGERIES
 
 FIRST_S = 0.1   # of what is so from the start

@@ -33,7 +33,7 @@ from companion.skipper.deeds import CALL
 from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.scene import EPOCH_S, Others, Scenario, Verdict, free_port, is_all_ordinary, judge, own_polar, scenario_wind
+from sitl.scene import Others, Scenario, Verdict, free_port, is_all_ordinary, judge, own_polar, scenario_wind
 from sitl.trouble import FragilePlanner, MortalPlanner, Observer, World, channel, happen
 
 TRUTH_EVERY_S = 0.25
@@ -124,7 +124,7 @@ async def run_embedded(
     autopilot = Autopilot(
         AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
                         parameters=scenario.parameters, has_ftp=scenario.has_ftp, has_motor=mission.boat.motor,
-                        polar=own_polar(mission)),
+                        polar=own_polar(mission), epoch_s=scenario.epoch_s),
         wind, seed=seed,
     )
     link = MemoryLink("companion", seed=seed)
@@ -168,7 +168,7 @@ async def _sail_and_restart(
     kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
     deadline_s = now_s() + scenario.limit_s
     options = SailOptions(
-        seed=seed, epoch_s=EPOCH_S, expansions=expansions if worker_pace is None else None,
+        seed=seed, epoch_s=scenario.epoch_s, expansions=expansions if worker_pace is None else None,
         budget_scale=1.0 / (worker_pace or 1.0), offload=at_once, is_durable=False,
         state_path=folder / STATE, disk=world.disk, command=f"sitl run {scenario.name}",
         exit_on_arrival=scenario.exit_on_arrival, dry_run=scenario.dry_run,

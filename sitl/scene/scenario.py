@@ -6,6 +6,7 @@ their unit in the key; directions are where the wind comes from, degrees clockwi
 
 from __future__ import annotations
 
+import datetime as dt
 import difflib
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,9 +17,7 @@ import msgspec
 from companion import examples
 from companion.errors import InputError
 from companion.words import choices
-
-# Unix time of every simulated voyage's start: stamps must not depend on when it was run.
-EPOCH_S = 1_781_000_000.0
+from sitl.autopilot import EPOCH_S
 
 EventKind = Literal[
     "wind_shift",        # veer_deg, over_s
@@ -43,6 +42,7 @@ EventKind = Literal[
     "disk",              # state: full | sick | read_only | ok; for_s: the companion's
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
+    "leak",              # for_s: the bilge's switch is wet
     "radio_lost",        # for_s: the transmitter is out of range
     "station",           # for_s: a ground station is heard, from then on no more
     "knockdown",         # roll_deg, for_s
@@ -119,7 +119,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 # What a boat must bear without coming nearer to anything than its mission allows.
 ORDINARY = frozenset({
-    "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "vessel",
+    "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "leak", "vessel",
     "neighbour", "disk", "order"})
 ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
 ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
@@ -182,6 +182,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     mission: str
     limit_s: float = 3600.0
     speedup: float = 8.0                      # when it runs in real time, separate processes
+    begins: dt.datetime = dt.datetime.fromtimestamp(EPOCH_S, dt.UTC)
     start_heading_deg: float | None = None
     has_ftp: bool = True                      # the embedded autopilot offers MAVFTP; else items go one by one
     is_service: bool = False                  # a companion that heard no autopilot is started again
@@ -193,6 +194,11 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     parameters: dict[str, float] = {}
     events: tuple[EventSpec, ...] = ()
     expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)
+
+    @property
+    def epoch_s(self) -> float:
+        """Unix time of its start."""
+        return self.begins.timestamp()
 
     def mission_path(self, source: Path) -> Path:
         """Return the mission file, which is named relative to the scenario; installed, ours are in the package."""

@@ -14,7 +14,7 @@ from sitl.scene import EventSpec
 
 BEAT_S = 1.0
 PERSONS = frozenset({"mode", "arm", "disarm", "set_current"})
-FAILURES = frozenset({"radio_lost", "station", "knockdown", "battery"})
+FAILURES = frozenset({"radio_lost", "station", "knockdown", "battery", "leak"})
 
 
 async def play(event: EventSpec, autopilot: Autopilot, station: MemoryEnd) -> None:
@@ -37,6 +37,10 @@ async def play(event: EventSpec, autopilot: Autopilot, station: MemoryEnd) -> No
             autopilot.pilot.helm.set_current(event.seq, resets=False)
     elif event.kind == "battery":
         autopilot.set_battery(event.volts or 0.0)
+    elif event.kind == "leak":
+        autopilot.set_leak(leaks=True)
+        await asyncio.sleep(lasts_s)
+        autopilot.set_leak(leaks=False)
     elif event.kind == "radio_lost":
         autopilot.pilot.radio.switch(is_on=False)
         await asyncio.sleep(lasts_s)

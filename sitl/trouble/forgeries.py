@@ -98,6 +98,8 @@ FORGERIES: tuple[Forgery, ...] = (
     Forgery(message="WIND", says="15 m/s from the south", build=lambda _: wire.MAVLink_wind_message(180.0, 15.0, 0.0)),
     Forgery(message="NAMED_VALUE_FLOAT", says="apparent wind from astern",
             build=lambda k: wire.MAVLink_named_value_float_message(k.boot_ms, b"AppWndDir", 180.0)),
+    Forgery(message="SYSTEM_TIME", says="it is midnight",
+            build=lambda k: wire.MAVLink_system_time_message(1_780_963_200_000_000, k.boot_ms)),
     Forgery(message="MISSION_CURRENT", says="the last item, complete",
             build=lambda _: wire.MAVLink_mission_current_message(1, 1, 5, 1)),
     Forgery(message="MISSION_ITEM_REACHED", says="the present item",
@@ -154,6 +156,8 @@ FORGERIES: tuple[Forgery, ...] = (
             build=lambda _: wire.MAVLink_mission_ack_message(1, COMPANION, 1, 0)),
     Forgery(message="FILE_TRANSFER_PROTOCOL", says="a refusal", in_a_read=True,
             build=lambda _: wire.MAVLink_file_transfer_protocol_message(0, 1, COMPANION, _NAK.ljust(251, b"\x00"))),
+    Forgery(message="NAMED_VALUE_FLOAT", says="she leaks",
+            build=lambda k: wire.MAVLink_named_value_float_message(k.boot_ms, b"LEAK", 1.0)),
 )
 
 

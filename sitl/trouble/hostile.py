@@ -27,8 +27,7 @@ from companion.messages import GeoPoint
 from companion.skipper.deeds import TOLD_S
 from companion.skipper.step import Phase
 from companion.skipper.step import actions as act
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.scene import EPOCH_S
+from sitl.autopilot import EPOCH_S, Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.trouble.forgeries import FORGERIES, Forger, Forgery
 from sitl.trouble.fragile import FragilePlanner
 from sitl.trouble.signer import SignedEnd, Signer
@@ -141,6 +140,8 @@ def _false(step: Step, autopilot: Autopilot) -> list[str]:
         out += ["false EKF state"] * (not status.ekf_ok)
         out += ["false GPS state"] * (status.gps_fix is not None and status.gps_fix < 3)
         out += ["false battery"] * (status.battery_remaining is not None and status.battery_remaining < 0.5)
+        out += ["false leak"] * bool(status.leaks)
+        out += ["false time"] * (status.utc_at_boot_s is not None and status.utc_at_boot_s < EPOCH_S - 3600.0)
         out += ["false fence state"] * bool(status.fence_breached)
         out += ["a person at the sticks"] * (snapshot.t_s - step.state.signs.rc_moved_s <= TOLD_S)
         core = autopilot.core

@@ -110,7 +110,7 @@ def states():
 NAMES = (
     "idle", "waiting", "new calculation", "first upload", "standard", "planning under way", "uploading under way",
     "operator", "comparing", "holding", "last resort", "destination approach", "done", "buoy approach",
-    "after a failed upload",
+    "after a failed upload", "to a place", "given up",
 )
 
 
@@ -168,6 +168,9 @@ def on_collision_course(snapshot, gap_m=90.0):
         size=(6.0, 6.0, 2.0, 2.0)),))
 
 
+MIDNIGHT_S = 1_780_963_200.0   # 2026-06-09, UTC
+
+
 EVENTS = {
     "nothing": lambda s: s,
     # one for each watchdog, by its name
@@ -194,6 +197,9 @@ EVENTS = {
     "reboot": event(AutopilotRebooted()),
     "battery low": status(battery_remaining=0.15),
     "battery critical": status(battery_remaining=0.02),
+    "leaking": status(leaks=True),
+    "dark": status(utc_at_boot_s=MIDNIGHT_S),
+    "shore lost": lambda s: replace(s, shore_age_s=700.0),
     "planner dead": lambda s: replace(s, planner_alive=False),
     "out of time": lambda s: replace(s, t_s=s.t_s + 7300.0),
     "dragged off": lambda s: replace(s, position_en_m=(s.position_en_m[0] + 60.0, s.position_en_m[1])),

@@ -25,6 +25,7 @@ from companion.geofence.mission.options import (
     OperatorOptions,
     RefugeOptions,
     RiskOptions,
+    SafetyOptions,
     SkipperOptions,
     TrafficOptions,
     WindOptions,
@@ -118,6 +119,11 @@ class Mission:
     def skipper(self) -> SkipperOptions:
         """The ``[skipper]`` table."""
         return self.options.skipper
+
+    @property
+    def safety(self) -> SafetyOptions:
+        """The ``[safety]`` table."""
+        return self.options.safety
 
     @property
     def traffic(self) -> TrafficOptions:

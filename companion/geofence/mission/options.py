@@ -152,6 +152,31 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Under way for longer than this the goals are given up: to the nearest refuge, or home, or a loiter near by."""
 
 
+End = Literal["say", "stay", "refuge", "home"]
+
+
+class SafetyOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[safety]``: what ends a voyage early, and where to.
+
+    ``refuge``: the nearest one, without one home if the mission ends there; ``home``; ``stay``: a loiter near by;
+    ``say``: words alone. A place to which no way leads is replaced by the next of these.
+    """
+
+    battery: End = "refuge"
+    """10 % are left, the autopilot calls it critical, or it has fallen to ``battery_v``."""
+    battery_v: Positive | None = None
+    leak: End = "refuge"
+    """The autopilot tells NAMED_VALUE_FLOAT ``LEAK`` 1 (a script of its own reads the switch)."""
+    out_of_time: End = "refuge"
+    """``[skipper] voyage_timeout_s`` is over: the goals are given up."""
+    dark: End = "say"
+    """The sun is lower than ``dark_below_deg``, by the autopilot's time; it is over when it rises."""
+    dark_below_deg: Annotated[float, Meta(ge=-18.0, le=45.0)] = -6.0
+    shore_lost: End = "say"
+    """A ground station was heard, and none for ``shore_lost_s``."""
+    shore_lost_s: Annotated[float, Meta(ge=10.0)] = 600.0
+
+
 class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """``[traffic]``: where other vessels are heard, and how far to stay away."""
 
@@ -181,6 +206,7 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     autopilot: AutopilotOptions = AutopilotOptions()
     operator: OperatorOptions = OperatorOptions()
     skipper: SkipperOptions = SkipperOptions()
+    safety: SafetyOptions = SafetyOptions()
     traffic: TrafficOptions = TrafficOptions()
 
 

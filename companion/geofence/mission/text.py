@@ -50,7 +50,7 @@ def dump_options(options: MissionOptions) -> str:
     data = _without_defaults(options)
     order = [
         "name", "description", "from_autopilot", "start", "goal", "refuge", "area", "wind", "risk", "boat", "autopilot",
-        "operator", "skipper", "traffic"]
+        "operator", "skipper", "safety", "traffic"]
     return tomli_w.dumps({k: data[k] for k in order if k in data})
 
 

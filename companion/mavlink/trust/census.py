@@ -7,6 +7,7 @@ is taken; without a name there must be one alone, and it must be a rover (which 
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -106,10 +107,13 @@ class Census:
         self.wanted = wanted
         self._speakers: dict[int, Speaker] = {}
         self._companions: dict[int, OtherCompanion] = {}
+        self._station_s = -math.inf
 
     def take(self, t_s: float, message: Message) -> None:
-        """Take an autopilot's HEARTBEAT; anything else is nothing to a census."""
+        """Take the HEARTBEAT of an autopilot or a ground station; anything else is nothing to a census."""
         system = message.get_srcSystem()
+        if message.get_type() == "HEARTBEAT" and message.type == wire.MAV_TYPE_GCS:
+            self._station_s = t_s
         if message.get_type() != "HEARTBEAT" or system == 0 or not codec.is_autopilot_heartbeat(message):
             return
         before = self._speakers.get(system)
@@ -127,6 +131,10 @@ class Census:
             token=int(message.custom_mode), is_starting=message.system_status == wire.MAV_STATE_BOOT,
             beats=before.beats + 1 if is_same and before is not None else 1, last_s=t_s,
         )
+
+    def hears_station(self, t_s: float) -> bool:
+        """Return whether a ground station was heard lately."""
+        return t_s - self._station_s <= GONE_S
 
     def heard(self, t_s: float) -> tuple[Speaker, ...]:
         """Return the autopilots heard lately, by system id."""

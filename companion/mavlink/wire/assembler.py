@@ -34,6 +34,8 @@ REBOOT_BACK_S = 5.0
 ATTITUDE_MAX_AGE_S = 1.5
 # NAV_CONTROLLER_OUTPUT and FENCE_STATUS stop when they have nothing to say; then they are unknown after [s].
 QUIET_S = 5.0
+LEAK = "LEAK"                     # the name under which a script tells of the bilge's switch: 1 wet, 0 dry
+KNOWS_TIME_S = 1_577_836_800.0    # 2020: an autopilot that has no time yet tells less
 _APPARENT = ("AppWndSpd", "AppWndDir")
 # Heartbeats that say the same before a change is believed, of so many, none older than this [s].
 BEATS_AGREE, BEATS_KEPT, BEATS_S = 2, 3, 3.5
@@ -80,6 +82,8 @@ class VehicleAssembler:
         self._nav_s: float | None = None
         self._fence_s: float | None = None
         self._fence_told = (False, -1)
+        self._leak_told: bool | None = None
+        self._leak_s: float | None = None
 
     def take(self, t_s: float, message: Message) -> list[Value]:
         """Return the values that ``message``, heard at ``t_s`` [s], completes: none, one, or several texts.
@@ -133,7 +137,7 @@ class VehicleAssembler:
             return self._position(t_s, message)
         if kind == "WIND":
             return [codec.wind_sample(t_s, message)]
-        if kind == "NAMED_VALUE_FLOAT":
+        if kind == "NAMED_VALUE_FLOAT" and message.name != LEAK:
             return self._named(t_s, message)
         if kind == "COMMAND_ACK":
             if message.command in _CHANGING and message.result == wire.MAV_RESULT_ACCEPTED:
@@ -231,6 +235,14 @@ class VehicleAssembler:
             return {"rc_us": codec.rc_us(message)}
         if kind == "HOME_POSITION":
             return {"home": codec.geo_point(message.latitude, message.longitude)}
+        if kind == "SYSTEM_TIME":
+            unix_s = message.time_unix_usec / 1e6
+            return {"utc_at_boot_s": unix_s - message.time_boot_ms / 1e3} if unix_s > KNOWS_TIME_S else None
+        if kind == "NAMED_VALUE_FLOAT":
+            # Twice in a row, as the fence: nothing true would ever contradict one that was forged.
+            wet, before = message.value > 0.5, self._leak_told
+            self._leak_told, self._leak_s = wet, t_s
+            return {"leaks": wet} if wet == before else {}
         if kind == "FENCE_STATUS":
             # Two in a row that say the same: one alone may be damaged or forged.
             fence = bool(message.breach_status), int(message.breach_count)
@@ -248,6 +260,9 @@ class VehicleAssembler:
         if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
             self._fence_s = None
             old |= {"fence_breached": None, "fence_breaches": None}
+        if self._leak_s is not None and t_s - self._leak_s > QUIET_S:
+            self._leak_s = self._leak_told = None
+            old |= {"leaks": None}
         return old
 
 

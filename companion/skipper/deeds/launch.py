@@ -10,6 +10,7 @@ from companion.messages import MissionState, Mode
 from companion.skipper.board.uploads import upload
 from companion.skipper.deeds.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning.asking import lacks, request
+from companion.skipper.planning.ends import announcement
 from companion.skipper.planning.errands import FAR_M, home_trouble
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import SafeEnd
@@ -103,6 +104,7 @@ def launch(turn: Turn) -> None:
         return
     if repair(turn):
         return
+    turn.say(Severity.INFO, "safe ends", announcement(turn.config), every_s=math.inf)
     stale = _stale(turn)
     if state.pending_upload is not None or state.pending_plan is not None:
         what = "a new plan" if state.pending_plan is not None else "a new plan's upload"

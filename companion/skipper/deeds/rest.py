@@ -10,15 +10,15 @@ from __future__ import annotations
 from companion.skipper.deeds.by_field import keeps_station
 from companion.skipper.deeds.failsafe import waits_for
 from companion.skipper.deeds.helm import hand_back, repair
-from companion.skipper.planning.errands import OUT_OF_TIME, Errand, Kind, home_trouble, is_at_rest
+from companion.skipper.planning.ends import HOW_LONG, OUT_OF_TIME, end_of
+from companion.skipper.planning.errands import Errand, Kind, home_trouble, is_at_rest, is_pressed
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.causes import STOPPING
-from companion.skipper.step.config import SafeEnd
+from companion.skipper.step.config import End, SafeEnd
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 
-HOW_LONG = {
-    "battery critical": "until the battery is charged, or a person takes her",
+ANSWERED = {
     "battery": "until a person takes her and gives AUTO back",
     "shore link": "until the link to the shore is back, or a person gives AUTO",
 }
@@ -29,8 +29,8 @@ def comes_to_rest(turn: Turn, bound: Errand) -> bool:
     """Lie at the end of an errand; True while she does."""
     if not is_at_rest(turn) or turn.state.own_mode in STOPPING:
         return False
-    if turn.is_raised(OUT_OF_TIME) and not (
-        turn.state.answering or turn.is_raised("battery critical") or bound.is_ordered
+    if turn.is_raised(OUT_OF_TIME) and end_of(turn.config, OUT_OF_TIME) is not End.SAY and not (
+        turn.state.answering or is_pressed(turn) or bound.is_ordered
     ):
         reached = len(turn.state.reached)
         _end(turn, f"out of time: {reached} of {len(turn.voyage.legs)} goals reached", arrived=False)
@@ -46,10 +46,15 @@ def comes_to_rest(turn: Turn, bound: Errand) -> bool:
         return True
     hand_back(turn)
     where = "staying near by" if bound.kind is Kind.STAY else f"at {bound.name}"
-    key = "battery critical" if turn.is_raised("battery critical") else turn.state.answering
-    how_long = UNTIL_TOLD if bound.is_ordered else HOW_LONG.get(key, "for a person")
+    how_long = UNTIL_TOLD if bound.is_ordered else _how_long(turn)
     turn.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
     return True
+
+
+def _how_long(turn: Turn) -> str:
+    """Return how long an errand that nobody ordered keeps her."""
+    raised = next((name for name in HOW_LONG if turn.is_raised(name) and end_of(turn.config, name) is not End.SAY), "")
+    return HOW_LONG.get(raised) or ANSWERED.get(turn.state.answering, "for a person")
 
 
 def rest(turn: Turn) -> None:

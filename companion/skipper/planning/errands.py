@@ -11,14 +11,15 @@ import math
 from dataclasses import dataclass, replace
 
 from companion.orders import Verb
+from companion.skipper.planning.ends import BATTERY, DARK, LEAK, OUT_OF_TIME, SHORE_LOST, WHY, end_of
 from companion.skipper.step.causes import BY_NAME, Answer
-from companion.skipper.step.config import SafeEnd
+from companion.skipper.step.config import End, SafeEnd
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import KEEP_SHARE, Gate, disc_wkt
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import PointEn, Refuge, Side
 
-BATTERY, OUT_OF_TIME, DRAGGED = "battery critical", "out of time", "dragged off"   # watchdogs
+DRAGGED = "dragged off"   # a watchdog
 HOME, REST = "home", "the place to rest"
 GOAL_RADIUS_M = 10.0     # a place that is named under way: there within this
 HOME_RADIUS_M = 15.0     # home is where she was armed: a place in the water or at its edge, not a mark
@@ -57,22 +58,31 @@ class Errand:
         return f"{'staying near by' if self.kind is Kind.STAY else f'to {self.name}'}: {self.why}"
 
 
+def is_pressed(turn: Turn) -> bool:
+    """Return whether she is on an errand that comes before every order and the voyage's end."""
+    return pressing(turn) is not None
+
+
 def errand(turn: Turn) -> Errand | None:
     """Return where she is bound for instead of the next goal, None: nowhere."""
     return pressing(turn) or _ordered(turn) or _at_the_end(turn)
 
 
 def pressing(turn: Turn) -> Errand | None:
-    """Return the errand that comes before every order: the battery, or a failsafe that is answered."""
-    state = turn.state
+    """Return the errand that comes before every order: battery, leak, or a failsafe that is answered."""
+    state, ends = turn.state, turn.config.ends
     cause = BY_NAME.get(state.answering)
     answer = cause.answer if cause is not None else None
-    if turn.is_raised(BATTERY) or answer is Answer.SHELTER:
-        why = "the battery is critical" if turn.is_raised(BATTERY) else "the autopilot's battery failsafe"
-        ends_home = state.sent_home or turn.config.safe_end is SafeEnd.RETURN
-        found = _refuge(turn, why) or (_home(turn, why) if ends_home else None)
-        if found is not None or answer is Answer.SHELTER:
-            return found or _stay(turn, why)
+    if answer is Answer.SHELTER:
+        why = WHY[BATTERY] if turn.is_raised(BATTERY) else "the autopilot's battery failsafe"
+        end = End.REFUGE if ends.battery is End.SAY else ends.battery   # she is stopped: something must be done
+        return _found(turn, end, why) or _stay(turn, why)
+    if turn.is_raised(BATTERY):
+        found = _found(turn, ends.battery, WHY[BATTERY])
+        if found is not None:
+            return found   # without a place to go to what is left takes her on
+    if turn.is_raised(LEAK) and ends.leak is not End.SAY:
+        return _found(turn, ends.leak, WHY[LEAK]) or _stay(turn, WHY[LEAK])
     if answer is Answer.STAY:
         why = "the autopilot has lost its link to the shore"
         return (_home(turn, why) if state.sent_home else None) or _stay(turn, why)
@@ -96,15 +106,26 @@ def _ordered(turn: Turn) -> Errand | None:
 
 
 def _at_the_end(turn: Turn) -> Errand | None:
-    """Return where she is bound for when her time is up, the goals are reached, or she has been dragged off."""
+    """Return where she is bound for when time, light or shore are gone, the goals reached, or she is off her place."""
     state = turn.state
-    if turn.is_raised(OUT_OF_TIME) and not state.over:
-        why = "the voyage is out of time"
-        home = _home(turn, why) if turn.config.safe_end is SafeEnd.RETURN else None
-        return _refuge(turn, why) or home or _stay(turn, why)
+    for name in (OUT_OF_TIME, SHORE_LOST, DARK):
+        end = end_of(turn.config, name)
+        if turn.is_raised(name) and end is not End.SAY and not state.over:
+            return _found(turn, end, WHY[name]) or _stay(turn, WHY[name])
     if state.over:
         return _back(turn)
     return homeward(turn) if turn.gate is None else None
+
+
+def _found(turn: Turn, end: End, why: str) -> Errand | None:
+    """Return the errand that ends a voyage so, None: there is no such place, or words are all that is asked."""
+    ends_home = end is End.HOME or turn.state.sent_home or turn.config.safe_end is SafeEnd.RETURN
+    home = _home(turn, why) if end in {End.HOME, End.REFUGE} and ends_home else None
+    if end is End.STAY:
+        return _stay(turn, why)
+    if end is End.SAY:
+        return None
+    return home or _refuge(turn, why) if end is End.HOME else _refuge(turn, why) or home
 
 
 def homeward(turn: Turn) -> Errand | None:

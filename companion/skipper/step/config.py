@@ -34,6 +34,29 @@ class SafeEnd(enum.Enum):
     RETURN = "return"          # at home, the way there planned like any other
 
 
+class End(enum.Enum):
+    """What is done when something ends a voyage early (``[safety]``)."""
+
+    SAY = "say"
+    STAY = "stay"              # a loiter where there is room near by
+    REFUGE = "refuge"          # the nearest; without one home if the mission ends there
+    HOME = "home"              # where there is no way to it, the nearest refuge
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ends:
+    """What ends a voyage early, and how; the figures at which it does."""
+
+    battery: End = End.REFUGE
+    battery_v: float | None = None     # critical at this voltage too; None: by charge and the autopilot's limits alone
+    leak: End = End.REFUGE
+    out_of_time: End = End.REFUGE
+    dark: End = End.SAY
+    dark_below_rad: float = -0.104720  # the sun 6 deg under the horizon: the end of civil twilight
+    shore_lost: End = End.SAY
+    shore_lost_s: float = 600.0        # no ground station was heard for so long
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Permissions:
     """What the operator allows. The default is a dry run: look, plan, speak, touch nothing."""
@@ -113,4 +136,5 @@ class SkipperConfig:
     guidance: Guidance = Guidance.PLAN
     station_s: float = 0.0             # how long to stay at the last goal
     adopts: bool = False               # the goals were drawn on the autopilot: others may be, under way
+    ends: Ends = Ends()
     voyage_timeout_s: float | None = None  # under way for longer than this the goals are given up; None: never

@@ -157,6 +157,7 @@ class Snapshot:
     mission: MissionOnBoard = MissionOnBoard()
     identity: Identity = field(default_factory=Identity)   # as far as the autopilot has told it
     neighbours: tuple[str, ...] = ()       # other autopilots on a link on which ours was not named, in words
+    shore_age_s: float | None = None       # since a ground station was heard
     has_company: bool = False              # another companion speaks with our ids
     limits: AutopilotLimits | None = None  # None: not read yet
     permissions: Permissions = DRY_RUN

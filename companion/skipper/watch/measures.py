@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from companion.geo.angles import difference_rad
+from companion.geo.sun import sun_height_rad
 from companion.skipper.deeds.adrift import meets_in_s, sails
 from companion.skipper.deeds.by_field import meets_in
 from companion.skipper.planning.errands import Kind, errand
@@ -156,7 +157,29 @@ def _battery_low(turn: Turn) -> float | None:
 
 
 def _battery_critical(turn: Turn) -> float | None:
-    return _battery(turn, "battery critical", is_below=turn.state.battery_critical)
+    status, least_v = turn.autopilot, turn.config.ends.battery_v
+    volts = status.battery_v if status is not None else None
+    is_empty = least_v is not None and volts is not None and volts <= least_v
+    return _battery(turn, "battery critical", is_below=turn.state.battery_critical or is_empty)
+
+
+def _leak(turn: Turn) -> float | None:
+    return _flag(turn.autopilot.leaks) if turn.autopilot is not None else None
+
+
+def _dark(turn: Turn) -> float | None:
+    status, vehicle = turn.autopilot, turn.snapshot.vehicle
+    if status is None or vehicle is None or status.utc_at_boot_s is None or status.boot_s is None:
+        return None
+    height_rad = sun_height_rad(
+        math.radians(vehicle.position.lat_deg), math.radians(vehicle.position.lon_deg),
+        status.utc_at_boot_s + status.boot_s)
+    return math.degrees(height_rad - turn.config.ends.dark_below_rad)
+
+
+def _shore(turn: Turn) -> float | None:
+    age_s = turn.snapshot.shore_age_s
+    return None if age_s is None else age_s / turn.config.ends.shore_lost_s
 
 
 def _time(turn: Turn) -> float | None:
@@ -183,5 +206,5 @@ _MEASURES: dict[str, Callable[[Turn], float | None]] = {
     "heading against course": _heading, "off the corridor": _corridor, "stuck waypoint": _stuck,
     "mission ended": _ended, "fence breach": _breach, "foreign mission": _foreign, "reboot": _reboot,
     "battery low": _battery_low, "battery critical": _battery_critical, "out of time": _time, "dragged off": _dragged,
-    "planner dead": _planner,
+    "planner dead": _planner, "leaking": _leak, "dark": _dark, "shore lost": _shore,
 }

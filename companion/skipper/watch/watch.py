@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from companion.messages import Mode
+from companion.skipper.planning.ends import words
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.state import Raised
 from companion.skipper.step.turn import Turn
 from companion.skipper.watch.measures import measure
-from companion.skipper.watch.watchdogs import BY_NAME, TABLE, Watchdog
+from companion.skipper.watch.watchdogs import BY_NAME, TABLE, Response, Watchdog
 
 
 def watch(turn: Turn) -> tuple[str, ...]:
@@ -53,8 +54,12 @@ def watch(turn: Turn) -> tuple[str, ...]:
         dog = BY_NAME[name]
         value = measure(turn, name)
         figure = "" if value is None or not dog.unit else f" ({value:.1f} {dog.unit})"
-        turn.say(dog.severity, name, f"{name}{figure}: {dog.response.value}", every_s=0.0)
+        turn.say(dog.severity, name, f"{name}{figure}: {_done_about(turn, dog)}", every_s=0.0)
     return tuple(fresh)
+
+
+def _done_about(turn: Turn, dog: Watchdog) -> str:
+    return words(turn.config, dog.name) if dog.response is Response.AS_SET else dog.response.value
 
 
 def _is_watched(turn: Turn, dog: Watchdog) -> bool:

@@ -30,10 +30,7 @@ class Response(enum.Enum):
     COMPARE = "read the mission; ours: go on; not ours: stop acting and report"
     ADVANCE = "make the next item current"
     BY_FIELD = "steer by field under GUIDED, plan again from there, back to AUTO when the way is clear"
-    REFUGE = ("plan to the mission's nearest refuge and loiter there; without one home if the mission ends there, "
-              "else say so")
-    GIVE_UP = ("give the goals up: plan to the nearest refuge, without one home if the mission ends there, else loiter "
-               "near by")
+    AS_SET = "what the mission's `[safety]` says of it"
     BACK = "say so; where the straight way back is not clear, plan one"
 
 
@@ -112,10 +109,19 @@ TABLE: tuple[Watchdog, ...] = (
       enter_s=10.0, exit_s=10.0, severity=S.WARNING, response=Response.SAY, at_rest=True,
       why="time to think of the way home"),
     W(name="battery critical", watches="battery remaining, or the autopilot's critical limit", enter=10.0, exit=15.0,
-      unit="%", enter_s=10.0, exit_s=10.0, severity=S.CRITICAL, response=Response.REFUGE, at_rest=True,
+      unit="%", enter_s=10.0, exit_s=10.0, severity=S.CRITICAL, response=Response.AS_SET, at_rest=True,
       why="a boat without power steers no more; better in a refuge"),
+    W(name="leaking", watches="NAMED_VALUE_FLOAT LEAK, of a script on the autopilot", enter=1.0, exit=0.5, unit="",
+      enter_s=2.0, exit_s=60.0, severity=S.CRITICAL, response=Response.AS_SET, at_rest=True,
+      why="a hull that fills sails no more; the switch chatters as she rolls"),
+    W(name="dark", watches="the sun's height over the mission's `dark_below_deg`, by the autopilot's time", enter=0.0,
+      exit=1.0, unit="deg", enter_s=30.0, exit_s=30.0, severity=S.NOTICE, response=Response.AS_SET,
+      why="who has no lights or no watch wants her to lie somewhere by night"),
+    W(name="shore lost", watches="time since a ground station was heard against the mission's `shore_lost_s`",
+      enter=1.0, exit=0.99, unit="of it", enter_s=0.0, exit_s=0.0, severity=S.WARNING, response=Response.AS_SET,
+      why="nobody ashore sees her, and no order reaches her"),
     W(name="out of time", watches="time under way against the mission's `voyage_timeout_s`", enter=1.0, exit=0.99,
-      unit="of it", enter_s=0.0, exit_s=0.0, severity=S.WARNING, response=Response.GIVE_UP,
+      unit="of it", enter_s=0.0, exit_s=0.0, severity=S.WARNING, response=Response.AS_SET,
       why="whoever waits for her must be able to reckon with an end"),
     W(name="dragged off", watches="distance from the place of the loiter when the voyage is over", enter=40.0,
       exit=25.0, unit="m", enter_s=10.0, exit_s=10.0, severity=S.ERROR, response=Response.BACK, loitering=True,

@@ -37,6 +37,7 @@ class Core:
             polar=config.polar,
         )
         self.battery_v = config.battery_v
+        self.leaks: bool | None = None   # what a script of the boat's tells of her bilge
         self.roll_rad = 0.0
         self.power_up(-WARM_BOOT_S if config.is_warm else 0.0)
         if config.is_warm:

@@ -12,7 +12,7 @@ from sitl.autopilot.protocol import commands
 from sitl.autopilot.protocol.ais_list import AisList
 from sitl.autopilot.protocol.ftp import FtpServer
 from sitl.autopilot.protocol.parameter_server import ParameterServer
-from sitl.autopilot.protocol.telemetry import BUILDERS, apparent_wind, send_once
+from sitl.autopilot.protocol.telemetry import BUILDERS, named_floats, send_once
 from sitl.autopilot.protocol.transfer import TransferServer
 
 _SETPOINTS = frozenset({
@@ -116,7 +116,7 @@ class Ports:
             link.send(message)
             if msgid == mav.MAVLINK_MSG_ID_WIND:
                 # named floats go out on every port on which somebody was heard, whoever asked for WIND
-                for named in apparent_wind(self._pilot):
+                for named in named_floats(self._pilot):
                     for other in self._voice.links.values():
                         if other is link or other.is_heard:
                             other.send(named)

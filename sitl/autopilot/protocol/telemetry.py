@@ -17,7 +17,6 @@ from sitl.autopilot.pilot.modes import POSITION_MODES
 from sitl.autopilot.pilot.pilot import Pilot
 
 # 2025-02-01T00:00:00Z: simulated calendars start at one moment, so that a voyage repeats bit for bit.
-EPOCH_S = 1738368000
 _SENSORS = 322034735
 _FENCE_BIT = 0x100000
 _SENSORS_ENABLED = 304185391
@@ -105,7 +104,7 @@ def _gps(p: Pilot) -> Any:
 
 
 def _system_time(p: Pilot) -> Any:
-    unix_us = round((EPOCH_S + p.core.t_s) * 1e6) if p.core.boot_s >= 9.95 else 0
+    unix_us = round((p.core.config.epoch_s + p.core.t_s) * 1e6) if p.core.boot_s >= 9.95 else 0
     return mav.MAVLink_system_time_message(unix_us, p.core.boot_ms)
 
 
@@ -223,13 +222,13 @@ def autopilot_version(p: Pilot) -> Any:
     )
 
 
-def apparent_wind(p: Pilot) -> tuple[Any, Any]:
-    """Return the two NAMED_VALUE_FLOAT that go with a WIND."""
+def named_floats(p: Pilot) -> tuple[Any, ...]:
+    """Return the NAMED_VALUE_FLOATs that go with a WIND: the apparent wind, and what a script says of a leak."""
     awa, aws = p.core.vehicle.apparent
-    return (
-        mav.MAVLink_named_value_float_message(p.core.boot_ms, b"AppWndSpd", aws),
-        mav.MAVLink_named_value_float_message(p.core.boot_ms, b"AppWndDir", math.degrees(awa)),
-    )
+    told = [(b"AppWndSpd", aws), (b"AppWndDir", math.degrees(awa))]
+    if p.core.leaks is not None:
+        told.append((b"LEAK", float(p.core.leaks)))
+    return tuple(mav.MAVLink_named_value_float_message(p.core.boot_ms, name, value) for name, value in told)
 
 
 def _rc_channels(p: Pilot) -> Any:

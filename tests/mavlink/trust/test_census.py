@@ -92,3 +92,12 @@ def test_a_second_companion_counts_from_its_second_word_and_while_it_speaks():
 ])
 def test_who_starts_gives_way_to_who_sails_and_of_two_that_start_one_goes_on(token, other, is_starting, yields):
     assert yields_to(token, OtherCompanion(token=other, is_starting=is_starting, beats=2, last_s=0.0)) is yields
+
+
+def test_a_ground_station_is_heard_for_a_while_and_is_no_autopilot():
+    census = Census()
+    assert not census.hears_station(0.0)
+    census.take(0.0, beat(255, wire.MAV_TYPE_GCS, wire.MAV_AUTOPILOT_INVALID, component=190))
+    assert census.hears_station(9.0)
+    assert not census.hears_station(11.0)
+    assert census.heard(1.0) == ()

@@ -10,10 +10,11 @@ import shapely
 from companion.boat import Hull
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint, Mode
+from sitl.autopilot import EPOCH_S
 from sitl.campaigns.fault_draw import draw
 from sitl.campaigns.fault_watch import EXCUSES, REACTION_S, RESUME_S, Watch, mission_key, operator_spans
 from sitl.campaigns.faults import BASE, run_faults, sail_faults, sail_seed
-from sitl.scene.scenario import EPOCH_S, EventSpec, load_scenario
+from sitl.scene.scenario import EventSpec, load_scenario
 from sitl.trouble.forgeries import forgery_named
 
 SEEDS = Path(__file__).parent / "seeds"
