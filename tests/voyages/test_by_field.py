@@ -61,12 +61,6 @@ def test_without_permission_nothing_is_steered(tmp_path):
     assert "distance to vessels, m" in [name for name, *_ in failed(verdict)]
 
 
-@pytest.mark.parametrize("name", ["two-boats", "two-boats-by-field", "station"])
-def test_scenario(name, tmp_path):
-    verdict = sail(FOLDER / f"{name}.toml", 0, tmp_path)
-    assert verdict.passed, failed(verdict)
-
-
 def test_two_boats_that_do_not_look_meet(tmp_path):
     """The scene is one: on the same line, and ours without the radio, they come near."""
     scenario = load_scenario(FOLDER / "two-boats.toml")
