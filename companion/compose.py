@@ -118,20 +118,20 @@ def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
         return Permissions()
     operator = mission.operator
     return Permissions(
-        orders=orders_of(mission),
+        orders=_orders(mission, "orders", mission.operator.orders),
+        local_orders=_orders(mission, "local_orders", mission.operator.local_orders),
         may_upload=operator.set_auto, may_upload_fence=operator.upload_fence, may_arm=operator.arm,
         may_set_mode=operator.set_auto, may_steer=operator.guided, may_replace_foreign=operator.replace_foreign,
     )
 
 
-def orders_of(mission: Mission) -> tuple[str, ...]:
-    """Return the verbs that the crew may give by MAVLink. Raises InputError for a word that is none."""
-    given = mission.operator.orders
+def _orders(mission: Mission, key: str, given: tuple[str, ...] | str) -> tuple[str, ...]:
+    """Return the verbs that a key of ``[operator]`` permits. Raises InputError for a word that is none."""
     words = (given,) if isinstance(given, str) else given
     for word in words:
         if word != ALL and word not in set(Verb):
             said, _, remedy = unknown(word).partition("; ")
-            raise InputError(str(mission.path), "[operator] orders", said, f'{remedy}, or "{ALL}"')
+            raise InputError(str(mission.path), f"[operator] {key}", said, f'{remedy}, or "{ALL}"')
     return tuple(words)
 
 

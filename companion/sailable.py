@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from companion.compose import config_of, estimator_of, feeds_of, orders_of, target_limits_of, voyage_of
+from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
 from companion.errors import InputError
 from companion.geofence import Mission
 from companion.geofence.mission import AreaOptions
@@ -19,7 +19,7 @@ def require_sailable(mission: Mission) -> Mission:
     try:
         estimator_of(mission)
         feeds_of(mission)
-        orders_of(mission)
+        permissions_of(mission)
         target_limits_of(mission)
         config_of(mission)
         voyage_of(mission)

@@ -10,8 +10,8 @@ from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import LATER, Link
 from companion.mavlink.wire import Drop
-from companion.orders import COMMANDS, RESULTS, Order, Result, Source, wanted_of
-from companion.skipper.step import Severity
+from companion.orders import COMMANDS, LOCAL, MAVLINK, RESULTS, Answer, Order, Result, Source, Wanted, wanted_of
+from companion.skipper.step import Acknowledge, Severity
 
 # What comes in one step beyond this is sent away: each order costs the radio an answer.
 MOST_WAITING = 4
@@ -28,6 +28,7 @@ class Crew:
         self._link, self._authority = link, "signed" if has_key else "unsigned"
         self._waiting: list[Order] = []
         self._is_open = False
+        self._asked: dict[int, asyncio.Future[Answer]] = {}   # by the number of who asks on board
         link.on_command = self._hear
 
     def begin(self) -> None:
@@ -43,6 +44,26 @@ class Crew:
     def unsigned(self) -> int:
         """How many commands to us were not signed with our key."""
         return self._link.dropped()[Drop.UNSIGNED_COMMAND]
+
+    async def ask(self, wanted: Wanted, number: int) -> Answer:
+        """Give an order from on board, by the connection of that number, and return its answer."""
+        if not self._is_open or number in self._asked:
+            return Answer(result=Result.NOT_NOW, text="the companion is not under way yet")
+        answer: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
+        self._asked[number] = answer
+        self._waiting.append(Order(
+            wanted=wanted, t_s=now_s(), authority=LOCAL, source=Source(kind=LOCAL, component=number)))
+        try:
+            return await answer
+        finally:
+            del self._asked[number]
+
+    def answered(self, action: Acknowledge) -> None:
+        """Take an answer to where the order came from."""
+        if action.way != LOCAL:
+            self._link.acknowledge(action.command, RESULTS[action.result], action.system, action.component)
+        elif action.component in self._asked and not self._asked[action.component].done():
+            self._asked[action.component].set_result(Answer(result=action.result, text=action.text))
 
     async def watch(self, autopilot: Autopilot, record: Callable[[dict[str, Any]], None]) -> None:
         """Say and record, once, that somebody without the key gives commands."""
@@ -61,5 +82,5 @@ class Crew:
             return RESULTS[Result.NOT_NOW]
         self._waiting.append(Order(
             wanted=wanted_of(message), t_s=now_s(), command=int(message.command), authority=self._authority,
-            source=Source(kind="mavlink", system=message.get_srcSystem(), component=message.get_srcComponent())))
+            source=Source(kind=MAVLINK, system=message.get_srcSystem(), component=message.get_srcComponent())))
         return LATER

@@ -18,7 +18,6 @@ from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.transfers import CommandAnswer
 from companion.mavlink.transfers import Outcome as WireOutcome
-from companion.orders import RESULTS
 from companion.planner import Plan, Problem
 from companion.skipper.step import (
     Acknowledge,
@@ -92,12 +91,12 @@ class Executor:
     def __init__(
         self, autopilot: Autopilot, planner: Planner, on_outcome: Callable[[Outcome], None], *,
         seed: int = 0, expansions: int | None = None, budget_scale: float = 1.0, config: SkipperConfig | None = None,
-        on_adopt: Callable[[], None] = lambda: None,
+        on_adopt: Callable[[], None] = lambda: None, on_answer: Callable[[Acknowledge], None] = lambda _: None,
     ) -> None:
         self._autopilot, self._planner, self._on_outcome = autopilot, planner, on_outcome
         self._seed, self._expansions, self._budget_scale = seed, expansions, budget_scale
         self._config = config or SkipperConfig()
-        self._on_adopt = on_adopt
+        self._on_adopt, self._on_answer = on_adopt, on_answer
         self._orders: deque[tuple[float, Action]] = deque()
         self._order_wanted = asyncio.Event()
         self._order: tuple[Action, asyncio.Task[Outcome]] | None = None   # under way
@@ -120,8 +119,7 @@ class Executor:
             elif isinstance(action, Announce):
                 self._autopilot.say(int(action.severity), action.text)
             elif isinstance(action, Acknowledge):
-                self._autopilot.link.acknowledge(
-                    action.command, RESULTS[action.result], action.system, action.component)
+                self._on_answer(action)
             elif isinstance(action, StopOrders):
                 self._give_up(Action, action.text)
             elif isinstance(action, AdoptDrawing):

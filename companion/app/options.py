@@ -45,6 +45,7 @@ class SailOptions:
         is_again: sail the mission again although the saved state says that it has arrived.
         settings: what a drawing that is adopted under way is sailed with; None: none is adopted.
         known: hashes of missions on the autopilot that ours may take the place of: the drawing that is sailed.
+        socket: where orders from on board are taken; None: nowhere.
         signing: key and timestamp for a signed link.
         token: 32 bits that tell our heartbeat from a second companion's; on the boat they are drawn by lot.
         budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
@@ -65,6 +66,7 @@ class SailOptions:
     shelf: Shelf | None = None
     is_again: bool = False
     settings: Settings | None = None
+    socket: Path | None = None
     known: tuple[str, ...] = ()
     signing: SigningStore | None = None
     token: int = 1

@@ -20,6 +20,7 @@ from companion.app.company import NOBODY, make_way, others_on
 from companion.app.crew import Crew
 from companion.app.executor import Executor, Planner
 from companion.app.keepers import keep_fence, keep_identity, keep_parameters
+from companion.app.local import served
 from companion.app.options import SailOptions
 from companion.clock import now_s
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
@@ -126,7 +127,9 @@ class _Shell:
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
                                     expansions=self.options.expansions,
                                     budget_scale=self.options.budget_scale, config=self.config,
-                                    on_adopt=adoption.ask)
+                                    on_adopt=adoption.ask, on_answer=crew.answered)
+                if self.options.socket is not None:
+                    await stack.enter_async_context(served(self.options.socket, crew))
                 radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
                 async with asyncio.TaskGroup() as group:
                     tasks = [

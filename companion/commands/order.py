@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import asyncio
+import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,13 +24,15 @@ _EPILOG = """\
 orders (* stands until go_on, or another order that stands):
 {verbs}
 
-Which of them the boat takes is in the mission that she sails: [operator] orders = ["hold", ...], default none;
-why is always answered. The same order again within 10 s gets the same answer and nothing is done twice.
+Which of them the boat takes is in the mission that she sails: [operator] orders = ["hold", ...], local_orders for
+those given on board; default none; why is always answered. The same order again within 10 s gets the same answer and
+nothing is done twice.
 
 examples:
   companion order hold --link /dev/ttyUSB0:57600
   companion order goal 50.8195 -1.3080 --link udpin:0.0.0.0:14550
   companion order refuge Mill Bay --link tcp:127.0.0.1:5762 --system 3
+  companion order hold --socket boat.sock      (on board, beside companion run --socket boat.sock)
   companion order --qgc Orders.json      (buttons for QGroundControl; for its folder MavlinkActions)
 
 Exit codes: 0 done, 1 refused (the answer says why), 2 bad usage, 3 no link or no answer: it may have been taken all
@@ -50,6 +54,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("words", nargs="*", metavar="VERB [ARGS]", help="the order, see below")
     parser.add_argument("--link", metavar="LINK",
                         help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--socket", type=Path, metavar="PATH", help="on board, in place of a link: as the companion's")
     parser.add_argument("--system", type=system_id, metavar="N",
                         help="the autopilot's MAVLink system id (default: the only one heard)")
     parser.add_argument("--timeout", type=number("s", above=0.0), default=15.0, metavar="S",
@@ -65,9 +70,10 @@ def run(args: argparse.Namespace) -> int:
     if args.qgc is not None:
         return _write_buttons(args)
     wanted = phrase(args.words)
-    if args.link is None:
-        raise InputError("--link", "", "is missing: there is nobody to give the order to",
-                         "name the link of the radio, as --link /dev/ttyUSB0:57600")
+    if (args.link is None) == (args.socket is None):
+        raise InputError("--link", "", "is missing: there is nobody to give the order to" if args.link is None else
+                         "and --socket are two ways for one order",
+                         "name the link of the radio, as --link /dev/ttyUSB0:57600, or on board --socket PATH")
     from companion.clock import run as run_loop
     from companion.errors import LinkError
     from companion.orders import Result
@@ -87,6 +93,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 async def _give(args: argparse.Namespace, wanted: Wanted) -> Answer:
+    if args.socket is not None:
+        return await _give_on_board(args.socket, " ".join(args.words), args.timeout)
     import time
 
     from companion.mavlink.link import Link
@@ -99,6 +107,27 @@ async def _give(args: argparse.Namespace, wanted: Wanted) -> Answer:
     ) as link:
         await link.wait_autopilot(args.timeout)
         return await give(link, wanted, give_up_s=args.timeout)
+
+
+async def _give_on_board(path: Path, words: str, give_up_s: float) -> Answer:
+    from companion.disk import reason
+    from companion.errors import LinkError
+    from companion.orders import Answer, Result
+
+    try:
+        async with asyncio.timeout(give_up_s):
+            reader, writer = await asyncio.open_unix_connection(path)
+            writer.write(words.encode() + b"\n")
+            line = await reader.readline()
+            writer.close()
+    except TimeoutError:
+        return Answer(result=Result.NO_ANSWER, text=f"no answer within {give_up_s:g} s")
+    except OSError as error:
+        raise LinkError(f"{path}: {reason(error)}; is the companion running with --socket?") from error
+    if not line:
+        raise LinkError(f"{path}: the companion has hung up")
+    told = json.loads(line)
+    return Answer(result=Result(told["result"]), text=str(told["text"]))
 
 
 def _write_buttons(args: argparse.Namespace) -> int:

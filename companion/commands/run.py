@@ -56,6 +56,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--state", type=Path, metavar="FILE",
                         help="where the state for a restart is kept (default: voyages/<mission>.state.json); its "
                         "folder is one boat's, and locked")
+    parser.add_argument("--socket", type=Path, metavar="PATH", help="take orders from on board at this Unix socket: "
+                        "companion order VERB --socket PATH, as [operator] local_orders permits")
     parser.add_argument("--again", action="store_true",
                         help="sail the mission again when its state says that it has arrived (asked at a terminal)")
     parser.add_argument("--keep-gb", type=number("GB", above=0.0), metavar="GB",
@@ -180,7 +182,8 @@ def _voyage(
             expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
             wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
             exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
-            settings=sailed.settings, command=" ".join(sys.argv), token=secrets.randbelow(0xFFFFFFFF) + 1,
+            settings=sailed.settings, socket=args.socket, command=" ".join(sys.argv),
+            token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
     summary = run_loop(_sail(mission, transport, folder, options, manager, out), speedup=args.speedup)

@@ -27,6 +27,7 @@ radius_m = 10.0
 [operator]
 arm = true
 set_auto = true
+local_orders = ["hold", "go_on"]
 """
 PATIENCE_S = 200.0
 COMPANION = [sys.executable, "-m", "companion.cli"]
@@ -71,10 +72,20 @@ def records(path):
     return [json.loads(line) for line in path.read_text().splitlines() if line] if path.exists() else []
 
 
+ORDERS = ("why", "home", "jump", "hold")   # held, she does not arrive while nothing can be recorded
+told = {}   # what orders on board were answered: the exit code, what was printed
+
+
+def order(folder, *words):
+    done = subprocess.run([*COMPANION, "order", *words, "--socket", "s"], cwd=folder, text=True, capture_output=True,
+                          check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
 @pytest.fixture(scope="module")
 def first(link, folder):
     """The first mission, sailed through everything: its exit code, its folder, what a second companion said."""
-    run = subprocess.Popen(command("first.toml", link, "--out", "first/v"), cwd=folder, text=True,
+    run = subprocess.Popen(command("first.toml", link, "--out", "first/v", "--socket", "s"), cwd=folder, text=True,
                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert run.stdout.readline()
     run.stdout.close()                                    # | head -1
@@ -82,6 +93,7 @@ def first(link, folder):
                             capture_output=True, check=False, timeout=PATIENCE_S)
     decisions = folder / "first/v/decisions.jsonl"
     wait_for(lambda: any(d.get("code") == "under way" for d in records(decisions)))
+    told.update((words, order(folder, *words.split())) for words in ORDERS)
     is_small = Disk().room(folder).free_bytes < 4 << 20
     if is_small:
         with (folder / "filler").open("wb") as file:
@@ -97,6 +109,7 @@ def first(link, folder):
         assert decisions.stat().st_size - size < 4096
         (folder / "filler").unlink()
     run.stderr.close()
+    told["go_on"] = order(folder, "go_on")
     try:
         wait_for(lambda: any(d.get("code") == "done" for d in records(decisions)))
         time.sleep(20.0 / PACE)
@@ -105,6 +118,19 @@ def first(link, folder):
         return run.wait(PATIENCE_S), folder / "first/v", second, is_small
     finally:
         run.kill()
+
+
+def test_orders_are_taken_from_on_board_as_the_mission_permits(first, folder):
+    assert (told["why"][0], told["hold"], told["go_on"][0]) == (
+        0, (0, "hold: loitering here, where there is room, until go_on\n"), 0)
+    assert told["go_on"][1].startswith("go_on: the end of hold: ")
+    assert told["home"] == (
+        1, "home: refused: not permitted: the mission's [operator] local_orders does not name home\n")
+    assert told["jump"][0] == 2
+    by = [d["order"] for d in records(first[1] / "decisions.jsonl") if d["kind"] == "order"]
+    assert {d["source"][0] for d in by} == {"local"}
+    assert not (folder / "s").exists()
+    assert order(folder, "why")[0] == 3
 
 
 def test_neither_a_closed_pipe_nor_a_hangup_ends_a_voyage(first):

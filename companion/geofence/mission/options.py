@@ -108,6 +108,8 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Overwrite a mission on the autopilot that is not ours, before setting sail; under way somebody else's stays."""
     orders: tuple[str, ...] | str = ()
     """What the crew may order over MAVLink (docs/orders.md): verbs, or ``all``. Asking why is always permitted."""
+    local_orders: tuple[str, ...] | str = ()
+    """The same over the socket on board (``companion run --socket``)."""
 
 
 class AutopilotOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from companion.messages import Mode
-from companion.orders import Answer, Order, Result, Verb, lead_in, permitted
+from companion.orders import LOCAL, Answer, Order, Result, Verb, lead_in, permitted
 from companion.skipper.board.adoption import adopt
 from companion.skipper.deeds.ordered_places import goal_place, home_place, refuge_place
 from companion.skipper.deeds.rest import UNTIL_TOLD
@@ -67,10 +67,11 @@ def _judged(turn: Turn, order: Order) -> Answer:
         return Answer(result=Result.UNKNOWN, text=wanted.fault)
     if wanted.fault:
         return Answer(result=Result.REFUSED, text=wanted.fault)
-    if not permitted(wanted.verb, turn.snapshot.permissions.orders):
-        return Answer(result=Result.REFUSED, text=f"not permitted: the mission's [operator] orders does not name "
-                      f"{wanted.verb}" if turn.snapshot.permissions.orders else
-                      "not permitted: the mission's [operator] orders permits none")
+    may, is_local = turn.snapshot.permissions, order.source.kind == LOCAL
+    verbs, key = (may.local_orders, "local_orders") if is_local else (may.orders, "orders")
+    if not permitted(wanted.verb, verbs):
+        which = f"does not name {wanted.verb}" if verbs else "permits none"
+        return Answer(result=Result.REFUSED, text=f"not permitted: the mission's [operator] {key} {which}")
     if turn.is_given_up and wanted.verb not in {Verb.GO_ON, Verb.STOP, Verb.WHY}:
         return _not_now(f"she is given up, {_why(turn)}: {Verb.GO_ON} first")
     return _DEEDS[wanted.verb](turn, order)

@@ -1,0 +1,86 @@
+"""The socket on board: orders of who may open it, a line of words each, and their answers, a line of JSON each.
+
+It is a Unix socket of mode 0600: the user that runs the companion, and root. What it may order is the mission's
+``[operator] local_orders``. The live page and ``companion order --socket`` speak to it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import json
+import socket
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+from companion.app.crew import Crew
+from companion.disk import reason
+from companion.errors import InputError
+from companion.orders import Answer, Result, phrase
+
+MAX_LINE = 500     # bytes; an order is shorter
+MOST = 8           # connections at a time
+
+
+@contextlib.asynccontextmanager
+async def served(path: Path, crew: Crew) -> AsyncIterator[None]:
+    """Take orders at ``path`` while the body runs; afterwards it is gone.
+
+    Raises:
+        InputError: another program listens there, something else is there, or it cannot be made.
+    """
+    _clear(path)
+    numbers = itertools.count(1)
+    writers: set[asyncio.StreamWriter] = set()
+
+    async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        number = next(numbers)
+        writers.add(writer)
+        try:
+            with contextlib.suppress(ConnectionError, ValueError):   # gone, or a line without end
+                while len(writers) <= MOST and (line := await reader.readline()):
+                    answer = await _answer(line, crew, number)
+                    writer.write(json.dumps({"result": answer.result.value, "text": answer.text}).encode() + b"\n")
+                    await writer.drain()
+        finally:
+            writers.discard(writer)
+            writer.close()
+
+    try:
+        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        listening.bind(str(path))
+        path.chmod(0o600)   # before anybody can connect: it does not listen yet
+        server = await asyncio.start_unix_server(talk, sock=listening, limit=MAX_LINE)
+    except OSError as error:
+        listening.close()
+        raise InputError("--socket", str(path), f"cannot be made ({reason(error)})", "name another place") from error
+    try:
+        async with server:
+            yield
+    finally:
+        path.unlink(missing_ok=True)
+        for writer in tuple(writers):
+            writer.close()
+
+
+def _clear(path: Path) -> None:
+    """Remove a socket that nobody listens on any more: one of a companion that was killed."""
+    if not path.exists():
+        return
+    if not path.is_socket():
+        raise InputError("--socket", str(path), "is there already and no socket", "name another place")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.connect(str(path))
+        except ConnectionRefusedError:
+            path.unlink(missing_ok=True)
+            return
+    raise InputError("--socket", str(path), "another program listens there", "name another place, or end that one")
+
+
+async def _answer(line: bytes, crew: Crew, number: int) -> Answer:
+    try:
+        return await crew.ask(phrase(line.decode("utf-8").split()), number)
+    except (InputError, UnicodeDecodeError) as error:
+        return Answer(result=Result.UNKNOWN, text=str(error))
