@@ -99,11 +99,12 @@ async def _give(args: argparse.Namespace, wanted: Wanted) -> Answer:
 
     from companion.mavlink.link import Link
     from companion.mavlink.transports import SigningStore, open_link
-    from companion.orders import GIVER, give
+    from companion.mavlink.trust import SHORE
+    from companion.orders import give
 
     signing = None if args.signing_key is None else SigningStore(args.signing_key, time.time())
     async with Link(
-        open_link(args.link), identity=GIVER, target_system=args.system, streams=(), is_quiet=True, signing=signing,
+        open_link(args.link), identity=SHORE, target_system=args.system, streams=(), is_quiet=True, signing=signing,
     ) as link:
         await link.wait_autopilot(args.timeout)
         return await give(link, wanted, give_up_s=args.timeout)

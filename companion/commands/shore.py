@@ -51,11 +51,10 @@ def find_system(link: str, timeout_s: float, system: int | None) -> int:
     from companion.clock import run
     from companion.mavlink.link import Link
     from companion.mavlink.transports import open_link
-    from companion.mavlink.trust import LinkIdentity
+    from companion.mavlink.trust import SHORE
 
     async def listen() -> int:
-        own = LinkIdentity(system=255, component=190)
-        async with Link(open_link(link), identity=own, target_system=system, streams=(), is_quiet=True) as heard:
+        async with Link(open_link(link), identity=SHORE, target_system=system, streams=(), is_quiet=True) as heard:
             return (await heard.wait_autopilot(timeout_s)).target_system
 
     return run(listen())

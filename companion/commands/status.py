@@ -58,13 +58,13 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
     from companion.clock import now_s
     from companion.errors import LinkError
     from companion.mavlink.link import Link
-    from companion.mavlink.trust import LinkIdentity
+    from companion.mavlink.trust import SHORE
     from companion.mavlink.wire import StatusReader, VehicleAssembler
 
     reader, vehicle = StatusReader(), VehicleAssembler()
     heard = asyncio.Event()
     async with Link(
-        transport, identity=LinkIdentity(system=255, component=190), target_system=args.system, streams=(),
+        transport, identity=SHORE, target_system=args.system, streams=(),
         is_quiet=True,
     ) as link:
 

@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from companion.mavlink.transfers import Machine, Party
-from companion.mavlink.trust import OWN_COMPONENT, LinkIdentity
+from companion.mavlink.trust import OWN_COMPONENT
 from companion.mavlink.wire import Message, VehicleAssembler
 from companion.messages import StatusText
 from companion.orders.fields import COMMANDS, RESULTS, message_of
 from companion.orders.order import Answer, Result, Wanted
 
-# Who gives an order through a link of its own. Not 255: the autopilot takes that for its ground station, whose silence
-# afterwards sets off a failsafe.
-GIVER = LinkIdentity(system=254, component=190)
 AGAIN_S = 1.5        # the companion answers within a second; a slow radio takes another half
 GIVE_UP_S = 15.0
 WORDS_S = 3.0        # the sentence follows the acknowledgement; chunk by chunk on a slow radio

@@ -5,7 +5,8 @@ from __future__ import annotations
 from companion.geo.frame import LocalFrame
 from companion.mavlink.link import Link
 from companion.mavlink.transports import Transport
-from companion.orders import GIVER, Place, Verb, Wanted, give, phrase
+from companion.mavlink.trust import SHORE
+from companion.orders import Place, Verb, Wanted, give, phrase
 from sitl.scene import EventSpec
 
 HEARD_S = 30.0   # for the boat's autopilot to be heard
@@ -22,7 +23,7 @@ def wanted_by(event: EventSpec, frame: LocalFrame) -> Wanted:
 async def give_order(transport: Transport, event: EventSpec, frame: LocalFrame) -> str:
     """Give an event's order; return what was wrong with its answer, empty: it was the one that is expected."""
     wanted = wanted_by(event, frame)
-    async with Link(transport, identity=GIVER, streams=(), is_quiet=True) as link:
+    async with Link(transport, identity=SHORE, streams=(), is_quiet=True) as link:
         await link.wait_autopilot(HEARD_S)
         answer = await give(link, wanted)
     if answer.result.value == event.answer:

@@ -22,9 +22,10 @@ from companion.geofence import load_mission, read
 from companion.geofence.mission import load_settings
 from companion.mavlink.autopilot import Autopilot as Ours
 from companion.mavlink.link import Link
+from companion.mavlink.trust import SHORE
 from companion.mavlink.wire.codec import mission_item
 from companion.messages import GeoPoint, waypoint
-from companion.orders import GIVER, Result, give, phrase
+from companion.orders import Result, give, phrase
 from companion.replay import replay
 from companion.skipper.board.mark import are_marked, marked
 from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
@@ -84,7 +85,7 @@ class Bay:
                 assert await self.station.upload(items, kind) == 0
 
     async def order(self, *words):
-        async with Link(self.crew.near, identity=GIVER, streams=(), is_quiet=True) as link:
+        async with Link(self.crew.near, identity=SHORE, streams=(), is_quiet=True) as link:
             await link.wait_autopilot()
             return await give(link, phrase(words))
 

@@ -32,6 +32,11 @@ class LinkIdentity:
     token: int = 0
 
 
+# Who listens or gives orders through a link of its own, ashore. Not 255: the autopilot takes that for its ground
+# station, whose silence afterwards sets off a failsafe.
+SHORE = LinkIdentity(system=254, component=190)
+
+
 class Heard(enum.Enum):
     """What a message is to us."""
 
