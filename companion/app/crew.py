@@ -47,7 +47,7 @@ class Crew:
 
     async def ask(self, wanted: Wanted, number: int) -> Answer:
         """Give an order from on board, by the connection of that number, and return its answer."""
-        if not self._is_open or number in self._asked:
+        if not self._is_open:
             return Answer(result=Result.NOT_NOW, text="the companion is not under way yet")
         answer: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
         self._asked[number] = answer

@@ -76,6 +76,9 @@ def _clear(path: Path) -> None:
         except ConnectionRefusedError:
             path.unlink(missing_ok=True)
             return
+        except OSError as error:
+            raise InputError(
+                "--socket", str(path), f"cannot be opened ({reason(error)})", "name another place") from error
     raise InputError("--socket", str(path), "another program listens there", "name another place, or end that one")
 
 

@@ -11,7 +11,7 @@ from companion.skipper.deeds.by_field import keeps_station
 from companion.skipper.deeds.failsafe import waits_for
 from companion.skipper.deeds.helm import hand_back, repair
 from companion.skipper.planning.ends import HOW_LONG, OUT_OF_TIME, end_of
-from companion.skipper.planning.errands import Errand, Kind, home_trouble, is_at_rest, is_pressed
+from companion.skipper.planning.errands import Errand, Kind, home_trouble, is_at_rest, pressing
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.config import End, SafeEnd
@@ -30,7 +30,7 @@ def comes_to_rest(turn: Turn, bound: Errand) -> bool:
     if not is_at_rest(turn) or turn.state.own_mode in STOPPING:
         return False
     if turn.is_raised(OUT_OF_TIME) and end_of(turn.config, OUT_OF_TIME) is not End.SAY and not (
-        turn.state.answering or is_pressed(turn) or bound.is_ordered
+        turn.state.answering or pressing(turn) is not None or bound.is_ordered
     ):
         reached = len(turn.state.reached)
         _end(turn, f"out of time: {reached} of {len(turn.voyage.legs)} goals reached", arrived=False)

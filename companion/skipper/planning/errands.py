@@ -58,11 +58,6 @@ class Errand:
         return f"{'staying near by' if self.kind is Kind.STAY else f'to {self.name}'}: {self.why}"
 
 
-def is_pressed(turn: Turn) -> bool:
-    """Return whether she is on an errand that comes before every order and the voyage's end."""
-    return pressing(turn) is not None
-
-
 def errand(turn: Turn) -> Errand | None:
     """Return where she is bound for instead of the next goal, None: nowhere."""
     return pressing(turn) or _ordered(turn) or _at_the_end(turn)
