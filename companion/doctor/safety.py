@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from companion.boat import AutopilotLimits
 from companion.doctor.findings import Examined, Level, Needs, Report
 from companion.skipper.step import ends_safely
 
 FENCE_ITEMS = 84             # what every board holds (672 bytes of storage, 8 each)
-CIRCLE_BIT = 2               # FENCE_TYPE: the circle around home
 POLYGON_BIT = 4
 RATES_HZ = {"WIND": 0.9, "GLOBAL_POSITION_INT": 0.9, "ATTITUDE": 0.9, "MISSION_CURRENT": 0.4, "EKF_STATUS_REPORT": 0.4}
 OLDEST = (4, 2)              # before it the boat is steered by L1 and the upwind corridor differs
@@ -21,7 +21,7 @@ def fence(report: Report, seen: Examined, needs: Needs) -> None:
     enabled, kind = report.get("FENCE_ENABLE"), report.get("FENCE_TYPE")
     radius, action = report.get("FENCE_RADIUS"), report.get("FENCE_ACTION")
     on = enabled is not None and enabled != 0
-    if kind is not None and int(kind) & CIRCLE_BIT and radius is not None and (on or needs.has_fence):
+    if kind is not None and int(kind) & AutopilotLimits.CIRCLE_BIT and radius is not None and (on or needs.has_fence):
         inside = needs.reach_m + needs.margin_m <= radius
         report.add(Level.INFO if inside else Level.ERROR, "home circle",
                    f"FENCE_TYPE {kind:g} includes the circle of {radius:g} m around home",

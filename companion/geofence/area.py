@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 # nearer than the distance; OUTWARDS pays for that.
 QUADRANT_SEGMENTS = 4
 OUTWARDS = 1.0 / math.cos(0.75 * math.pi / (2.0 * QUADRANT_SEGMENTS))
+CIRCLE_SEGMENTS = 16   # of a quarter of a circle: 0.1 % of its radius is given away
 MANY_POINTS = 500  # from here on the grid pays for being built and compiled
 
 
@@ -114,15 +115,27 @@ class LocalArea:
     polygons: tuple[Polygon, ...]
     own_margins_m: tuple[float, ...]
     limits: BaseGeometry | None
+    edge_name: str = "the fence"
 
     @functools.cached_property
     def unfenced(self) -> LocalArea:
-        """The obstacles alone: for a boat that has got outside the limits."""
+        """The obstacles alone: for a boat that has got outside the limits. What is known of them is kept there."""
         return self if self.limits is None else replace(self, limits=None)
+
+    @functools.lru_cache(maxsize=4)  # noqa: B019 - an area lives as long as its voyage
+    def within(self, centre_en: tuple[float, float], radius_m: float, name: str) -> LocalArea:
+        """Return the area with one limit more: a circle, by ``name``, drawn inside of it."""
+        disc = shapely.buffer(shapely.points(centre_en), radius_m, quad_segs=CIRCLE_SEGMENTS)
+        limits = disc if self.limits is None else shapely.intersection(self.limits, disc)
+        area = replace(self, limits=limits, edge_name=name if self.limits is None else f"{self.edge_name} or {name}")
+        area.__dict__["unfenced"] = self.unfenced   # what was computed of the obstacles serves both
+        return area
 
     @functools.cached_property
     def solid(self) -> BaseGeometry:
         """The union of the obstacles, prepared; empty without any."""
+        if self.limits is not None:
+            return self.unfenced.solid
         union = shapely.union_all(list(self.polygons)) if self.polygons else MultiPolygon()
         shapely.prepare(union)
         return union
@@ -140,6 +153,8 @@ class LocalArea:
 
         Prepared. Contains the true buffer; at most 5 % wider.
         """
+        if self.limits is not None:
+            return self.unfenced.buffered(margin_m)
         grown = [buffer_out(p, max(margin_m, m)) for p, m in zip(self.polygons, self.own_margins_m, strict=True)]
         union = shapely.union_all(grown) if grown else MultiPolygon()
         shapely.prepare(union)
@@ -156,6 +171,8 @@ class LocalArea:
 
     def obstacle_clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
         """Return the distance of each point to the nearest obstacle [m], negative inside; inf without any."""
+        if self.limits is not None:
+            return self.unfenced.obstacle_clearance_m(points_en)
         wanted = np.asarray(points_en, dtype=np.float64).reshape(-1, 2)
         if self.solid.is_empty:
             return np.full(wanted.shape[0], np.inf)
@@ -207,7 +224,7 @@ class LocalArea:
         far = [float(shapely.distance(p, point)) for p in self.polygons]
         nearest = min(range(len(far)), key=far.__getitem__, default=None)
         if self.limits is not None and (nearest is None or float(self.limit_clearance_m(point_en)[0]) < far[nearest]):
-            return "the fence"
+            return self.edge_name
         return "" if nearest is None else self.names[nearest]
 
     def obstacles_wkt(self, margin_m: float = 0.0) -> list[str]:

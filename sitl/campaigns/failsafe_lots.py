@@ -12,15 +12,28 @@ from sitl.campaigns.fault_lots import FIRST_S, Lot, Maker, length
 from sitl.scene import EventSpec
 
 _ACTIONS = (0.0, 1.0, 2.0, 3.0, 4.0)
+SET_UNDER_WAY, WIDENED = 0.6, 0.5
 LOW_V, CRITICAL_V = 10.8, 10.0
 CRASH_DEG = 40.0
 
 
-def _fence(rng: random.Random, at_s: float) -> Lot:  # noqa: ARG001 - all makers are alike
-    """The circle round home, which is where she lies: the goal is outside of it."""
-    return Lot(parameters={
-        "FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0, "FENCE_RADIUS": round(rng.uniform(30.0, 160.0), 1),
-        "FENCE_ACTION": rng.choice(_ACTIONS), "AVOID_ENABLE": rng.choice((0.0, 3.0))})
+def _fence(rng: random.Random, at_s: float) -> Lot:
+    """The circle round home, which is where she lies: the goal is outside of it.
+
+    It is there from the start, or somebody sets it under way: it may be behind her then. Now and then it is widened.
+    """
+    circle = {
+        "FENCE_TYPE": 2.0, "FENCE_RADIUS": round(rng.uniform(30.0, 160.0), 1), "FENCE_ACTION": rng.choice(_ACTIONS),
+        "AVOID_ENABLE": rng.choice((0.0, 3.0))}
+    events: list[EventSpec] = []
+    if rng.random() < SET_UNDER_WAY:
+        events.append(EventSpec(at_s=at_s, kind="parameter", parameter="FENCE_ENABLE", value=1.0))
+    else:
+        circle["FENCE_ENABLE"] = 1.0
+    if rng.random() < WIDENED:
+        later_s = round(at_s + length(rng, 30.0, 150.0), 1)
+        events.append(EventSpec(at_s=later_s, kind="parameter", parameter="FENCE_RADIUS", value=1000.0))
+    return Lot(events=tuple(events), parameters=circle)
 
 
 def _battery(rng: random.Random, at_s: float) -> Lot:
@@ -63,6 +76,11 @@ def _knockdown(rng: random.Random, at_s: float) -> Lot:
         parameters={"FS_CRASH_CHECK": rng.choice((1.0, 2.0)), "CRASH_ANGLE": CRASH_DEG})
 
 
+def _leak(rng: random.Random, at_s: float) -> Lot:
+    """The bilge's switch is wet, for good or as she rolls; nothing on the autopilot acts on it."""
+    return Lot(events=(EventSpec(at_s=at_s, kind="leak", for_s=rng.choice((None, length(rng, 1.0, 120.0)))),))
+
+
 def unattended(rng: random.Random) -> Lot:
     """The companion may not set modes: a person arms her and sets AUTO, now and then again, or does not."""
     times = [10.0, 20.0, 30.0, *sorted(round(rng.uniform(40.0, 250.0), 1) for _ in range(rng.choice((0, 1, 3))))]
@@ -72,5 +90,5 @@ def unattended(rng: random.Random) -> Lot:
 
 # Each at most once a voyage: there is one fence, one battery, one radio.
 FAILSAFES: tuple[tuple[Maker, float], ...] = (
-    (_fence, 1), (_battery, 1.5), (_radio, 1), (_station, 1), (_filter, 0.5), (_knockdown, 1),
+    (_fence, 1), (_battery, 1.5), (_radio, 1), (_station, 1), (_filter, 0.5), (_knockdown, 1), (_leak, 0.5),
 )

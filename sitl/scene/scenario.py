@@ -25,6 +25,7 @@ EventKind = Literal[
     "mode",              # mode: a person's choice, by name; by: radio (the mode switch), else the ground station
     "arm", "disarm",     # by the ground station
     "set_current",       # seq, for_s: the ground station makes an item of the mission current, and insists
+    "parameter",         # parameter, value: set by the ground station, for good
     "reboot",            # the autopilot restarts
     "link_cut",          # for_s (none: for good)
     "link_half",         # state: unheard (the companion hears and is not heard) | deaf; for_s
@@ -91,6 +92,8 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     answer: Literal["done", "refused", "not now", "unknown", "no answer"] = "done"
     state: str | None = None
     value_deg: float = 0.0
+    parameter: str = ""
+    value: float = 0.0
     restart_after_s: float | None = None
     saved: Literal["kept", "lost", "torn", "old"] = "kept"   # what becomes of the companion's saved state
     aged_s: float = 0.0          # of an old one: as it was so long before

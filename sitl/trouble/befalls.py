@@ -16,7 +16,7 @@ from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
 from companion.mavlink.transports import Transport
-from companion.mavlink.trust import LinkIdentity
+from companion.mavlink.trust import SHORE, LinkIdentity
 from companion.messages import GeoPoint, MissionItem, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryEnd, MemoryLink, VaneFault, VaneState, serve
 from sitl.scene import TRAFFIC, EventSpec, Motion, Others, Truth
@@ -151,6 +151,18 @@ async def _foreign(world: World, event: EventSpec) -> None:
         await _upload_foreign(world.shore.near, [waypoint(away)])
 
 
+async def _parameter(world: World, event: EventSpec) -> None:
+    await _begins(event)
+    async with (
+        world.stranger,
+        Link(world.shore.near, identity=SHORE, streams=(), is_quiet=True) as link,
+        Pilot(link) as pilot,
+    ):
+        answer = await pilot.set_parameter(event.parameter, event.value)
+    if not answer.is_ok:
+        world.errors.append(f"{event.parameter} could not be set at {event.at_s:g} s")
+
+
 async def _neighbour(world: World, event: EventSpec) -> None:
     """Be another boat's autopilot that comes into range; it is nobody's to order about."""
     await _begins(event)
@@ -238,6 +250,7 @@ _BY_KIND: dict[str, _Befall] = {
     "crew": _crew,
     "order": _order,
     "foreign_mission": _foreign,
+    "parameter": _parameter,
     "neighbour": _neighbour,
     "spoof": _spoof,
 }

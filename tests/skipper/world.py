@@ -103,6 +103,7 @@ class World:
     sigma: float = 0.05
     corridor: float = 10.0
     no_go: float = math.radians(45.0)
+    circle_m: float | None = None   # the autopilot's own fence around home, kept while ``fence_breached`` is told
     upload_s: float = 1.0
     plan_s: float = 1.0
     expansions: int = 3000
@@ -316,7 +317,8 @@ class World:
             wind=WindView(health=self.wind_health, forecast=forecast(self.t, mean, mean_tws, self.sigma),
                           mean_twd_from_rad=mean, mean_tws_mps=mean_tws, sigma_twd_rad=self.sigma,
                           present_twd_from_rad=present, present_tws_mps=tws, record_s=100.0 + self.t),
-            limits=AutopilotLimits(sail_no_go_angle_rad=self.no_go, sail_xtrack_max_m=self.corridor),
+            limits=AutopilotLimits(
+                sail_no_go_angle_rad=self.no_go, sail_xtrack_max_m=self.corridor, fence_circle_m=self.circle_m),
             mission=MissionOnBoard(), events=tuple(self.events), outcomes=tuple(self.answer()))
         self.events = []
         return replace(out, **self.extra)

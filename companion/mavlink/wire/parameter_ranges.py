@@ -20,6 +20,8 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "TURN_RADIUS": (0.0, 10_000.0),
     "FENCE_ENABLE": (0.0, 1.0),
     "FENCE_ACTION": (0.0, 255.0),
+    "FENCE_TYPE": (0.0, 255.0),
+    "FENCE_RADIUS": (0.0, 100_000.0),
     "WNDVN_TYPE": (0.0, 255.0),
     "WNDVN_SPEED_TYPE": (0.0, 255.0),
     "WNDVN_SPEED_MIN": (0.0, 100.0),

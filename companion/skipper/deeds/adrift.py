@@ -22,7 +22,7 @@ from companion.skipper.step.state import Fix, Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.drift import DriftAhead, drift_ahead
 from companion.skipper.way.geometry import distance_m
-from companion.skipper.way.voyage import PointEn
+from companion.skipper.way.voyage import PointEn, water_at
 
 STEERAGE_MPS = 0.4     # less wind than this moves no boat that could be steered
 LIGHT_MPS = 0.8        # less than this makes no way that is worth a plan: the entry of "becalmed"
@@ -113,9 +113,10 @@ def drift(turn: Turn) -> DriftAhead | None:
     if not (wind[1] < STEERAGE_MPS or _is_carried(turn, boat, ground)):
         return None
     # What she is too near to already counts when she comes nearer still.
-    here_m = float(turn.voyage.area.clearance_m([boat])[0])
+    water = water_at(turn.voyage.area, boat)
+    here_m = float(water.clearance_m([boat])[0])
     floor_m = min(turn.config.margin_floor_m, turn.config.margin_m, max(0.0, here_m - HAIR_M))
-    return drift_ahead(turn.voyage.area, boat, ground, floor_m=floor_m)
+    return drift_ahead(water, boat, ground, floor_m=floor_m)
 
 
 def meets_in_s(turn: Turn) -> float | None:

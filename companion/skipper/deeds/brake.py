@@ -16,6 +16,7 @@ from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.drift import DriftAhead, drift_ahead
 from companion.skipper.way.geometry import bearing_rad, distance_m
+from companion.skipper.way.voyage import water_at
 
 REACT_S = 8.0        # a step to see it, a plan, its upload and reading back, the turn: six seconds; and two to spare
 LEAST_M = 2.0        # how far the autopilot wanders off its line
@@ -32,10 +33,10 @@ def ahead_of(turn: Turn) -> DriftAhead | None:
     if speed < SLOW_MPS or left_m < 1.0:
         return None
     course = bearing_rad(boat, leg[1])
-    hull_m = turn.voyage.boat.hull.reach_m
-    here_m = float(turn.voyage.area.clearance_m([boat])[0])
+    hull_m, water = turn.voyage.boat.hull.reach_m, water_at(turn.voyage.area, boat)
+    here_m = float(water.clearance_m([boat])[0])
     found = drift_ahead(
-        turn.voyage.area, boat, (speed * math.sin(course), speed * math.cos(course)),
+        water, boat, (speed * math.sin(course), speed * math.cos(course)),
         floor_m=max(0.0, min(hull_m + LEAST_M, here_m - HAIR_M)), horizon_s=min(REACT_S, left_m / speed))
     return None if found.is_clear else found
 

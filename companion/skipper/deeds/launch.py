@@ -11,7 +11,7 @@ from companion.skipper.board.uploads import upload
 from companion.skipper.deeds.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.ends import announcement
-from companion.skipper.planning.errands import FAR_M, home_trouble
+from companion.skipper.planning.errands import FAR_M, fenced_off, home_trouble
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import SafeEnd
 from companion.skipper.step.snapshot import WindHealth
@@ -38,6 +38,11 @@ def start(turn: Turn) -> None:
         turn.phase(Phase.WAITING, f"a plan is ready; waiting for permission to upload it: {MAY_UPLOAD}")
         if snapshot.permissions.may_upload:
             upload(turn, state.ready_route, 1, "the first plan")
+        return
+    shut = next(filter(None, (fenced_off(turn, gate) for gate in turn.gates[turn.state.gate:])), "")
+    if shut:
+        turn.phase(Phase.WAITING, f"waiting: {shut}")
+        turn.say(Severity.ERROR, "fenced off", f"not setting sail: {shut}")
         return
     wants = []
     if turn.boat_en is None:

@@ -33,6 +33,7 @@ class Kind(enum.Enum):
     HOME = "home"
     REST = "rest"            # back to where she loitered
     GOAL = "goal"            # a place that somebody named
+    INSIDE = "inside"        # back into the autopilot's own fence
     STAY = "stay"            # where there is room near by
 
 
@@ -60,7 +61,7 @@ class Errand:
 
 def errand(turn: Turn) -> Errand | None:
     """Return where she is bound for instead of the next goal, None: nowhere."""
-    return pressing(turn) or _ordered(turn) or _at_the_end(turn)
+    return pressing(turn) or _ordered(turn) or _at_the_end(turn) or _kept_in(turn)
 
 
 def pressing(turn: Turn) -> Errand | None:
@@ -110,6 +111,31 @@ def _at_the_end(turn: Turn) -> Errand | None:
     if state.over:
         return _back(turn)
     return homeward(turn) if turn.gate is None else None
+
+
+def _kept_in(turn: Turn) -> Errand | None:
+    """Return where she waits when the autopilot's own fence lies between her and the next goal."""
+    trouble, here = fenced_off(turn, turn.gate), turn.boat_en
+    if not trouble or turn.circle is None:
+        return None
+    # From the edge a loiter strays across it: she goes so far in, and is there when she has come there.
+    room_m = min(turn.config.margin_m + 2.0 * turn.config.loiter_radius_m, 0.5 * turn.circle.radius_m)
+    name = f"a place inside {turn.circle.words}"
+    route = turn.state.route
+    is_bound = route is not None and route.bound_for == name
+    if here is None or (turn.circle.inside_m(here) >= room_m and not is_bound):
+        return _stay(turn, trouble)
+    place = route.points_en_m[turn.last_waypoint()] if route is not None and is_bound else (
+        turn.circle.place_inside(turn.voyage.area, here, room_m))
+    return Errand(kind=Kind.INSIDE, name=name, why=trouble, en_m=place)
+
+
+def fenced_off(turn: Turn, gate: Gate | None) -> str:
+    """Return why a goal cannot be sailed to for the autopilot's own fence (empty: it can)."""
+    if gate is None or turn.circle is None or turn.state.over:
+        return ""
+    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
+    return turn.circle.trouble(gate.name or "the goal", gate.en_m, floor_m)
 
 
 def _found(turn: Turn, end: End, why: str) -> Errand | None:

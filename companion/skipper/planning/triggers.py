@@ -76,7 +76,7 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
 
 
 REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST,
-           Kind.GOAL: ReplanReason.ORDER}
+           Kind.GOAL: ReplanReason.ORDER, Kind.INSIDE: ReplanReason.OBSTACLE}
 
 
 def _errand(turn: Turn, bound: Errand | None) -> Trigger | None:

@@ -31,6 +31,7 @@ from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import Snapshot, wind_mean, wind_now
 from companion.skipper.step.state import Phase, Retry, SkipperState, is_given_up
+from companion.skipper.way.circle import Circle, circle_of
 from companion.skipper.way.gates import Approach, Gate, gates_of
 from companion.skipper.way.voyage import PointEn, Voyage
 
@@ -59,13 +60,21 @@ def permitted(action: Action, permissions: Permissions) -> bool:
     return True
 
 
+def _kept_in(voyage: Voyage, circle: Circle | None) -> Voyage:
+    """Return the voyage in what the autopilot's own fence leaves of its water."""
+    if circle is None:
+        return voyage
+    return replace(voyage, area=voyage.area.within(circle.en_m, circle.radius_m, circle.words))
+
+
 class Turn:
-    """The work of one step."""
+    """The work of one step. ``voyage`` is in the water that the autopilot's own ``circle`` leaves."""
 
     def __init__(
         self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot,
     ) -> None:
-        self.voyage, self.config = voyage, config
+        self.circle = circle_of(voyage, snapshot.limits, snapshot.autopilot, snapshot.position_en_m)
+        self.voyage, self.config = _kept_in(voyage, self.circle), config
         self.state, self.snapshot = state, snapshot
         self.actions: list[Action] = []
 

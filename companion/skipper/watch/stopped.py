@@ -15,7 +15,7 @@ from companion.skipper.step.actions import Severity
 from companion.skipper.step.causes import BY_NAME, HOMEWARD, PERSON
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.drift import DriftAhead, drift_ahead
-from companion.skipper.way.voyage import Area, PointEn
+from companion.skipper.way.voyage import PointEn, outside_m, water_at
 
 EVERY_S = 60.0
 MOVES_MPS = 0.15      # slower than this the fixes' noise tells no drift
@@ -49,7 +49,7 @@ def _ahead(turn: Turn, here: PointEn, velocity: tuple[float, float]) -> DriftAhe
 
     Outside the fence the fence is left out.
     """
-    status, area = turn.snapshot.autopilot, _water(turn, here)
+    status, area = turn.snapshot.autopilot, water_at(turn.voyage.area, here)
     floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
     speed = math.hypot(*velocity)
     homeward = status is not None and status.mode in HOMEWARD
@@ -63,22 +63,10 @@ def _ahead(turn: Turn, here: PointEn, velocity: tuple[float, float]) -> DriftAhe
     return drift_ahead(area, here, way, floor_m=floor_m, horizon_s=max(1.0, far_m / max(speed, MOVES_MPS)))
 
 
-def _water(turn: Turn, here: PointEn) -> Area:
-    area = turn.voyage.area
-    return area.unfenced if _outside_m(turn, here) > 0.0 else area
-
-
-def _outside_m(turn: Turn, here: PointEn) -> float:
-    """Return how far outside the fence she is [m], 0 inside it."""
-    clearance = float(turn.voyage.area.clearance_m([here])[0])
-    bare = float(turn.voyage.area.unfenced.clearance_m([here])[0])
-    return max(0.0, -clearance) if clearance < bare else 0.0
-
-
 def _where(turn: Turn, here: PointEn, ahead: DriftAhead) -> str:
-    vehicle, outside_m = turn.snapshot.vehicle, _outside_m(turn, here)
+    vehicle, far_m = turn.snapshot.vehicle, outside_m(turn.voyage.area, here)
     place = "" if vehicle is None else f" at {vehicle.position.lat_deg:.5f}, {vehicle.position.lon_deg:.5f}"
-    fence = f", {outside_m:.0f} m outside the fence" if outside_m > 0.0 else ""
+    fence = f", {far_m:.0f} m outside the fence" if far_m > 0.0 else ""
     if turn.autopilot is not None and turn.autopilot.mode in HOMEWARD and ahead.speed_mps > 0.0:
         course = math.degrees(wrap_two_pi(math.atan2(*ahead.velocity_en_mps)))
         way = f"sailing straight home, {course:03.0f}°"

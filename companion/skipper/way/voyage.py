@@ -59,6 +59,10 @@ class Area(Protocol):
         """The obstacles alone: for a boat that has got outside the limits."""
         ...
 
+    def within(self, centre_en: PointEn, radius_m: float, name: str) -> Area:
+        """Return the area with one limit more: a circle."""
+        ...
+
     def nearest_name(self, point_en: ArrayLike) -> str:
         """Return what the nearest obstacle or limit to a point is called; empty in open water."""
         ...
@@ -70,6 +74,17 @@ class Area(Protocol):
     def fence_wkt(self, margin_m: float = 0.0, near_en: PointEn | None = None) -> str | None:
         """Return the limits less the margin as a WKT POLYGON, None without any; ValueError when nothing is left."""
         ...
+
+
+def outside_m(area: Area, en_m: PointEn) -> float:
+    """Return how far outside the limits a place is [m], 0 inside them and over an obstacle."""
+    clearance = float(area.clearance_m([en_m])[0])
+    return max(0.0, -clearance) if clearance < float(area.unfenced.clearance_m([en_m])[0]) else 0.0
+
+
+def water_at(area: Area, en_m: PointEn) -> Area:
+    """Return what there is to keep clear of from a place on: outside the limits only the obstacles."""
+    return area.unfenced if outside_m(area, en_m) > 0.0 else area
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -42,7 +42,7 @@ def test_every_kind_of_fault_is_drawn_and_within_the_voyage(drawn):
     assert {e.kind for e in events} == {
         "link_quality", "link_cut", "link_half", "vane", "compass", "gps_jump", "gps_lost", "wind_shift", "wind_speed",
         "current", "crew", "kill_planner", "planner_hang", "kill_companion", "disk", "reboot", "mode", "arm",
-        "foreign_mission", "battery", "radio_lost", "station", "knockdown", "neighbour", "spoof",
+        "foreign_mission", "battery", "radio_lost", "station", "knockdown", "neighbour", "spoof", "parameter", "leak",
     }
     assert all(0.0 <= e.at_s < scenario.limit_s for scenario in drawn for e in scenario.events)
     assert {e.state for e in events if e.kind == "vane"} == {"frozen", "offset", "spikes"}
