@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import math
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -27,7 +27,7 @@ from companion.mavlink.wire import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import MOTOR, ArduRover, require
 from sitl.scene import EventSpec, Scenario, free_port
-from sitl.trouble import give_order
+from sitl.trouble import give_order, set_parameter
 from sitl.world import Wind
 
 # A warm simulated autopilot has been up for a minute when its simulation starts [s].
@@ -40,7 +40,7 @@ JUDGE_STREAMS = (
     Stream("ATTITUDE", 5.0, 3.0),
 )
 # What an operator and a ground station do, over any autopilot's link.
-OPERATORS = frozenset({"mode", "reboot", "foreign_mission", "order"})
+OPERATORS = frozenset({"mode", "reboot", "foreign_mission", "order", "parameter"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,7 +151,9 @@ class SimulatedBoat:
         elif event.kind == "foreign_mission":
             await _upload_foreign(self._judge_url, event, frame)
         elif event.kind == "order":
-            await _order(self._judge_url, event, frame)
+            await _answered(give_order(open_link(self._judge_url), event, frame))
+        elif event.kind == "parameter":
+            await _answered(set_parameter(open_link(self._judge_url), event))
 
 
 class RealBoat:
@@ -198,7 +200,9 @@ class RealBoat:
         elif event.kind == "foreign_mission":
             await _upload_foreign(rover.shore_link, event, frame)
         elif event.kind == "order":
-            await _order(rover.shore_link, event, frame)
+            await _answered(give_order(open_link(rover.shore_link), event, frame))
+        elif event.kind == "parameter":
+            await _answered(set_parameter(open_link(rover.shore_link), event))
         elif event.kind in {"arm", "disarm"}:
             rover.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, float(event.kind == "arm"))
         elif event.kind == "radio_lost":
@@ -221,12 +225,12 @@ class RealBoat:
             rover.set_gps(is_lost=False)
 
 
-async def _order(url: str, event: EventSpec, frame: LocalFrame) -> None:
-    """Give an order as somebody ashore does, over a link of his own.
+async def _answered(told: Awaitable[str]) -> None:
+    """Do what somebody ashore does, over a link of his own.
 
     Raises:
         JobError: it was not answered as the scenario expects.
     """
-    trouble = await give_order(open_link(url), event, frame)
+    trouble = await told
     if trouble:
         raise JobError(trouble)

@@ -16,11 +16,11 @@ from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
 from companion.mavlink.transports import Transport
-from companion.mavlink.trust import SHORE, LinkIdentity
+from companion.mavlink.trust import LinkIdentity
 from companion.messages import GeoPoint, MissionItem, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryEnd, MemoryLink, VaneFault, VaneState, serve
 from sitl.scene import TRAFFIC, EventSpec, Motion, Others, Truth
-from sitl.trouble.crew import give_order
+from sitl.trouble.crew import give_order, set_parameter
 from sitl.trouble.failsafes import FAILURES, PERSONS, play
 from sitl.trouble.forgeries import Forger, forgery_named
 from sitl.trouble.fragile import FragilePlanner, MortalPlanner
@@ -153,14 +153,10 @@ async def _foreign(world: World, event: EventSpec) -> None:
 
 async def _parameter(world: World, event: EventSpec) -> None:
     await _begins(event)
-    async with (
-        world.stranger,
-        Link(world.shore.near, identity=SHORE, streams=(), is_quiet=True) as link,
-        Pilot(link) as pilot,
-    ):
-        answer = await pilot.set_parameter(event.parameter, event.value)
-    if not answer.is_ok:
-        world.errors.append(f"{event.parameter} could not be set at {event.at_s:g} s")
+    async with world.stranger:
+        trouble = await set_parameter(world.shore.near, event)
+    if trouble:
+        world.errors.append(trouble)
 
 
 async def _neighbour(world: World, event: EventSpec) -> None:

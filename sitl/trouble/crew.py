@@ -1,8 +1,9 @@
-"""The crew ashore: gives the orders of a scenario over real MAVLink, as ``companion order`` does."""
+"""The crew ashore: gives a scenario's orders and sets its parameters over real MAVLink, as ``companion`` does there."""
 
 from __future__ import annotations
 
 from companion.geo.frame import LocalFrame
+from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.transports import Transport
 from companion.mavlink.trust import SHORE
@@ -29,3 +30,11 @@ async def give_order(transport: Transport, event: EventSpec, frame: LocalFrame) 
     if answer.result.value == event.answer:
         return ""
     return f"the order {wanted.words} at {event.at_s:g} s was answered {answer.result.value!r}: {answer.text}"
+
+
+async def set_parameter(transport: Transport, event: EventSpec) -> str:
+    """Set a parameter of the autopilot for good; return what went wrong, empty: nothing."""
+    async with Link(transport, identity=SHORE, streams=(), is_quiet=True) as link, Autopilot(link) as pilot:
+        await link.wait_autopilot(HEARD_S)
+        answer = await pilot.set_parameter(event.parameter, event.value)
+    return "" if answer.is_ok else f"{event.parameter} could not be set at {event.at_s:g} s: {answer.text}"

@@ -94,6 +94,7 @@ class Fence:
         self.breach_type = 0
         self.breach_ms = 0
         self.is_limiting = False
+        self._switched_on = 0            # its types when it was switched on: one set later waits for the next time
         self._types = TYPE_POLYGON
         self._circle_clear_m = math.inf
         self._circle_m = math.inf         # how far outside the home circle the next breach of it begins
@@ -119,7 +120,7 @@ class Fence:
         Zones are intersected: outside any inclusion zone is forbidden, also when there are several.
         """
         core = self._core
-        self._types = types = core.parameters.flag("FENCE_TYPE")
+        self._types = types = core.parameters.flag("FENCE_TYPE") & self._switched_on
         found = self._circle_clear_m = math.inf
         if types & TYPE_POLYGON:
             for zone in self._zones:
@@ -177,6 +178,7 @@ class Fence:
     def switch(self, *, enabled: bool) -> None:
         """Enable or disable."""
         self.is_enabled = enabled
+        self._switched_on = self._core.parameters.flag("FENCE_TYPE") if enabled else 0
         if not enabled:
             self.is_breached = self.is_limiting = False
             self.breach_type = 0

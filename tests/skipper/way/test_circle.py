@@ -26,7 +26,7 @@ def status(**shown):
     return AutopilotStatus(t_s=0.0, home=HOME, **shown)
 
 
-@pytest.mark.parametrize("params, shown, counts", [
+@pytest.mark.parametrize(("params", "shown", "counts"), [
     ({}, {}, True),
     ({}, {"fence_breached": False}, True),
     ({"FENCE_ENABLE": 0.0}, {"fence_breached": False}, True),   # switched on until the next reboot
