@@ -10,7 +10,17 @@ from companion.boat import Boat, Hull, Polar, ardurover_sitl, constant, read_pol
 from companion.errors import InputError
 from companion.geofence import Mission
 from companion.orders import ALL, Verb, unknown
-from companion.skipper.step import End, Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.step import (
+    CHOICES,
+    SHORE,
+    End,
+    Ends,
+    Guidance,
+    Permissions,
+    ReplanPolicy,
+    SafeEnd,
+    SkipperConfig,
+)
 from companion.skipper.way import Goal, Refuge, Side, Voyage
 from companion.traffic import TargetLimits
 from companion.traffic.feeds import parse_feed
@@ -108,7 +118,10 @@ def _ends(mission: Mission) -> Ends:
         battery=End(safety.battery), battery_v=safety.battery_v, leak=End(safety.leak),
         out_of_time=End(safety.out_of_time), dark=End(safety.dark),
         dark_below_rad=math.radians(safety.dark_below_deg), shore_lost=End(safety.shore_lost),
-        shore_lost_s=safety.shore_lost_s,
+        shore_lost_s=safety.shore_lost_s, battery_reserve=safety.battery_reserve,
+        failsafes=tuple((name, CHOICES[word]) for name, word in (
+            ("position", safety.position_failsafe), ("battery", safety.battery_failsafe),
+            ("fence", safety.fence_failsafe), (SHORE, safety.shore_failsafe))),
     )
 
 

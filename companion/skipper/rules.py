@@ -34,6 +34,7 @@ from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import Snapshot
 from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState, saved_of, standing_saved
 from companion.skipper.step.turn import Turn
+from companion.skipper.watch.charge import follow_charge
 from companion.skipper.watch.lookout import look_out
 from companion.skipper.watch.stopped import speak_of_stop
 from companion.skipper.watch.watch import watch
@@ -86,6 +87,7 @@ class Skipper:
         locate(turn)
         look_out(turn)
         count_time(turn)
+        follow_charge(turn)
         fresh = watch(turn)
         take_orders(turn)
         _decide(turn, fresh)

@@ -155,6 +155,7 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 End = Literal["say", "stay", "refuge", "home"]
+Failsafe = Literal["leave", "sail_on", "stay", "refuge"]
 
 
 class SafetyOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -174,6 +175,13 @@ class SafetyOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     dark: End = "say"
     """The sun is lower than ``dark_below_deg``, by the autopilot's time; it is over when it rises."""
     dark_below_deg: Annotated[float, Meta(ge=-18.0, le=45.0)] = -6.0
+    battery_reserve: Annotated[float, Meta(ge=0.0, le=10.0)] = 1.5
+    """Critical, too, when at its rate the charge lasts less than so many times the way to the refuge; 0: not asked."""
+    position_failsafe: Failsafe = "sail_on"
+    """What is done when a failsafe of the autopilot has stopped her, with ``set_auto``; ``leave``: nothing."""
+    battery_failsafe: Failsafe = "refuge"
+    fence_failsafe: Failsafe = "sail_on"
+    shore_failsafe: Failsafe = "stay"
     shore_lost: End = "say"
     """A ground station was heard, and none for ``shore_lost_s``."""
     shore_lost_s: Annotated[float, Meta(ge=10.0)] = 600.0

@@ -14,12 +14,12 @@ from companion.boat import AutopilotLimits
 from companion.messages import AutopilotStatus, Mode, StatusText
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.causes import (
-    BY_NAME,
     CRITICAL,
     EMPTY,
     HOMEWARD,
     PERSON,
     RECEIVER,
+    SHORE,
     STOPPING,
     TABLE,
     Answer,
@@ -33,7 +33,6 @@ TOLD_S = 5.0          # a sign this long before or after the change of mode belo
 ASKED_S = 30.0        # an AUTO that shows so long after it was accepted is the one that was asked for
 FILTER_S = 30.0       # a heartbeat that is critical so soon after the filter failed is critical because of it
 MOVED_US = 100        # a stick or switch that is moved moves by more than this; at rest it trembles by a few
-SHORE = "shore link"
 SAILED = frozenset({Mode.AUTO, Mode.GUIDED, *STOPPING}) - {Mode.HOLD}
 
 
@@ -122,15 +121,15 @@ def take_over(turn: Turn) -> bool:
     stop, may = turn.state.stop, turn.snapshot.permissions
     if stop is None or not stop.is_armed or stop.cause == PERSON or not (may.may_set_mode and may.may_upload):
         return False
-    cause = BY_NAME[stop.cause]
-    if cause.answer is Answer.LEAVE or stop.mode is None:
+    answer = turn.config.ends.answer(stop.cause)
+    if answer is None or answer is Answer.LEAVE or stop.mode is None:
         return False
     turn.update(
-        own_mode=stop.mode, operator_since_s=None, after_operator=True, plan_retry=PATIENT, answering=cause.name,
+        own_mode=stop.mode, operator_since_s=None, after_operator=True, plan_retry=PATIENT, answering=stop.cause,
         sent_home=stop.mode in HOMEWARD)
     turn.phase(Phase.HOLDING, waits_for(turn) or "stopped: waiting for a plan from where she is")
-    turn.say(Severity.WARNING, f"{cause.name} failsafe",
-             f"put into {stop.mode.name} by the autopilot's {cause.name} failsafe: {cause.answer.value}", every_s=0.0)
+    turn.say(Severity.WARNING, f"{stop.cause} failsafe",
+             f"put into {stop.mode.name} by the autopilot's {stop.cause} failsafe: {answer.value}", every_s=0.0)
     return True
 
 
@@ -166,15 +165,15 @@ def follow_answer(turn: Turn) -> None:
         if stop is not None and (stop.cause == PERSON or (
                 state.signs.rc_moved_s > stop.t_s and RECEIVER not in state.signs.standing)):
             turn.update(answering="", own_mode=None, stop=replace(stop, cause=PERSON))
-        elif stop is not None and BY_NAME[stop.cause].answer is not Answer.LEAVE:
+        elif stop is not None and turn.config.ends.answer(stop.cause) is not Answer.LEAVE:
             turn.update(answering=stop.cause)   # a better sign came late
         return
     if turn.autopilot.mode is Mode.AUTO and not _has_asked_for_auto(turn):
         turn.say(Severity.NOTICE, "answered", "a person has set AUTO: sailing on", every_s=0.0)
         turn.update(answering="")
         return
-    answer = BY_NAME[state.answering].answer
-    if answer is Answer.SAIL_ON or (answer is Answer.STAY and state.answering not in state.signs.standing):
+    is_over = state.answering == SHORE and SHORE not in state.signs.standing   # of the others a person says so
+    if is_over or turn.config.ends.answer(state.answering) is Answer.SAIL_ON:
         turn.update(answering="")
 
 

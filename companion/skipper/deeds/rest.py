@@ -13,15 +13,16 @@ from companion.skipper.deeds.helm import hand_back, repair
 from companion.skipper.planning.ends import HOW_LONG, OUT_OF_TIME, end_of
 from companion.skipper.planning.errands import Errand, Kind, home_trouble, is_at_rest, pressing
 from companion.skipper.step.actions import CancelPlan, Severity
-from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.causes import SHORE, STOPPING
 from companion.skipper.step.config import End, SafeEnd
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 
 ANSWERED = {
-    "battery": "until a person takes her and gives AUTO back",
-    "shore link": "until the link to the shore is back, or a person gives AUTO",
+    "": "for a person",
+    SHORE: "until the link to the shore is back, or a person gives AUTO",
 }
+TAKEN = "until a person takes her and gives AUTO back"
 UNTIL_TOLD = "until told to go on"
 
 
@@ -54,7 +55,7 @@ def comes_to_rest(turn: Turn, bound: Errand) -> bool:
 def _how_long(turn: Turn) -> str:
     """Return how long an errand that nobody ordered keeps her."""
     raised = next((name for name in HOW_LONG if turn.is_raised(name) and end_of(turn.config, name) is not End.SAY), "")
-    return HOW_LONG.get(raised) or ANSWERED.get(turn.state.answering, "for a person")
+    return HOW_LONG.get(raised) or ANSWERED.get(turn.state.answering, TAKEN)
 
 
 def rest(turn: Turn) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from companion.skipper.step.causes import TABLE
 from companion.skipper.step.config import End, SafeEnd, SkipperConfig
 
 # Watchdogs.
@@ -43,4 +44,9 @@ def announcement(config: SkipperConfig) -> str:
     names = [BATTERY, LEAK, DARK, SHORE_LOST]
     if config.voyage_timeout_s is not None:
         names.insert(2, OUT_OF_TIME)
-    return "; ".join(f"{name}: {words(config, name)}" for name in names)
+    said = [f"{name}: {words(config, name)}" for name in names]
+    for name in (cause.name for cause in TABLE):
+        answer = config.ends.answer(name)
+        if answer is not None:
+            said.append(f"{name} failsafe: {answer.words}")
+    return "; ".join(said)

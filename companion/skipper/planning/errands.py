@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from companion.orders import Verb
 from companion.skipper.planning.ends import BATTERY, DARK, LEAK, OUT_OF_TIME, SHORE_LOST, WHY, end_of
-from companion.skipper.step.causes import BY_NAME, Answer
+from companion.skipper.step.causes import SHORE, Answer
 from companion.skipper.step.config import End, SafeEnd
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import KEEP_SHARE, Gate, disc_wkt
@@ -67,11 +67,14 @@ def errand(turn: Turn) -> Errand | None:
 def pressing(turn: Turn) -> Errand | None:
     """Return the errand that comes before every order: battery, leak, or a failsafe that is answered."""
     state, ends = turn.state, turn.config.ends
-    cause = BY_NAME.get(state.answering)
-    answer = cause.answer if cause is not None else None
+    answer = ends.answer(state.answering)
+    why = "the autopilot has lost its link to the shore" if state.answering == SHORE else (
+        f"the autopilot's {state.answering} failsafe")
     if answer is Answer.SHELTER:
-        why = WHY[BATTERY] if turn.is_raised(BATTERY) else "the autopilot's battery failsafe"
-        end = End.REFUGE if ends.battery is End.SAY else ends.battery   # she is stopped: something must be done
+        is_battery = state.answering == "battery"
+        # she is stopped: something must be done
+        end = End.REFUGE if not is_battery or ends.battery is End.SAY else ends.battery
+        why = WHY[BATTERY] if is_battery and turn.is_raised(BATTERY) else why
         return _found(turn, end, why) or _stay(turn, why)
     if turn.is_raised(BATTERY):
         found = _found(turn, ends.battery, WHY[BATTERY])
@@ -80,7 +83,6 @@ def pressing(turn: Turn) -> Errand | None:
     if turn.is_raised(LEAK) and ends.leak is not End.SAY:
         return _found(turn, ends.leak, WHY[LEAK]) or _stay(turn, WHY[LEAK])
     if answer is Answer.STAY:
-        why = "the autopilot has lost its link to the shore"
         return (_home(turn, why) if state.sent_home else None) or _stay(turn, why)
     return None
 

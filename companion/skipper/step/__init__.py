@@ -19,6 +19,7 @@ from companion.skipper.step.actions import (
     UploadFence,
     UploadMission,
 )
+from companion.skipper.step.causes import CHOICES, SHORE
 from companion.skipper.step.config import End, Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Route
@@ -45,10 +46,11 @@ from companion.skipper.step.standing import Standing
 from companion.skipper.step.state import Phase, SkipperState, is_given_up
 
 __all__ = [
-    "Acknowledge", "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome",
-    "CommandResult", "Disbelieved", "End", "Ends", "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome",
-    "Permissions", "Persisted", "Phase", "PlanOutcome", "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan",
-    "Route", "RunMotor", "SafeEnd", "SetCurrent", "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot",
-    "Standing", "SteerHeading", "StopOrders", "Tack", "UploadFence", "UploadMission", "UploadOutcome", "UploadResult",
-    "WaypointReached", "WindHealth", "WindView", "ends_safely", "is_given_up",
+    "CHOICES", "SHORE", "Acknowledge", "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted",
+    "CancelPlan", "CommandOutcome", "CommandResult", "Disbelieved", "End", "Ends", "Event", "Guidance",
+    "MissionOnBoard", "ModeChanged", "Outcome", "Permissions", "Persisted", "Phase", "PlanOutcome", "ReadMission",
+    "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd", "SetCurrent", "SetMode",
+    "Severity", "SkipperConfig", "SkipperState", "Snapshot", "Standing", "SteerHeading", "StopOrders", "Tack",
+    "UploadFence", "UploadMission", "UploadOutcome", "UploadResult", "WaypointReached", "WindHealth", "WindView",
+    "ends_safely", "is_given_up",
 ]

@@ -30,6 +30,16 @@ class Answer(enum.Enum):
     STAY = "AUTO and a loiter where there is room near by (put into RTL: planned home) until it is over; then sail on"
     SHELTER = "AUTO and the nearest refuge; without one home if she was sent there, else a loiter where there is room"
 
+    @property
+    def words(self) -> str:
+        """What is done, in a few words."""
+        return {Answer.LEAVE: "left to a person", Answer.SAIL_ON: "sail on", Answer.STAY: "loiter near by",
+                Answer.SHELTER: "to the nearest refuge"}[self]
+
+
+# What a mission may say of the failsafes in place of the table (``[safety] ..._failsafe``).
+CHOICES = {"leave": Answer.LEAVE, "sail_on": Answer.SAIL_ON, "stay": Answer.STAY, "refuge": Answer.SHELTER}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cause:
@@ -45,6 +55,7 @@ class Cause:
 
 
 PERSON = "a person"
+SHORE = "shore link"
 
 TABLE: tuple[Cause, ...] = (
     Cause(name="position", texts=("EKF variance", "EKF failsafe"), shown="HEARTBEAT critical with the filter ill",

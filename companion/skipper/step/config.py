@@ -10,6 +10,7 @@ import enum
 from dataclasses import dataclass
 
 from companion.orders import ALL
+from companion.skipper.step.causes import BY_NAME, Answer
 
 
 class ReplanPolicy(enum.Enum):
@@ -55,6 +56,13 @@ class Ends:
     dark_below_rad: float = -0.104720  # the sun 6 deg under the horizon: the end of civil twilight
     shore_lost: End = End.SAY
     shore_lost_s: float = 600.0        # no ground station was heard for so long
+    battery_reserve: float = 1.5       # critical when it lasts less than so many times the way to a refuge; 0: never
+    failsafes: tuple[tuple[str, Answer], ...] = ()   # by cause, in place of ``companion.skipper.step.causes``
+
+    def answer(self, cause: str) -> Answer | None:
+        """Return what is done about a stop by this cause, None: it is nobody's failsafe."""
+        known = BY_NAME.get(cause)
+        return dict(self.failsafes).get(cause, known.answer) if known is not None else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -154,6 +154,19 @@ class Answered:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Charge:
+    """The battery's share when its fall began, and the last that was told.
+
+    ``is_short``: it has not covered the way to where she can wait, since then; on that way it covers it again.
+    """
+
+    since_s: float
+    first: float
+    last: float
+    is_short: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SkipperState:
     """Everything that ``step`` needs from before. ``Skipper.initial`` makes the first."""
 
@@ -217,6 +230,7 @@ class SkipperState:
     back_s: float = float("-inf")      # when it was back where it was reckoned: this step's jump is none
     signs: Signs = Signs()
     battery_critical: bool = False     # by the autopilot's own limit (BATT_CRT_VOLT, BATT_CRT_MAH)
+    charge: Charge | None = None
     stop: Stop | None = None           # she is not being sailed though she was
     answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
     sent_home: bool = False            # ... which put her into RTL

@@ -160,7 +160,9 @@ def _battery_critical(turn: Turn) -> float | None:
     status, least_v = turn.autopilot, turn.config.ends.battery_v
     volts = status.battery_v if status is not None else None
     is_empty = least_v is not None and volts is not None and volts <= least_v
-    return _battery(turn, "battery critical", is_below=turn.state.battery_critical or is_empty)
+    is_short = turn.state.charge is not None and turn.state.charge.is_short
+    is_below = turn.state.battery_critical or is_empty or is_short
+    return _battery(turn, "battery critical", is_below=is_below)
 
 
 def _leak(turn: Turn) -> float | None:

@@ -10,6 +10,7 @@ from shapely.geometry import box
 from companion.messages import Command, Mode, StatusText
 from companion.skipper.step import actions as act
 from companion.skipper.step.causes import TABLE, Answer
+from companion.skipper.step.config import Ends
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
@@ -369,3 +370,38 @@ def test_a_loiter_that_cannot_be_sailed_to_any_more_is_laid_anew():
     text(world, "Battery 1 is critical 9.10V used 0 mAh")
     assert world.run(60, lambda w: w.mode is Mode.AUTO)   # a position that leapt is not believed at once
     assert any(isinstance(a, act.UploadMission) for _, a in world.actions[before:])
+
+
+@pytest.mark.parametrize(("name", "words", "is_over"), [
+    ("battery", "", False), ("shore link", "Radio Failsafe", True), ("position", "EKF failsafe", False),
+])
+@pytest.mark.parametrize("answer", list(Answer))
+def test_the_mission_says_what_is_done_about_each(name, words, is_over, answer):
+    """``[safety] ..._failsafe``: left alone, sailed on, stayed near by, or to the refuge; the end of a sign."""
+    refuge = (40.0, 90.0)
+    world = under_way(config={"ends": Ends(failsafes=((name, answer),))}, voyage={"refuges": (refuge,)})
+    here = world.position
+    sign = {"battery_failed": True} if name == "battery" else {}
+    stop(world, **sign)
+    world.system_status = 5 if name == "shore link" else 4
+    if words:
+        text(world, words)
+    world.run(3)
+    if answer is Answer.LEAVE:
+        world.run(120)
+        assert world.mode is Mode.HOLD
+        assert world.state.phase is Phase.OPERATOR
+        return
+    assert said(world, f"{name} failsafe")
+    assert world.run(60, lambda w: w.mode is Mode.AUTO)
+    world.run(260)
+    if answer is Answer.SAIL_ON:
+        assert world.position[0] > 300.0
+        return
+    place = refuge if answer is Answer.SHELTER else here
+    assert distance_m(world.position, place) < 60.0
+    assert world.state.phase is Phase.HOLDING
+    world.shown.pop("battery_failed", None)
+    world.system_status = 4
+    world.run(200)
+    assert (distance_m(world.position, place) > 100.0) is is_over

@@ -1,0 +1,73 @@
+"""The charge against the way to where she can wait, and a battery that is critical by it."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.skipper.planning.ends import BATTERY
+from companion.skipper.step.config import Ends
+from companion.skipper.step.state import Charge, SkipperState
+from companion.skipper.step.turn import Turn
+from companion.skipper.watch.charge import DETOUR, FALL, LOOK_S, lasts_s
+from companion.skipper.way.voyage import Goal
+from tests.skipper.test_voyage import make, said
+from tests.skipper.world import FRAME, voyage
+
+AWAY = Goal(en_m=(1500.0, 0.0), radius_m=8.0)
+
+
+def sailing(**made):
+    world = make(AWAY, obstacles=(), **made)
+    world.shown = {"home": FRAME.geo_from_en(0.0, 0.0)}
+    return world
+
+
+def falls(world, share_per_s, first=0.9, for_s=900):
+    """Sail on while the charge falls."""
+    began = world.t
+    for _ in range(for_s // 10):
+        world.shown["battery_remaining"] = round(first - share_per_s * (world.t - began), 2)
+        world.run(10)
+        if any(r.name == BATTERY for r in world.state.raised):
+            return
+
+
+def test_it_is_critical_while_it_still_covers_the_way_to_the_refuge():
+    world = sailing(voyage={"refuges": ((0.0, 0.0),)})
+    falls(world, 0.9 / 1500.0)
+    assert world.state.charge.last > 0.2                    # long before the 10 % that are always critical
+    assert "the way to where she can wait" in said(world, "charge")[0][2]
+    assert world.run(60, lambda w: w.state.route.bound_for == "the refuge 1")
+
+
+@pytest.mark.parametrize("made", [
+    {"voyage": {"refuges": ((0.0, 0.0),)}, "config": {"ends": Ends(battery_reserve=0.0)}},   # not asked for
+    {"voyage": {"refuges": ((1400.0, 100.0),)}},                                             # near by
+])
+def test_it_is_not_where_it_is_not_asked_for_or_the_refuge_is_near(made):
+    world = sailing(**made)
+    falls(world, 0.5 / 1500.0, for_s=700)
+    assert not said(world, "charge")
+    assert not world.state.battery_critical
+
+
+def test_a_charge_that_rises_begins_anew():
+    world = sailing()
+    falls(world, 0.3 / 400.0, for_s=400)
+    assert world.state.charge.first == 0.9
+    world.shown["battery_remaining"] = 0.8
+    world.run(2)
+    assert world.state.charge.first == world.state.charge.last == 0.8
+
+
+@given(st.floats(0.3, 1.0), st.floats(0.0, 0.3), st.floats(0.0, 20_000.0))
+def test_what_is_left_at_the_mean_rate(first, fallen, after_s):
+    charge = Charge(since_s=10.0, first=first, last=first - fallen)
+    world = make(AWAY)
+    world.t = 10.0 + after_s
+    left = lasts_s(Turn(voyage(), world.skipper.config, SkipperState(charge=charge), world.snapshot()))
+    if after_s < LOOK_S or first - charge.last < FALL:
+        assert left is None
+    else:
+        assert left == pytest.approx((first - fallen) * after_s / fallen, rel=1e-6)
+    assert DETOUR >= 2.0 ** 0.5
