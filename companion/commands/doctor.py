@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import functools
 import json
 import math
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.arguments import number, system_id
+from companion.errors import InputError
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -30,7 +32,7 @@ examples:
   companion doctor --link udpin:127.0.0.1:14551
   companion doctor --link /dev/serial0:921600 --mission missions/lake.toml
   companion doctor --link udpin:127.0.0.1:14551 --mission missions/lake.toml --apply
-  companion doctor --link /dev/serial0:921600 --signing-key boat.key
+  companion doctor --link /dev/ttyACM0 --signing-key boat.key --set-key
 
 With --mission the parameters are held against that voyage's margins, distances and boat. --apply sets what the
 warnings and errors name (never what is only good to know), one parameter at a time, and reads each back.
@@ -67,6 +69,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)")
     parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="hold the settings against this voyage")
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (mode 0600)")
+    parser.add_argument("--set-key", action="store_true",
+                        help="first put that key on the autopilot, as 'companion key set' does; it asks")
+    parser.add_argument("--yes", action="store_true", help="with --set-key: do not ask")
     parser.add_argument("--apply", action="store_true", help="set what the warnings and errors name, and read it back")
     parser.add_argument("--json", action="store_true", help="print findings and changes as JSON")
     parser.add_argument("--wait", type=number("s", above=0.0), default=30.0, metavar="S",
@@ -77,17 +82,23 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
+    from companion.commands.key import put_on
     from companion.doctor import Level
     from companion.geofence import load_mission
     from companion.mavlink.transports import SigningStore, open_link
     from companion.sailable import require_sailable
 
     mission = require_sailable(load_mission(args.mission)) if args.mission is not None else None
-    transport = open_link(args.link)
     signing = SigningStore(args.signing_key, time.time()) if args.signing_key is not None else None
     system = args.system or (mission.autopilot.system if mission is not None else None)
+    if args.set_key:
+        if signing is None:
+            raise InputError("--set-key", "", "there is no key", "name it: --signing-key FILE ('companion key new')")
+        seen = put_on(functools.partial(open_link, args.link), signing, system=system, asks=not args.yes,
+                      name=str(args.signing_key))
+        print(run_loop(seen), file=sys.stderr if args.json else sys.stdout)
     findings, changes = run_loop(diagnose(
-        transport, needs_of(mission), wait_s=args.wait, apply=args.apply, signing=signing, system=system))
+        open_link(args.link), needs_of(mission), wait_s=args.wait, apply=args.apply, signing=signing, system=system))
     if args.json:
         print(json.dumps(as_json(findings, changes), indent=1))
     else:

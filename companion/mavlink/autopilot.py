@@ -245,7 +245,8 @@ class Autopilot:
 
     async def read_parameters(self) -> ParamTable:
         """Read all parameters."""
-        return await self.link.perform(ParamList(self.link.party), "param")
+        with self.link.burst():
+            return await self.link.perform(ParamList(self.link.party), "param")
 
     # ------------------------------------------------------------------------------------------- lists
     async def read_mission(self, *, method: Method = "items") -> ReadResult:

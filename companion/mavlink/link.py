@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Any, Self
 
@@ -254,6 +254,15 @@ class Link:
     def lock(self, channel: str) -> asyncio.Lock:
         """Return the lock of a kind of conversation: two uploads at once would spoil each other."""
         return self._locks.setdefault(channel, asyncio.Lock())
+
+    @contextlib.contextmanager
+    def burst(self) -> Iterator[None]:
+        """Take what comes all at once meanwhile: for tools that ask for a long list, not for a boat under way."""
+        self._reception.expects_burst = True
+        try:
+            yield
+        finally:
+            self._reception.expects_burst = False
 
     async def perform(self, machine: Machine[ResultT_co], channel: str | None = None) -> ResultT_co:
         """Drive ``machine`` to its result; with ``channel``, alone among those of that name."""

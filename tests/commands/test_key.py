@@ -2,7 +2,10 @@
 
 import hashlib
 import io
+import json
 import stat
+import subprocess
+import sys
 from contextlib import asynccontextmanager
 
 import pytest
@@ -17,6 +20,7 @@ from companion.mavlink.link import Link
 from companion.mavlink.transports import SigningStore, make_key, read_key
 from sitl.autopilot import Autopilot as Boat
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
+from sitl.scene.ships import free_port
 from sitl.world.wind import Constant
 
 NOW_S = 1_780_000_000.0
@@ -109,3 +113,24 @@ def test_nothing_is_done_to_an_armed_boat_or_without_consent(key, monkeypatch):
             assert await is_answered(radio)
 
     run_virtual(work())
+
+
+@pytest.fixture
+def port():
+    """A simulated boat in a process of its own; its TCP port, which is its USB."""
+    port = free_port()
+    command = [sys.executable, "-m", "sitl.cli", "boat", "--port", str(port), "--udp", "0", "--warm"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as boat:
+        assert "sitl boat" in boat.stdout.readline()
+        yield port
+        boat.terminate()
+
+
+def test_the_doctor_puts_the_key_on_board(key, port, capsys):
+    doctor = ["doctor", "--link", f"tcp:127.0.0.1:{port}", "--set-key"]
+    assert main(doctor) == 2
+    assert "--signing-key FILE" in capsys.readouterr().err
+    main([*doctor, "--signing-key", str(key), "--yes", "--json"])
+    out, err = capsys.readouterr()
+    assert "signs with" in err
+    assert "signing" not in {f["code"] for f in json.loads(out)["findings"]}

@@ -71,7 +71,9 @@ OTHER = {
                 "min_replan_s": 25.0, "max_replan_s": 700.0, "wind_shift_deg": 30.0, "off_track_m": 45.0,
                 "voyage_timeout_s": 900.0},
     "safety": {"battery": "stay", "battery_v": 10.5, "leak": "home", "out_of_time": "say", "dark": "refuge",
-               "dark_below_deg": 0.0, "shore_lost": "stay", "shore_lost_s": 60.0},
+               "dark_below_deg": 0.0, "shore_lost": "stay", "shore_lost_s": 60.0, "battery_reserve": 3.0,
+               "position_failsafe": "leave", "battery_failsafe": "stay", "fence_failsafe": "refuge",
+               "shore_failsafe": "sail_on"},
     "traffic": {"feeds": ["udpin:127.0.0.1:10110"], "safe_distance_m": 60.0, "safe_time_s": 80.0,
                 "drop_after_s": 300.0},
 }

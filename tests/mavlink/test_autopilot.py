@@ -192,6 +192,19 @@ def test_fences_rally_points_and_parameters():
     sail(main)
 
 
+def test_a_list_that_was_asked_for_is_no_forgery_however_fast_it_comes():
+    """It took a doctor a minute: the burst was out of step with the streams before it, and was dropped as forged."""
+    async def main(boat, link, autopilot, memory):
+        await asyncio.sleep(7.0)   # the streams' numbers are known by now
+        began_s = now_s()
+        table = await autopilot.read_parameters()
+        assert len(table.values) > 200
+        assert now_s() - began_s < 2.0
+        assert link.stats.dropped[Drop.OUT_OF_STEP] == 0
+
+    sail(main)
+
+
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("method", ["items", "ftp"])
 def test_a_link_that_loses_a_third_still_delivers_the_whole_mission(method, seed):
