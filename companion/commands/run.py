@@ -64,7 +64,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         "permits; `companion far` is its end ashore")
     parser.add_argument("--far-key", type=Path, metavar="FILE",
                         help="the key of that link, made by `companion key new` (default: the signing key)")
-    parser.add_argument("--far-every", type=number("min", at_least=1.0), default=10.0, metavar="MIN",
+    parser.add_argument("--far-every", type=number("min", at_least=1.0, at_most=1440.0), default=10.0, metavar="MIN",
                         help="a new status this often (default: 10), and after each order")
     parser.add_argument("--again", action="store_true",
                         help="sail the mission again when its state says that it has arrived (asked at a terminal)")
