@@ -1,5 +1,7 @@
 """``companion far``: orders made and statuses read ashore; each slip is one line."""
 
+import subprocess
+import sys
 import time
 
 import pytest
@@ -106,3 +108,10 @@ def test_a_boat_without_a_key_for_it_is_not_begun(tmp_path, capsys):
     assert "has no key; make one with `companion key new" in capsys.readouterr().err
     assert cli.main([*words, "--far-key", "k"]) == 2
     assert "name its folder: --far DIR" in capsys.readouterr().err
+
+
+def test_two_at_once_have_a_counter_each(key, tmp_path):
+    words = [sys.executable, "-m", "companion.cli", "far", "order", "hold", "--key", str(key), "--expires", "2h"]
+    started = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+    told = [process.communicate()[0] for process in started]
+    assert sorted(text.splitlines()[1].split(":")[0] for text in told) == [f"order {n}" for n in range(1, 5)]

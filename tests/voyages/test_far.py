@@ -96,6 +96,18 @@ def test_an_order_that_comes_two_hours_late_counts_for_nothing(tmp_path, seed):
     assert not replay(tmp_path).differences
 
 
+def test_what_the_mission_does_not_permit_is_refused_and_told(tmp_path):
+    scenario = msgspec.structs.replace(
+        load_scenario(SOURCE), mission="../../missions/open-water.toml", limit_s=120.0, exit_on_arrival=False,
+        satellite=SatelliteSpec(delay_s=1.0, delay_most_s=5.0),
+        events=(EventSpec(at_s=20.0, kind="far_order", order="hold", answer="refused"),),
+        expect=ExpectSpec(arrived=None))
+    verdict = run_virtual(run_embedded(scenario, SOURCE, 0, tmp_path))
+    assert verdict.passed, failed(verdict)
+    said = [d["text"] for d in read_jsonl(tmp_path / "decisions.jsonl") if d.get("code") == "order"]
+    assert said == ["order hold: not permitted: the mission's [operator] far_orders permits none"]
+
+
 class HighLatencyStation(Station):
     """Asks the companion for HIGH_LATENCY2, and lets it be."""
 

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import fcntl
+import os
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from companion.commands.far.moments import moment
@@ -15,7 +19,6 @@ COUNTER = ".far-counter"     # beside the key: the last counter that was used wi
 
 def run_order(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.lock import FolderLock
     from companion.mavlink.transports import read_key
     from companion.orders.far import FarKey, FarOrder, minutes_of, pack_order
     from companion.orders.phrase import phrase
@@ -25,23 +28,29 @@ def run_order(args: argparse.Namespace) -> int:
         refuse_existing([str(args.out)], force=args.force)
     # The last minute in which it counts is whole: what is cut off is given on top.
     expires_min = minutes_of(time.time() + args.expires) + 1
-    lock = FolderLock(args.key.absolute().parent)
-    if not lock.take():
-        raise JobError(f"{args.key.absolute().parent} is in use by another program: try again")
-    try:
+    with _alone_with(args.key):
         counter = _next_counter(args.key, args.counter)
         try:
             data = pack_order(FarOrder(wanted=wanted, counter=counter, expires_min=expires_min), key)
         except ValueError as error:
             raise InputError(" ".join(args.words)[:40], "", str(error)) from None
         _keep_counter(args.key, counter)    # before anybody can send it: a counter is never used twice
-    finally:
-        lock.release()
     if args.out is not None:
         write_files({str(args.out): data}, force=args.force)
     print(data.hex())
     print(f"order {counter}: {wanted.words}, counts until {moment(expires_min)}")
     return 0
+
+
+@contextlib.contextmanager
+def _alone_with(key: Path) -> Iterator[None]:
+    """Let two that give orders with one key at once have one counter each."""
+    fd = os.open(key, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(fd)
 
 
 def _next_counter(key: Path, given: int | None) -> int:
