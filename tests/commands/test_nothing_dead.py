@@ -202,7 +202,7 @@ def options_of(parser):
 def read_names(package):
     """Return every attribute that the command modules read, and every name given to getattr."""
     names = set()
-    for path in Path(inspect.getfile(package)).parent.glob("*.py"):
+    for path in Path(inspect.getfile(package)).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):
                 names.add(node.attr)
