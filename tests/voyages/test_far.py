@@ -87,6 +87,7 @@ def test_a_voyage_by_satellite_each_order_once_the_late_one_never_and_over_a_kil
 
 
 @pytest.mark.campaign
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("seed", range(3))
 def test_an_order_that_comes_two_hours_late_counts_for_nothing(tmp_path, seed):
     verdict = run_virtual(run_embedded(load_scenario(SOURCE), SOURCE, seed, tmp_path))
