@@ -52,6 +52,22 @@ def whole(*, at_least: int = 0, at_most: int | None = None) -> Callable[[str], i
     return read
 
 
+def duration(text: str) -> float:
+    """Return the seconds of ``90m``, ``2h`` or ``1d``: at least a minute, at most a week.
+
+    >>> duration("2h"), duration("1.5d")
+    (7200.0, 129600.0)
+    """
+    units = {"m": 60.0, "h": 3600.0, "d": 86_400.0}
+    try:
+        seconds = float(text[:-1]) * units[text[-1:]]
+    except (ValueError, KeyError):
+        raise ArgumentTypeError(f"{text[:40]!r} is not a time; write 90m, 2h or 1d") from None
+    if not 60.0 <= seconds <= 7 * units["d"]:
+        raise ArgumentTypeError(f"{text[:40]} is out of range; from 1m to 7d")
+    return seconds
+
+
 def system_id(text: str) -> int:
     """Take the argument of ``--system``: a MAVLink system id."""
     if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 255):

@@ -17,6 +17,7 @@ PROGRAM = Program(
         "wind": "forecast a wind record and score the forecasts",
         "status": "what the companion says over the radio",
         "order": "tell the companion on board what to do",
+        "far": "orders and statuses over a satellite link",
         "fence": "check, convert, upload, download fences",
         "mission": "check, make, convert, upload, download missions",
         "doctor": "is this autopilot set up to be sailed?",

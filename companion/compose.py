@@ -133,6 +133,7 @@ def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
     return Permissions(
         orders=_orders(mission, "orders", mission.operator.orders),
         local_orders=_orders(mission, "local_orders", mission.operator.local_orders),
+        far_orders=_orders(mission, "far_orders", mission.operator.far_orders),
         may_upload=operator.set_auto, may_upload_fence=operator.upload_fence, may_arm=operator.arm,
         may_set_mode=operator.set_auto, may_steer=operator.guided, may_replace_foreign=operator.replace_foreign,
     )

@@ -100,7 +100,8 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
         epoch_s = float(description["run"]["epoch_s"])
         recorded_path = _mission_path(folder, description["mission"])
         permitted = description["permissions"]
-        permissions = Permissions(**{**permitted, "orders": tuple(permitted.get("orders", ()))})
+        verbs: Any = {name: tuple(words) for name, words in permitted.items() if isinstance(words, list)}
+        permissions = Permissions(**{**permitted, **verbs})
     mission = load_mission(mission_path or recorded_path)
     skipper = Skipper(voyage=voyage_of(mission), config=config_of(mission))
     decisions = read_decisions(folder)

@@ -9,7 +9,7 @@ from typing import Any
 from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import LATER, Link
-from companion.mavlink.wire import Drop
+from companion.mavlink.wire import CONTROL_COMMAND, Drop
 from companion.orders import COMMANDS, LOCAL, MAVLINK, RESULTS, Answer, Order, Result, Source, Wanted, wanted_of
 from companion.skipper.step import Acknowledge, Severity
 
@@ -28,7 +28,8 @@ class Crew:
         self._link, self._authority = link, "signed" if has_key else "unsigned"
         self._waiting: list[Order] = []
         self._is_open = False
-        self._asked: dict[int, asyncio.Future[Answer]] = {}   # by the number of who asks on board
+        self._asked: dict[tuple[str, int], asyncio.Future[Answer]] = {}   # by the way and the number of who asks
+        self.wants_high_latency = False   # HIGH_LATENCY2 was asked for
         link.on_command = self._hear
 
     def begin(self) -> None:
@@ -45,25 +46,29 @@ class Crew:
         """How many commands to us were not signed with our key."""
         return self._link.dropped()[Drop.UNSIGNED_COMMAND]
 
-    async def ask(self, wanted: Wanted, number: int) -> Answer:
-        """Give an order from on board, by the connection of that number, and return its answer."""
+    async def ask(self, wanted: Wanted, number: int, way: str = LOCAL) -> Answer:
+        """Give an order that comes on another way than the link, and return its answer.
+
+        ``number`` is its own among those that wait: of the connection on board, of the order from far away.
+        """
         if not self._is_open:
             return Answer(result=Result.NOT_NOW, text="the companion is not under way yet")
         answer: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
-        self._asked[number] = answer
+        self._asked[way, number] = answer
         self._waiting.append(Order(
-            wanted=wanted, t_s=now_s(), authority=LOCAL, source=Source(kind=LOCAL, component=number)))
+            wanted=wanted, t_s=now_s(), authority=way, source=Source(kind=way, component=number)))
         try:
             return await answer
         finally:
-            del self._asked[number]
+            del self._asked[way, number]
 
     def answered(self, action: Acknowledge) -> None:
         """Take an answer to where the order came from."""
-        if action.way != LOCAL:
+        asked = self._asked.get((action.way, action.component))
+        if action.way == MAVLINK:
             self._link.acknowledge(action.command, RESULTS[action.result], action.system, action.component)
-        elif action.component in self._asked and not self._asked[action.component].done():
-            self._asked[action.component].set_result(Answer(result=action.result, text=action.text))
+        elif asked is not None and not asked.done():
+            asked.set_result(Answer(result=action.result, text=action.text))
 
     async def watch(self, autopilot: Autopilot, record: Callable[[dict[str, Any]], None]) -> None:
         """Say and record, once, that somebody without the key gives commands."""
@@ -76,6 +81,11 @@ class Crew:
             await asyncio.sleep(LOOK_S)
 
     def _hear(self, message: Any) -> int:
+        if message.command == CONTROL_COMMAND:
+            if message.param1 not in {0.0, 1.0}:
+                return RESULTS[Result.REFUSED]
+            self.wants_high_latency = message.param1 == 1.0
+            return RESULTS[Result.DONE]
         if message.command not in COMMANDS:
             return RESULTS[Result.UNKNOWN]
         if not self._is_open or len(self._waiting) >= MOST_WAITING:

@@ -26,6 +26,15 @@ async def at_once(work: Callable[[], None]) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Far:
+    """The link far away: ``out`` and ``in`` of ``folder``, the ``key`` (32 bytes), a status every ``every_s`` [s]."""
+
+    folder: Path
+    key: bytes = field(repr=False)
+    every_s: float = 600.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SailOptions:
     """How to sail, beside the mission.
 
@@ -46,6 +55,7 @@ class SailOptions:
         settings: what a drawing that is adopted under way is sailed with; None: none is adopted.
         known: hashes of missions on the autopilot that ours may take the place of: the drawing that is sailed.
         socket: where orders from on board are taken; None: nowhere.
+        far: the folder that a satellite modem's program shares with us; None: there is none.
         signing: key and timestamp for a signed link.
         token: 32 bits that tell our heartbeat from a second companion's; on the boat they are drawn by lot.
         budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
@@ -67,6 +77,7 @@ class SailOptions:
     is_again: bool = False
     settings: Settings | None = None
     socket: Path | None = None
+    far: Far | None = None
     known: tuple[str, ...] = ()
     signing: SigningStore | None = None
     token: int = 1

@@ -19,9 +19,10 @@ from companion.app.adoption import ADOPTED, Adoption
 from companion.app.company import NOBODY, make_way, others_on
 from companion.app.crew import Crew
 from companion.app.executor import Executor, Planner
+from companion.app.far import Mailbox
 from companion.app.keepers import keep_fence, keep_identity, keep_parameters
 from companion.app.local import served
-from companion.app.options import SailOptions
+from companion.app.options import Far, SailOptions
 from companion.clock import now_s
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
 from companion.fold import Step, VoyageFold
@@ -36,7 +37,7 @@ from companion.skipper import Skipper
 from companion.skipper.step import Phase, Severity
 from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, order_record, outcome_record
 from companion.telemetry.progress import DISK, left_behind
-from companion.telemetry.radio import Radio
+from companion.telemetry.radio import Radio, speak_high_latency
 from companion.telemetry.state_file import StateFile
 from companion.telemetry.status import companion_status
 from companion.traffic.listening import Feeds
@@ -130,6 +131,7 @@ class _Shell:
                                     on_adopt=adoption.ask, on_answer=crew.answered)
                 if self.options.socket is not None:
                     await stack.enter_async_context(served(self.options.socket, crew))
+                mailbox = () if self.options.far is None else (self._mailbox(self.options.far, autopilot, crew),)
                 radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
                 async with asyncio.TaskGroup() as group:
                     tasks = [
@@ -139,6 +141,10 @@ class _Shell:
                         group.create_task(keep_parameters(self.fold, autopilot), name="parameters"),
                         group.create_task(keep_fence(self.fold, autopilot, self.mission, self._record), name="fence"),
                         group.create_task(radio.run(), name="radio"),
+                        group.create_task(
+                            speak_high_latency(autopilot, self._seen, lambda: crew.wants_high_latency),
+                            name="high latency"),
+                        *(group.create_task(box.run(), name="far") for box in mailbox),
                         group.create_task(crew.watch(autopilot, self._record), name="crew"),
                         group.create_task(self._tend_records(), name="records"),
                         group.create_task(self._watch_loop(), name="loop watch"),
@@ -154,6 +160,18 @@ class _Shell:
             summary = self._summary()
             self.recorder.summary(summary)
         return summary
+
+    def _mailbox(self, far: Far, autopilot: Autopilot, crew: Crew) -> Mailbox:
+        """Return the mailbox of the satellite link."""
+        link, options = autopilot.link, self.options
+        return Mailbox(
+            far, link.party.target_system, crew, disk=options.disk, offload=options.offload,
+            is_durable=options.is_durable, seen=self._seen, is_heard=lambda: link.is_alive,
+            has_trouble=lambda: bool(self._trouble()), say=autopilot.say, record=self._record)
+
+    def _seen(self) -> tuple[CompanionStatus, Step] | None:
+        """Return the newest status and the step that it tells of, None before there is one."""
+        return None if self.status is None or self._step is None else (self.status, self._step)
 
     def _begin(self, link: str) -> None:
         """Begin the fold with what is known from before, and write that down."""

@@ -15,7 +15,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from companion.arguments import number, system_id, whole
+from companion.arguments import number, out_folder, system_id, whole
+from companion.errors import InputError
 from companion.program import INTERRUPTED
 from companion.words import counted, file_name
 
@@ -58,6 +59,13 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         "folder is one boat's, and locked")
     parser.add_argument("--socket", type=Path, metavar="PATH", help="take orders from on board at this Unix socket: "
                         "companion order VERB --socket PATH, as [operator] local_orders permits")
+    parser.add_argument("--far", type=out_folder, metavar="DIR", help="the folder shared with the program of a "
+                        "satellite modem: the newest status in DIR/out, orders in DIR/in, as [operator] far_orders "
+                        "permits; `companion far` is its end ashore")
+    parser.add_argument("--far-key", type=Path, metavar="FILE",
+                        help="the key of that link, made by `companion key new` (default: the signing key)")
+    parser.add_argument("--far-every", type=number("min", at_least=1.0, at_most=1440.0), default=10.0, metavar="MIN",
+                        help="a new status this often (default: 10), and after each order")
     parser.add_argument("--again", action="store_true",
                         help="sail the mission again when its state says that it has arrived (asked at a terminal)")
     parser.add_argument("--keep-gb", type=number("GB", above=0.0), metavar="GB",
@@ -120,6 +128,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
     for name in args.feed:
         parse_feed(name)
     parse_link(args.link)
+    _far(args)
     settings, sailed = settings_of(args.mission, is_drawn=args.from_autopilot, system=args.system), None
     if settings is None:
         named = require_sailable(load_mission(args.mission))
@@ -182,7 +191,7 @@ def _voyage(
             expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
             wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
             exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
-            settings=sailed.settings, socket=args.socket, command=" ".join(sys.argv),
+            settings=sailed.settings, socket=args.socket, far=_far(args), command=" ".join(sys.argv),
             token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
@@ -276,6 +285,23 @@ def _signing(path: Path | None) -> Any:
     from companion.mavlink.transports import SigningStore
 
     return SigningStore(path, time.time())
+
+
+def _far(args: argparse.Namespace) -> Any:
+    """Return the folder of the satellite link with its key. Raises InputError: it cannot be used."""
+    if args.far is None:
+        if args.far_key is not None:
+            raise InputError("--far-key", str(args.far_key), "there is no link to use it on",
+                             "name its folder: --far DIR")
+        return None
+    from companion.app.options import Far
+    from companion.mavlink.transports import read_key
+
+    key_file = args.far_key or args.signing_key
+    if key_file is None:
+        raise InputError("--far", str(args.far), "has no key", "make one with `companion key new far.key` and name it "
+                         "with --far-key")
+    return Far(folder=args.far, key=read_key(key_file), every_s=60.0 * args.far_every)
 
 
 def _report(folder: Path, err: Console) -> None:

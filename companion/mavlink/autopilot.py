@@ -24,6 +24,7 @@ from companion.mavlink.transfers.params import ParamAnswer, ParamList, ParamRead
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.assembler import Value, VehicleAssembler
 from companion.mavlink.wire.frames import Message
+from companion.mavlink.wire.high_latency import high_latency2
 from companion.mavlink.wire.status import status_messages
 from companion.messages import (
     AutopilotStatus,
@@ -32,6 +33,7 @@ from companion.messages import (
     MissionItem,
     MissionType,
     Mode,
+    VehicleState,
 )
 
 OnValue = Callable[[Value], None]
@@ -229,6 +231,12 @@ class Autopilot:
         """Put the companion's status on the air; to be called every 2 s or more slowly."""
         self.link.send(*status_messages(status, self.link.boot_s, self._status_turn))
         self._status_turn += 1
+
+    def send_high_latency(self, status: CompanionStatus, vehicle: VehicleState | None, watchdog: str) -> None:
+        """Put HIGH_LATENCY2 on the air, to be called every 5 s; nothing before the boat is known."""
+        message = high_latency2(status, vehicle, self.status, watchdog)
+        if message is not None:
+            self.link.send(message)
 
     # -------------------------------------------------------------------------------------- parameters
     async def get_parameter(self, name: str) -> ParamAnswer:

@@ -12,7 +12,7 @@ from typing import Any
 from companion.messages import GeoPoint
 from companion.orders.verbs import Verb
 
-MAVLINK, LOCAL = "mavlink", "local"   # the ways in which orders come
+MAVLINK, LOCAL, FAR = "mavlink", "local", "far"   # the ways in which orders come
 MARK_BITS = 24   # a float32 holds so many exactly
 
 
@@ -78,7 +78,10 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """Who asked: on which way, and with which ids; ``local``: over the socket on board, each connection its own."""
+    """Who asked: on which way, and with which ids.
+
+    ``local``: over the socket on board, each connection its own. ``far``: by satellite, each counter its own.
+    """
 
     kind: str
     system: int = 0
@@ -87,15 +90,15 @@ class Source:
     @property
     def words(self) -> str:
         """Whom to name."""
-        return "somebody on board" if self.kind == LOCAL else f"{self.system}/{self.component}"
+        return {LOCAL: "somebody on board", FAR: "somebody far away"}.get(self.kind, f"{self.system}/{self.component}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
     """Something asked of the boat at ``t_s`` [s]; ``command`` is the MAV_CMD to acknowledge.
 
-    ``authority`` is what makes it count: ``signed`` (with the link's key), ``unsigned`` on a link without a key, or
-    ``local``: who may open the socket.
+    ``authority`` is what makes it count: ``signed`` (with the link's key), ``unsigned`` on a link without a key,
+    ``local``: who may open the socket, or ``far``: sealed with the key of the satellite link.
     """
 
     wanted: Wanted

@@ -7,15 +7,30 @@ import math
 from collections.abc import Callable
 
 from companion.clock import now_s
+from companion.fold import Step
 from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.wire import HIGH_LATENCY_S
 from companion.messages import CompanionStatus
 from companion.skipper.step import Severity
+from companion.telemetry.far import worst_watchdog
 from companion.telemetry.folder.logbook import Logbook
 from companion.traffic.listening import Feeds
 
 # Status to the radio: a frame of it every so often [s]; see companion.mavlink.wire.status for its bytes.
 STATUS_EVERY_S = 2.0
 TROUBLE_EVERY_S = 600.0   # trouble with the disk that lasts is said again
+
+
+async def speak_high_latency(
+    autopilot: Autopilot, seen: Callable[[], tuple[CompanionStatus, Step] | None], is_wanted: Callable[[], bool],
+) -> None:
+    """Send HIGH_LATENCY2 while it is asked for, until cancelled."""
+    while True:
+        now = seen() if is_wanted() else None
+        if now is not None:
+            status, step = now
+            autopilot.send_high_latency(status, step.snapshot.vehicle, worst_watchdog(step))
+        await asyncio.sleep(HIGH_LATENCY_S)
 
 
 class Radio:

@@ -18,7 +18,7 @@ from typing import Any
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from companion.app.options import SailOptions, at_once
+from companion.app.options import Far, SailOptions, at_once
 from companion.app.sail import OnStatus, sail
 from companion.clock import now_s
 from companion.compose import boat_of
@@ -34,13 +34,14 @@ from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.scene import Others, Scenario, Verdict, free_port, is_all_ordinary, judge, own_polar, scenario_wind
-from sitl.trouble import FragilePlanner, MortalPlanner, Observer, World, channel, happen
+from sitl.trouble import KEY, FragilePlanner, MortalPlanner, Observer, Satellite, World, channel, happen
 
 TRUTH_EVERY_S = 0.25
 MAX_TRUTH_SAMPLES = 20_000
 # Effort of one plan under the virtual clock, where time cannot stop it.
 EXPANSIONS = 15_000
 
+FAR = "far"   # the folder of the satellite link, in the voyage's
 # A companion that ended for want of an autopilot is started again after this long, as its service does [s].
 SERVICE_RESTART_S = 5.0
 
@@ -134,11 +135,14 @@ async def run_embedded(
         station=MemoryLink("station", seed=seed + 2), observer=observer,
         others=Others(frame, wind, seed, port=radio_port, hear=autopilot.hear_vessel))
     channel(world, scenario.events)
+    if scenario.satellite is not None:
+        world.satellite = Satellite(scenario.satellite, folder / FAR, seed=seed, epoch_s=scenario.epoch_s)
     folder.mkdir(parents=True, exist_ok=True)
     station = [world.station.far] if any(e.kind == "station" for e in scenario.events) else []
     async with serve(autopilot, [link.far, world.shore.far, *station]):
         side_tasks = [
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
+            *([asyncio.create_task(world.satellite.run(), name="satellite")] if world.satellite is not None else []),
             *(asyncio.create_task(happen(world, e), name=f"event {e.kind}") for e in scenario.events),
         ]
         await _sail_and_restart(world, scenario, mission, seed, folder, on_status, expansions, worker_pace)
@@ -172,6 +176,8 @@ async def _sail_and_restart(
         budget_scale=1.0 / (worker_pace or 1.0), offload=at_once, is_durable=False,
         state_path=folder / STATE, disk=world.disk, command=f"sitl run {scenario.name}",
         exit_on_arrival=scenario.exit_on_arrival, dry_run=scenario.dry_run,
+        far=None if scenario.satellite is None else Far(
+            folder=folder / FAR, key=KEY, every_s=scenario.satellite.status_every_s),
     )
 
     def look(status: CompanionStatus, step: Step) -> None:

@@ -49,6 +49,7 @@ EventKind = Literal[
     "knockdown",         # roll_deg, for_s
     "current",           # set_deg, drift_mps, for_s
     "order",             # order: to the companion, in words (a goal at east_m, north_m); answer: what it must be
+    "far_order",         # order, expires_s, late_s: over the satellite link, sent again until it is answered; answer
     "crew",              # anchors react_s after the companion first calls for it, weighs after for_s
     "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
     "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
@@ -89,7 +90,9 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     north_m: float = 0.0
     is_resisted: bool = False
     order: str = ""
-    answer: Literal["done", "refused", "not now", "unknown", "no answer"] = "done"
+    answer: Literal["done", "refused", "not now", "unknown", "no answer", "expired"] = "done"
+    expires_s: float = 3600.0    # of an order from far away
+    late_s: float = 0.0          # it lies somewhere on its way for so long
     state: str | None = None
     value_deg: float = 0.0
     parameter: str = ""
@@ -123,7 +126,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 # What a boat must bear without coming nearer to anything than its mission allows.
 ORDINARY = frozenset({
     "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "leak", "vessel",
-    "neighbour", "disk", "order"})
+    "neighbour", "disk", "order", "far_order"})
 ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
 ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
 ORDINARY_LOSS = 0.3          # a link that loses more is none
@@ -144,6 +147,16 @@ def is_ordinary(event: EventSpec) -> bool:
 def is_all_ordinary(events: Iterable[EventSpec]) -> bool:
     """Return whether nothing but ordinary weather, links and traffic befalls the boat."""
     return all(is_ordinary(event) for event in events)
+
+
+class SatelliteSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A satellite link to the boat: each message takes from ``delay_s`` to ``delay_most_s``, by a lot of its own."""
+
+    delay_s: float = 30.0
+    delay_most_s: float = 300.0
+    loss: float = 0.0
+    duplicate: float = 0.0
+    status_every_s: float = 600.0
 
 
 class HeldSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -193,6 +206,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     dry_run: bool = False                     # the companion may only look
     set_auto: bool = True                     # it may set modes
     system: int | None = None                 # of our autopilot, named in place of what the mission says
+    satellite: SatelliteSpec | None = None    # ``far_order`` needs one
     wind: WindSpec = msgspec.field(default_factory=WindSpec)
     parameters: dict[str, float] = {}
     events: tuple[EventSpec, ...] = ()
@@ -230,6 +244,8 @@ def load_scenario(path: Path) -> Scenario:
         scenario = msgspec.convert(raw, Scenario)
     except msgspec.ValidationError as error:
         raise InputError(str(path), _place(error), _sentence(error), _suggestion(error)) from error
+    if scenario.satellite is None and any(event.kind == "far_order" for event in scenario.events):
+        raise InputError(str(path), "events", "far_order needs a satellite link", "add a table [satellite]")
     if not scenario.mission_path(path).is_file():
         raise InputError(str(path), "mission", f"there is no file {scenario.mission}", "paths start at the scenario")
     return scenario
@@ -250,6 +266,7 @@ def _suggestion(error: msgspec.ValidationError) -> str:
     if "unknown field" not in str(error):
         return ""
     word = str(error).partition("`")[2].partition("`")[0]
-    table = {"wind": WindSpec, "events": EventSpec, "expect": ExpectSpec}.get(_place(error).split("[")[0], Scenario)
+    tables = {"wind": WindSpec, "satellite": SatelliteSpec, "events": EventSpec, "expect": ExpectSpec}
+    table = tables.get(_place(error).split("[")[0], Scenario)
     close = difflib.get_close_matches(word, table.__struct_fields__, n=1)
     return f"did you mean `{close[0]}`?" if close else f"known: {', '.join(table.__struct_fields__)}"

@@ -7,9 +7,10 @@ from sitl.trouble.fragile import FragilePlanner, MortalPlanner
 from sitl.trouble.hostile import HOSTILITIES, measure, rows, written
 from sitl.trouble.man_in_the_middle import Middle, Plan
 from sitl.trouble.relay import LINK_EVENTS, Relay, befall
+from sitl.trouble.satellite import KEY, Satellite
 
 __all__ = [
-    "FORGERIES", "HOSTILITIES", "LINK_EVENTS", "FragilePlanner", "Middle", "MortalPlanner", "Observer", "Plan", "Relay",
-    "World", "befall", "break_vane", "channel", "give_order", "happen", "measure", "rows", "set_parameter",
-    "written",
+    "FORGERIES", "HOSTILITIES", "KEY", "LINK_EVENTS", "FragilePlanner", "Middle", "MortalPlanner", "Observer", "Plan",
+    "Relay", "Satellite", "World", "befall", "break_vane", "channel", "give_order", "happen", "measure", "rows",
+    "set_parameter", "written",
 ]

@@ -20,11 +20,12 @@ from companion.mavlink.trust import LinkIdentity
 from companion.messages import GeoPoint, MissionItem, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryEnd, MemoryLink, VaneFault, VaneState, serve
 from sitl.scene import TRAFFIC, EventSpec, Motion, Others, Truth
-from sitl.trouble.crew import give_order, set_parameter
+from sitl.trouble.crew import give_order, set_parameter, wanted_by
 from sitl.trouble.failsafes import FAILURES, PERSONS, play
 from sitl.trouble.forgeries import Forger, forgery_named
 from sitl.trouble.fragile import FragilePlanner, MortalPlanner
 from sitl.trouble.relay import LINK_EVENTS, befall
+from sitl.trouble.satellite import Satellite, order_far
 from sitl.trouble.sick_disk import SickDisk
 from sitl.world import Air, Wind
 
@@ -64,6 +65,7 @@ class World:
     planner: FragilePlanner | MortalPlanner = field(default_factory=FragilePlanner)
     disk: SickDisk = field(default_factory=SickDisk)
     observer: Observer | None = None
+    satellite: Satellite | None = None
     stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
     called: asyncio.Event = field(default_factory=asyncio.Event)   # the companion calls its crew to the anchor
     called_at_s: list[float] = field(default_factory=list)
@@ -183,6 +185,12 @@ async def _order(world: World, event: EventSpec) -> None:
         world.errors.append(trouble)
 
 
+async def _far_order(world: World, event: EventSpec) -> None:
+    await _begins(event)
+    assert world.satellite is not None
+    await order_far(world.satellite, event, world.frame, wanted_by, world.errors)
+
+
 async def _spoof(world: World, event: EventSpec) -> None:
     forger, forgery = Forger(listens=event.listens, seed=world.seed), forgery_named(event.forgery)
     world.forgers.append(forger)
@@ -245,6 +253,7 @@ _BY_KIND: dict[str, _Befall] = {
     "vane": _vane,
     "crew": _crew,
     "order": _order,
+    "far_order": _far_order,
     "foreign_mission": _foreign,
     "parameter": _parameter,
     "neighbour": _neighbour,

@@ -65,7 +65,7 @@ OTHER = {
     "autopilot": {"system": 7, "frame": "motor"},
     "wind": {"estimator": "mean90", "preview_from_deg": 40.0, "preview_speed_mps": 8.0},
     "operator": {"arm": False, "set_auto": True, "guided": True, "upload_fence": True, "replace_foreign": True,
-                 "orders": ["hold"], "local_orders": ["stop"]},
+                 "orders": ["hold"], "local_orders": ["stop"], "far_orders": ["home"]},
     "skipper": {"replan": "forecast", "end": "home", "autopilot_beats": False, "guidance": "field", "station_s": 60.0,
                 "laps": 2, "bandwidth_m": 90.0, "planning_budget_s": 1.0, "expansions": 123, "seed": 7,
                 "min_replan_s": 25.0, "max_replan_s": 700.0, "wind_shift_deg": 30.0, "off_track_m": 45.0,
@@ -204,7 +204,7 @@ def options_of(parser):
 def read_names(package):
     """Return every attribute that the command modules read, and every name given to getattr."""
     names = set()
-    for path in Path(inspect.getfile(package)).parent.glob("*.py"):
+    for path in Path(inspect.getfile(package)).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):
                 names.add(node.attr)

@@ -1,6 +1,6 @@
 """Every scenario file of ours, sailed once under the virtual clock on the embedded autopilot.
 
-More seeds with ``-m campaign``; the day of ``endurance`` has a test of its own.
+More seeds with ``-m campaign``; the day of ``endurance`` and the hours of ``far-away`` have tests of their own.
 """
 
 import json
@@ -17,7 +17,8 @@ from sitl.scene.scenario import load_scenario
 FOLDER = Path("sitl/scenarios")
 # What is folded again from the record: the new inputs of a failsafe's answer and of a watched rest among them.
 REPLAYED = {"station-lost", "mode-switch", "at-rest", "watched"}
-ALL = sorted(str(p.relative_to(FOLDER).with_suffix("")) for p in FOLDER.rglob("*.toml") if p.stem != "endurance")
+LONG = {"endurance", "far-away"}
+ALL = sorted(str(p.relative_to(FOLDER).with_suffix("")) for p in FOLDER.rglob("*.toml") if p.stem not in LONG)
 
 
 def is_said_once_in_a_while(folder):

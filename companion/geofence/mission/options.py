@@ -110,6 +110,8 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """What the crew may order over MAVLink (docs/orders.md): verbs, or ``all``. Asking why is always permitted."""
     local_orders: tuple[str, ...] | str = ()
     """The same over the socket on board (``companion run --socket``)."""
+    far_orders: tuple[str, ...] | str = ()
+    """The same over a satellite link (``companion run --far``)."""
 
 
 class AutopilotOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

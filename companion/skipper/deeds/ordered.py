@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from companion.messages import Mode
-from companion.orders import LOCAL, Answer, Order, Result, Verb, lead_in, permitted
+from companion.orders import FAR, LOCAL, MAVLINK, Answer, Order, Result, Verb, lead_in, permitted
 from companion.skipper.board.adoption import adopt
 from companion.skipper.deeds.ordered_places import goal_place, home_place, refuge_place
 from companion.skipper.deeds.rest import UNTIL_TOLD
@@ -29,6 +29,8 @@ REMEMBERED_S = 10.0   # longer than any station repeats a command that is not an
 STATIONS = 8          # whose last order is remembered
 HERE_M = 40.0         # a loiter that is farther from her than this is not here
 CODE = "order"        # what is said of orders
+# The key of the mission's [operator] that permits what comes on each way, and the name of it in ``Permissions``.
+_PERMITTED_BY = {MAVLINK: "orders", LOCAL: "local_orders", FAR: "far_orders"}
 
 
 def take_orders(turn: Turn) -> None:
@@ -67,8 +69,8 @@ def _judged(turn: Turn, order: Order) -> Answer:
         return Answer(result=Result.UNKNOWN, text=wanted.fault)
     if wanted.fault:
         return Answer(result=Result.REFUSED, text=wanted.fault)
-    may, is_local = turn.snapshot.permissions, order.source.kind == LOCAL
-    verbs, key = (may.local_orders, "local_orders") if is_local else (may.orders, "orders")
+    key = _PERMITTED_BY[order.source.kind]
+    verbs = getattr(turn.snapshot.permissions, key)
     if not permitted(wanted.verb, verbs):
         which = f"does not name {wanted.verb}" if verbs else "permits none"
         return Answer(result=Result.REFUSED, text=f"not permitted: the mission's [operator] {key} {which}")

@@ -77,6 +77,7 @@ class Permissions:
     may_replace_foreign: bool = False  # a mission that is not ours may be overwritten before setting sail
     orders: tuple[str, ...] = ()       # verbs that the crew may give by MAVLink, or "all" (``companion.orders``)
     local_orders: tuple[str, ...] = ()  # ... over the socket on board
+    far_orders: tuple[str, ...] = ()   # ... over the satellite link
 
 
 DRY_RUN = Permissions()
