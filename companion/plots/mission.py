@@ -32,6 +32,7 @@ from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint
 from companion.planner.courses import courses
 from companion.plots.chart import place_words, save, scale_bar
+from companion.plots.tasks import BOX, PORT, STARBOARD, draw_gate, draw_water, gate_handles, water_handle
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 
 LAND, LAND_EDGE, SEA = "#d9cfb4", "#8d7f5a", "#eaf3f8"
 MARGIN, LIMIT, AUTOPILOT = "#f0b27a", "#34495e", "#8e44ad"
-PORT, STARBOARD, PATH, START, GOAL, WIND = "#c0392b", "#1e8449", "#1f4e9c", "#00a3b4", "#d68910", "#1f4e79"
+PATH, START, GOAL, WIND = "#1f4e9c", "#00a3b4", "#d68910", "#1f4e79"
 
 En = tuple[float, float]
 Handle = Patch | Line2D
@@ -196,15 +197,26 @@ def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En])
         axes.annotate("start", start, xytext=(7, -10), textcoords="offset points", fontsize=8, zorder=9)
         handles.append(_dot(START, "start"))
     for index, (place, goal) in enumerate(zip(goals, mission.goals, strict=True)):
+        name = goal.name or (f"goal {index + 1}" if len(goals) > 1 else "goal")
+        if goal.gate is not None:
+            draw_gate(axes, mission.frame().en_from_geo(goal.gate.port), mission.frame().en_from_geo(
+                goal.gate.starboard), name)
+            continue
+        if goal.box is not None:
+            draw_water(axes, polygon_en(goal.box.shape, mission.frame(), cover=False), name)
+            continue
         colour = {"port": PORT, "starboard": STARBOARD}.get(goal.rounding or "", GOAL)
         axes.add_patch(Disc(place, goal.radius_m, fc="none", ec=colour, lw=1.3, zorder=7))
         axes.plot(*place, "o", color=colour, ms=6, mec="black", mew=0.6, zorder=8)
-        name = goal.name or (f"goal {index + 1}" if len(goals) > 1 else "goal")
         text = f"{name}\nleave to {goal.rounding}" if goal.rounding else name
         axes.annotate(text, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
     for side, colour in (("", GOAL), ("port", PORT), ("starboard", STARBOARD)):
-        if any((goal.rounding or "") == side for goal in mission.goals):
+        if any((goal.rounding or "") == side and goal.gate is None and goal.box is None for goal in mission.goals):
             handles.append(_dot(colour, f"mark to leave to {side}" if side else "goal and its radius"))
+    if any(goal.gate is not None for goal in mission.goals):
+        handles += gate_handles()
+    if any(goal.box is not None for goal in mission.goals):
+        handles.append(water_handle(BOX))
     return handles
 
 
@@ -276,7 +288,7 @@ def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
     if len(out) > 1 and all(p.has_path for p in plans):
         out.insert(0, f"{sum(p.cost_s for p in plans):.0f} s to all {min(len(plans), len(mission.goals))} goals"
                    + (" and home" if len(plans) > len(mission.goals) else ""))
-    if plans and any(g.rounding for g in mission.goals):
+    if plans and any(g.rounding or g.gate for g in mission.goals):
         out.append("the preview sails to the marks; on which side they are left is the skipper's part")
     return out
 

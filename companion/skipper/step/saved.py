@@ -49,6 +49,8 @@ class Persisted:
     quarters: int = 0                  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
     standing: Standing | None = None   # the order that stands
     skipped: int = 0                   # goals given up by order
+    set_sail_utc_s: float | None = None   # Unix time of setting sail
+    inside: tuple[int, float] | None = None   # the goal whose box she stays in, Unix time of entry
 
     @property
     def lists(self) -> tuple[Route, ...]:
@@ -70,6 +72,7 @@ class Persisted:
             "system": self.system,
             "approaches": [[a.goal, *a.en_m, a.turn_rad] for a in self.approaches], "quarters": self.quarters,
             "standing": _standing_to_dict(self.standing), "skipped": self.skipped,
+            "set_sail_utc_s": self.set_sail_utc_s, "inside": None if self.inside is None else list(self.inside),
         }
 
     @classmethod
@@ -98,6 +101,9 @@ class Persisted:
                 quarters=_whole(data.get("quarters", 0), -MAX_QUARTERS, MAX_QUARTERS),
                 standing=_standing_from_dict(data.get("standing")),
                 skipped=_whole(data.get("skipped", 0), 0, MAX_GOALS),
+                set_sail_utc_s=None if data.get("set_sail_utc_s") is None else _number(data["set_sail_utc_s"]),
+                inside=None if data.get("inside") is None else (
+                    _whole(data["inside"][0], 0, MAX_GOALS), _number(data["inside"][1])),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
