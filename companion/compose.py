@@ -10,7 +10,7 @@ from companion.boat import Boat, Hull, Polar, ardurover_sitl, constant, read_pol
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
-from companion.geofence.mission import Gate
+from companion.geofence.mission import Gate, free_water
 from companion.geofence.shapes import polygon_en
 from companion.orders import ALL, Verb, unknown
 from companion.skipper.step import (
@@ -24,7 +24,7 @@ from companion.skipper.step import (
     SafeEnd,
     SkipperConfig,
 )
-from companion.skipper.way import Box, Goal, Line, Refuge, Side, Voyage
+from companion.skipper.way import Box, Goal, Line, Refuge, Search, Side, Voyage
 from companion.traffic import TargetLimits
 from companion.traffic.feeds import parse_feed
 from companion.wind import Estimator, make
@@ -75,6 +75,9 @@ def voyage_of(mission: Mission) -> Voyage:
             bandwidth_m=mission.skipper.bandwidth_m, line=_line(g.gate, frame),
             box=None if g.box is None else Box(
                 area_en=polygon_en(g.box.shape, frame, cover=False), for_s=g.box.for_s),
+            search=None if g.search is None else Search(
+                area_en=free_water(g.search.shape, frame, mission.area), swath_m=g.search.swath_m,
+                coverage=g.search.coverage),
         )
         for g in mission.goals
     )

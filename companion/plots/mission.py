@@ -28,11 +28,13 @@ from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, LocalArea, Mission, ZoneKind
 from companion.geofence.fence import FenceStatus, fence_for_autopilot
+from companion.geofence.mission import free_water
 from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint
 from companion.planner.courses import courses
 from companion.plots.chart import place_words, save, scale_bar
-from companion.plots.tasks import BOX, PORT, STARBOARD, draw_gate, draw_water, gate_handles, water_handle
+from companion.plots.tasks import PORT, STARBOARD, TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
+from companion.skipper.way.sweeps import Sweep, lay, length_m
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
 
 LAND, LAND_EDGE, SEA = "#d9cfb4", "#8d7f5a", "#eaf3f8"
 MARGIN, LIMIT, AUTOPILOT = "#f0b27a", "#34495e", "#8e44ad"
-PATH, START, GOAL, WIND = "#1f4e9c", "#00a3b4", "#d68910", "#1f4e79"
+PATH, SWEEP, START, GOAL, WIND = "#1f4e9c", "#5b2c83", "#00a3b4", "#d68910", "#1f4e79"
 
 En = tuple[float, float]
 Handle = Patch | Line2D
@@ -68,21 +70,24 @@ def save_mission(
     legs = [np.asarray(p.waypoints_en) for p in plans if p.has_path]
     places = [*([start] if start is not None else []), *goals]
     refuges = [(frame.en_from_geo(r.point), f"refuge {r.name}") for r in mission.refuges]
-    extent = _extent(local, [*places, *(place for place, _ in refuges)], legs)
+    extent = _extent(local, [*places, *(place for place, _ in refuges), *_corners(mission)], legs)
     handles += _draw_laylines(axes, places, twd_from_rad, beat_rad, extent)
     for leg in legs:
         axes.plot(leg[:, 0], leg[:, 1], "-", color=PATH, lw=1.8, zorder=6, solid_joinstyle="round")
         axes.plot(leg[1:-1, 0], leg[1:-1, 1], "o", color=PATH, ms=3.0, zorder=6)
     if legs:
         handles.append(Line2D([], [], color=PATH, lw=1.8, label="plan in this wind, held steady"))
-    handles += _draw_marks(axes, mission, start, goals)
+    sweeps = _sweeps(mission, local, start, twd_from_rad)
+    handles += _draw_marks(axes, mission, start, goals) + _draw_sweeps(axes, sweeps)
     for place, name in refuges:
         axes.plot(*place, "P", color=GOAL, ms=8, mec="black", mew=0.6, zorder=8)
         axes.annotate(name, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
     if refuges:
         handles.append(Line2D([], [], ls="", marker="P", color=GOAL, ms=8, mec="black", mew=0.6, label="refuge"))
     _finish(axes, extent, twd_from_rad, tws_mps, handles)
-    words = _words(mission, plans)
+    words = _words(mission, plans) + [
+        f"{name}: {counted(len(laid), 'sweep')}, {length_m(laid):.0f} m, beside the time of the way there"
+        for name, laid in sweeps]
     subtitle = words[0] if words else mission.options.description
     where = place_words(mission.origin.lat_deg, mission.origin.lon_deg)
     figure.suptitle(f"{mission.name}   ·   {where}\n{subtitle}", fontsize=10, x=0.1, ha="left")
@@ -202,8 +207,9 @@ def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En])
             draw_gate(axes, mission.frame().en_from_geo(goal.gate.port), mission.frame().en_from_geo(
                 goal.gate.starboard), name)
             continue
-        if goal.box is not None:
-            draw_water(axes, polygon_en(goal.box.shape, mission.frame(), cover=False), name)
+        water = goal.box or goal.search
+        if water is not None:
+            draw_water(axes, polygon_en(water.shape, mission.frame(), cover=False), name)
             continue
         colour = {"port": PORT, "starboard": STARBOARD}.get(goal.rounding or "", GOAL)
         axes.add_patch(Disc(place, goal.radius_m, fc="none", ec=colour, lw=1.3, zorder=7))
@@ -211,13 +217,51 @@ def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En])
         text = f"{name}\nleave to {goal.rounding}" if goal.rounding else name
         axes.annotate(text, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
     for side, colour in (("", GOAL), ("port", PORT), ("starboard", STARBOARD)):
-        if any((goal.rounding or "") == side and goal.gate is None and goal.box is None for goal in mission.goals):
+        if any((goal.rounding or "") == side and not (goal.gate or goal.box or goal.search) for goal in mission.goals):
             handles.append(_dot(colour, f"mark to leave to {side}" if side else "goal and its radius"))
     if any(goal.gate is not None for goal in mission.goals):
         handles += gate_handles()
-    if any(goal.box is not None for goal in mission.goals):
-        handles.append(water_handle(BOX))
+    if any(goal.box or goal.search for goal in mission.goals):
+        handles.append(water_handle(TASK_WATER))
     return handles
+
+
+def _corners(mission: Mission) -> list[En]:
+    """Return what must be seen of goals that are no points: marks of gates, corners of boxes and searches."""
+    frame, out = mission.frame(), list[En]()
+    for goal in mission.goals:
+        water = goal.box or goal.search
+        if goal.gate is not None:
+            out += [frame.en_from_geo(goal.gate.port), frame.en_from_geo(goal.gate.starboard)]
+        elif water is not None:
+            west, south, east, north = polygon_en(water.shape, frame, cover=False).bounds
+            out += [(west, south), (east, north)]
+    return out
+
+
+def _sweeps(
+    mission: Mission, local: LocalArea, start: En | None, twd_from_rad: float,
+) -> list[tuple[str, tuple[Sweep, ...]]]:
+    """Return the sweeps of each search as they would be laid for this wind; under way they are for the wind then."""
+    out = []
+    for goal in mission.goals:
+        if goal.search is None:
+            continue
+        water = free_water(goal.search.shape, mission.frame(), mission.area)
+        if local.polygons:
+            water = shapely.difference(water, local.buffered(mission.margin_m))
+        inner = local.water(mission.margin_m)
+        water = water if inner is None else shapely.intersection(water, inner)
+        near = start or mission.frame().en_from_geo(goal.point)
+        out.append((goal.name or "search", lay(water, goal.search.swath_m, twd_from_rad, near)))
+    return out
+
+
+def _draw_sweeps(axes: Axes, sweeps: Sequence[tuple[str, tuple[Sweep, ...]]]) -> list[Handle]:
+    for _, laid in sweeps:
+        for a, b in laid:
+            axes.plot(*zip(a, b, strict=True), color=SWEEP, lw=1.0, zorder=6)
+    return [Line2D([], [], color=SWEEP, lw=1.0, label="sweeps in this wind")] if sweeps else []
 
 
 def _dot(colour: str, label: str) -> Line2D:

@@ -1,4 +1,4 @@
-"""What regatta and area tasks look like on a chart: lines and which way they are crossed, water to stay in."""
+"""What regatta and area tasks look like on a chart: lines, which way they are crossed, water to stay in or search."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 PORT, STARBOARD, LINE = "#c0392b", "#1e8449", "#5b2c83"
-BOX = "box to stay in"
+TASK_WATER = "box to stay in, area to search"
 ARROW_SHARE = 0.35   # of the line's length
 
 En = tuple[float, float]
@@ -48,13 +48,14 @@ def gate_handles() -> list[Line2D]:
 
 
 def draw_water(axes: Axes, area: BaseGeometry, name: str) -> None:
-    """Draw water that is a goal: a box to stay in."""
+    """Draw water that is a goal: a box to stay in, an area to search."""
     for part in shapely.get_parts(area):
         ring = np.asarray(part.exterior.coords)
         axes.fill(ring[:, 0], ring[:, 1], fc=LINE, alpha=0.12, ec="none", zorder=3.5)
         axes.plot(ring[:, 0], ring[:, 1], color=LINE, lw=1.3, zorder=7)
-    west, _, _, north = area.bounds
-    axes.annotate(name, (west, north), xytext=(0, 4), textcoords="offset points", fontsize=8, zorder=9)
+    corners = shapely.get_coordinates(area)
+    top = corners[int(np.argmax(corners[:, 1]))]
+    axes.annotate(name, (float(top[0]), float(top[1])), xytext=(0, 4), textcoords="offset points", fontsize=8, zorder=9)
 
 
 def water_handle(label: str) -> Line2D:

@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.plots.chart import date_words, legend_above, legend_below, place_words, save, scale_bar
-from companion.plots.tasks import BOX, draw_gate, draw_water, gate_handles, water_handle
+from companion.plots.tasks import TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
 from companion.telemetry.folder import Chart, RecordedPlan, VoyageRecord
 from companion.words import counted
 
@@ -140,7 +140,7 @@ def _goals(axes: Any, chart: Chart) -> None:
         for handle in gate_handles():
             axes.add_line(handle)   # nothing of it is drawn: it stands in the legend
     if any(goal.water is not None for goal in chart.goals):
-        axes.add_line(water_handle(BOX))
+        axes.add_line(water_handle(TASK_WATER))
     if any(goal.line is None and goal.water is None for goal in chart.goals):
         axes.plot([], [], "o", color=GOAL, markeredgecolor="black", markersize=8, label="goal and its radius")
 

@@ -6,6 +6,7 @@ import math
 
 import shapely
 
+from companion.skipper.planning.searching import end_search, follow_search, lay_sweeps
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, utc_s, waits_for_gun
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.state import Inside
@@ -27,12 +28,16 @@ def pass_gates(turn: Turn) -> None:
     _cross(turn)
     if turn.gate is not None and turn.gate.line is not None and not waits_for_gun(turn, turn.gate):
         turn.update(released=turn.gate.goal)
+    follow_search(turn)
     while turn.gate is not None and turn.state.route is not None:
         gate, number = turn.gate, turn.state.gate
         if gate.box is not None:
             if not _has_stayed(turn, gate, boat):
                 return
             continue
+        if gate.search is not None and gate.sweep[1] == 0:
+            lay_sweeps(turn, gate)
+            return
         if gate.is_crossed:
             if number in turn.state.route.gate_of[: turn.state.index]:
                 _begin_again(turn, gate, boat, f"{gate.name} was passed by outside of its marks: again")
@@ -51,6 +56,11 @@ def pass_gates(turn: Turn) -> None:
             turn.approach(again(gate, boat, turn.state.bearing_rad))
             missed(turn)
             turn.say(Severity.WARNING, "buoy missed", f"{gate.name} was left on the wrong side: again", every_s=0.0)
+            return
+        if gate.search is not None and gate.ends_goal:
+            if lay_sweeps(turn, gate):
+                return
+            end_search(turn, gate)
             return
         closest = turn.state.closest_m
         reached = (*turn.state.reached, gate.goal) if gate.ends_goal else turn.state.reached

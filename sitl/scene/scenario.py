@@ -192,6 +192,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     start_within_s: float | None = None        # after the gun, and not before it
     inside_s: float | None = None              # each box is not left for so long after she came in ...
     inside_share: float = 0.98                 # ... but for the rest of this share of the time
+    seen: float | None = None                  # share of the water of each search, within half a swath of the track
     called_s: float | None = None              # the crew is called to the anchor this long before a contact
 
 

@@ -1,4 +1,4 @@
-"""The judge of tasks: gates in order and direction, a start at its gun, a box not left. From the true track alone.
+"""The judge of tasks: gates in order and direction, a start at its gun, boxes kept, water seen. By the true track.
 
 Nothing of the companion's own geometry is used: what it counts is judged by other code.
 """
@@ -21,6 +21,7 @@ from sitl.scene.scenario import ExpectSpec
 
 Points = NDArray[np.float64]
 Finding = tuple[str, bool, Any, Any]   # what had to hold, whether it did, its figure, what was wanted
+GRID = 10         # points of a grid to a swath
 EARLY = "early start"                  # said by the companion
 
 
@@ -41,13 +42,15 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tasks:
-    """What a mission asks for beside places and buoys: the gates, laps written out, and the boxes [m].
+    """What a mission asks for beside places and buoys.
 
+    The gates, laps written out; the boxes; of the searches the free water with its swath [m].
     ``epoch_s`` is the Unix time of the track's time 0.
     """
 
     gates: tuple[Pair, ...] = ()
     boxes: tuple[BaseGeometry, ...] = ()
+    searches: tuple[tuple[BaseGeometry, float], ...] = ()
     epoch_s: float = 0.0
 
 
@@ -58,8 +61,28 @@ def tasks_of(mission: Mission, epoch_s: float) -> Tasks:
         Pair(port_en_m=frame.en_from_geo(g.gate.port), starboard_en_m=frame.en_from_geo(g.gate.starboard),
              not_before_s=g.gate.not_before_s, after_s=g.gate.after_s)
         for g in mission.goals if g.gate is not None)
+    solid = list(mission.area.local(frame).polygons)
     boxes = tuple(polygon_en(g.box.shape, frame, cover=False) for g in mission.goals if g.box is not None)
-    return Tasks(gates=lap * mission.skipper.laps, boxes=boxes, epoch_s=epoch_s)
+    searches = tuple(
+        (shapely.difference(polygon_en(g.search.shape, frame, cover=False), shapely.union_all(solid) if solid else
+                            shapely.Polygon()), g.search.swath_m)
+        for g in mission.goals if g.search is not None)
+    return Tasks(gates=lap * mission.skipper.laps, boxes=boxes, searches=searches, epoch_s=epoch_s)
+
+
+def share_seen(track: Points, water: BaseGeometry, swath_m: float) -> float:
+    """Return the share of some water that lay within half a swath of a track: of the points of a grid in it."""
+    west, south, east, north = water.bounds
+    fine_m = max(1.0, swath_m / GRID)
+    x, y = np.meshgrid(np.arange(west + 0.5 * fine_m, east, fine_m),
+                       np.arange(south + 0.5 * fine_m, north, fine_m))
+    spots = shapely.points(x.ravel(), y.ravel())
+    spots = spots[shapely.covers(water, spots)]
+    if not len(spots) or len(track) < 2:
+        return 0.0
+    line = shapely.LineString(track)
+    shapely.prepare(line)
+    return float(np.mean(shapely.dwithin(line, spots, 0.5 * swath_m)))
 
 
 def shares_inside(t_s: Sequence[float], track: Points, boxes: Sequence[BaseGeometry], for_s: float) -> list[float]:
@@ -141,6 +164,11 @@ def findings(
         shares = shares_inside(t_s, track, tasks.boxes, expect.inside_s)
         yield (f"in the box for {expect.inside_s:g} s after entry", bool(shares) and min(shares) >= expect.inside_share,
                shares, f"a share of at least {expect.inside_share}")
+
+
+    if expect.seen is not None:
+        seen = [share_seen(track, water, swath_m) for water, swath_m in tasks.searches]
+        yield "share of the water seen", bool(seen) and min(seen) >= expect.seen, seen, f"at least {expect.seen}"
 
 
 def _gun_s(start: Pair, tasks: Tasks, set_sail_s: float) -> float:

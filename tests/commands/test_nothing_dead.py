@@ -59,10 +59,13 @@ TASKS = {
     "gate": {"kind": "gate", "port_mark": {"lat": 50.8200, "lon": -1.3090},
              "starboard_mark": {"lat": 50.8200, "lon": -1.3080}, "mark_radius_m": 6.0, "after_s": 300.0},
     "box": {"kind": "box", "polygon": "POLYGON ((-1.309 50.820, -1.308 50.820, -1.308 50.821, -1.309 50.820))"},
+    "search": {"kind": "search", "swath_m": 20.0,
+               "polygon": "POLYGON ((-1.309 50.820, -1.308 50.820, -1.308 50.821, -1.309 50.820))"},
 }
 TASK_KEYS = {
     "kind": "gate", "port_mark": {"lat": 50.8200, "lon": -1.3092}, "starboard_mark": {"lat": 50.8200, "lon": -1.3078},
     "polygon": "POLYGON ((-1.309 50.820, -1.3081 50.820, -1.3081 50.821, -1.309 50.820))", "for_s": 60.0,
+    "swath_m": 30.0, "coverage": 0.5,
     "mark_radius_m": 8.0, "after_s": 400.0, "not_before": dt.datetime(2026, 11, 21, 12, tzinfo=dt.UTC),
 }
 

@@ -129,3 +129,54 @@ def test_a_box_whose_file_is_not_there_is_refused(tmp_path):
     text = BOX.replace(BOX[BOX.index("POLYGON"):BOX.index('"\nfor_s')], "nowhere.wkt")
     with pytest.raises(InputError, match="there is no such file"):
         load(tmp_path, text, rock=FAR)
+
+
+SEARCH = """
+name = "m"
+[start]
+lat = 50.8160
+lon = -1.3100
+[[goal]]
+kind = "search"
+name = "Area"
+polygon = "POLYGON ((-1.3103 50.8170, -1.3083 50.8170, -1.3083 50.8184, -1.3103 50.8184, -1.3103 50.8170))"
+swath_m = 20.0
+[area]
+obstacles = ["rock.wkt"]
+"""
+
+
+def test_a_search_has_an_area_and_a_swath(tmp_path):
+    search = load(tmp_path, SEARCH, rock=FAR).goals[0].search
+    assert (search.swath_m, search.coverage) == (20.0, 0.95)
+
+
+@pytest.mark.parametrize(("old", "new", "says"), [
+    ("swath_m = 20.0", "", "swath_m: is missing"),
+    ("swath_m = 20.0", "swath_m = 1.0", "swath_m"),
+    ("swath_m = 20.0", "swath_m = 300.0", "[[goal]] 1 swath_m: 300 m is wider than the area itself"),
+    ("swath_m", "swath", "did you mean 'swath_m'?"),
+    ('"search"', '"serch"', 'did you mean "search"?'),
+])
+def test_what_is_wrong_with_a_search_is_one_line(tmp_path, old, new, says):
+    with pytest.raises(InputError) as refused:
+        load(tmp_path, SEARCH.replace(old, new), rock=FAR)
+    assert says in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_search_of_too_many_sweeps_is_refused(tmp_path):
+    with pytest.raises(InputError, match="swath_m: 4 m make about"):
+        load(tmp_path, SEARCH.replace("50.8184", "50.8684").replace("20.0", "4.0"), rock=FAR)
+
+
+def test_a_search_mostly_ashore_is_refused(tmp_path):
+    land = "POLYGON ((-1.3105 50.8160, -1.3087 50.8160, -1.3087 50.8190, -1.3105 50.8190, -1.3105 50.8160))"
+    with pytest.raises(InputError, match=r"\[\[goal\]\] 1: only 20 % of it is free water"):
+        load(tmp_path, SEARCH, rock=land)
+
+
+def test_the_sweeps_of_a_search_are_told_and_drawn(tmp_path, capsys):
+    load(tmp_path, SEARCH, rock=FAR)
+    assert main(["mission", "check", str(tmp_path / "m.toml"), "--plot", str(tmp_path / "m.png"), "--no-plan"]) == 0
+    assert "Area: 10 sweeps, 1" in capsys.readouterr().out

@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from sitl.scene.scenario import ExpectSpec
-from sitl.scene.tasks import Pair, Tasks, count_gates, crossings, findings, shares_inside
+from sitl.scene.tasks import Pair, Tasks, count_gates, crossings, findings, share_seen, shares_inside
 
 NORTHWARD = Pair(port_en_m=(-10.0, 50.0), starboard_en_m=(10.0, 50.0))
 SOUTHWARD = Pair(port_en_m=(50.0, 20.0), starboard_en_m=(30.0, 20.0))
@@ -63,3 +63,11 @@ def test_the_time_in_a_box_is_from_first_entry_and_each_box_follows_the_one_befo
     assert shares_inside(t_s, way, [first, second], 9.0) == [0.9, 1.0]
     assert shares_inside(t_s, way, [second, first], 9.0) == [1.0, 0.0]
     assert shares_inside(t_s, way, [first], 60.0) == [0.0]   # not so long
+
+
+def test_what_was_seen_is_the_water_within_half_a_swath_of_the_track():
+    water = shapely.box(0.0, 0.0, 100.0, 40.0)
+    along = track((0.0, 10.0), (100.0, 10.0))
+    assert share_seen(along, water, 20.0) == pytest.approx(0.5, abs=0.02)
+    assert share_seen(track((0.0, 10.0), (100.0, 10.0), (100.0, 30.0), (0.0, 30.0)), water, 20.0) == 1.0
+    assert share_seen(along[:1], water, 20.0) == 0.0

@@ -43,8 +43,8 @@ def goal_losses(mission: Mission) -> Losses:
         losses.add(Severity.WARNING, "the side on which marks are left is not carried by this format")
     if any(g.gate is not None for g in mission.goals):
         losses.add(Severity.WARNING, "of a gate only the middle between its marks is carried by this format")
-    if any(g.box is not None for g in mission.goals):
-        losses.add(Severity.WARNING, "of a box only its roomiest place is carried by this format")
+    if any(g.box or g.search for g in mission.goals):
+        losses.add(Severity.WARNING, "of a box or a search only its roomiest place is carried by this format")
     plain = replace_defaults(mission.options)
     if plain:
         losses.add(Severity.NOTE, f"the mission's own settings ({', '.join(plain)}) are not carried by this format")

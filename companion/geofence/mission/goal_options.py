@@ -53,8 +53,21 @@ class BoxOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, 
     name: str = ""
 
 
-GoalOptions = PointOptions | GateOptions | BoxOptions
-KINDS: dict[str, type[GoalOptions]] = {"point": PointOptions, "gate": GateOptions, "box": BoxOptions}
+class SearchOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="search"):
+    """``kind = "search"``: water to be looked at, in sweeps across the wind."""
+
+    polygon: str
+    """As for a box."""
+    swath_m: Annotated[float, Meta(ge=4.0, le=5000.0)]
+    """How wide the strip is that is seen from the track, both sides together."""
+    coverage: Annotated[float, Meta(gt=0.0, le=0.99)] = 0.95
+    """What share of the free water must be seen; what the sweeps left is sailed again, up to three times."""
+    name: str = ""
+
+
+GoalOptions = PointOptions | GateOptions | BoxOptions | SearchOptions
+KINDS: dict[str, type[GoalOptions]] = {
+    "point": PointOptions, "gate": GateOptions, "box": BoxOptions, "search": SearchOptions}
 
 
 def kind_of(goal: GoalOptions) -> str:

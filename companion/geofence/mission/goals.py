@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -12,7 +13,7 @@ from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area
 from companion.geofence.formats.registry import parse, read
-from companion.geofence.mission.goal_options import BoxOptions, GateOptions, GoalOptions, MarkOptions
+from companion.geofence.mission.goal_options import BoxOptions, GateOptions, GoalOptions, MarkOptions, SearchOptions
 from companion.geofence.mission.options import MissionOptions
 from companion.geofence.shapes import Shape, ZoneKind, center_of, polygon_en
 from companion.messages import GeoPoint
@@ -20,6 +21,8 @@ from companion.messages import GeoPoint
 NARROWEST_M = 10.0   # between what is kept clear of the two marks: a track strays 3 m to either side, and tacks
 PREVIEW_M = 5.0      # previews sail to within this of a gate's middle
 LOITER_ROOM_M = 16.0   # a sailboat's loiter swings 12 m, about a place that is met within 3 m
+LEAST_WATER = 0.5      # share of a search's area
+MOST_SWEEPS = 200      # each is two plans and two uploads
 WIDEST_M = 2000.0    # a longer line is two marks that do not belong together
 
 
@@ -46,11 +49,20 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """Water to be looked at: what is seen from the track is ``swath_m`` wide; ``coverage`` of it is asked for."""
+
+    shape: Shape
+    swath_m: float
+    coverage: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
     """A mark, reached inside ``radius_m``; ``rounding`` says which side of the boat it is left to.
 
     With ``gate`` two marks to pass between: ``point`` is the middle, and ``radius_m`` about it is for previews alone.
-    With ``box`` water to stay in: ``point`` is the place with the most room in it, and ``radius_m`` that room.
+    With ``box`` or ``search`` some water: ``point`` is the place with the most room in it, and ``radius_m`` that room.
     """
 
     point: GeoPoint
@@ -59,6 +71,7 @@ class Goal:
     name: str = ""
     gate: Gate | None = None
     box: Box | None = None
+    search: Search | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,6 +105,8 @@ class GoalReader:
             return _gate(goal, str(self.path), place)
         if isinstance(goal, BoxOptions):
             return self._box(goal, place, area)
+        if isinstance(goal, SearchOptions):
+            return self._search(goal, place, area)
         return Goal(point=GeoPoint(lat_deg=goal.lat, lon_deg=goal.lon), radius_m=goal.radius_m, rounding=goal.rounding,
                     name=goal.name)
 
@@ -106,6 +121,25 @@ class GoalReader:
                              f"needs {LOITER_ROOM_M:g} m", "draw a larger box, or in freer water")
         return Goal(point=frame.geo_from_en(*room.coords[0]), radius_m=room_m, name=goal.name,
                     box=Box(shape=shape, for_s=goal.for_s))
+
+    def _search(self, goal: SearchOptions, place: str, area: Area) -> Goal:
+        shape = self._shape(goal.polygon, f"{place} polygon")
+        frame = LocalFrame(center_of(shape))
+        whole, water = polygon_en(shape, frame, cover=False), free_water(shape, frame, area)
+        share = float(water.area / whole.area)
+        if share < LEAST_WATER:
+            raise InputError(str(self.path), place, f"only {100.0 * share:.0f} % of it is free water",
+                             "draw it in the water, or correct the area's files")
+        sweeps = float(water.area) / goal.swath_m / max(goal.swath_m, float(np.sqrt(whole.area)))
+        if sweeps > MOST_SWEEPS:
+            raise InputError(str(self.path), f"{place} swath_m", f"{goal.swath_m:g} m make about {sweeps:.0f} sweeps",
+                             f"write a larger swath, or a smaller area: {MOST_SWEEPS} are the most")
+        if goal.swath_m > float(np.sqrt(whole.area)):
+            raise InputError(str(self.path), f"{place} swath_m", f"{goal.swath_m:g} m is wider than the area itself",
+                             "write what is seen from the track, or make it a point to sail to")
+        room = shapely.maximum_inscribed_circle(water, tolerance=0.5)
+        return Goal(point=frame.geo_from_en(*room.coords[0]), radius_m=float(room.length), name=goal.name,
+                    search=Search(shape=shape, swath_m=goal.swath_m, coverage=goal.coverage))
 
     def _shape(self, text: str, place: str) -> Shape:
         """Return the one polygon or circle that WKT, or a file, holds."""

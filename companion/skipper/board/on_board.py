@@ -186,7 +186,8 @@ def _take_up(turn: Turn, saved: Persisted) -> None:
     """Take up the voyage where it was: the gates that are passed, and the way round the next buoy."""
     turn.update(
         gate=saved.gate, approaches=saved.approaches, bearing_rad=0.5 * math.pi * saved.quarters, is_blind=True,
-        inside=None if saved.inside is None else Inside(goal=saved.inside[0], t_s=turn.t_s, utc_s=saved.inside[1]))
+        inside=None if saved.inside is None else Inside(goal=saved.inside[0], t_s=turn.t_s, utc_s=saved.inside[1]),
+        searched=saved.searched, covered=saved.covered)
 
 
 def _adopt(turn: Turn, saved: Persisted, what: str = "ours") -> None:

@@ -89,6 +89,7 @@ class Retry:
 
 
 PATIENT = Retry()
+SAVED_AT_ONCE = 8   # points of a search's track: not every one is worth a write; what is lost is a straight line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -236,6 +237,9 @@ class SkipperState:
     bearing_rad: float = 0.0            # how far the boat has come round the buoy that is next, see gates.bearing_on
     is_blind: bool = False              # the voyage was taken up again: what she passed meanwhile was not seen
     released: int = -1                  # the goal at whose line she no longer waits for the gun, or in whose box
+    searched: tuple[PointEn, ...] = ()  # the track of the search that is next
+    covered: tuple[tuple[int, float], ...] = ()   # goals searched, and the share that was seen
+    task: str = ""                      # how far she is with it, in words
     inside: Inside | None = None        # the box that she stays in
     set_sail_utc_s: float | None = None  # Unix time of setting sail, by the autopilot's clock
     missed_s: float | None = None       # when a gate was missed to which no upload since leads
@@ -301,4 +305,5 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
         standing=standing_saved(state), skipped=state.skipped, set_sail_utc_s=state.set_sail_utc_s,
         inside=None if state.inside is None or state.inside.utc_s is None else (state.inside.goal, state.inside.utc_s),
+        searched=state.searched[:len(state.searched) // SAVED_AT_ONCE * SAVED_AT_ONCE], covered=state.covered,
     )

@@ -2,6 +2,6 @@
 
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.geometry import cross_track_m, moved
-from companion.skipper.way.voyage import Box, Goal, Line, PointEn, Refuge, Side, Voyage
+from companion.skipper.way.voyage import Box, Goal, Line, PointEn, Refuge, Search, Side, Voyage
 
-__all__ = ["Box", "Goal", "Line", "PointEn", "Refuge", "Side", "Voyage", "cross_track_m", "gates_of", "moved"]
+__all__ = ["Box", "Goal", "Line", "PointEn", "Refuge", "Search", "Side", "Voyage", "cross_track_m", "gates_of", "moved"]

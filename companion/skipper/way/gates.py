@@ -30,12 +30,14 @@ from companion.skipper.way.line import (
     crossing_en,
     wings_wkt,
 )
-from companion.skipper.way.voyage import Area, Box, Goal, Line, PointEn, Side, Voyage
+from companion.skipper.way.sweeps import Sweep
+from companion.skipper.way.voyage import Area, Box, Goal, Line, PointEn, Search, Side, Voyage
 
 ARC_RAD = math.radians(100.0)       # gates around a buoy are at most this far apart
 STRAIGHT_RAD = math.radians(60.0)   # a bend the other way up to this is passed with one gate, not with a loop
 KEEP_SHARE = 0.5                    # the disc around the buoy that plans avoid, as a share of the rounding radius
 BARRIER_M = 60.0                    # shortest barrier
+SWEEP_RADIUS_M = 7.0                # the autopilot leaves a sweep's end 3 to 5 m before it
 BOX_RADIUS_M = 8.0                  # her loiter lies this near to a box's roomiest place, and nearer as it is planned
 
 
@@ -44,12 +46,16 @@ class Approach:
     """Where the way to a goal began, when that is not the goal before: at the start, and again after a miss.
 
     ``goal`` is the index into ``Voyage.legs``. ``turn_rad`` is how far the boat still has to turn around the buoy,
-    positive to the buoy's hand; None: as the courses to it and away from it ask for.
+    positive to the buoy's hand; None: as the courses to it and away from it ask for. ``sweeps`` are what is left to be
+    sailed of a search, laid for the wind ``twd_from_rad`` and for the ``round``-th time, 0: not yet.
     """
 
     goal: int
     en_m: PointEn
     turn_rad: float | None = None
+    sweeps: tuple[Sweep, ...] = ()
+    twd_from_rad: float = 0.0
+    round: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +67,8 @@ class Gate:
     ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the approach's
     beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With ``line`` it
     is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place before it. With
-    ``box`` it is where she stays.
+    ``box`` it is where she stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before there
+    are any, of none.
     """
 
     en_m: PointEn
@@ -81,6 +88,8 @@ class Gate:
     line: Line | None = None
     is_before_line: bool = False
     box: Box | None = None
+    search: Search | None = None
+    sweep: tuple[int, int] = (0, 0)
 
     @property
     def is_crossed(self) -> bool:
@@ -112,11 +121,13 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
             out.extend(
                 replace(gate, keep_out=(*discs, *gate.keep_out))
                 for gate in _cross(goal, i, name, None if is_once_more else before, after, voyage.area))
+        elif goal.search is not None and approach is not None and approach.round > 0:
+            out.extend(_sweep(goal, i, name, approach, discs))
         elif goal.side is Side.NONE:
             out.append(Gate(
                 en_m=goal.en_m, radius_m=goal.radius_m if goal.box is None else BOX_RADIUS_M, goal=i,
                 ends_goal=True, name=name, from_en_m=before,
-                bandwidth_m=goal.bandwidth_m, keep_out=discs, box=goal.box,
+                bandwidth_m=goal.bandwidth_m, keep_out=discs, box=goal.box, search=goal.search,
             ))
         else:
             turn_rad = approach.turn_rad if approach is not None else None
@@ -135,6 +146,15 @@ def marks_of(voyage: Voyage) -> tuple[tuple[PointEn, float], ...]:
         elif goal.side is not Side.NONE:
             out.append((goal.en_m, KEEP_SHARE * goal.rounding_m))
     return tuple(out)
+
+
+def _sweep(goal: Goal, index: int, name: str, approach: Approach, discs: tuple[str, ...]) -> list[Gate]:
+    """Return the gates that search an area: both ends of each sweep."""
+    count = len(approach.sweeps)
+    return [
+        Gate(en_m=end, radius_m=SWEEP_RADIUS_M, goal=index, is_first=n == 0 and k == 0, name=name, from_en_m=None,
+             ends_goal=n == count - 1 and k == 1, keep_out=discs, search=goal.search, sweep=(n + 1, count))
+        for n, sweep in enumerate(approach.sweeps) for k, end in enumerate(sweep)]
 
 
 def _cross(

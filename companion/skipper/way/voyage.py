@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from companion.boat import Boat, outline_en_m
 from companion.geo.frame import LocalFrame
@@ -62,11 +63,24 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """Water to be looked at, to half a swath on either side of the track (``companion.skipper.way.sweeps``).
+
+    ``area_en`` is its free water; the search is done when its sweeps are sailed and ``coverage`` of it was seen.
+    """
+
+    area_en: BaseGeometry
+    swath_m: float
+    coverage: float = 0.95
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
     """A place to reach within ``radius_m``, a buoy to round, or a line to cross.
 
     With ``side`` the position is the buoy's, which the boat rounds at ``rounding_m``; with ``line`` it is the middle
-    between the marks, with ``box`` the roomiest place in it. ``bandwidth_m`` bounds the way from the goal before (or
+    between the marks, with ``box`` the roomiest place in it, with
+    ``search`` one inside. ``bandwidth_m`` bounds the way from the goal before (or
     the start) to this one: half the width of Büsser's band (section 4.2).
     """
 
@@ -78,6 +92,7 @@ class Goal:
     bandwidth_m: float | None = None
     line: Line | None = None
     box: Box | None = None
+    search: Search | None = None
 
 
 class Area(Protocol):

@@ -36,7 +36,8 @@ def _task(goal: Goal) -> dict[str, Any]:
     """Return what else a chart says of a goal that is no point."""
     if goal.line is not None:
         return {"line": [list(goal.line.port_en_m), list(goal.line.starboard_en_m)]}
-    return {} if goal.box is None else {"water": goal.box.area_en.wkt}
+    water = goal.box or goal.search
+    return {} if water is None else {"water": water.area_en.wkt}
 
 
 def voyage_record(mission: Mission, permissions: Permissions, run: dict[str, Any], copy: str) -> dict[str, Any]:

@@ -43,7 +43,7 @@ class ChartGoal(Struct, frozen=True, kw_only=True):
     name: str = ""
     side: str = "none"
     line: tuple[tuple[float, float], tuple[float, float]] | None = None   # the port mark and the starboard mark
-    water: str | None = None   # of a box, WKT
+    water: str | None = None   # of a box or a search, WKT
 
 
 class Chart(Struct, frozen=True, kw_only=True):
