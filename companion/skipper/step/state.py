@@ -89,7 +89,6 @@ class Retry:
 
 
 PATIENT = Retry()
-SAVED_AT_ONCE = 8   # points of a search's track: not every one is worth a write; what is lost is a straight line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -305,5 +304,5 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
         standing=standing_saved(state), skipped=state.skipped, set_sail_utc_s=state.set_sail_utc_s,
         inside=None if state.inside is None or state.inside.utc_s is None else (state.inside.goal, state.inside.utc_s),
-        searched=state.searched[:len(state.searched) // SAVED_AT_ONCE * SAVED_AT_ONCE], covered=state.covered,
+        searched=state.searched[:-1], covered=state.covered,   # the last point moves with her
     )

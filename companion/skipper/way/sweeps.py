@@ -18,7 +18,7 @@ from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.geo.angles import difference_rad
-from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.geometry import distance_m, leg_distance_m
 from companion.skipper.way.voyage import PointEn
 
 Sweep = tuple[PointEn, PointEn]
@@ -27,6 +27,9 @@ OVERLAP = 0.85        # of the swath: the distance between two sweeps at the mos
 SHORTEST = 0.25       # of the swath: a shorter sweep is none
 RELAID_RAD = math.radians(30.0)   # the wind has turned so far from that which the sweeps were laid for: the rest anew
 SLIVER = 0.12         # of the swath: what is narrower than twice this is no gap
+STEP = 0.25           # of the swath: between two points of a track, and ...
+STRAIGHT = 4.0        # ... this at the most where it is straight ...
+BEND = 0.03           # ... to within this
 LEAST_GAP = 0.5       # of the swath's square: what is smaller is none
 
 
@@ -105,10 +108,13 @@ def left_over(area: BaseGeometry, track: tuple[PointEn, ...], swath_m: float) ->
 
 
 def grown(track: tuple[PointEn, ...], here: PointEn, swath_m: float) -> tuple[PointEn, ...]:
-    """Return the track with one point more where it has gone far enough."""
-    if track and distance_m(track[-1], here) < 0.25 * swath_m:
+    """Return the track with one point more where it has gone far enough; straight on, in place of the last one."""
+    if track and distance_m(track[-1], here) < STEP * swath_m:
         return track
-    return (*track, (round(here[0], 1), round(here[1], 1)))
+    point = (round(here[0], 1), round(here[1], 1))
+    is_straight = len(track) > 1 and distance_m(track[-2], point) <= STRAIGHT * swath_m and (
+        leg_distance_m(track[-1], track[-2], point) <= BEND * swath_m)
+    return (*(track[:-1] if is_straight else track), point)
 
 
 def length_m(sweeps: Sequence[Sweep]) -> float:
