@@ -34,7 +34,7 @@ from companion.messages import GeoPoint
 from companion.planner.courses import courses
 from companion.plots.chart import place_words, save, scale_bar
 from companion.plots.tasks import PORT, STARBOARD, TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
-from companion.skipper.way.sweeps import Sweep, lay, length_m
+from companion.skipper.way import Sweep, length_m, sweeps_over
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -253,7 +253,7 @@ def _sweeps(
         inner = local.water(mission.margin_m)
         water = water if inner is None else shapely.intersection(water, inner)
         near = start or mission.frame().en_from_geo(goal.point)
-        out.append((goal.name or "search", lay(water, goal.search.swath_m, twd_from_rad, near)))
+        out.append((goal.name or "search", sweeps_over(water, goal.search.swath_m, twd_from_rad, near)))
     return out
 
 

@@ -10,7 +10,7 @@ import shapely
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Approach, Gate
-from companion.skipper.way.sweeps import coverage, grown, is_off, lay, left_over
+from companion.skipper.way.sweeps import coverage, grown, is_off, left_over, sweeps_over
 from companion.skipper.way.voyage import Search
 
 AT_MOST = 4          # rounds: the sweeps, and what they left; the wind's own anew are not counted
@@ -58,7 +58,7 @@ def lay_sweeps(turn: Turn, gate: Gate, *, is_shift: bool = False) -> bool:
     if not is_shift and rounds > 0 and (share >= search.coverage or rounds >= AT_MOST):
         return False
     # What lies between the margin and the shore is seen from the sweep beside it, or not at all.
-    sweeps = lay(_water(turn, search), search.swath_m, wind[0], boat)
+    sweeps = sweeps_over(_water(turn, search), search.swath_m, wind[0], boat)
     if not sweeps:
         return False
     if turn.state.pending_plan is not None:

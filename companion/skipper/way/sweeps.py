@@ -33,7 +33,7 @@ BEND = 0.03           # ... to within this
 LEAST_GAP = 0.5       # of the swath's square: what is smaller is none
 
 
-def lay(area: BaseGeometry, swath_m: float, twd_from_rad: float, near_en: PointEn) -> tuple[Sweep, ...]:
+def sweeps_over(area: BaseGeometry, swath_m: float, twd_from_rad: float, near_en: PointEn) -> tuple[Sweep, ...]:
     """Return the sweeps of an area [m], the windward ones first, each begun where the one before ended.
 
     ``near_en`` is where the boat comes from. Of several pieces the nearest is swept first. Empty: nothing is left.

@@ -11,7 +11,7 @@ from shapely import affinity
 
 from companion.geo.angles import difference_rad
 from companion.skipper.way.geometry import bearing_rad, distance_m
-from companion.skipper.way.sweeps import coverage, grown, is_off, lay, left_over, length_m
+from companion.skipper.way.sweeps import coverage, grown, is_off, left_over, length_m, sweeps_over
 
 FIELD = shapely.box(0.0, 0.0, 200.0, 100.0)
 ROCK = shapely.box(90.0, 40.0, 110.0, 60.0)
@@ -27,20 +27,20 @@ def sailed(sweeps):
 
 @given(area=shapes, wind=twd, swath=st.floats(12.0, 50.0))
 def test_every_sweep_is_a_beam_reach(area, wind, swath):
-    for a, b in lay(area, swath, wind, (0.0, 0.0)):
+    for a, b in sweeps_over(area, swath, wind, (0.0, 0.0)):
         assert abs(abs(difference_rad(bearing_rad(a, b), wind)) - math.pi / 2.0) < 0.02 or distance_m(a, b) < 2.0
 
 
 @given(area=shapes, wind=twd, swath=st.floats(12.0, 50.0))
 def test_sailed_as_they_are_laid_they_cover_most_and_lie_in_it(area, wind, swath):
-    sweeps = lay(area, swath, wind, (0.0, 0.0))
+    sweeps = sweeps_over(area, swath, wind, (0.0, 0.0))
     assert coverage(area, sailed(sweeps), swath) > 0.9   # corners beside a slanting edge are laid again
     assert all(area.buffer(0.1).covers(shapely.LineString(sweep)) for sweep in sweeps)
 
 
 @given(area=shapes, wind=twd)
 def test_each_step_leads_to_leeward_and_each_sweep_begins_at_the_near_end(area, wind):
-    sweeps = lay(area, 25.0, wind, (-500.0, 300.0))
+    sweeps = sweeps_over(area, 25.0, wind, (-500.0, 300.0))
     up = (math.sin(wind), math.cos(wind))
     heights = [a[0] * up[0] + a[1] * up[1] for a, _ in sweeps]
     assert heights == sorted(heights, reverse=True)
@@ -50,13 +50,13 @@ def test_each_step_leads_to_leeward_and_each_sweep_begins_at_the_near_end(area, 
 
 def test_round_a_rock_the_sweeps_are_cut_and_do_not_touch_it():
     water = shapely.difference(FIELD, ROCK)
-    sweeps = lay(water, 20.0, 0.0, (0.0, 0.0))
+    sweeps = sweeps_over(water, 20.0, 0.0, (0.0, 0.0))
     assert not any(shapely.LineString(s).crosses(ROCK.buffer(-0.1)) for s in sweeps)
-    assert len(sweeps) > len(lay(FIELD, 20.0, 0.0, (0.0, 0.0)))
+    assert len(sweeps) > len(sweeps_over(FIELD, 20.0, 0.0, (0.0, 0.0)))
 
 
 def test_nothing_to_search_is_no_sweeps():
-    assert lay(shapely.Polygon(), 20.0, 0.0, (0.0, 0.0)) == ()
+    assert sweeps_over(shapely.Polygon(), 20.0, 0.0, (0.0, 0.0)) == ()
 
 
 def test_what_is_left_is_what_the_track_did_not_see():
@@ -64,7 +64,7 @@ def test_what_is_left_is_what_the_track_did_not_see():
     assert coverage(FIELD, track, 20.0) == pytest.approx(0.4, abs=0.01)
     rest = left_over(FIELD, track, 20.0)
     assert rest.area == pytest.approx(12000.0, rel=0.02)
-    assert length_m(lay(rest, 20.0, 0.0, (0.0, 30.0))) == pytest.approx(800.0, rel=0.02)
+    assert length_m(sweeps_over(rest, 20.0, 0.0, (0.0, 30.0))) == pytest.approx(800.0, rel=0.02)
     assert left_over(FIELD, (*track, (0.0, 50.0), (200.0, 50.0), (200.0, 70.0), (0.0, 70.0), (0.0, 90.0),
                              (200.0, 90.0)), 20.0).is_empty
 
