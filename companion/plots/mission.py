@@ -28,13 +28,23 @@ from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, LocalArea, Mission, ZoneKind
 from companion.geofence.fence import FenceStatus, fence_for_autopilot
-from companion.geofence.mission import free_water
 from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint
 from companion.planner.courses import courses
 from companion.plots.chart import place_words, save, scale_bar
-from companion.plots.tasks import PORT, STARBOARD, TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
-from companion.skipper.way import Sweep, length_m, sweeps_over
+from companion.plots.tasks import (
+    PORT,
+    STARBOARD,
+    TASK_WATER,
+    corners_of,
+    draw_gate,
+    draw_sweeps,
+    draw_water,
+    gate_handles,
+    sweeps_of,
+    water_handle,
+)
+from companion.skipper.way import length_m
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -44,7 +54,7 @@ if TYPE_CHECKING:
 
 LAND, LAND_EDGE, SEA = "#d9cfb4", "#8d7f5a", "#eaf3f8"
 MARGIN, LIMIT, AUTOPILOT = "#f0b27a", "#34495e", "#8e44ad"
-PATH, SWEEP, START, GOAL, WIND = "#1f4e9c", "#5b2c83", "#00a3b4", "#d68910", "#1f4e79"
+PATH, START, GOAL, WIND = "#1f4e9c", "#00a3b4", "#d68910", "#1f4e79"
 
 En = tuple[float, float]
 Handle = Patch | Line2D
@@ -70,15 +80,15 @@ def save_mission(
     legs = [np.asarray(p.waypoints_en) for p in plans if p.has_path]
     places = [*([start] if start is not None else []), *goals]
     refuges = [(frame.en_from_geo(r.point), f"refuge {r.name}") for r in mission.refuges]
-    extent = _extent(local, [*places, *(place for place, _ in refuges), *_corners(mission)], legs)
+    extent = _extent(local, [*places, *(place for place, _ in refuges), *corners_of(mission)], legs)
     handles += _draw_laylines(axes, places, twd_from_rad, beat_rad, extent)
     for leg in legs:
         axes.plot(leg[:, 0], leg[:, 1], "-", color=PATH, lw=1.8, zorder=6, solid_joinstyle="round")
         axes.plot(leg[1:-1, 0], leg[1:-1, 1], "o", color=PATH, ms=3.0, zorder=6)
     if legs:
         handles.append(Line2D([], [], color=PATH, lw=1.8, label="plan in this wind, held steady"))
-    sweeps = _sweeps(mission, local, start, twd_from_rad)
-    handles += _draw_marks(axes, mission, start, goals) + _draw_sweeps(axes, sweeps)
+    sweeps = sweeps_of(mission, local, start, twd_from_rad)
+    handles += _draw_marks(axes, mission, start, goals) + draw_sweeps(axes, sweeps)
     for place, name in refuges:
         axes.plot(*place, "P", color=GOAL, ms=8, mec="black", mew=0.6, zorder=8)
         axes.annotate(name, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
@@ -224,44 +234,6 @@ def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En])
     if any(goal.box or goal.search for goal in mission.goals):
         handles.append(water_handle(TASK_WATER))
     return handles
-
-
-def _corners(mission: Mission) -> list[En]:
-    """Return what must be seen of goals that are no points: marks of gates, corners of boxes and searches."""
-    frame, out = mission.frame(), list[En]()
-    for goal in mission.goals:
-        water = goal.box or goal.search
-        if goal.gate is not None:
-            out += [frame.en_from_geo(goal.gate.port), frame.en_from_geo(goal.gate.starboard)]
-        elif water is not None:
-            west, south, east, north = polygon_en(water.shape, frame, cover=False).bounds
-            out += [(west, south), (east, north)]
-    return out
-
-
-def _sweeps(
-    mission: Mission, local: LocalArea, start: En | None, twd_from_rad: float,
-) -> list[tuple[str, tuple[Sweep, ...]]]:
-    """Return the sweeps of each search as they would be laid for this wind; under way they are for the wind then."""
-    out = []
-    for goal in mission.goals:
-        if goal.search is None:
-            continue
-        water = free_water(goal.search.shape, mission.frame(), mission.area)
-        if local.polygons:
-            water = shapely.difference(water, local.buffered(mission.margin_m))
-        inner = local.water(mission.margin_m)
-        water = water if inner is None else shapely.intersection(water, inner)
-        near = start or mission.frame().en_from_geo(goal.point)
-        out.append((goal.name or "search", sweeps_over(water, goal.search.swath_m, twd_from_rad, near)))
-    return out
-
-
-def _draw_sweeps(axes: Axes, sweeps: Sequence[tuple[str, tuple[Sweep, ...]]]) -> list[Handle]:
-    for _, laid in sweeps:
-        for a, b in laid:
-            axes.plot(*zip(a, b, strict=True), color=SWEEP, lw=1.0, zorder=6)
-    return [Line2D([], [], color=SWEEP, lw=1.0, label="sweeps in this wind")] if sweeps else []
 
 
 def _dot(colour: str, label: str) -> Line2D:

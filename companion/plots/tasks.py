@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,10 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from companion.geo.angles import heading_of, unit_en
+from companion.geofence import LocalArea, Mission
+from companion.geofence.mission import free_water
+from companion.geofence.shapes import polygon_en
+from companion.skipper.way import Sweep, sweeps_over
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,3 +68,44 @@ def water_handle(label: str) -> Line2D:
     from matplotlib.lines import Line2D
 
     return Line2D([], [], color=LINE, lw=1.3, marker="s", mfc="none", label=label)
+
+
+def corners_of(mission: Mission) -> list[En]:
+    """Return what must be seen of goals that are no points: marks of gates, corners of boxes and searches."""
+    frame, out = mission.frame(), list[En]()
+    for goal in mission.goals:
+        water = goal.box or goal.search
+        if goal.gate is not None:
+            out += [frame.en_from_geo(goal.gate.port), frame.en_from_geo(goal.gate.starboard)]
+        elif water is not None:
+            west, south, east, north = polygon_en(water.shape, frame, cover=False).bounds
+            out += [(west, south), (east, north)]
+    return out
+
+
+def sweeps_of(
+    mission: Mission, local: LocalArea, start: En | None, twd_from_rad: float,
+) -> list[tuple[str, tuple[Sweep, ...]]]:
+    """Return the sweeps of each search as they would be laid for this wind; under way they are for the wind then."""
+    out = []
+    for goal in mission.goals:
+        if goal.search is None:
+            continue
+        water = free_water(goal.search.shape, mission.frame(), mission.area)
+        if local.polygons:
+            water = shapely.difference(water, local.buffered(mission.margin_m))
+        inner = local.water(mission.margin_m)
+        water = water if inner is None else shapely.intersection(water, inner)
+        near = start or mission.frame().en_from_geo(goal.point)
+        out.append((goal.name or "search", sweeps_over(water, goal.search.swath_m, twd_from_rad, near)))
+    return out
+
+
+def draw_sweeps(axes: Axes, sweeps: Sequence[tuple[str, tuple[Sweep, ...]]]) -> list[Line2D]:
+    """Draw sweeps; return the legend's handles."""
+    from matplotlib.lines import Line2D
+
+    for _, laid in sweeps:
+        for a, b in laid:
+            axes.plot(*zip(a, b, strict=True), color=LINE, lw=1.0, zorder=6)
+    return [Line2D([], [], color=LINE, lw=1.0, label="sweeps in this wind")] if sweeps else []
