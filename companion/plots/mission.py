@@ -88,7 +88,7 @@ def save_mission(
     if legs:
         handles.append(Line2D([], [], color=PATH, lw=1.8, label="plan in this wind, held steady"))
     sweeps = sweeps_of(mission, local, start, twd_from_rad)
-    handles += _draw_marks(axes, mission, start, goals) + draw_sweeps(axes, sweeps)
+    handles += [*_draw_marks(axes, mission, start, goals), *draw_sweeps(axes, sweeps)]
     for place, name in refuges:
         axes.plot(*place, "P", color=GOAL, ms=8, mec="black", mew=0.6, zorder=8)
         axes.annotate(name, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
