@@ -8,7 +8,10 @@ from typing import Any
 
 from companion.boat import Boat, Hull, Polar, ardurover_sitl, constant, read_polar
 from companion.errors import InputError
+from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
+from companion.geofence.mission import Gate, free_water
+from companion.geofence.shapes import polygon_en
 from companion.orders import ALL, Verb, unknown
 from companion.skipper.step import (
     CHOICES,
@@ -21,7 +24,7 @@ from companion.skipper.step import (
     SafeEnd,
     SkipperConfig,
 )
-from companion.skipper.way import Goal, Refuge, Side, Voyage
+from companion.skipper.way import Box, Goal, Line, Refuge, Search, Side, Voyage
 from companion.traffic import TargetLimits
 from companion.traffic.feeds import parse_feed
 from companion.wind import Estimator, make
@@ -69,7 +72,12 @@ def voyage_of(mission: Mission) -> Voyage:
         Goal(
             en_m=frame.en_from_geo(g.point), radius_m=g.radius_m, name=g.name, side=_SIDES[g.rounding],
             rounding_m=max(g.radius_m, mission.margin_m) if g.rounding else 12.0,
-            bandwidth_m=mission.skipper.bandwidth_m,
+            bandwidth_m=mission.skipper.bandwidth_m, line=_line(g.gate, frame),
+            box=None if g.box is None else Box(
+                area_en=polygon_en(g.box.shape, frame, cover=False), for_s=g.box.for_s),
+            search=None if g.search is None else Search(
+                area_en=free_water(g.search.shape, frame, mission.area), swath_m=g.search.swath_m,
+                coverage=g.search.coverage),
         )
         for g in mission.goals
     )
@@ -79,6 +87,14 @@ def voyage_of(mission: Mission) -> Voyage:
         refuges=tuple(
             Refuge(name=r.name, en_m=frame.en_from_geo(r.point), radius_m=r.radius_m) for r in mission.refuges),
     )
+
+
+def _line(gate: Gate | None, frame: LocalFrame) -> Line | None:
+    if gate is None:
+        return None
+    return Line(
+        port_en_m=frame.en_from_geo(gate.port), starboard_en_m=frame.en_from_geo(gate.starboard), keep_m=gate.keep_m,
+        not_before_s=gate.not_before_s, after_s=gate.after_s)
 
 
 def config_of(mission: Mission) -> SkipperConfig:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
 from companion.errors import InputError
 from companion.geofence import Mission
-from companion.geofence.mission import AreaOptions
+from companion.geofence.mission import AreaOptions, kind_of
 
 
 def require_sailable(mission: Mission) -> Mission:
@@ -39,6 +39,11 @@ def _require_consistent(mission: Mission, source: str) -> None:
         raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" steers in GUIDED, which nobody allows',
                          f"write {' and '.join(f'{key} = true' for key in missing)} in [operator], "
                          'or guidance = "plan"')
+    kinds = [(n, kind_of(goal)) for n, goal in enumerate(mission.options.goal, start=1)]
+    task = next(((n, kind) for n, kind in kinds if kind != "point"), None)
+    if skipper.guidance != "plan" and task is not None:
+        raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" knows nothing of the {task[1]}, [[goal]] '
+                         f"{task[0]}", 'write guidance = "plan"')
     if skipper.max_replan_s is not None and skipper.max_replan_s < skipper.min_replan_s:
         raise InputError(source, "[skipper] max_replan_s",
                          f"{skipper.max_replan_s:g} s is less than min_replan_s, {skipper.min_replan_s:g} s",

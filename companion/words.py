@@ -39,8 +39,12 @@ def file_name(name: str) -> str:
 def choices(kind: Any, path: str) -> tuple[str, ...]:
     """Return the words that an option may be: of the struct ``kind``, at msgspec's path (``$.skipper.end``)."""
     for key in re.findall(r"\.(\w+)", path):
-        hints = get_type_hints(kind)
-        kind = next((part for part in (hints[key], *get_args(hints[key])) if isinstance(part, type)
-                     and issubclass(part, msgspec.Struct)), hints[key])
+        structs = [part for part in _parts(kind) if isinstance(part, type) and issubclass(part, msgspec.Struct)]
+        kind = next((hints[key] for hints in map(get_type_hints, structs) if key in hints), None)
     words = [word for part in (kind, *get_args(kind)) if get_origin(part) is Literal for word in get_args(part)]
     return tuple(words)
+
+
+def _parts(kind: Any) -> list[Any]:
+    """Return a type and what it is made of: the members of unions, the items of tuples, and theirs."""
+    return [kind, *(part for inner in get_args(kind) for part in _parts(inner))]

@@ -350,6 +350,8 @@ class _Shell:
             **self.log.figures.to_dict(),
             "goals_reached": min(goals, len(state.reached)),
             "goals": goals,
+            "searched": [{"goal": self.voyage.legs[goal].name or f"goal {goal + 1}", "covered": share}
+                         for goal, share in state.covered if goal < goals],
             "end_phase": state.phase.value,
             "end_reason": self.end_reason,
             "end_why": state.why,

@@ -8,7 +8,8 @@ from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Document
 from companion.geofence.findings import Code, Finding, Severity
 from companion.geofence.formats.registry import read
-from companion.geofence.mission.mission import Goal, Mission, load_mission
+from companion.geofence.mission.goals import Goal
+from companion.geofence.mission.mission import Mission, load_mission
 from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
 
 __all__ = [

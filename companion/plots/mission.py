@@ -32,6 +32,19 @@ from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint
 from companion.planner.courses import courses
 from companion.plots.chart import place_words, save, scale_bar
+from companion.plots.tasks import (
+    PORT,
+    STARBOARD,
+    TASK_WATER,
+    corners_of,
+    draw_gate,
+    draw_sweeps,
+    draw_water,
+    gate_handles,
+    sweeps_of,
+    water_handle,
+)
+from companion.skipper.way import length_m
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -41,7 +54,7 @@ if TYPE_CHECKING:
 
 LAND, LAND_EDGE, SEA = "#d9cfb4", "#8d7f5a", "#eaf3f8"
 MARGIN, LIMIT, AUTOPILOT = "#f0b27a", "#34495e", "#8e44ad"
-PORT, STARBOARD, PATH, START, GOAL, WIND = "#c0392b", "#1e8449", "#1f4e9c", "#00a3b4", "#d68910", "#1f4e79"
+PATH, START, GOAL, WIND = "#1f4e9c", "#00a3b4", "#d68910", "#1f4e79"
 
 En = tuple[float, float]
 Handle = Patch | Line2D
@@ -67,21 +80,24 @@ def save_mission(
     legs = [np.asarray(p.waypoints_en) for p in plans if p.has_path]
     places = [*([start] if start is not None else []), *goals]
     refuges = [(frame.en_from_geo(r.point), f"refuge {r.name}") for r in mission.refuges]
-    extent = _extent(local, [*places, *(place for place, _ in refuges)], legs)
+    extent = _extent(local, [*places, *(place for place, _ in refuges), *corners_of(mission)], legs)
     handles += _draw_laylines(axes, places, twd_from_rad, beat_rad, extent)
     for leg in legs:
         axes.plot(leg[:, 0], leg[:, 1], "-", color=PATH, lw=1.8, zorder=6, solid_joinstyle="round")
         axes.plot(leg[1:-1, 0], leg[1:-1, 1], "o", color=PATH, ms=3.0, zorder=6)
     if legs:
         handles.append(Line2D([], [], color=PATH, lw=1.8, label="plan in this wind, held steady"))
-    handles += _draw_marks(axes, mission, start, goals)
+    sweeps = sweeps_of(mission, local, start, twd_from_rad)
+    handles += [*_draw_marks(axes, mission, start, goals), *draw_sweeps(axes, sweeps)]
     for place, name in refuges:
         axes.plot(*place, "P", color=GOAL, ms=8, mec="black", mew=0.6, zorder=8)
         axes.annotate(name, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
     if refuges:
         handles.append(Line2D([], [], ls="", marker="P", color=GOAL, ms=8, mec="black", mew=0.6, label="refuge"))
     _finish(axes, extent, twd_from_rad, tws_mps, handles)
-    words = _words(mission, plans)
+    words = _words(mission, plans) + [
+        f"{name}: {counted(len(laid), 'sweep')}, {length_m(laid):.0f} m, beside the time of the way there"
+        for name, laid in sweeps]
     subtitle = words[0] if words else mission.options.description
     where = place_words(mission.origin.lat_deg, mission.origin.lon_deg)
     figure.suptitle(f"{mission.name}   ·   {where}\n{subtitle}", fontsize=10, x=0.1, ha="left")
@@ -196,15 +212,27 @@ def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En])
         axes.annotate("start", start, xytext=(7, -10), textcoords="offset points", fontsize=8, zorder=9)
         handles.append(_dot(START, "start"))
     for index, (place, goal) in enumerate(zip(goals, mission.goals, strict=True)):
+        name = goal.name or (f"goal {index + 1}" if len(goals) > 1 else "goal")
+        if goal.gate is not None:
+            draw_gate(axes, mission.frame().en_from_geo(goal.gate.port), mission.frame().en_from_geo(
+                goal.gate.starboard), name)
+            continue
+        water = goal.box or goal.search
+        if water is not None:
+            draw_water(axes, polygon_en(water.shape, mission.frame(), cover=False), name)
+            continue
         colour = {"port": PORT, "starboard": STARBOARD}.get(goal.rounding or "", GOAL)
         axes.add_patch(Disc(place, goal.radius_m, fc="none", ec=colour, lw=1.3, zorder=7))
         axes.plot(*place, "o", color=colour, ms=6, mec="black", mew=0.6, zorder=8)
-        name = goal.name or (f"goal {index + 1}" if len(goals) > 1 else "goal")
         text = f"{name}\nleave to {goal.rounding}" if goal.rounding else name
         axes.annotate(text, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
     for side, colour in (("", GOAL), ("port", PORT), ("starboard", STARBOARD)):
-        if any((goal.rounding or "") == side for goal in mission.goals):
+        if any((goal.rounding or "") == side and not (goal.gate or goal.box or goal.search) for goal in mission.goals):
             handles.append(_dot(colour, f"mark to leave to {side}" if side else "goal and its radius"))
+    if any(goal.gate is not None for goal in mission.goals):
+        handles += gate_handles()
+    if any(goal.box or goal.search for goal in mission.goals):
+        handles.append(water_handle(TASK_WATER))
     return handles
 
 
@@ -276,7 +304,7 @@ def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
     if len(out) > 1 and all(p.has_path for p in plans):
         out.insert(0, f"{sum(p.cost_s for p in plans):.0f} s to all {min(len(plans), len(mission.goals))} goals"
                    + (" and home" if len(plans) > len(mission.goals) else ""))
-    if plans and any(g.rounding for g in mission.goals):
+    if plans and any(g.rounding or g.gate for g in mission.goals):
         out.append("the preview sails to the marks; on which side they are left is the skipper's part")
     return out
 

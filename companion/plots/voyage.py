@@ -15,6 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.plots.chart import date_words, legend_above, legend_below, place_words, save, scale_bar
+from companion.plots.tasks import TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
 from companion.telemetry.folder import Chart, RecordedPlan, VoyageRecord
 from companion.words import counted
 
@@ -125,11 +126,22 @@ def _goals(axes: Any, chart: Chart) -> None:
     from matplotlib.patches import Circle
 
     for number, goal in enumerate(chart.goals, start=1):
-        axes.add_patch(Circle((goal.x, goal.y), goal.radius_m, facecolor=GOAL, edgecolor="black", alpha=0.8, zorder=4))
         name = goal.name or (f"goal {number}" if len(chart.goals) > 1 else "goal")
+        if goal.line is not None:
+            draw_gate(axes, goal.line[0], goal.line[1], name)
+            continue
+        if goal.water is not None:
+            draw_water(axes, shapely.from_wkt(goal.water), name)
+            continue
+        axes.add_patch(Circle((goal.x, goal.y), goal.radius_m, facecolor=GOAL, edgecolor="black", alpha=0.8, zorder=4))
         side = f", leave to {goal.side}" if goal.side != "none" else ""
         axes.annotate(name + side, (goal.x, goal.y), xytext=(9, 7), textcoords="offset points", zorder=8)
-    if chart.goals:
+    if any(goal.line is not None for goal in chart.goals):
+        for handle in gate_handles():
+            axes.add_line(handle)   # nothing of it is drawn: it stands in the legend
+    if any(goal.water is not None for goal in chart.goals):
+        axes.add_line(water_handle(TASK_WATER))
+    if any(goal.line is None and goal.water is None for goal in chart.goals):
         axes.plot([], [], "o", color=GOAL, markeredgecolor="black", markersize=8, label="goal and its radius")
 
 

@@ -9,8 +9,10 @@ from companion.messages import Mode, StatusText
 from companion.skipper.board.uploads import take_upload
 from companion.skipper.deeds.failsafe import note
 from companion.skipper.deeds.helm import MOTOR_OFF, MOTOR_ON
+from companion.skipper.passing import pass_gates
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.errands import errand
+from companion.skipper.planning.waits import utc_s
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.snapshot import (
@@ -25,8 +27,8 @@ from companion.skipper.step.snapshot import (
 )
 from companion.skipper.step.state import PATIENT, Fix, Phase
 from companion.skipper.step.turn import FRESH_S, Turn
-from companion.skipper.way.gates import Gate, again, bearing_on, is_on_wrong_side
-from companion.skipper.way.geometry import distance_m, leg_distance_m, waypoint_done
+from companion.skipper.way.gates import bearing_on
+from companion.skipper.way.geometry import distance_m, waypoint_done
 
 HISTORY_STEP_S = 10.0
 HISTORY_KEPT = 19            # 180 s and the present
@@ -110,6 +112,9 @@ def count_time(turn: Turn) -> None:
     sails = state.sailing and not state.over and status is not None and status.is_armed
     passed_s = turn.t_s - state.last_step_s if sails and math.isfinite(state.last_step_s) else 0.0
     turn.update(under_way_s=state.under_way_s + max(0.0, passed_s), last_step_s=turn.t_s)
+    now_s = utc_s(turn)
+    if sails and state.set_sail_utc_s is None and now_s is not None:
+        turn.update(set_sail_utc_s=round(now_s - turn.state.under_way_s, 1))
 
 
 def locate(turn: Turn) -> None:
@@ -130,7 +135,7 @@ def locate(turn: Turn) -> None:
         _own_count(turn)
         if guided:
             turn.update(index=min(turn.state.own_index, len(route.items) - 1), passed_since_s=None)
-        _pass_gates(turn)
+        pass_gates(turn)
         if guided and turn.config.guidance is Guidance.FIELD and turn.state.route is not None:
             # Steered to the gates themselves: the waypoints before a gate that is passed need not be.
             done = [n + 1 for n, g in enumerate(route.gate_of) if 0 <= g < turn.state.gate]
@@ -182,71 +187,6 @@ def _own_count(turn: Turn) -> None:
     lags = own > turn.state.index
     since = turn.state.passed_since_s if turn.state.passed_since_s is not None else turn.t_s
     turn.update(own_index=own, passed_since_s=since if lags else None)
-
-
-def _pass_gates(turn: Turn) -> None:
-    """Count the gates passed: by being there, or by the autopilot's count."""
-    boat = turn.boat_en
-    if boat is None:
-        return
-    _approach(turn)
-    while turn.gate is not None and turn.state.route is not None:
-        gate, number = turn.gate, turn.state.gate
-        left = distance_m(boat, gate.en_m)
-        counted = number in turn.state.route.gate_of[: turn.state.index]
-        near = max(gate.radius_m, turn.config.grid_size_m)
-        if not (turn.state.closest_m <= gate.radius_m or (counted and left <= near and not _is_last(turn))
-                or _is_near_enough(turn, gate, counted)):
-            if counted and left > near and not _is_last(turn):
-                # The autopilot has left it behind and we were never near.
-                turn.void_route()
-                _missed(turn)
-            return
-        if is_on_wrong_side(gate, turn.state.bearing_rad):
-            turn.approach(again(gate, boat, turn.state.bearing_rad))
-            _missed(turn)
-            turn.say(Severity.WARNING, "buoy missed", f"{gate.name} was left on the wrong side: again", every_s=0.0)
-            return
-        closest = turn.state.closest_m
-        reached = (*turn.state.reached, gate.goal) if gate.ends_goal else turn.state.reached
-        turn.update(gate=number + 1, reached=reached, closest_m=math.inf)
-        if gate.ends_goal:
-            turn.update(bearing_rad=0.0)
-            turn.say(Severity.NOTICE, "goal", f"{gate.name} reached, {min(left, closest):.1f} m from it", every_s=0.0)
-
-
-def _approach(turn: Turn) -> None:
-    """Keep the smallest distance to the gate, between the last fix and this one too."""
-    boat, gate, last = turn.boat_en, turn.gate, turn.state.last_seen
-    if boat is None or gate is None:
-        return
-    way = distance_m(boat, gate.en_m)
-    if last is not None and turn.t_s - last.t_s <= 2.0 + FRESH_S and not turn.is_raised("position jump"):
-        way = min(way, leg_distance_m(gate.en_m, last.en_m, boat))
-    turn.update(closest_m=min(turn.state.closest_m, way))
-
-
-def _is_near_enough(turn: Turn, gate: Gate, counted: bool) -> bool:
-    """Return whether the last goal counts as reached although its radius was not: Büsser's grid size, and no better.
-
-    The boat has been at the waypoint by the autopilot's count and loiters in the mission's safe end.
-    """
-    route = turn.state.route
-    if route is None or not counted or not _is_last(turn) or turn.state.closest_m > turn.config.grid_size_m:
-        return False
-    at_end = turn.state.index >= len(route.items) - 1
-    return at_end and (distance_m(route.points_en_m[-1], gate.en_m) > gate.radius_m or turn.is_raised("mission ended"))
-
-
-def _is_last(turn: Turn) -> bool:
-    return turn.state.gate == len(turn.gates) - 1
-
-
-def _missed(turn: Turn) -> None:
-    """Have the gate that is next planned for from where the boat is; what is being planned was for another."""
-    if turn.state.pending_plan is not None:
-        turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
-    turn.update(missed=turn.state.missed + 1, missed_s=turn.t_s, pending_plan=None)
 
 
 def _remember(turn: Turn) -> None:

@@ -63,7 +63,8 @@ class Skipper:
             return SkipperState(why="the saved state is of another voyage", known=(*known, *persisted.names))
         return SkipperState(
             adoptable=persisted, known=known, under_way_s=persisted.under_way_s, arrived=persisted.arrived,
-            uid=persisted.uid, system=persisted.system, standing=persisted.standing, skipped=persisted.skipped)
+            uid=persisted.uid, system=persisted.system, standing=persisted.standing, skipped=persisted.skipped,
+            set_sail_utc_s=persisted.set_sail_utc_s)
 
     def fits(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage."""

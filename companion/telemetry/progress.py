@@ -125,6 +125,8 @@ def progress_text(step: Step, next_tack_s: float | None) -> str:
             parts.append(f"next tack {next_tack_s:.0f} s")
         if autopilot is not None and autopilot.cross_track_m is not None:
             parts.append(f"xt {autopilot.cross_track_m:+.1f} m")
+    if state.task:
+        parts.append(state.task)
     if state.standing is not None:
         minutes = state.standing.age_s(snapshot.t_s) / 60.0
         parts.append(f"order {state.standing.words} of {state.standing.by}, {minutes:.0f} min")

@@ -33,7 +33,7 @@ from companion.skipper.deeds import CALL
 from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.scene import Others, Scenario, Verdict, free_port, is_all_ordinary, judge, own_polar, scenario_wind
+from sitl.scene import Others, Scenario, Verdict, free_port, is_all_ordinary, judge, own_polar, scenario_wind, tasks_of
 from sitl.trouble import KEY, FragilePlanner, MortalPlanner, Observer, Satellite, World, channel, happen
 
 TRUTH_EVERY_S = 0.25
@@ -158,7 +158,7 @@ async def run_embedded(
         called_at_s=world.called_at_s, ordered=world.ordered if world.neighbours else None,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
         status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
-        **ends_of(mission),
+        tasks=tasks_of(mission, scenario.epoch_s), **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict

@@ -187,6 +187,12 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     end_phase: str | None = None
     alerts: tuple[str, ...] = ()              # announced at least once, by code
     marks_rounded: int | None = None           # in order, each on its side
+    gates_crossed: int | None = None           # in order, each in its direction, laps counted
+    marks_clear_m: float = 1.0                 # of the gates: what the boat's position keeps clear of them
+    start_within_s: float | None = None        # after the gun, and not before it
+    inside_s: float | None = None              # each box is not left for so long after she came in ...
+    inside_share: float = 0.98                 # ... but for the rest of this share of the time
+    seen: float | None = None                  # share of the water of each search, within half a swath of the track
     called_s: float | None = None              # the crew is called to the anchor this long before a contact
 
 

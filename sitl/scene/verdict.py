@@ -19,6 +19,8 @@ from companion.boat import Hull
 from sitl.scene.clearance import HullTrack
 from sitl.scene.scenario import ExpectSpec
 from sitl.scene.scores import station_score
+from sitl.scene.tasks import Tasks
+from sitl.scene.tasks import findings as task_findings
 
 # A call to the anchor is for what comes within this time [s].
 CALL_HOLDS_S = 600.0
@@ -186,13 +188,14 @@ def judge(
     called_at_s: Sequence[float] | None = None,
     ordered: Sequence[int] | None = None,
     began_s: float = 0.0,
+    tasks: Tasks | None = None,
 ) -> Verdict:
     """Hold a run against what its scenario expects.
 
     ``hull`` is what touches. ``floor_m`` is the mission's, which the hull must keep in ordinary weather; None: not
     asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
     ``ordered`` are the systems of other autopilots that were given orders, None where there was no other. The
-    scenario's beginning is ``began_s`` in the track's time.
+    scenario's beginning is ``began_s`` in the track's time; ``tasks`` are the mission's.
     """
     ends = {"goal": [goal_en_m], "home": truth.en_m[:1], "refuge": refuges_en_m}[expect.ends_at]
     positions = truth.positions_m()
@@ -263,6 +266,8 @@ def judge(
     if expect.marks_rounded is not None:
         rounded = count_roundings(positions, marks)
         check("marks rounded", rounded == expect.marks_rounded, rounded, expect.marks_rounded)
+    for finding in task_findings(expect, tasks or Tasks(), truth.t_s, positions, seen):
+        check(*finding)
     if expect.called_s is not None and called_at_s is not None:
         ahead_s = [max((truth.t_s[i] - t for t in called_at_s if 0.0 <= truth.t_s[i] - t <= CALL_HOLDS_S), default=0.0)
                    for i in touches]

@@ -2,6 +2,7 @@
 
 import argparse
 import ast
+import datetime as dt
 import inspect
 import tomllib
 from dataclasses import fields
@@ -15,6 +16,7 @@ from companion import cli
 from companion.commands.doctor import needs_of
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
 from companion.geofence import load_mission
+from companion.geofence.mission.goal_options import KINDS
 from companion.geofence.mission.options import tables
 from companion.skipper.step.config import Permissions
 from companion.skipper.watch.watchdogs import TABLE
@@ -52,9 +54,25 @@ ROCK = "POLYGON ((-1.3110 50.8180, -1.3105 50.8180, -1.3105 50.8183, -1.3110 50.
 FENCE = "POLYGON ((-1.32 50.81, -1.30 50.81, -1.30 50.83, -1.32 50.83, -1.32 50.81))"
 POINT = "POINT (-1.3060 50.8175)"
 
+# Of the kinds of goal that are no point: each in a goal of its own, behind the mission's.
+TASKS = {
+    "gate": {"kind": "gate", "port_mark": {"lat": 50.8200, "lon": -1.3090},
+             "starboard_mark": {"lat": 50.8200, "lon": -1.3080}, "mark_radius_m": 6.0, "after_s": 300.0},
+    "box": {"kind": "box", "polygon": "POLYGON ((-1.309 50.820, -1.308 50.820, -1.308 50.821, -1.309 50.820))"},
+    "search": {"kind": "search", "swath_m": 20.0,
+               "polygon": "POLYGON ((-1.309 50.820, -1.308 50.820, -1.308 50.821, -1.309 50.820))"},
+}
+TASK_KEYS = {
+    "kind": "gate", "port_mark": {"lat": 50.8200, "lon": -1.3092}, "starboard_mark": {"lat": 50.8200, "lon": -1.3078},
+    "polygon": "POLYGON ((-1.309 50.820, -1.3081 50.820, -1.3081 50.821, -1.309 50.820))", "for_s": 60.0,
+    "swath_m": 30.0, "coverage": 0.5,
+    "mark_radius_m": 8.0, "after_s": 400.0, "not_before": dt.datetime(2026, 11, 21, 12, tzinfo=dt.UTC),
+}
+
 # Every key with another value than the mission's or its default.
 OTHER = {
-    "goal": {"lat": 50.8189, "lon": -1.3099, "radius_m": 30.0, "rounding": "starboard", "name": "other"},
+    "goal": {"lat": 50.8189, "lon": -1.3099, "radius_m": 30.0, "rounding": "starboard", "name": "other",
+             **TASK_KEYS},
     "refuge": {"lat": 50.8173, "lon": -1.3091, "radius_m": 25.0, "name": "cove"},
     "start": {"lat": 50.8171, "lon": -1.3101, "heading_deg": 200.0},
     "area": {"obstacles": ["point.wkt"], "fence": "fence.wkt", "axis": "latlon", "margin_m": 14.0,
@@ -97,7 +115,14 @@ def mission(path, table="", key="", value=None):
         raw["area"]["obstacles"] = ["point.wkt"]
     if (table, key) == ("area", "axis"):
         (path / "point.wkt").write_text("POINT (50.8175 -1.3060)")
-    if table:
+    if table == "goal" and key in TASK_KEYS:
+        raw["goal"].append(dict(TASKS[value if key == "kind" else kind_with(key)]))
+        if key == "not_before":
+            del raw["goal"][-1]["after_s"]
+        raw["goal"][-1][key] = value
+    elif table == "goal-kind":
+        raw["goal"].append(dict(TASKS[key]))
+    elif table:
         place = raw[table][0] if table in {"goal", "refuge"} else raw.setdefault(table, {})
         place[key] = value
     elif key:
@@ -106,7 +131,13 @@ def mission(path, table="", key="", value=None):
     return load_mission(path / "m.toml")
 
 
+def kind_with(key):
+    return next(kind for kind, options in KINDS.items() if kind != "point" and key in options.__struct_fields__)
+
+
 def base_for(path, table, key):
+    if table == "goal" and key in TASK_KEYS and key != "kind":
+        return mission(path, "goal-kind", kind_with(key))
     if table == "area" and key == "point_radius_m":
         return mission(path, "area", "obstacles", ["point.wkt"])
     return mission(path)

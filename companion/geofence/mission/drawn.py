@@ -16,8 +16,9 @@ from companion.geofence.formats.losses import Written
 from companion.geofence.formats.qgc_plan import read_plan, write_plan
 from companion.geofence.formats.rings import Findings
 from companion.geofence.mission.course import REDRAW, course_of
+from companion.geofence.mission.goal_options import PointOptions
 from companion.geofence.mission.mission import Mission, assembled, place_troubles
-from companion.geofence.mission.options import GoalOptions, MissionOptions, RefugeOptions
+from companion.geofence.mission.options import MissionOptions, RefugeOptions
 from companion.geofence.shapes import ZoneKind
 from companion.messages import GeoPoint, MissionItem
 from companion.words import counted
@@ -86,7 +87,7 @@ def drawn_mission(document: Document, settings: MissionOptions, path: Path, plan
         return Drawn(mission=None, refusals=tuple(refusals))
     options = msgspec.structs.replace(
         settings, name=f"{settings.name or NO_NAME} {tag(document)}", from_autopilot=True,
-        goal=tuple(GoalOptions(lat=s.point.lat_deg, lon=s.point.lon_deg, name=f"item {s.number}")
+        goal=tuple(PointOptions(lat=s.point.lat_deg, lon=s.point.lon_deg, name=f"item {s.number}")
                    for s in course.stops),
         refuge=(*settings.refuge, *(RefugeOptions(
             lat=r.point.lat_deg, lon=r.point.lon_deg, name=f"rally {n}")

@@ -10,10 +10,10 @@ from companion.geofence.findings import Finding, Severity
 from companion.geofence.formats.losses import Losses, Written
 from companion.geofence.formats.registry import write
 from companion.geofence.mission.course import course_of
+from companion.geofence.mission.goal_options import PointOptions
 from companion.geofence.mission.mission import Mission
 from companion.geofence.mission.options import (
     AreaOptions,
-    GoalOptions,
     MissionOptions,
     RefugeOptions,
     SkipperOptions,
@@ -41,6 +41,10 @@ def goal_losses(mission: Mission) -> Losses:
     losses = Losses()
     if any(g.rounding for g in mission.goals):
         losses.add(Severity.WARNING, "the side on which marks are left is not carried by this format")
+    if any(g.gate is not None for g in mission.goals):
+        losses.add(Severity.WARNING, "of a gate only the middle between its marks is carried by this format")
+    if any(g.box or g.search for g in mission.goals):
+        losses.add(Severity.WARNING, "of a box or a search only its roomiest place is carried by this format")
     plain = replace_defaults(mission.options)
     if plain:
         losses.add(Severity.NOTE, f"the mission's own settings ({', '.join(plain)}) are not carried by this format")
@@ -91,12 +95,12 @@ def mission_files(
         losses.add(Severity.WARNING if is_loss else Severity.NOTE,
                    f"{finding.place}: {finding.text}" + (": not carried over" if is_loss else ""))
     names = document.item_names or ("",) * len(document.items)
-    goal_options = [GoalOptions(lat=g.lat_deg, lon=g.lon_deg) for g in goals] or [
-        GoalOptions(lat=s.point.lat_deg, lon=s.point.lon_deg, name=names[s.number - 1]) for s in course.stops]
+    goal_options = [PointOptions(lat=g.lat_deg, lon=g.lon_deg) for g in goals] or [
+        PointOptions(lat=s.point.lat_deg, lon=s.point.lon_deg, name=names[s.number - 1]) for s in course.stops]
     if not goal_options:
         raise ValueError("there is no goal: give --goal, or draw waypoints")
     if radius_m is not None:
-        goal_options = [GoalOptions(lat=g.lat, lon=g.lon, name=g.name, radius_m=radius_m) for g in goal_options]
+        goal_options = [PointOptions(lat=g.lat, lon=g.lon, name=g.name, radius_m=radius_m) for g in goal_options]
     home = start or document.home
     whole = replace(document, zones=(*document.zones, *(land.zones if land else ())),
                     marks=(*document.marks, *(land.marks if land else ())))

@@ -16,6 +16,7 @@ from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Document
 from companion.geofence.findings import Finding, Severity
 from companion.geofence.formats.registry import read
+from companion.geofence.mission.goals import Gate, Goal, GoalReader, RefugePoint, refuges_of
 from companion.geofence.mission.names import called, name_findings
 from companion.geofence.mission.options import (
     AreaOptions,
@@ -23,7 +24,6 @@ from companion.geofence.mission.options import (
     BoatOptions,
     MissionOptions,
     OperatorOptions,
-    RefugeOptions,
     RiskOptions,
     SafetyOptions,
     SkipperOptions,
@@ -35,25 +35,6 @@ from companion.geofence.shapes import Obstacle, Zone, ZoneKind
 from companion.messages import GeoPoint
 
 RANGE_M = 50_000.0  # the frame is below 1 m wrong to here; what lies farther off is a mistake
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Goal:
-    """A mark: reached inside ``radius_m``; ``rounding`` says which side of the boat it is left to."""
-
-    point: GeoPoint
-    radius_m: float
-    rounding: str | None = None
-    name: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RefugePoint:
-    """A safe place to wait in: there inside ``radius_m``."""
-
-    point: GeoPoint
-    radius_m: float
-    name: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,8 +176,8 @@ def assembled(options: MissionOptions, path: Path, drawn: Document | None = None
 
     The zones of ``drawn`` belong to its area. Whether its places lie in free water is not looked at. Raises InputError.
     """
-    place = options.start or options.goal[0]
-    origin = GeoPoint(lat_deg=place.lat, lon_deg=place.lon)
+    reader = GoalReader(path=path, axis=options.area.axis)
+    origin = reader.origin_of(options)
     area, findings = load_area(options.area, path, origin)
     if drawn is not None:
         limits = tuple(z for z in drawn.zones if z.kind is ZoneKind.INCLUSION)
@@ -204,23 +185,15 @@ def assembled(options: MissionOptions, path: Path, drawn: Document | None = None
                     fence=Fence(zones=(*area.fence.zones, *limits)))
     mission = Mission(
         options=options,
-        goals=tuple(
-            Goal(point=GeoPoint(lat_deg=g.lat, lon_deg=g.lon), radius_m=g.radius_m, rounding=g.rounding, name=g.name)
-            for g in options.goal
-        ),
+        goals=reader.goals_of(options, area),
         start=GeoPoint(lat_deg=options.start.lat, lon_deg=options.start.lon) if options.start else None,
         area=area, path=path, findings=(*name_findings(options.name, path), *findings),
-        refuges=tuple(_refuge(r, n) for n, r in enumerate(options.refuge)),
+        refuges=refuges_of(options),
     )
     if mission.polar_path is not None:
         _require(mission.polar_path, str(path), "[boat] polar",
                  'write a file beside the mission, "ardurover" or a speed in m/s')
     return mission
-
-
-def _refuge(refuge: RefugeOptions, number: int) -> RefugePoint:
-    point = GeoPoint(lat_deg=refuge.lat, lon_deg=refuge.lon)
-    return RefugePoint(point=point, radius_m=refuge.radius_m, name=refuge.name or f"{number + 1}")
 
 
 def _require(path: Path, source: str, place: str, remedy: str) -> None:
@@ -283,6 +256,10 @@ def place_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
         if problem:
             yield (place, f"{point.lat_deg:.6f}, {point.lon_deg:.6f} {problem}",
                    "move it into free water or correct the area's files")
+    for number, goal in enumerate(mission.goals, start=1):
+        problem = "" if goal.gate is None else gate_trouble(goal.gate, frame, local, mission.margin_floor_m)
+        if problem:
+            yield f"[[goal]] {number}", problem, "move its marks into free water or correct the area's files"
 
 
 def trouble_at(local: LocalArea, point_en: tuple[float, float]) -> str:
@@ -294,3 +271,16 @@ def trouble_at(local: LocalArea, point_en: tuple[float, float]) -> str:
     if local.limits is not None and not shapely.covers(local.limits, point):
         return "is outside the fence"
     return ""
+
+
+def gate_trouble(gate: Gate, frame: LocalFrame, local: LocalArea, floor_m: float) -> str:
+    """Return why a gate cannot be sailed through ("" when it can): what stands nearer to its opening than the floor."""
+    marks = np.asarray([frame.en_from_geo(gate.port), frame.en_from_geo(gate.starboard)])
+    share = gate.keep_m / float(np.hypot(*(marks[1] - marks[0])))
+    opening = [marks[0] + s * (marks[1] - marks[0]) for s in (share, 1.0 - share)]
+    clearance_m = local.path_clearance_m(opening)
+    if clearance_m >= floor_m:
+        return ""
+    where = np.asarray(opening)[int(np.argmin(local.clearance_m(opening)))]
+    return (f"between its marks there are {max(0.0, clearance_m):.0f} m to {local.nearest_name(where)}: "
+            f"the margin's floor is {floor_m:g} m")

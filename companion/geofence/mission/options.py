@@ -10,22 +10,11 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-Latitude = Annotated[float, Meta(ge=-90.0, le=90.0)]
-Longitude = Annotated[float, Meta(ge=-180.0, le=180.0)]
+from companion.geofence.mission.goal_options import KINDS, GoalOptions, Latitude, Longitude
+
 Positive = Annotated[float, Meta(gt=0.0)]
 NonNegative = Annotated[float, Meta(ge=0.0)]
 Heading = Annotated[float, Meta(ge=0.0, le=360.0)]
-
-
-class GoalOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """``[[goal]]``: a mark to reach, or to round."""
-
-    lat: Latitude
-    lon: Longitude
-    radius_m: Annotated[float, Meta(gt=0.0, le=5000.0)] = 10.0
-    rounding: Literal["port", "starboard"] | None = None
-    """Leave the mark to this side of the boat; None: just come within the radius."""
-    name: str = ""
 
 
 class RefugeOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -228,7 +217,7 @@ def tables() -> dict[str, tuple[str, ...]]:
     for field in msgspec.structs.fields(MissionOptions):
         if isinstance(field.default, Struct):
             known[field.name] = type(field.default).__struct_fields__
-    known["goal"] = GoalOptions.__struct_fields__
+    known["goal"] = tuple(dict.fromkeys(key for kind in KINDS.values() for key in ("kind", *kind.__struct_fields__)))
     known["refuge"] = RefugeOptions.__struct_fields__
     known["start"] = StartOptions.__struct_fields__
     return known

@@ -15,6 +15,7 @@ import tomli_w
 
 from companion.errors import InputError
 from companion.geofence.formats.raw.text import decode, read_bytes
+from companion.geofence.mission.goal_options import KINDS
 from companion.geofence.mission.options import MissionOptions, tables
 from companion.words import choices
 
@@ -39,6 +40,10 @@ def parse_options(text: str, source: str) -> MissionOptions:
     except ValueError as error:  # a number of thousands of digits
         raise InputError(source, "", f"is not TOML: {str(error)[:60]}") from None
     _refuse_odd_numbers(raw, source, "")
+    goals = raw.get("goal")
+    for goal in goals if isinstance(goals, list) else ():
+        if isinstance(goal, dict):
+            goal.setdefault("kind", "point")
     try:
         return msgspec.convert(raw, MissionOptions)
     except msgspec.ValidationError as error:
@@ -55,7 +60,8 @@ def dump_options(options: MissionOptions) -> str:
 
 
 def _without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
-    out: dict[str, Any] = {}
+    tag = struct.__struct_config__.tag
+    out: dict[str, Any] = {"kind": tag} if tag not in {None, "point"} else {}
     for field in msgspec.structs.fields(struct):
         value = getattr(struct, field.name)
         if value is None or (field.default is not msgspec.NODEFAULT and value == field.default):
@@ -106,6 +112,9 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
         table = re.sub(r"^\$\.?", "", path)
         table = re.sub(r"[\[.].*", "", table)
         fields = known.get(table, ())
+        goal = _value_at(raw, path)
+        if table == "goal" and isinstance(goal, dict) and goal.get("kind") in KINDS:
+            fields = ("kind", *KINDS[goal["kind"]].__struct_fields__)
         near = difflib.get_close_matches(key, fields, n=1, cutoff=0.5)
         elsewhere = [t for t, keys in known.items() if key in keys and t != table]
         remedy = (
@@ -119,6 +128,11 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
         key = missing.group(1)
         remedy = "add [[goal]] with lat and lon" if key == "goal" else "add it"
         return InputError(source, f"{place} {key}".strip(), "is missing", remedy)
+    if place.endswith(" kind") and place.startswith("[[goal]]"):
+        kind = _value_at(raw, path)
+        near = difflib.get_close_matches(str(kind), KINDS, n=1, cutoff=0.5)
+        return InputError(source, place, f"{_short(kind)} is no kind of goal",
+                          f'did you mean "{near[0]}"?' if near else "write " + " or ".join(f'"{k}"' for k in KINDS))
     if problem.startswith("Invalid enum value"):
         return InputError(source, place, f"{_short(_value_at(raw, path))} is none of the choices",
                           "write " + " or ".join(f'"{choice}"' for choice in choices(MissionOptions, path)))

@@ -18,7 +18,7 @@ from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.missions import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
 from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.state import Phase, saved_of
+from companion.skipper.step.state import Inside, Phase, saved_of
 from companion.skipper.step.turn import Turn
 
 REMEDY = "it is not resumed; waiting for [operator] replace_foreign, or an order, to allow its replacement"
@@ -184,7 +184,10 @@ def _under_way(turn: Turn) -> bool:
 
 def _take_up(turn: Turn, saved: Persisted) -> None:
     """Take up the voyage where it was: the gates that are passed, and the way round the next buoy."""
-    turn.update(gate=saved.gate, approaches=saved.approaches, bearing_rad=0.5 * math.pi * saved.quarters)
+    turn.update(
+        gate=saved.gate, approaches=saved.approaches, bearing_rad=0.5 * math.pi * saved.quarters, is_blind=True,
+        inside=None if saved.inside is None else Inside(goal=saved.inside[0], t_s=turn.t_s, utc_s=saved.inside[1]),
+        searched=saved.searched, covered=saved.covered)
 
 
 def _adopt(turn: Turn, saved: Persisted, what: str = "ours") -> None:

@@ -26,8 +26,8 @@ from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.state import ByField, Phase
 from companion.skipper.step.turn import Turn
+from companion.skipper.way.gates import marks_of
 from companion.skipper.way.geometry import distance_m
-from companion.skipper.way.voyage import Side
 from companion.traffic import Vessel, predict
 
 NAME = "vessel too near"      # the watchdog's
@@ -92,10 +92,7 @@ def situation(turn: Turn) -> Situation | None:
     if boat is None or vehicle is None or wind is None:
         return None
     seen = obstacles(turn, near(turn))
-    buoys = tuple(
-        Obstacle(en_m=goal.en_m, keep_m=0.5 * goal.rounding_m)
-        for goal in turn.voyage.goals if goal.side is not Side.NONE
-    )
+    buoys = tuple(Obstacle(en_m=mark, keep_m=keep_m) for mark, keep_m in marks_of(turn.voyage))
     return Situation(
         t_s=turn.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
         twd_from_rad=wind[0], tws_mps=wind[1], obstacles=(*seen, *buoys),

@@ -141,6 +141,11 @@ def _go_on(turn: Turn, _: Order) -> Answer:
     was = turn.state.standing
     if was is None:
         turn.update(plan_retry=PATIENT)
+        gate = turn.gate
+        if gate is not None and gate.box is not None and turn.state.inside is not None:
+            turn.update(released=gate.goal)
+            following = turn.gates[turn.state.gate + 1] if turn.state.gate + 1 < len(turn.gates) else None
+            return _done(f"the end of her stay in {gate.name}" + (f": on to {following.name}" if following else ""))
         return _done(f"no order stands: {_next(turn)}")
     turn.update(standing=None, plan_retry=PATIENT, history=())
     if was.verb is Verb.STOP and turn.state.sailing:

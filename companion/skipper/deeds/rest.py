@@ -47,7 +47,7 @@ def comes_to_rest(turn: Turn, bound: Errand) -> bool:
         return True
     hand_back(turn)
     where = "staying near by" if bound.kind is Kind.STAY else f"at {bound.name}"
-    how_long = UNTIL_TOLD if bound.is_ordered else _how_long(turn)
+    how_long = UNTIL_TOLD if bound.is_ordered else bound.until or _how_long(turn)
     turn.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
     return True
 

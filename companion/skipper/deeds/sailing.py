@@ -232,7 +232,7 @@ def _name(turn: Turn) -> None:
         turn.phase(Phase.NEW_CALCULATION, f"planning: {state.pending_plan.reason.value}")
         return
     raised = ", ".join(r.name for r in state.raised)
-    tail = f"; {raised}" if raised else ""
+    tail = (f"; {state.task}" if state.task else "") + (f"; {raised}" if raised else "")
     gate, bound = turn.gate, errand(turn)
     if not turn.ahead():
         wait = state.plan_retry.not_before_s - turn.t_s

@@ -11,6 +11,7 @@ from companion.planner import Plan, PlanStatus, Problem
 from companion.planner.problem import evaluate, resolved
 from companion.skipper.board.uploads import upload
 from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
+from companion.skipper.planning.errands import Kind, errand
 from companion.skipper.planning.not_found import asks_again, not_found
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step.actions import Change, ReplanReason, Severity
@@ -134,7 +135,10 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
             start, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
             area=turn.voyage.area, floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m)))
         turn.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
-    tail = Tail(start_en=start, points_en=tuple(points), gate=pending.gate)
+    bound = errand(turn)
+    tail = Tail(
+        start_en=start, points_en=tuple(points), gate=pending.gate,
+        is_place=bound is not None and bound.kind is Kind.BOX and bound.name == pending.facts.bound_for)
     facts = replace(
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
         why=plan.why.text or plan.reason)

@@ -12,12 +12,14 @@ from dataclasses import dataclass, replace
 
 from companion.orders import Verb
 from companion.skipper.planning.ends import BATTERY, DARK, LEAK, OUT_OF_TIME, SHORE_LOST, WHY, end_of
+from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step.causes import SHORE, Answer
 from companion.skipper.step.config import End, SafeEnd
 from companion.skipper.step.turn import Turn
-from companion.skipper.way.gates import KEEP_SHARE, Gate, disc_wkt
+from companion.skipper.way.barriers import disc_wkt
+from companion.skipper.way.gates import Gate, marks_of
 from companion.skipper.way.geometry import distance_m
-from companion.skipper.way.voyage import PointEn, Refuge, Side
+from companion.skipper.way.voyage import PointEn, Refuge
 
 DRAGGED = "dragged off"   # a watchdog
 HOME, REST = "home", "the place to rest"
@@ -34,6 +36,8 @@ class Kind(enum.Enum):
     REST = "rest"            # back to where she loitered
     GOAL = "goal"            # a place that somebody named
     INSIDE = "inside"        # back into the autopilot's own fence
+    START = "start"          # before a start line, until the gun
+    BOX = "box"              # water to stay in
     STAY = "stay"            # where there is room near by
 
 
@@ -47,6 +51,7 @@ class Errand:
     en_m: PointEn = (0.0, 0.0)
     radius_m: float = HOME_RADIUS_M
     is_ordered: bool = False     # it lasts until she is told to go on
+    until: str = ""              # what it lasts for, where that is known
 
     @property
     def has_place(self) -> bool:
@@ -61,7 +66,34 @@ class Errand:
 
 def errand(turn: Turn) -> Errand | None:
     """Return where she is bound for instead of the next goal, None: nowhere."""
-    return pressing(turn) or _ordered(turn) or _at_the_end(turn) or _kept_in(turn)
+    return pressing(turn) or _ordered(turn) or _at_the_end(turn) or _kept_in(turn) or _before_start(turn) or (
+        _in_box(turn))
+
+
+def _in_box(turn: Turn) -> Errand | None:
+    """Return where she stays in the box that is next."""
+    gate = turn.gate
+    if gate is None or gate.box is None or turn.state.over:
+        return None
+    left_s = stay_left_s(turn, gate)
+    until = "until told to go on" if gate.box.for_s is None else f"{left_s:.0f} s more"
+    return Errand(kind=Kind.BOX, name=f"the box {gate.name}", why="to stay in it", en_m=gate.en_m,
+                  radius_m=gate.radius_m, until=until)
+
+
+def _before_start(turn: Turn) -> Errand | None:
+    """Return where she waits for the gun of the start line that is next."""
+    gate = turn.gate
+    if gate is None or gate.line is None or turn.state.over or not waits_for_gun(turn, gate):
+        return None
+    left_s = gun_in_s(turn, gate.line)
+    why = "the autopilot does not know the time of day yet" if left_s is None else "waiting for the gun"
+    until = "" if left_s is None else f"{left_s:.0f} s"
+    name = f"the water before {gate.name}"
+    route = turn.state.route
+    is_bound = route is not None and route.bound_for == name and route.points_en_m
+    place = route.points_en_m[turn.last_waypoint()] if route is not None and is_bound else waiting_en(turn, gate)
+    return Errand(kind=Kind.START, name=name, why=why, en_m=place, until=until)
 
 
 def pressing(turn: Turn) -> Errand | None:
@@ -232,8 +264,7 @@ def _is_bound(turn: Turn, name: str) -> bool:
 
 def gate_for(turn: Turn, bound: Errand) -> Gate:
     """Return an errand as a gate that completes nothing; buoys are something to keep clear of on this leg too."""
-    discs = tuple(
-        disc_wkt(g.en_m, KEEP_SHARE * g.rounding_m) for g in turn.voyage.goals if g.side is not Side.NONE)
+    discs = tuple(disc_wkt(mark, keep_m) for mark, keep_m in marks_of(turn.voyage))
     return Gate(
         en_m=bound.en_m, radius_m=bound.radius_m, goal=-1, ends_goal=False, name=bound.name, from_en_m=None,
         keep_out=discs)

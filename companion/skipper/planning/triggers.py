@@ -9,6 +9,7 @@ from companion.geo.angles import difference_rad
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
 from companion.skipper.planning.errands import HOME, Errand, Kind, errand, homeward
 from companion.skipper.planning.vessels import meetings
+from companion.skipper.planning.waits import waits_for_gun
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import Guidance, ReplanPolicy
 from companion.skipper.step.missions import NO_PLAN, path_length_m
@@ -76,7 +77,8 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
 
 
 REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST,
-           Kind.GOAL: ReplanReason.ORDER, Kind.INSIDE: ReplanReason.OBSTACLE}
+           Kind.GOAL: ReplanReason.ORDER, Kind.INSIDE: ReplanReason.OBSTACLE,
+           Kind.START: ReplanReason.NEXT_GOAL, Kind.BOX: ReplanReason.NEXT_GOAL}
 
 
 def _errand(turn: Turn, bound: Errand | None) -> Trigger | None:
@@ -197,6 +199,8 @@ def _extension(turn: Turn, bound: Errand | None) -> Trigger | None:
             return None
     elif ends >= len(turn.gates) - 1 and homeward(turn) is None:
         return None
+    elif 0 <= ends < len(turn.gates) - 1 and waits_for_gun(turn, turn.gates[ends + 1]):
+        return None   # where she waits is planned for when it is next
     left = path_length_m([boat, *turn.ahead()])
     if left > turn.config.look_ahead_s * max(turn.speed_mps, 1.0) or not may_restart_leg(turn):
         return None

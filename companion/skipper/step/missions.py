@@ -117,6 +117,7 @@ class Tail:
     start_en: PointEn
     points_en: tuple[PointEn, ...]
     gate: int                  # -1: the last point completes nothing (a nearer goal, the local plan's horizon)
+    is_place: bool = False     # she is to loiter at its end, and nowhere near by
 
 
 def splice(
@@ -139,7 +140,8 @@ def splice(
         starts.append(start)
         gates.append(tail.gate if n == len(tail.points_en) - 1 else -1)
         start = point
-    item, place = end_item(voyage, config, start, twd_from_rad)
+    item, place = end_item(voyage, config, start, twd_from_rad) if not tail.is_place else (
+        waypoint(voyage.frame.geo_from_en(*start), command=Command.NAV_LOITER_UNLIM), start)
     items.append(item)
     points.append(place)
     starts.append(start)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from companion.mavlink.wire import mission_hash
@@ -16,6 +16,7 @@ from companion.skipper.way.gates import Approach
 FORMAT = 1
 MAX_ITEMS = 2000       # no autopilot holds more
 MAX_GOALS = 10**6
+MAX_POINTS = 20_000    # of the track of a search
 MAX_QUARTERS = 10**6   # turns round one buoy
 _NUMBERS = ("plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s",
             "vessel_risk", "vessels_part")
@@ -49,6 +50,10 @@ class Persisted:
     quarters: int = 0                  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
     standing: Standing | None = None   # the order that stands
     skipped: int = 0                   # goals given up by order
+    set_sail_utc_s: float | None = None   # Unix time of setting sail
+    inside: tuple[int, float] | None = None   # the goal whose box she stays in, Unix time of entry
+    searched: tuple[tuple[float, float], ...] = ()   # the track of the search that is next
+    covered: tuple[tuple[int, float], ...] = ()      # goals searched, and the share that was seen
 
     @property
     def lists(self) -> tuple[Route, ...]:
@@ -68,8 +73,10 @@ class Persisted:
             "unsure": _route_to_dict(self.unsure), "own_mode": None if self.own_mode is None else self.own_mode.name,
             "motor": self.motor, "under_way_s": self.under_way_s, "arrived": self.arrived, "uid": self.uid,
             "system": self.system,
-            "approaches": [[a.goal, *a.en_m, a.turn_rad] for a in self.approaches], "quarters": self.quarters,
+            "approaches": [_approach_to_list(a) for a in self.approaches], "quarters": self.quarters,
             "standing": _standing_to_dict(self.standing), "skipped": self.skipped,
+            "set_sail_utc_s": self.set_sail_utc_s, "inside": None if self.inside is None else list(self.inside),
+            "searched": [list(p) for p in self.searched], "covered": [list(c) for c in self.covered],
         }
 
     @classmethod
@@ -91,16 +98,38 @@ class Persisted:
                 under_way_s=_number(data.get("under_way_s", 0.0)), arrived=_truth(data.get("arrived", False)),
                 uid=None if data.get("uid") is None else _words(data["uid"]),
                 system=None if data.get("system") is None else _whole(data["system"], 1, 255),
-                approaches=tuple(
-                    Approach(goal=_whole(goal, 0, MAX_GOALS), en_m=(_number(e), _number(n)),
-                             turn_rad=None if turn is None else _number(turn))
-                    for goal, e, n, turn in data.get("approaches", ())[:MAX_GOALS + 1]),
+                approaches=tuple(_approach_from_list(a) for a in data.get("approaches", ())[:MAX_GOALS + 1]),
                 quarters=_whole(data.get("quarters", 0), -MAX_QUARTERS, MAX_QUARTERS),
                 standing=_standing_from_dict(data.get("standing")),
                 skipped=_whole(data.get("skipped", 0), 0, MAX_GOALS),
+                set_sail_utc_s=None if data.get("set_sail_utc_s") is None else _number(data["set_sail_utc_s"]),
+                inside=None if data.get("inside") is None else (
+                    _whole(data["inside"][0], 0, MAX_GOALS), _number(data["inside"][1])),
+                searched=tuple((_number(e), _number(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
+                covered=tuple((_whole(g, 0, MAX_GOALS), _number(s)) for g, s in data.get("covered", ())[:MAX_GOALS]),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
+
+
+def _approach_to_list(approach: Approach) -> list[Any]:
+    """Return an approach as it is saved: the sweeps of a search behind the rest, where there are any."""
+    out: list[Any] = [approach.goal, *approach.en_m, approach.turn_rad]
+    if approach.round > 0:
+        out += [[[*a, *b] for a, b in approach.sweeps], approach.twd_from_rad, approach.round]
+    return out
+
+
+def _approach_from_list(data: list[Any]) -> Approach:
+    goal, e, n, turn, *laid = data
+    approach = Approach(goal=_whole(goal, 0, MAX_GOALS), en_m=(_number(e), _number(n)),
+                        turn_rad=None if turn is None else _number(turn))
+    if not laid:
+        return approach
+    sweeps, twd_from_rad, count = laid
+    return replace(
+        approach, twd_from_rad=_number(twd_from_rad), round=_whole(count, 1, MAX_GOALS),
+        sweeps=tuple(((_number(a), _number(b)), (_number(c), _number(d))) for a, b, c, d in sweeps[:MAX_POINTS]))
 
 
 def _standing_to_dict(order: Standing | None) -> dict[str, Any] | None:

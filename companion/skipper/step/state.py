@@ -145,6 +145,19 @@ class ByField:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Inside:
+    """She has come into the box of a goal: when, and when by the autopilot's clock (None: not known then)."""
+
+    goal: int
+    t_s: float
+    utc_s: float | None = None
+
+    def age_s(self, t_s: float, utc_s: float | None) -> float:
+        """Return how long ago that was [s]; over a restart only the clock can tell."""
+        return t_s - self.t_s if utc_s is None or self.utc_s is None else utc_s - self.utc_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Answered:
     """An order and its answer, and when."""
 
@@ -221,6 +234,13 @@ class SkipperState:
     read_t_s: float = float("-inf")
     approaches: tuple[Approach, ...] = ()   # where the way to a goal began, see companion.skipper.way.gates
     bearing_rad: float = 0.0            # how far the boat has come round the buoy that is next, see gates.bearing_on
+    is_blind: bool = False              # the voyage was taken up again: what she passed meanwhile was not seen
+    released: int = -1                  # the goal at whose line she no longer waits for the gun, or in whose box
+    searched: tuple[PointEn, ...] = ()  # the track of the search that is next
+    covered: tuple[tuple[int, float], ...] = ()   # goals searched, and the share that was seen
+    task: str = ""                      # how far she is with it, in words
+    inside: Inside | None = None        # the box that she stays in
+    set_sail_utc_s: float | None = None  # Unix time of setting sail, by the autopilot's clock
     missed_s: float | None = None       # when a gate was missed to which no upload since leads
     history_plan: int = -1
     history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
@@ -282,5 +302,7 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         unsure=state.unsure_route, own_mode=state.own_mode, motor=state.adrift.motor,
         under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived, uid=state.uid, system=state.system,
         approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
-        standing=standing_saved(state), skipped=state.skipped,
+        standing=standing_saved(state), skipped=state.skipped, set_sail_utc_s=state.set_sail_utc_s,
+        inside=None if state.inside is None or state.inside.utc_s is None else (state.inside.goal, state.inside.utc_s),
+        searched=state.searched[:-1], covered=state.covered,   # the last point moves with her
     )

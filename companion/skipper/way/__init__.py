@@ -2,6 +2,10 @@
 
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.geometry import cross_track_m, moved
-from companion.skipper.way.voyage import Goal, PointEn, Refuge, Side, Voyage
+from companion.skipper.way.sweeps import Sweep, length_m, sweeps_over
+from companion.skipper.way.voyage import Box, Goal, Line, PointEn, Refuge, Search, Side, Voyage
 
-__all__ = ["Goal", "PointEn", "Refuge", "Side", "Voyage", "cross_track_m", "gates_of", "moved"]
+__all__ = [
+    "Box", "Goal", "Line", "PointEn", "Refuge", "Search", "Side", "Sweep", "Voyage", "cross_track_m", "gates_of",
+    "length_m", "moved", "sweeps_over",
+]

@@ -17,13 +17,28 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from companion.geo.angles import difference_rad, wrap_pi
+from companion.skipper.way.barriers import barrier_wkt, disc_wkt
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from companion.skipper.way.voyage import Goal, PointEn, Side, Voyage
+from companion.skipper.way.line import (
+    BEFORE_M,
+    BEFORE_RADIUS_M,
+    BEYOND_M,
+    BEYOND_RADIUS_M,
+    STRAY_M,
+    ahead_m,
+    course_rad,
+    crossing_en,
+    wings_wkt,
+)
+from companion.skipper.way.sweeps import Sweep
+from companion.skipper.way.voyage import Area, Box, Goal, Line, PointEn, Search, Side, Voyage
 
 ARC_RAD = math.radians(100.0)       # gates around a buoy are at most this far apart
 STRAIGHT_RAD = math.radians(60.0)   # a bend the other way up to this is passed with one gate, not with a loop
 KEEP_SHARE = 0.5                    # the disc around the buoy that plans avoid, as a share of the rounding radius
 BARRIER_M = 60.0                    # shortest barrier
+SWEEP_RADIUS_M = 7.0                # the autopilot leaves a sweep's end 3 to 5 m before it
+BOX_RADIUS_M = 8.0                  # her loiter lies this near to a box's roomiest place, and nearer as it is planned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,12 +46,16 @@ class Approach:
     """Where the way to a goal began, when that is not the goal before: at the start, and again after a miss.
 
     ``goal`` is the index into ``Voyage.legs``. ``turn_rad`` is how far the boat still has to turn around the buoy,
-    positive to the buoy's hand; None: as the courses to it and away from it ask for.
+    positive to the buoy's hand; None: as the courses to it and away from it ask for. ``sweeps`` are what is left to be
+    sailed of a search, laid for the wind ``twd_from_rad`` and for the ``round``-th time, 0: not yet.
     """
 
     goal: int
     en_m: PointEn
     turn_rad: float | None = None
+    sweeps: tuple[Sweep, ...] = ()
+    twd_from_rad: float = 0.0
+    round: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +65,10 @@ class Gate:
     ``goal`` is the index into ``Voyage.legs``. ``keep_out`` are WKT polygons for the way here. For buoys
     ``buoy_en_m`` is the buoy and ``side`` where it is left; ``turn_rad`` is how far its rounding turns the boat, and
     ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the approach's
-    beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate.
+    beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With ``line`` it
+    is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place before it. With
+    ``box`` it is where she stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before there
+    are any, of none.
     """
 
     en_m: PointEn
@@ -63,6 +85,16 @@ class Gate:
     bearing_rad: float = 0.0
     is_first: bool = True
     keep_out: tuple[str, ...] = ()
+    line: Line | None = None
+    is_before_line: bool = False
+    box: Box | None = None
+    search: Search | None = None
+    sweep: tuple[int, int] = (0, 0)
+
+    @property
+    def is_crossed(self) -> bool:
+        """Whether it is passed by crossing its line, and not by coming near."""
+        return self.line is not None and not self.is_before_line
 
 
 @lru_cache(maxsize=8)   # asked for at every step, and the same until a buoy is missed
@@ -73,7 +105,7 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
     """
     legs = voyage.legs
     begun = {a.goal: a for a in approaches}
-    discs = tuple(disc_wkt(g.en_m, KEEP_SHARE * g.rounding_m) for g in voyage.goals if g.side is not Side.NONE)
+    discs = tuple(disc_wkt(mark, keep_m) for mark, keep_m in marks_of(voyage))
     out: list[Gate] = []
     before: PointEn | None = None
     for i, goal in enumerate(legs):
@@ -84,18 +116,64 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
         elif i > 0 and not is_once_more:
             before = legs[i - 1].en_m
         name = goal.name or f"goal {i + 1}"
-        if goal.side is Side.NONE:
+        after = legs[i + 1].en_m if i + 1 < len(legs) else None
+        if goal.line is not None:
+            out.extend(
+                replace(gate, keep_out=(*discs, *gate.keep_out))
+                for gate in _cross(goal, i, name, None if is_once_more else before, after, voyage.area))
+        elif goal.search is not None and approach is not None and approach.round > 0:
+            out.extend(_sweep(goal, i, name, approach, discs))
+        elif goal.side is Side.NONE:
             out.append(Gate(
-                en_m=goal.en_m, radius_m=goal.radius_m, goal=i, ends_goal=True, name=name, from_en_m=before,
-                bandwidth_m=goal.bandwidth_m, keep_out=discs,
+                en_m=goal.en_m, radius_m=goal.radius_m if goal.box is None else BOX_RADIUS_M, goal=i,
+                ends_goal=True, name=name, from_en_m=before,
+                bandwidth_m=goal.bandwidth_m, keep_out=discs, box=goal.box, search=goal.search,
             ))
         else:
-            after = legs[i + 1].en_m if i + 1 < len(legs) else None
             turn_rad = approach.turn_rad if approach is not None else None
             out.extend(
                 replace(gate, keep_out=(*discs, *gate.keep_out))
                 for gate in _round(goal, i, name, before, after, turn_rad, is_once_more=is_once_more))
     return tuple(out)
+
+
+def marks_of(voyage: Voyage) -> tuple[tuple[PointEn, float], ...]:
+    """Return every mark of the voyage and how far plans keep clear of it [m]: buoys, and the ends of lines."""
+    out: list[tuple[PointEn, float]] = []
+    for goal in voyage.goals:
+        if goal.line is not None:
+            out += [(mark, goal.line.keep_m + STRAY_M) for mark in (goal.line.port_en_m, goal.line.starboard_en_m)]
+        elif goal.side is not Side.NONE:
+            out.append((goal.en_m, KEEP_SHARE * goal.rounding_m))
+    return tuple(out)
+
+
+def _sweep(goal: Goal, index: int, name: str, approach: Approach, discs: tuple[str, ...]) -> list[Gate]:
+    """Return the gates that search an area: both ends of each sweep."""
+    count = len(approach.sweeps)
+    return [
+        Gate(en_m=end, radius_m=SWEEP_RADIUS_M, goal=index, is_first=n == 0 and k == 0, name=name, from_en_m=None,
+             ends_goal=n == count - 1 and k == 1, keep_out=discs, search=goal.search, sweep=(n + 1, count))
+        for n, sweep in enumerate(approach.sweeps) for k, end in enumerate(sweep)]
+
+
+def _cross(
+    goal: Goal, index: int, name: str, before: PointEn | None, after: PointEn | None, area: Area,
+) -> list[Gate]:
+    """Return the gates that cross a line: a place beyond it, and one before it where the way begins elsewhere."""
+    line = goal.line
+    assert line is not None
+    way_m = 0.0 if before is None else distance_m(before, goal.en_m)
+    cut, course = crossing_en(line, before, after), course_rad(line)
+    to = Gate(
+        en_m=moved(cut, course, BEYOND_M), radius_m=BEYOND_RADIUS_M, goal=index, ends_goal=True, name=name,
+        from_en_m=before, bandwidth_m=goal.bandwidth_m, keep_out=wings_wkt(line, area, way_m), line=line)
+    if before is not None and ahead_m(line, before) <= -0.5 * BEFORE_M:
+        return [to]
+    place = moved(cut, course + math.pi, BEFORE_M)
+    return [
+        replace(to, en_m=place, radius_m=BEFORE_RADIUS_M, ends_goal=False, keep_out=(), is_before_line=True),
+        replace(to, from_en_m=place, is_first=False)]
 
 
 def _round(
@@ -173,24 +251,3 @@ def again(gate: Gate, boat: PointEn, bearing: float) -> Approach:
     astray = bearing if gate.side is Side.PORT else -bearing
     # A boat that circled the buoy the wrong way while it waited need not circle it back as often.
     return Approach(goal=gate.goal, en_m=boat, turn_rad=gate.turn_rad + min(astray, astray % (2.0 * math.pi)))
-
-
-def disc_wkt(center: PointEn, radius_m: float, sides: int = 16) -> str:
-    """Return a polygon around a disc."""
-    r = radius_m / math.cos(math.pi / sides)
-    ring = [moved(center, 2.0 * math.pi * n / sides, r) for n in range(sides)]
-    return polygon_wkt(ring)
-
-
-def barrier_wkt(foot: PointEn, direction_rad: float, length_m: float) -> str:
-    """Return a thin wedge from ``foot`` outwards."""
-    tip = moved(foot, direction_rad, length_m)
-    wide = 0.5
-    return polygon_wkt([foot, moved(tip, direction_rad + math.pi / 2.0, wide),
-                        moved(tip, direction_rad - math.pi / 2.0, wide)])
-
-
-def polygon_wkt(ring: list[PointEn]) -> str:
-    """Return a ring of points as a WKT polygon."""
-    closed = [*ring, ring[0]]
-    return "POLYGON ((" + ", ".join(f"{e:.3f} {n:.3f}" for e, n in closed) + "))"

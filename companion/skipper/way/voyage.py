@@ -12,6 +12,8 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from companion.boat import Boat, outline_en_m
 from companion.geo.frame import LocalFrame
@@ -28,11 +30,58 @@ class Side(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Goal:
-    """A place to reach within ``radius_m``, or a buoy to round.
+class Line:
+    """Two marks to pass between, the port one on the port hand (``companion.skipper.way.line``).
 
-    With ``side`` the position is the buoy's, which the boat rounds at ``rounding_m``. ``bandwidth_m`` bounds
-    the way from the goal before (or the start) to this one: half the width of Büsser's band (section 4.2).
+    Attributes:
+        port_en_m: the mark that is left to port.
+        starboard_en_m: the mark that is left to starboard.
+        keep_m: what is kept clear of each mark.
+        not_before_s: a start line's gun, Unix time; an earlier crossing does not count.
+        after_s: the same, counted from setting sail.
+
+    """
+
+    port_en_m: PointEn
+    starboard_en_m: PointEn
+    keep_m: float
+    not_before_s: float | None = None
+    after_s: float | None = None
+
+    @property
+    def is_start(self) -> bool:
+        """Whether it may be crossed from a moment on only."""
+        return self.not_before_s is not None or self.after_s is not None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Box:
+    """Water to stay in, for ``for_s`` from entry on, None: until told to go on."""
+
+    area_en: Polygon
+    for_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """Water to be looked at, to half a swath on either side of the track (``companion.skipper.way.sweeps``).
+
+    ``area_en`` is its free water; the search is done when its sweeps are sailed and ``coverage`` of it was seen.
+    """
+
+    area_en: BaseGeometry
+    swath_m: float
+    coverage: float = 0.95
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goal:
+    """A place to reach within ``radius_m``, a buoy to round, or a line to cross.
+
+    With ``side`` the position is the buoy's, which the boat rounds at ``rounding_m``; with ``line`` it is the middle
+    between the marks, with ``box`` the roomiest place in it, with
+    ``search`` one inside. ``bandwidth_m`` bounds the way from the goal before (or
+    the start) to this one: half the width of Büsser's band (section 4.2).
     """
 
     en_m: PointEn
@@ -41,6 +90,9 @@ class Goal:
     side: Side = Side.NONE
     rounding_m: float = 12.0
     bandwidth_m: float | None = None
+    line: Line | None = None
+    box: Box | None = None
+    search: Search | None = None
 
 
 class Area(Protocol):

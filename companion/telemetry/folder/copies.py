@@ -12,6 +12,7 @@ import msgspec
 import tomli_w
 
 from companion.geofence import Mission
+from companion.geofence.mission import is_file
 from companion.telemetry.folder.names import COPIES
 from companion.telemetry.folder.recorder import Recorder, without_none
 
@@ -39,6 +40,9 @@ def write_copies(mission: Mission, recorder: Recorder) -> str:
     area["obstacles"] = [copied(name) for name in mission.options.area.obstacles]
     if mission.options.area.fence is not None:
         area["fence"] = copied(mission.options.area.fence)
+    for goal in options["goal"]:
+        if is_file(goal.get("polygon", "(")):
+            goal["polygon"] = copied(goal["polygon"])
     if mission.polar_path is not None:
         options["boat"]["polar"] = copied(str(mission.boat.polar))
     try:

@@ -10,7 +10,7 @@ from typing import Any
 from companion import __version__
 from companion.geofence import Mission
 from companion.skipper.step import Permissions
-from companion.skipper.way import Voyage
+from companion.skipper.way import Goal, Voyage
 
 
 def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str, Any]:
@@ -20,7 +20,8 @@ def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str,
         "name": mission.name,
         "origin": {"lat_deg": origin.lat_deg, "lon_deg": origin.lon_deg},
         "goals": [
-            {"x": g.en_m[0], "y": g.en_m[1], "radius_m": g.radius_m, "name": g.name, "side": g.side.value}
+            {"x": g.en_m[0], "y": g.en_m[1], "radius_m": g.radius_m, "name": g.name, "side": g.side.value,
+             **_task(g)}
             for g in voyage.goals
         ],
         "obstacles": area.obstacles_wkt(0.0),
@@ -29,6 +30,14 @@ def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str,
         "margin_m": margin_m,
         "no_go_half_deg": mission.boat.no_go_half_deg,
     }
+
+
+def _task(goal: Goal) -> dict[str, Any]:
+    """Return what else a chart says of a goal that is no point."""
+    if goal.line is not None:
+        return {"line": [list(goal.line.port_en_m), list(goal.line.starboard_en_m)]}
+    water = goal.box or goal.search
+    return {} if water is None else {"water": water.area_en.wkt}
 
 
 def voyage_record(mission: Mission, permissions: Permissions, run: dict[str, Any], copy: str) -> dict[str, Any]:

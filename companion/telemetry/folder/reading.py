@@ -42,6 +42,8 @@ class ChartGoal(Struct, frozen=True, kw_only=True):
     radius_m: float
     name: str = ""
     side: str = "none"
+    line: tuple[tuple[float, float], tuple[float, float]] | None = None   # the port mark and the starboard mark
+    water: str | None = None   # of a box or a search, WKT
 
 
 class Chart(Struct, frozen=True, kw_only=True):

@@ -1,0 +1,121 @@
+"""Lines: which way a track cuts them, where they are crossed, what stands beside them. Signs by property."""
+
+import math
+
+import pytest
+import shapely
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from companion.skipper.way.gates import Approach, gates_of, marks_of
+from companion.skipper.way.geometry import distance_m, moved
+from companion.skipper.way.line import (
+    BEFORE_M,
+    BEYOND_M,
+    ahead_m,
+    course_rad,
+    crossing,
+    crossing_en,
+    is_between,
+    opening_m,
+    wings_wkt,
+)
+from companion.skipper.way.voyage import Goal, Line
+from tests.skipper.world import area, voyage
+
+NORTHWARD = Line(port_en_m=(-20.0, 100.0), starboard_en_m=(20.0, 100.0), keep_m=5.0)
+place = st.tuples(st.floats(-200.0, 200.0), st.floats(-200.0, 200.0))
+
+
+def goal(line):
+    middle = tuple((a + b) / 2.0 for a, b in zip(line.port_en_m, line.starboard_en_m, strict=True))
+    return Goal(en_m=middle, line=line, name="gate")
+
+
+def test_with_the_port_mark_to_the_west_it_is_crossed_northward():
+    assert course_rad(NORTHWARD) == pytest.approx(0.0)
+    assert ahead_m(NORTHWARD, (0.0, 110.0)) == pytest.approx(10.0)
+    assert crossing(NORTHWARD, (5.0, 95.0), (5.0, 105.0)).is_forward
+    assert not crossing(NORTHWARD, (5.0, 105.0), (5.0, 95.0)).is_forward
+    assert crossing(NORTHWARD, (5.0, 95.0), (5.0, 105.0)).from_port_m == pytest.approx(25.0)
+
+
+@pytest.mark.parametrize(("a", "b"), [
+    ((25.0, 95.0), (25.0, 105.0)),       # outside of the starboard mark
+    ((-25.0, 95.0), (-21.0, 105.0)),     # outside of the port mark
+    ((0.0, 90.0), (0.0, 99.0)),          # not over it
+])
+def test_what_does_not_cross(a, b):
+    assert crossing(NORTHWARD, a, b) is None
+
+
+@given(a=place, b=place, port=place, starboard=place)
+def test_a_track_sailed_back_crosses_the_other_way(a, b, port, starboard):
+    assume(distance_m(port, starboard) > 1.0)
+    assume(all(shapely.LineString([a, b]).distance(shapely.Point(m)) > 1e-6 for m in (port, starboard)))
+    line = Line(port_en_m=port, starboard_en_m=starboard, keep_m=1.0)
+    assume(min(abs(ahead_m(line, a)), abs(ahead_m(line, b))) > 1e-6)
+    there, back = crossing(line, a, b), crossing(line, b, a)
+    assert (there is None) == (back is None)
+    assert there is None or (there.is_forward != back.is_forward
+                             and there.from_port_m == pytest.approx(back.from_port_m, abs=1e-6))
+
+
+@given(a=place, b=place, port=place, starboard=place)
+def test_it_is_crossed_exactly_where_shapely_says(a, b, port, starboard):
+    assume(distance_m(port, starboard) > 1.0)
+    line = Line(port_en_m=port, starboard_en_m=starboard, keep_m=1.0)
+    assume(min(abs(ahead_m(line, a)), abs(ahead_m(line, b))) > 1e-6)
+    way = shapely.LineString([a, b])
+    assume(min(way.distance(shapely.Point(m)) for m in (port, starboard)) > 1e-6)
+    assert (crossing(line, a, b) is not None) == way.crosses(shapely.LineString([port, starboard]))
+
+
+def test_it_is_crossed_where_the_straight_way_leads_and_clear_of_the_marks():
+    assert crossing_en(NORTHWARD, (0.0, 0.0), (0.0, 200.0)) == pytest.approx((0.0, 100.0))
+    assert crossing_en(NORTHWARD, (0.0, 0.0), (10.0, 200.0)) == pytest.approx((5.0, 100.0))
+    assert crossing_en(NORTHWARD, (-150.0, 50.0), None) == pytest.approx((-10.0, 100.0))
+    assert crossing_en(NORTHWARD, None, None) == pytest.approx((0.0, 100.0))
+
+
+@given(before=place, after=place)
+def test_where_it_is_crossed_lies_in_the_opening(before, after):
+    cut = crossing_en(NORTHWARD, before, after)
+    assert is_between(NORTHWARD, cut)
+    assert min(distance_m(cut, NORTHWARD.port_en_m), distance_m(cut, NORTHWARD.starboard_en_m)) >= 8.0
+    assert opening_m(NORTHWARD) == pytest.approx(24.0)
+
+
+def test_the_wings_stand_outwards_and_end_ashore():
+    port, starboard = (shapely.from_wkt(w) for w in wings_wkt(NORTHWARD, area(), 100.0))
+    assert port.bounds[2] == pytest.approx(-20.0, abs=0.6)
+    assert starboard.bounds[0] == pytest.approx(20.0, abs=0.6)
+    assert port.bounds[0] < -200.0
+    land = shapely.box(60.0, 0.0, 400.0, 400.0)
+    _, short = (shapely.from_wkt(w) for w in wings_wkt(NORTHWARD, area(land), 100.0))
+    assert 60.0 <= short.bounds[2] <= 66.0
+
+
+def test_from_before_the_line_one_gate_leads_across_from_beyond_it_two():
+    plain = voyage(goal(NORTHWARD))
+    (across,) = gates_of(plain, (Approach(goal=0, en_m=(0.0, 0.0)),))
+    assert across.is_crossed
+    assert ahead_m(NORTHWARD, across.en_m) == pytest.approx(BEYOND_M)
+    before, across = gates_of(plain, (Approach(goal=0, en_m=(0.0, 150.0)),))
+    assert not before.is_crossed
+    assert ahead_m(NORTHWARD, before.en_m) == pytest.approx(-BEFORE_M)
+    assert across.ends_goal
+    assert not before.ends_goal
+
+
+def test_the_same_line_once_more_is_approached_from_before_it_again():
+    gates = gates_of(voyage(goal(NORTHWARD), laps=2), (Approach(goal=0, en_m=(0.0, 0.0)),))
+    assert [g.is_crossed for g in gates] == [True, False, True]
+
+
+def test_marks_are_kept_clear_of_on_every_leg():
+    v = voyage(Goal(en_m=(0.0, 50.0)), goal(NORTHWARD))
+    assert [keep for _, keep in marks_of(v)] == [8.0, 8.0]
+    assert all(len(g.keep_out) >= 2 for g in gates_of(v))
+    disc = shapely.from_wkt(gates_of(v)[0].keep_out[0])
+    assert disc.contains(shapely.Point(moved(NORTHWARD.port_en_m, math.pi / 4.0, 7.9)))
