@@ -15,6 +15,7 @@ from itertools import pairwise
 
 from companion.geo.angles import difference_rad
 from companion.planner.problem import VESSELS_SHARE, Target, sigmas_for, vessel_count
+from companion.skipper.planning.manners import MEET_SHARE, bow_discs, held_of, is_stood_on_to, regions
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import LOST_MPS
@@ -93,9 +94,11 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
     """Return what a plan is told that starts at ``start_en`` in ``after_s``, on a rung of the ladder.
 
     The wind keeps its part on every rung. Where the start is within a vessel's disc already, its discs shrink to let
-    the boat out: none nearer than now. What that risks is in the plan's path risk.
+    the boat out: none nearer than now. What that risks is in the plan's path risk. By the rules of the road a vessel
+    that keeps out of our way is left to do so, and one that we give way to adds regions on the first rung.
     """
-    found = discs(turn, near(turn), turn.t_s + after_s, 0.0)
+    vessels = [v for v in near(turn) if not ((held := held_of(turn, v)) is not None and held.stands_on)]
+    found = discs(turn, vessels, turn.t_s + after_s, 0.0)
     if not found:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
     of_wind = (1.0 - VESSELS_SHARE) * (1.0 - delta_s)
@@ -120,6 +123,8 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
             out.append(replace(target, radius_m=radius_m))
     if not out:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
+    if rung == 0 and turn.state.encounters:
+        out += regions(turn, vessels, start_en, after_s, is_met=bool(meetings(turn)))
     least = max(LEAST_DELTA_S, 1.0 - of_wind - part)   # a half and not the last digit below it
     return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)
 
@@ -172,7 +177,9 @@ def soon(legs: Sequence[TimedLeg], seconds: float) -> list[PointEn]:
 
 def meetings(turn: Turn) -> tuple[Conflict, ...]:
     """Return where the route meets vessels soon enough to act, in order of time; empty when it is clear."""
-    vessels = near(turn)
-    if not vessels:
+    vessels, boat = [v for v in near(turn) if not is_stood_on_to(turn, v)], turn.boat_en
+    if not vessels or boat is None:
         return ()
-    return pressing(check_legs(timed_legs(turn), discs(turn, vessels, turn.t_s, tail_factor(GIVE_UP_RISK))))
+    bows = (d for d in bow_discs(turn, vessels, turn.t_s, MEET_SHARE) if distance_m(boat, (d.x_m, d.y_m)) > d.radius_m)
+    found = (*discs(turn, vessels, turn.t_s, tail_factor(GIVE_UP_RISK)), *bows)
+    return pressing(check_legs(timed_legs(turn), found))
