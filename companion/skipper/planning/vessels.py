@@ -21,6 +21,7 @@ from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import LOST_MPS
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Conflict, Disc, Vessel, check_legs, path_distance_m, planning_discs, predict
+from companion.traffic.encounters import expected
 from companion.traffic.occupancy import Keep
 from companion.traffic.plans import TimedLeg, pressing
 from companion.traffic.predict import tail_factor
@@ -74,7 +75,11 @@ def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> t
     )
     known = [v for v in vessels if v.is_moving_known]
     unknown = [v for v in vessels if not v.is_moving_known]
-    return (*planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
+    met = {(h.mmsi, h.branch) for h in turn.state.encounters}
+    holding = [v for v in known if (v.mmsi, v.branch) in met]
+    known = [v for v in known if (v.mmsi, v.branch) not in met]
+    return (*(d for v in holding for d in planning_discs([v], t_s, keep, motion=expected(v))),
+            *planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
