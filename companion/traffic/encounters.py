@@ -1,9 +1,9 @@
 """Encounters under the rules of the road: what the rules ask of us, held from the beginning to past and clear.
 
 An encounter begins when both vessels, going on as they do, would come nearer than is safe (rule 7), and ends when they
-draw apart. What the rules gave at its beginning stays: an overtaking vessel remains one however the bearing changes
-(rule 13 d), and nobody's turn makes a give-way vessel of the other. Between two sailing vessels a tack of either is
-judged anew.
+draw apart, and would on their first courses. What the rules gave at its beginning stays: an overtaking vessel remains
+one however the bearing changes (rule 13 d), and nobody's turn makes a give-way vessel of the other. Between two sailing
+vessels a tack of either is judged anew.
 
 Where we stand on we keep course and speed (rule 17 a i) until the other has evidently not acted, that is until no
 more time is left than we need to get clear by ourselves (rule 17 a ii and b).
@@ -16,21 +16,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from companion.geo.angles import difference_rad
-from companion.traffic.approach import AlarmLimits, Approach, OwnShip, alarm_of
+from companion.traffic.approach import AlarmLimits, Approach, OwnShip, alarm_of, cpa
 from companion.traffic.assess import Assessment
 from companion.traffic.colregs import Encounter, Policy, Role, Rule, wind_side
 from companion.traffic.predict import Motion, motion_of
 from companion.traffic.vessel import Vessel
 
 SOON_S = 300.0               # an approach later than this is no risk of collision yet
-OVER_S = 5.0                 # for so long the vessels have drawn apart: past and clear
-SPEAK_S = 30.0               # between two lines of one encounter
+OVER_S = 5.0                 # for so long they have drawn apart, and would on their first courses: past and clear
+LEFT_S = 120.0               # for so long she has drawn away on a course of hers: she does not come back
 # Getting clear by ourselves: seeing it, a plan, its upload and the turn; then a way that is not straight across.
 REACTION_S, DETOUR = 15.0, 1.5
 SLOW_MPS = 1.0
 # A change of course that is readily apparent (rule 8 b). The rule has no number: 30 degrees is the usual reading
 # (Woerner et al. 2018 grade from 20 to 30); once this much of it shows, the change is made.
 APPARENT_RAD, SHOWN_RAD = math.radians(30.0), math.radians(24.0)
+ACTS_RAD, SHE_ACTS_CPA = math.radians(15.0), 0.4   # she has turned by this much; then this share of the distance does
 TACK_RAD = math.radians(10.0)   # nearer to the wind's line than this a tack is not told from a heading
 
 # Who stands on is bound to keep course and speed (rule 17), and who should give way and does not has shown that she
@@ -55,6 +56,7 @@ class Held:
         since_s: when it began.
         course_rad: ours then, over ground.
         side: where she was then: "ahead", "port", "starboard" or "astern".
+        her_course_rad: hers then; None where it was not known.
         tacks: ours and hers, "" where it cannot be told.
         must_act: we must keep out of her way now.
         evident: we stood on and she evidently does not act: it is for us to get clear now.
@@ -71,6 +73,7 @@ class Held:
     since_s: float
     course_rad: float
     side: str
+    her_course_rad: float | None = None
     tacks: tuple[str, str] = ("", "")
     must_act: bool = False
     evident: bool = False
@@ -111,11 +114,14 @@ class Held:
         return (f"{self.label} {where}: {does} ({rule}); CPA {approach.distance_m:.0f} m in {approach.time_s:.0f} s")
 
 
-def act_limits(own: OwnShip, vessel: Vessel, clearance_m: float) -> AlarmLimits:
-    """Return when an approach is an encounter, and when a vessel that stands on must act by herself."""
+def act_limits(own: OwnShip, vessel: Vessel, clearance_m: float, *, she_acts: bool = False) -> AlarmLimits:
+    """Return when an approach is an encounter, and when a vessel that stands on must act by herself.
+
+    Where the other has turned, how near she then passes is her choice, as long as it is not too near.
+    """
     way_m = DETOUR * (clearance_m + own.radius_m + vessel.reach_m)
     return AlarmLimits(
-        warn_cpa_m=clearance_m, warn_tcpa_s=SOON_S, act_cpa_m=clearance_m,
+        warn_cpa_m=clearance_m, warn_tcpa_s=SOON_S, act_cpa_m=clearance_m * (SHE_ACTS_CPA if she_acts else 1.0),
         act_tcpa_s=REACTION_S + way_m / max(own.speed_mps, SLOW_MPS))
 
 
@@ -157,7 +163,7 @@ def _begun(
     return Held(
         mmsi=one.vessel.mmsi, branch=one.vessel.branch, label=one.vessel.label, encounter=one.encounter, since_s=t_s,
         course_rad=course, side=_side(difference_rad(a.bearing_rad, course)),
-        tacks=_tacks(own, one.vessel, twd_from_rad))
+        her_course_rad=one.vessel.course_rad, tacks=_tacks(own, one.vessel, twd_from_rad))
 
 
 def _gone_on(held: Held, own: OwnShip, one: Assessment, t_s: float, twd_from_rad: float | None) -> Held | None:
@@ -166,7 +172,7 @@ def _gone_on(held: Held, own: OwnShip, one: Assessment, t_s: float, twd_from_rad
         held = replace(held, apart_s=None)
     elif held.apart_s is None:
         held = replace(held, apart_s=t_s)
-    elif t_s - held.apart_s >= OVER_S:
+    elif t_s - held.apart_s >= (LEFT_S if _meets_again(held, own, one.vessel, t_s) else OVER_S):
         return None
     if own.speed_mps >= 0.5 * SLOW_MPS and abs(
             difference_rad(math.atan2(*own.velocity_en_mps), held.course_rad)) >= SHOWN_RAD:
@@ -179,8 +185,19 @@ def _gone_on(held: Held, own: OwnShip, one: Assessment, t_s: float, twd_from_rad
     return replace(held, encounter=one.encounter) if unknown and not held.altered else held
 
 
+def _meets_again(held: Held, own: OwnShip, vessel: Vessel, t_s: float) -> bool:
+    """Would they close again, were both back on the courses that the encounter began on?"""
+    if held.her_course_rad is None:
+        return False
+    back = replace(own, velocity_en_mps=(
+        own.speed_mps * math.sin(held.course_rad), own.speed_mps * math.cos(held.course_rad)))
+    return cpa(back, replace(vessel, course_rad=held.her_course_rad, heading_rad=None), t_s).is_closing
+
+
 def _judged(held: Held, own: OwnShip, one: Assessment, clearance_m: float, policy: Policy) -> Held:
-    alarm = alarm_of(one.approach, act_limits(own, one.vessel, clearance_m))
+    then, now = held.her_course_rad, one.vessel.course_rad
+    she_acts = then is not None and now is not None and abs(difference_rad(now, then)) >= ACTS_RAD
+    alarm = alarm_of(one.approach, act_limits(own, one.vessel, clearance_m, she_acts=she_acts))
     must_act = held.evident or held.encounter.role is not Role.STAND_ON or held.encounter.must_act(alarm, policy)
     return replace(held, must_act=must_act, evident=must_act and held.encounter.role is Role.STAND_ON,
                    cpa_m=one.approach.distance_m)

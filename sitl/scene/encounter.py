@@ -7,7 +7,8 @@ Then, from the tracks alone:
   when no more than ``EVIDENT_S`` are left and she has not changed course; if she has, we still stand on until past;
 - **we give way** (8, 15, 16): a change of course of ``APPARENT_DEG``, begun early (``EARLY_S`` before the meeting, or
   within ``PROMPT_S`` of her first report), and not across her bow nearer than ``AHEAD_S`` of her way; where rule 14
-  says so, to starboard;
+  says so, to starboard; under sail on port tack, with a vessel nearly dead before the wind whose tack nobody could
+  tell, giving way is no fault either (12 a iii);
 - **both**: the hulls stay ``keep_m`` apart.
 
 Thresholds after the grades of Woerner, Benjamin, Novitzky and Leonard (Autonomous Robots 2019): the rules have none.
@@ -33,6 +34,7 @@ EARLY_S, PROMPT_S = 60.0, 45.0
 AHEAD_S = 40.0
 SMOOTH_S = 5.0
 CROSS_DEG = (20.0, 160.0)
+DOUBT_DEG = 25.0
 
 
 @dataclass(slots=True)
@@ -131,8 +133,11 @@ def judge_encounter(
     begun = np.flatnonzero(turned[before] >= SHOWS_DEG)
     left_s = float(meet_s - (times[begun[0]] - times[0])) if len(begun) else None
     crossed = _crossed(ours, hers, hers_deg, speeds[1], float(hers_deg[0] - ours_deg[0]))
-    faults = _stand_on_faults(movers, turned, her_turn, nearest, keep_m + 0.5 * met.length_m) if who == "second" else (
-        _give_way_faults(turned[before], left_s, meet_s, times, begun, crossed, rule))
+    giving_way = _give_way_faults(turned[before], left_s, meet_s, times, begun, crossed, rule)
+    faults = giving_way if who != "second" else _stand_on_faults(
+        movers, turned, her_turn, nearest, keep_m + 0.5 * met.length_m)
+    if who == "second" and faults and rule == "12" and not giving_way and _in_doubt(*movers[0], float(wind[0])):
+        who, faults = "first", []
     if who == "both" and len(begun) and ours_deg[begun[0]] < ours_deg[0]:
         faults.append("altered to port")
     return Judgement(
@@ -140,6 +145,12 @@ def judge_encounter(
         craft=met.craft, cpa_unaltered_m=cpa_m, meet_s=meet_s, nearest_m=float(gaps[nearest]),
         altered_deg=float(turned[before].max()), altered_left_s=left_s, crossed=crossed[0], faults=tuple(faults),
         keep_m=keep_m)
+
+
+def _in_doubt(ours: Mover, hers: Mover, twd_from_rad: float) -> bool:
+    """Whether we are on port tack and her tack cannot be told for sure: she runs nearly dead before the wind."""
+    off_wind = math.degrees(abs(math.remainder(hers.heading_rad - twd_from_rad, 2.0 * math.pi)))
+    return off_wind > 180.0 - DOUBT_DEG and math.sin(twd_from_rad - ours.heading_rad) < 0.0
 
 
 def _stand_on_faults(
