@@ -10,9 +10,18 @@ import math
 import random
 from typing import Literal, get_args
 
-from sitl.scene import EventSpec, ExpectSpec, Scenario, WindSpec
-from sitl.scene.mariner import CLOSE_HAULED_DEG, Manner, met_by
-from sitl.scene.road import Craft, Mover, duty
+from sitl.scene import (
+    CLOSE_HAULED_DEG,
+    Craft,
+    EventSpec,
+    ExpectSpec,
+    Manner,
+    Mover,
+    Scenario,
+    WindSpec,
+    duty,
+    met_by,
+)
 
 Kind = Literal["crossing", "head-on", "overtaking", "sailing"]
 Policy = Literal["rules", "keep clear"]

@@ -110,7 +110,7 @@ def test_who_turned_away_and_comes_back_is_the_same_encounter():
 
 
 def test_a_change_of_course_shows_once_and_stays_shown():
-    we, ship = crossing(**{"nav_status": 7})
+    we, ship = crossing(nav_status=7)
     [held] = look((), we, ship)
     assert not held.altered
     turned = own((0.0, 0.0), 40.0, 3.0)

@@ -100,9 +100,13 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
 
     The wind keeps its part on every rung. Where the start is within a vessel's disc already, its discs shrink to let
     the boat out: none nearer than now. What that risks is in the plan's path risk. By the rules of the road a vessel
-    that keeps out of our way is left to do so, and one that we give way to adds regions on the first rung.
+    that keeps out of our way is left to do so, unless another has to be kept clear of: whoever alters course does it
+    clear of all. One that we give way to adds regions on the first rung.
     """
-    vessels = [v for v in near(turn) if not ((held := held_of(turn, v)) is not None and held.stands_on)]
+    vessels = near(turn)
+    is_met = bool(turn.state.encounters) and bool(meetings(turn))
+    if not is_met:
+        vessels = tuple(v for v in vessels if not ((held := held_of(turn, v)) is not None and held.stands_on))
     found = discs(turn, vessels, turn.t_s + after_s, 0.0)
     if not found:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
@@ -129,7 +133,7 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
     if not out:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
     if rung == 0 and turn.state.encounters:
-        out += regions(turn, vessels, start_en, after_s, is_met=bool(meetings(turn)))
+        out += regions(turn, vessels, start_en, after_s, is_met=is_met)
     least = max(LEAST_DELTA_S, 1.0 - of_wind - part)   # a half and not the last digit below it
     return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)
 

@@ -80,6 +80,19 @@ def test_a_motor_ship_that_has_time_is_stood_on_to():
     assert len(said(turn)) == 1
 
 
+def test_who_gives_way_to_one_keeps_clear_of_the_other_too():
+    turn = turn_with(POWER)
+    here = turn.boat_en
+    [ship] = turn.snapshot.traffic.vessels
+    fisher = vessel((ship.antenna_en_m[0], 2.0 * here[1] - ship.antenna_en_m[1]), 180.0, 3.0, mmsi=7, t_s=turn.t_s,
+                    heard_s=turn.t_s, size=(10.0, 10.0, 3.0, 3.0), **FISHING)
+    both = replace(turn.snapshot, traffic=TrafficPicture(t_s=turn.t_s, vessels=(ship, fisher)))
+    turn = Turn(turn.voyage, turn.config, replace(turn.state, encounters=()), both)
+    look_out(turn)
+    assert [h.stands_on for h in turn.state.encounters] == [False, True]
+    assert {t.name for t in shares(turn, here, 0.0, 0, 0.9).targets} >= {"7", "211000001", "ahead of 7"}
+
+
 def test_the_same_ship_is_kept_clear_of_by_default():
     turn = turn_with(POWER, policy=Policy.KEEP_CLEAR)
     assert SkipperConfig().traffic_policy is Policy.KEEP_CLEAR
