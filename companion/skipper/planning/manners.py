@@ -50,8 +50,10 @@ def is_stood_on_to(turn: Turn, vessel: Vessel) -> bool:
     held = held_of(turn, vessel)
     if held is not None:
         return held.stands_on
-    return any(a.encounter.role is Role.STAND_ON for a in turn.state.watch
-               if (a.vessel.mmsi, a.vessel.branch) == (vessel.mmsi, vessel.branch))
+    # A boat that hardly moves meets nobody: she has no course to keep.
+    return turn.speed_mps >= LEAST_MPS and any(
+        a.encounter.role is Role.STAND_ON for a in turn.state.watch
+        if (a.vessel.mmsi, a.vessel.branch) == (vessel.mmsi, vessel.branch))
 
 
 def stands_on(turn: Turn) -> bool:
