@@ -3,7 +3,7 @@
 An encounter begins when both vessels, going on as they do, would come nearer than is safe (rule 7), and ends when they
 draw apart, and would on their first courses. What the rules gave at its beginning stays: an overtaking vessel remains
 one however the bearing changes (rule 13 d), and nobody's turn makes a give-way vessel of the other. Between two sailing
-vessels a tack of either is judged anew.
+vessels a tack of ours is judged anew.
 
 Where we stand on we keep course and speed (rule 17 a i) until the other has evidently not acted, that is until no
 more time is left than we need to get clear by ourselves (rule 17 a ii and b).
@@ -178,7 +178,8 @@ def _gone_on(held: Held, own: OwnShip, one: Assessment, t_s: float, twd_from_rad
             difference_rad(math.atan2(*own.velocity_en_mps), held.course_rad)) >= SHOWN_RAD:
         held = replace(held, altered=True)
     tacks = _tacks(own, one.vessel, twd_from_rad)
-    changed = any(now and then and now != then for now, then in zip(tacks, held.tacks, strict=True))
+    # Hers may change because she gives way: that relieves her of nothing.
+    changed = bool(tacks[0]) and bool(held.tacks[0]) and tacks[0] != held.tacks[0]
     if held.encounter.rule is Rule.SAILING and changed and a.is_closing and not held.altered:
         return replace(held, encounter=one.encounter, tacks=tacks, evident=False)
     unknown = held.encounter.role is Role.KEEP_CLEAR and one.encounter.role is not Role.KEEP_CLEAR

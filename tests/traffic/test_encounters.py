@@ -175,3 +175,17 @@ def test_the_line_names_her_the_rule_and_what_we_do():
     text = held.sentence(one.approach)
     assert one.alarm >= Alarm.WARN
     assert text.startswith("Ferry crosses from starboard: standing on (rule 18: power gives way to sail)")
+
+
+def test_a_tack_by_which_she_gives_way_relieves_her_of_nothing():
+    """We are on starboard tack, she on port; she turns until the wind is on her starboard side, too: by the new tacks
+    another encounter, with other roles elsewhere (`sitl encounters --kind sailing`, seed 68)."""
+    wind, c = math.radians(200.0), math.radians(-10.0)
+    we = own((0.0, 0.0), 90.0, 3.0)
+    ship = vessel((300.0 - 300.0 * math.sin(c), -300.0 * math.cos(c)), -10.0, 3.0, **SAIL)
+    [held] = look((), we, ship, wind_rad=wind)
+    assert held.tacks == ("starboard", "port")
+    turned = replace(ship, course_rad=math.radians(60.0), heading_rad=math.radians(60.0))
+    [after] = look((held,), we, turned, t_s=1.0, wind_rad=wind)
+    assert after.encounter == held.encounter
+    assert look((), we, turned, wind_rad=wind)[0].encounter != held.encounter
