@@ -188,4 +188,5 @@ def test_a_tack_by_which_she_gives_way_relieves_her_of_nothing():
     turned = replace(ship, course_rad=math.radians(60.0), heading_rad=math.radians(60.0))
     [after] = look((held,), we, turned, t_s=1.0, wind_rad=wind)
     assert after.encounter == held.encounter
-    assert look((), we, turned, wind_rad=wind)[0].encounter != held.encounter
+    [anew] = assess(we, TrafficPicture(t_s=0.0, vessels=(turned,)), SEA, wind)
+    assert anew.encounter != held.encounter
