@@ -25,7 +25,7 @@ from companion.skipper.step import (
     SkipperConfig,
 )
 from companion.skipper.way import Box, Goal, Line, Refuge, Search, Side, Voyage
-from companion.traffic import TargetLimits
+from companion.traffic import Policy, TargetLimits
 from companion.traffic.feeds import parse_feed
 from companion.wind import Estimator, make
 
@@ -119,6 +119,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "min_replan_interval_s": options.min_replan_s,
         "traffic_clearance_m": mission.traffic.safe_distance_m,
         "traffic_time_s": mission.traffic.safe_time_s,
+        "traffic_policy": Policy(mission.traffic.policy),
         "wind_change_rad": math.radians(options.wind_shift_deg),
         "grid_size_m": options.off_track_m,
         "safe_end": SafeEnd.RETURN if options.end == "home" else SafeEnd.LOITER,

@@ -17,6 +17,7 @@ PROGRAM = Program(
         "run": "sail a scenario: autopilot, weather, companion, verdict",
         "campaign": "a scenario over many seeds: success, risk, time",
         "faults": "a short voyage a thousand times, each with trouble of its own",
+        "encounters": "vessels that would hit the boat, by the hundred: the rules of the road",
         "baselines": "the companion against ArduRover alone and with its own path planning",
         "hostile": "forge what the companion reads, and see what comes of it",
         "fetch": "download the official ArduRover simulator",

@@ -1,7 +1,8 @@
 """The rules of the road between our sailboat and another vessel: COLREGs 12, 13 and 18 (14, 15 under power).
 
-This says what the rules say; it does not steer. The default policy keeps clear of everyone: a boat of a metre is
-not seen, and "right of way is not an acceptable excuse" (WRSC).
+This says what the rules say; it does not steer (``companion.traffic.encounters`` holds it through an encounter). The
+default policy keeps clear of everyone: a boat of a metre is not seen, and "right of way is not an acceptable excuse"
+(WRSC).
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class Role(enum.Enum):
 class Policy(enum.Enum):
     """How we act on it."""
 
-    KEEP_CLEAR = "keep_clear"   # of everyone, whatever the rules give us
+    KEEP_CLEAR = "keep clear"   # of everyone, whatever the rules give us
     RULES = "rules"             # stand on where they say so, until the alarm says ACT (rule 17)
 
 

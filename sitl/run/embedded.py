@@ -78,7 +78,8 @@ def permitted(mission: Mission, scenario: Scenario) -> Mission:
     options = mission.options
     operator = replace_struct(options.operator, arm=True, set_auto=scenario.set_auto)
     named = options.autopilot if scenario.system is None else replace_struct(options.autopilot, system=scenario.system)
-    return replace(mission, options=replace_struct(options, operator=operator, autopilot=named))
+    traffic = options.traffic if scenario.policy is None else replace_struct(options.traffic, policy=scenario.policy)
+    return replace(mission, options=replace_struct(options, operator=operator, autopilot=named, traffic=traffic))
 
 
 def mission_of(scenario: Scenario, source: Path) -> Mission:
@@ -99,7 +100,8 @@ RADIO_EVENTS = frozenset({"intruder", "second_boat"})
 def with_radio(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
     """Return the mission with its UDP feed at a free port, and the port; 0 where nothing is told by radio."""
     feeds = mission.traffic.feeds
-    if not any(e.kind in RADIO_EVENTS for e in scenario.events) or not any(f.startswith("udpin:") for f in feeds):
+    told = any(e.kind in RADIO_EVENTS or (e.kind == "meeting" and e.receiver == "feed") for e in scenario.events)
+    if not told or not any(f.startswith("udpin:") for f in feeds):
         return mission, 0
     port = free_port()
     moved = tuple(f"udpin:127.0.0.1:{port}" if f.startswith("udpin:") else f for f in feeds)
@@ -158,7 +160,7 @@ async def run_embedded(
         called_at_s=world.called_at_s, ordered=world.ordered if world.neighbours else None,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
         status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
-        tasks=tasks_of(mission, scenario.epoch_s), **ends_of(mission),
+        tasks=tasks_of(mission, scenario.epoch_s), keep_m=mission.traffic.safe_distance_m, **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict

@@ -172,7 +172,7 @@ async def _run(
         floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point),
         summary=summary, status_times_s=None, alerts=summary.get("alerts", {}), errors=errors,
-        marks=marks_of(mission), began_s=began_s,
+        marks=marks_of(mission), began_s=began_s, keep_m=mission.traffic.safe_distance_m,
         tasks=tasks_of(mission, scenario.epoch_s - began_s), **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())

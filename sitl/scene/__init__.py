@@ -2,7 +2,9 @@
 
 from sitl.scene.clearance import HullTrack
 from sitl.scene.hull import own_polar
+from sitl.scene.mariner import CLOSE_HAULED_DEG, Manner, met_by
 from sitl.scene.others import TRAFFIC, Others
+from sitl.scene.road import Craft, Mover, duty
 from sitl.scene.scenario import (
     EventSpec,
     ExpectSpec,
@@ -19,7 +21,8 @@ from sitl.scene.verdict import CALL_HOLDS_S, Truth, Verdict, count_tacks, judge
 from sitl.scene.weather import scenario_wind
 
 __all__ = [
-    "CALL_HOLDS_S", "TASK_S", "TRAFFIC", "EventSpec", "ExpectSpec", "HullTrack", "Motion", "Others",
-    "SatelliteSpec", "Scenario", "StationScore", "Tasks", "Truth", "Verdict", "WindSpec", "count_tacks", "free_port",
-    "is_all_ordinary", "judge", "load_scenario", "own_polar", "scenario_wind", "station_score", "tasks_of",
+    "CALL_HOLDS_S", "CLOSE_HAULED_DEG", "TASK_S", "TRAFFIC", "Craft", "EventSpec", "ExpectSpec", "HullTrack",
+    "Manner", "Motion", "Mover", "Others", "SatelliteSpec", "Scenario", "StationScore", "Tasks", "Truth", "Verdict",
+    "WindSpec", "count_tacks", "duty", "free_port", "is_all_ordinary", "judge", "load_scenario", "met_by",
+    "own_polar", "scenario_wind", "station_score", "tasks_of",
 ]

@@ -9,20 +9,27 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from pyais import encode_dict
 
 from companion.clock import now_s
 from companion.geo.frame import LocalFrame
 from sitl.autopilot import Vessel
+from sitl.scene.encounter import Met
+from sitl.scene.mariner import Mariner, Receiver, met_by
+from sitl.scene.road import SHIP_TYPE, STATUS, Mover
 from sitl.scene.scenario import EventSpec
 from sitl.scene.ships import (
     FIRST_MMSI,
+    SHIP_M,
     Motion,
     Moving,
     SecondBoat,
     ais_report,
+    beam_m,
     distance_m,
     intruder_of,
     radio_report,
@@ -32,7 +39,7 @@ from sitl.scene.ships import (
 from sitl.scene.verdict import Truth
 from sitl.world import Wind
 
-TRAFFIC = frozenset({"vessel", "intruder", "second_boat"})
+TRAFFIC = frozenset({"vessel", "intruder", "second_boat", "meeting"})
 OUR_LENGTH_M = 2.0    # what the second boat takes ours for
 _MPS_PER_KNOT = 1852.0 / 3600.0
 
@@ -55,6 +62,16 @@ def sentences(vessel: Vessel) -> bytes:
     return "".join(f"{line}\r\n" for line in encode_dict(said, talker_id="AI", sentence_type="VDM")).encode()
 
 
+def described(mariner: Mariner) -> bytes:
+    """Return a class A static report as NMEA lines (message 5): name, kind and size."""
+    half, side = round(0.5 * mariner.length_m), max(1, round(0.5 * beam_m(mariner)))
+    said: dict[str, Any] = {
+        "msg_type": 5, "mmsi": mariner.mmsi, "shipname": mariner.name, "ship_type": SHIP_TYPE[mariner.craft],
+        "to_bow": half, "to_stern": half, "to_port": side, "to_starboard": side,
+    }
+    return "".join(f"{line}\r\n" for line in encode_dict(said, talker_id="AI", sentence_type="VDM")).encode()
+
+
 class Others:
     """The vessels of one run."""
 
@@ -73,6 +90,15 @@ class Others:
             name = str(vessel.mmsi)
             nearest = min(truth.vessels_m.get(name, math.inf), distance_m(vessel, here_en_m, t_s))
             truth.vessels_m[name] = round(nearest, 2)
+            if isinstance(vessel, Mariner):
+                met = truth.met.setdefault(name, Met(
+                    craft=vessel.craft, manner=vessel.manner, length_m=vessel.length_m, beam_m=beam_m(vessel),
+                    heard_s=truth.t_s[-1]))
+                course, _, speed = vessel.way(t_s)
+                met.t_s.append(truth.t_s[-1])
+                met.en_m.append(vessel.at(t_s))
+                met.course_rad.append(course)
+                met.speed_mps.append(speed)
         if self._second is not None:
             truth.second_boat_m = self._second.nearest_goal_m
 
@@ -97,6 +123,8 @@ class Others:
             while self._port:
                 self._tell(intruder, now_s() - began_s)
                 await asyncio.sleep(event.every_s)
+        elif event.kind == "meeting":
+            await self._meet(event, number, began_s, ours)
         else:
             second = SecondBoat(
                 FIRST_MMSI + number, self._wind, self._seed, now_s() - began_s, (event.east_m, event.north_m),
@@ -117,6 +145,48 @@ class Others:
             next_s += 1.0   # the model sails a second a call: a late timer is caught up with
             await asyncio.sleep(max(0.0, next_s - now_s()))
             second.sail(ours()[0], OUR_LENGTH_M)
+
+    async def _meet(
+        self, event: EventSpec, number: int, began_s: float, ours: Callable[[], tuple[Motion, float]],
+    ) -> None:
+        """Let a vessel come whose watch sees us, and tell of her by AIS with the errors of her instruments."""
+        motion, _ = ours()
+        place, course = met_by(motion, event.course_deg, event.sog_mps, event.meet_s, event.miss_m)
+        mariner = Mariner(
+            mmsi=FIRST_MMSI + number, length_m=event.length_m or SHIP_M, craft=event.craft, manner=event.manner,
+            react_s=event.react_s or event.meet_s, base_rad=course, speed_mps=event.sog_mps, en_m=place,
+            t_s=now_s() - began_s, name=f"M{number}")
+        self._vessels.append(mariner)
+        errors = Receiver(rng=np.random.default_rng((11, self._seed, mariner.mmsi)))
+        told_s, next_s = -math.inf, now_s()
+        while True:
+            t_s = now_s() - began_s
+            if event.is_on_ais and t_s - told_s >= event.every_s:
+                self._report(mariner, errors, event, t_s, is_first=told_s < 0.0)
+                told_s = t_s
+            next_s += 1.0
+            await asyncio.sleep(max(0.0, next_s - now_s()))
+            motion, heading = ours()
+            us = Mover(en_m=motion[0], course_rad=math.atan2(*motion[1]), heading_rad=heading,
+                       speed_mps=math.hypot(*motion[1]), craft="sail")
+            t_s = now_s() - began_s
+            mariner.watch(us, self._wind.at(max(0.0, t_s))[0], t_s)
+
+    def _report(self, mariner: Mariner, errors: Receiver, event: EventSpec, t_s: float, *, is_first: bool) -> None:
+        true = ais_report(mariner, self._frame, t_s)
+        fix = errors.fix_error_m()
+        east, north = mariner.at(t_s)
+        course = mariner.course_rad + errors.course_error_rad(mariner.speed_mps)
+        heard = replace(
+            true, position=self._frame.geo_from_en(east + fix.real, north + fix.imag),
+            cog_deg=math.degrees(course) % 360.0, sog_mps=max(0.0, mariner.speed_mps + errors.speed_error_mps()),
+            nav_status=STATUS[mariner.craft])
+        if event.receiver == "autopilot":
+            self._hear(heard)
+        elif self._port:
+            self._receive(heard)
+            if is_first:
+                send_datagram(described(mariner), self._port)
 
     def _tell(self, vessel: Moving, t_s: float) -> None:
         send_datagram(radio_report(vessel, self._frame, t_s), self._port)

@@ -18,6 +18,8 @@ from companion import examples
 from companion.errors import InputError
 from companion.words import choices
 from sitl.autopilot import EPOCH_S
+from sitl.scene.mariner import Manner
+from sitl.scene.road import Craft
 
 EventKind = Literal[
     "wind_shift",        # veer_deg, over_s
@@ -53,6 +55,8 @@ EventKind = Literal[
     "crew",              # anchors react_s after the companion first calls for it, weighs after for_s
     "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
     "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
+    "meeting",           # course_deg off ours, sog_mps, meet_s, miss_m, craft, manner, react_s, length_m, receiver: a
+                         # vessel with somebody on watch, who would meet us
     "second_boat",       # east_m, north_m, goal_east_m, goal_north_m: VAIMOS's model, steered by field, told by radio
 ]
 
@@ -119,6 +123,11 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     length_m: float | None = None   # of a vessel; none: a ship of 100 m, a boat of 3.65 m
     gap_m: float = 0.0
     bearing_deg: float = 0.0     # clockwise
+    craft: Craft = "power"
+    manner: Manner = "rules"     # of whoever is met: gives way where it is for her, or keeps her course whatever
+    meet_s: float = 120.0        # until the closest approach, both going on ...
+    miss_m: float = 0.0          # ... and how far apart the middles are then
+    receiver: Literal["autopilot", "feed"] = "autopilot"   # who hears her AIS
     goal_east_m: float = 0.0
     goal_north_m: float = 0.0
 
@@ -126,7 +135,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 # What a boat must bear without coming nearer to anything than its mission allows.
 ORDINARY = frozenset({
     "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "leak", "vessel",
-    "neighbour", "disk", "order", "far_order"})
+    "neighbour", "disk", "order", "far_order", "meeting"})
 ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
 ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
 ORDINARY_LOSS = 0.3          # a link that loses more is none
@@ -179,6 +188,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     min_clearance_m: float | None = None
     min_vessel_distance_m: float | None = None  # from the boat to each vessel's hull
     second_boat_within_m: float | None = None   # of its goal, at some moment
+    rules_kept: bool | None = None            # of the road, by the tracks, in every meeting
     station_radius_m: float | None = None       # about their mean, of 95 % of 5 minutes' points at the last goal
     max_silence_s: float | None = 10.0        # without a status from the companion that says why
     max_replans_per_hour: float | None = None
@@ -211,6 +221,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     exit_on_arrival: bool = True              # else the boat is watched in its loiter until the limit
     dry_run: bool = False                     # the companion may only look
     set_auto: bool = True                     # it may set modes
+    policy: Literal["keep clear", "rules"] | None = None   # for vessels, in place of what the mission says
     system: int | None = None                 # of our autopilot, named in place of what the mission says
     satellite: SatelliteSpec | None = None    # ``far_order`` needs one
     wind: WindSpec = msgspec.field(default_factory=WindSpec)

@@ -17,6 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.boat import Hull
 from sitl.scene.clearance import HullTrack
+from sitl.scene.encounter import Met, judge_encounter
 from sitl.scene.scenario import ExpectSpec
 from sitl.scene.scores import station_score
 from sitl.scene.tasks import Tasks
@@ -39,6 +40,7 @@ class Truth:
     twd_from_rad: list[float] = field(default_factory=list)
     tws_mps: list[float] = field(default_factory=list)
     vessels_m: dict[str, float] = field(default_factory=dict)   # the least distance to each vessel's hull
+    met: dict[str, Met] = field(default_factory=dict)     # the tracks of those who met us
     second_boat_m: float | None = None   # the second boat's least distance to its goal
 
     def add(
@@ -189,13 +191,15 @@ def judge(
     ordered: Sequence[int] | None = None,
     began_s: float = 0.0,
     tasks: Tasks | None = None,
+    keep_m: float = 0.0,
 ) -> Verdict:
     """Hold a run against what its scenario expects.
 
     ``hull`` is what touches. ``floor_m`` is the mission's, which the hull must keep in ordinary weather; None: not
     asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
     ``ordered`` are the systems of other autopilots that were given orders, None where there was no other. The
-    scenario's beginning is ``began_s`` in the track's time; ``tasks`` are the mission's.
+    scenario's beginning is ``began_s`` in the track's time; ``tasks`` are the mission's, ``keep_m`` what it keeps from
+    vessels.
     """
     ends = {"goal": [goal_en_m], "home": truth.en_m[:1], "refuge": refuges_en_m}[expect.ends_at]
     positions = truth.positions_m()
@@ -237,6 +241,12 @@ def judge(
         nearest = min(truth.vessels_m.values(), default=-math.inf)   # nothing measured does not pass
         check("distance to vessels, m", nearest >= expect.min_vessel_distance_m, truth.vessels_m,
               f"at least {expect.min_vessel_distance_m}")
+    met = {name: found for name, track in truth.met.items() if (found := judge_encounter(
+        track, truth.t_s, truth.en_m, truth.heading_rad, truth.twd_from_rad, keep_m=keep_m,
+        our_length_m=hull.length_m)) is not None}
+    if expect.rules_kept is not None:
+        faults = [f"{name}: {fault}" for name, found in met.items() for fault in found.faults]
+        check("rules of the road", bool(met) and (not faults) == expect.rules_kept, faults, "kept")
     if expect.second_boat_within_m is not None:
         nearest_m = truth.second_boat_m
         check("the second boat's distance to its goal, m", nearest_m is not None and
@@ -291,6 +301,7 @@ def judge(
             "gybes": gybes,
             "min_clearance_m": clearance if math.isfinite(clearance) else None,
             "vessel_distances_m": truth.vessels_m,
+            "encounters": [found.to_dict() for found in met.values()],
             "end_distance_m": end_distance,
             "silence_s": silence_s,
             "replans": summary.get("replans"),

@@ -93,7 +93,7 @@ OTHER = {
                "position_failsafe": "leave", "battery_failsafe": "stay", "fence_failsafe": "refuge",
                "shore_failsafe": "sail_on"},
     "traffic": {"feeds": ["udpin:127.0.0.1:10110"], "safe_distance_m": 60.0, "safe_time_s": 80.0,
-                "drop_after_s": 300.0},
+                "drop_after_s": 300.0, "policy": "rules"},
 }
 # What does not sail: pictures and previews, and what `companion run` itself takes. Tried below.
 DRAWN = {("start", "heading_deg"), ("wind", "preview_from_deg")}

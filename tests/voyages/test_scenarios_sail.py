@@ -16,7 +16,7 @@ from sitl.scene.scenario import load_scenario
 
 FOLDER = Path("sitl/scenarios")
 # What is folded again from the record: the new inputs of a failsafe's answer and of a watched rest among them.
-REPLAYED = {"station-lost", "mode-switch", "at-rest", "watched"}
+REPLAYED = {"station-lost", "mode-switch", "at-rest", "watched", "rules-head-on"}
 LONG = {"endurance", "far-away"}
 ALL = sorted(str(p.relative_to(FOLDER).with_suffix("")) for p in FOLDER.rglob("*.toml") if p.stem not in LONG)
 

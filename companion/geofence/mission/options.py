@@ -188,6 +188,9 @@ class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Plans keep this clear between hulls; an approach nearer than it within ``safe_time_s`` is an alarm."""
     safe_time_s: Positive = 90.0
     drop_after_s: Positive = 600.0
+    policy: Literal["keep clear", "rules"] = "keep clear"
+    """Keep clear of everyone, whatever the rules of the road give us; or stand on where they say so, and give way
+    early, by much and astern where they ask for it."""
 
 
 class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -21,6 +21,7 @@ from companion.messages import Mode
 from companion.skipper.deeds.helm import hand_back, is_busy, set_mode
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.errands import errand
+from companion.skipper.planning.manners import held_of
 from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
 from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.step.config import Guidance
@@ -29,6 +30,7 @@ from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import marks_of
 from companion.skipper.way.geometry import distance_m
 from companion.traffic import Vessel, predict
+from companion.traffic.encounters import expected
 
 NAME = "vessel too near"      # the watchdog's
 KEEP_SHARE = 0.5              # of the distance that plans keep: what the last resort defends
@@ -49,7 +51,8 @@ def obstacles(turn: Turn, vessels: Sequence[Vessel]) -> tuple[Obstacle, ...]:
     own_m = hull.reach_m + KEEP_SHARE * turn.config.traffic_clearance_m
     out = []
     for vessel in vessels:
-        now, later = predict(vessel, turn.t_s), predict(vessel, turn.t_s + GROWN_S)
+        motion = None if held_of(turn, vessel) is None else expected(vessel)
+        now, later = predict(vessel, turn.t_s, motion), predict(vessel, turn.t_s + GROWN_S, motion)
         radius_m = now.radius_m(GIVE_UP_RISK)
         out.append(Obstacle(
             en_m=now.mean_en_m, velocity_en_mps=now.velocity_en_mps, keep_m=radius_m + own_m,

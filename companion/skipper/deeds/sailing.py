@@ -19,6 +19,7 @@ from companion.skipper.deeds.short_tack import short_tack
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S
 from companion.skipper.planning.errands import Errand, errand, is_at_rest
+from companion.skipper.planning.manners import stands_on
 from companion.skipper.planning.not_found import hold
 from companion.skipper.planning.triggers import find_trigger, is_buoy
 from companion.skipper.planning.vessels import near
@@ -181,6 +182,8 @@ def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
     interval_s = trigger.interval_s
     if trigger.reason in ROUTINE and near(turn):
         interval_s = max(interval_s, MIN_INTERVAL_S)
+    if trigger.reason in ROUTINE - {ReplanReason.OFF_LEG} and stands_on(turn):
+        return   # rule 17 a i: course and speed are kept
     if turn.t_s - state.last_plan_s < interval_s:
         return
     if request(turn, trigger.reason, from_index=trigger.from_index, text=trigger.text):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from companion.skipper.step.causes import TABLE
 from companion.skipper.step.config import End, SafeEnd, SkipperConfig
+from companion.traffic import Policy
 
 # Watchdogs.
 BATTERY, LEAK, OUT_OF_TIME = "battery critical", "leaking", "out of time"
@@ -16,6 +17,11 @@ HOW_LONG = {
     BATTERY: "until the battery is charged, or a person takes her",
     LEAK: "until the bilge is dry, or a person takes her",
     DARK: "until it is light", SHORE_LOST: "until a ground station is heard",
+}
+
+POLICY_WORDS = {
+    Policy.KEEP_CLEAR: "vessels: kept clear of, whoever must give way",
+    Policy.RULES: "vessels: by the rules of the road",
 }
 
 
@@ -40,7 +46,7 @@ def words(config: SkipperConfig, name: str) -> str:
 
 
 def announcement(config: SkipperConfig) -> str:
-    """Return all of it in one sentence, to be said before setting sail."""
+    """Return all of it in one sentence, and how vessels are met, to be said before setting sail."""
     names = [BATTERY, LEAK, DARK, SHORE_LOST]
     if config.voyage_timeout_s is not None:
         names.insert(2, OUT_OF_TIME)
@@ -49,4 +55,4 @@ def announcement(config: SkipperConfig) -> str:
         answer = config.ends.answer(name)
         if answer is not None:
             said.append(f"{name} failsafe: {answer.words}")
-    return "; ".join(said)
+    return "; ".join([*said, POLICY_WORDS[config.traffic_policy]])

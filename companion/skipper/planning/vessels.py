@@ -15,11 +15,13 @@ from itertools import pairwise
 
 from companion.geo.angles import difference_rad
 from companion.planner.problem import VESSELS_SHARE, Target, sigmas_for, vessel_count
+from companion.skipper.planning.manners import MEET_SHARE, bow_discs, held_of, is_stood_on_to, regions
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import LOST_MPS
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Conflict, Disc, Vessel, check_legs, path_distance_m, planning_discs, predict
+from companion.traffic.encounters import expected
 from companion.traffic.occupancy import Keep
 from companion.traffic.plans import TimedLeg, pressing
 from companion.traffic.predict import tail_factor
@@ -73,7 +75,11 @@ def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> t
     )
     known = [v for v in vessels if v.is_moving_known]
     unknown = [v for v in vessels if not v.is_moving_known]
-    return (*planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
+    met = {(h.mmsi, h.branch) for h in turn.state.encounters}
+    holding = [v for v in known if (v.mmsi, v.branch) in met]
+    known = [v for v in known if (v.mmsi, v.branch) not in met]
+    return (*(d for v in holding for d in planning_discs([v], t_s, keep, motion=expected(v))),
+            *planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,9 +99,15 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
     """Return what a plan is told that starts at ``start_en`` in ``after_s``, on a rung of the ladder.
 
     The wind keeps its part on every rung. Where the start is within a vessel's disc already, its discs shrink to let
-    the boat out: none nearer than now. What that risks is in the plan's path risk.
+    the boat out: none nearer than now. What that risks is in the plan's path risk. By the rules of the road a vessel
+    that keeps out of our way is left to do so, unless another has to be kept clear of: whoever alters course does it
+    clear of all. One that we give way to adds regions on the first rung.
     """
-    found = discs(turn, near(turn), turn.t_s + after_s, 0.0)
+    vessels = near(turn)
+    is_met = bool(turn.state.encounters) and bool(meetings(turn))
+    if not is_met:
+        vessels = tuple(v for v in vessels if not ((held := held_of(turn, v)) is not None and held.stands_on))
+    found = discs(turn, vessels, turn.t_s + after_s, 0.0)
     if not found:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
     of_wind = (1.0 - VESSELS_SHARE) * (1.0 - delta_s)
@@ -120,6 +132,8 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
             out.append(replace(target, radius_m=radius_m))
     if not out:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
+    if rung == 0 and turn.state.encounters:
+        out += regions(turn, vessels, start_en, after_s, is_met=is_met)
     least = max(LEAST_DELTA_S, 1.0 - of_wind - part)   # a half and not the last digit below it
     return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)
 
@@ -172,7 +186,9 @@ def soon(legs: Sequence[TimedLeg], seconds: float) -> list[PointEn]:
 
 def meetings(turn: Turn) -> tuple[Conflict, ...]:
     """Return where the route meets vessels soon enough to act, in order of time; empty when it is clear."""
-    vessels = near(turn)
-    if not vessels:
+    vessels, boat = [v for v in near(turn) if not is_stood_on_to(turn, v)], turn.boat_en
+    if not vessels or boat is None:
         return ()
-    return pressing(check_legs(timed_legs(turn), discs(turn, vessels, turn.t_s, tail_factor(GIVE_UP_RISK))))
+    bows = (d for d in bow_discs(turn, vessels, turn.t_s, MEET_SHARE) if distance_m(boat, (d.x_m, d.y_m)) > d.radius_m)
+    found = (*discs(turn, vessels, turn.t_s, tail_factor(GIVE_UP_RISK)), *bows)
+    return pressing(check_legs(timed_legs(turn), found))

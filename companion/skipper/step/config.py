@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from companion.orders import ALL
 from companion.skipper.step.causes import BY_NAME, Answer
+from companion.traffic import Policy
 
 
 class ReplanPolicy(enum.Enum):
@@ -120,6 +121,7 @@ class SkipperConfig:
     buoy_angle_rad: float = 0.523599   # 30 deg, experimentally his
     traffic_clearance_m: float = 50.0  # between hulls, beyond what is not known of where a vessel will be
     traffic_time_s: float = 90.0       # an approach within that distance and this time is an alarm
+    traffic_policy: Policy = Policy.KEEP_CLEAR
     # uploads
     settle_s: float = 5.0              # a mode or sequence number that was asked for shows within this
     reread_s: float = 300.0            # the mission on board is read again this often

@@ -19,6 +19,7 @@ from companion.skipper.step.standing import Standing
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Assessment
+from companion.traffic.encounters import Held
 
 
 class Phase(enum.Enum):
@@ -275,6 +276,8 @@ class SkipperState:
     irons_s: tuple[float, ...] = ()                # when the boat was in irons
     watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
     watch_told: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of those said lately, when
+    encounters: tuple[Held, ...] = ()              # with vessels, under the policy "rules"
+    encounters_told: tuple[tuple[int, int, str, float], ...] = ()   # MMSI, branch, what, when
     announced: tuple[tuple[str, float], ...] = ()  # code, last said
     reached: tuple[int, ...] = ()                  # goals reached, in order
     missed: int = 0                                # buoys passed on the wrong side and sailed again

@@ -1,18 +1,21 @@
 """The lookout: every vessel's approach, alarm and rule each step, and what is said of them.
 
 An alarm needs CPA and TCPA both under their limits. Of each vessel one line is said in half a minute, one vessel a
-step and the worst first: among many nobody can read more. The rules of the road are shown, never relied upon: the boat
-keeps clear of everyone (``companion.traffic.colregs``).
+step and the worst first: among many nobody can read more. The rules of the road are shown, and not relied upon: the
+boat keeps clear of everyone (``companion.traffic.colregs``). Under the policy "rules" encounters are followed to past
+and clear, and each is said when it begins and when what we do changes (``companion.traffic.encounters``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.turn import Turn
-from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, assess
+from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, Policy, assess
+from companion.traffic.encounters import follow
 
 SHOWN = 8                # vessels kept in the state: the worst
 EVERY_S = 30.0           # between two lines of one vessel
@@ -35,13 +38,44 @@ def look_out(turn: Turn) -> None:
         if turn.state.watch:
             turn.update(watch=())
         return
-    hull, wind = turn.voyage.boat.hull, turn.wind_now
+    hull, wind, adrift = turn.voyage.boat.hull, turn.wind_now, turn.state.adrift
     own = OwnShip(
         t_s=turn.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
-        radius_m=hull.reach_m)
-    found = assess(own, picture, limits(turn.config), None if wind is None else wind[0])[:SHOWN]
-    turn.update(watch=found)
-    _say(turn, found)
+        radius_m=hull.reach_m,
+        is_sailing=turn.config.sails and not (adrift.motor and adrift.since_s is not None))   # rule 3 c
+    found = assess(own, picture, limits(turn.config), None if wind is None else wind[0])
+    if turn.config.traffic_policy is Policy.RULES:
+        found = _meet(turn, own, found)
+    turn.update(watch=found[:SHOWN])
+    _say(turn, found[:SHOWN])
+
+
+def _meet(turn: Turn, own: OwnShip, found: Sequence[Assessment]) -> tuple[Assessment, ...]:
+    """Follow the encounters, say which have changed, and return the vessels with what the rules gave each of them."""
+    state, mean = turn.state, turn.wind_mean
+    before = {(h.mmsi, h.branch): h for h in state.encounters}
+    held = follow(state.encounters, own, found, t_s=turn.t_s, clearance_m=turn.config.traffic_clearance_m,
+                  twd_from_rad=None if mean is None else mean[0])
+    now = {(h.mmsi, h.branch): h for h in held}
+    told = {t[:2]: t for t in state.encounters_told}
+    for one in found:
+        key = one.vessel.mmsi, one.vessel.branch
+        after, last = now.get(key), told.get(key)
+        if after is None:
+            continue
+        what = "evident" if after.evident else after.encounter.role.value
+        if last is not None and (last[2] == what or (turn.t_s - last[3] < EVERY_S and not after.evident)):
+            continue
+        severity = (Severity.CRITICAL if after.evident else Severity.WARNING if after.stands_on else Severity.NOTICE)
+        turn.say(severity, "encounter", after.sentence(one.approach), every_s=0.0)
+        told[key] = (*key, what, turn.t_s)
+    for key, gone in before.items():
+        if key not in now:
+            turn.say(Severity.INFO, "encounter", f"{gone.label}: past and clear", every_s=0.0)
+            told.pop(key, None)
+    turn.update(encounters=held, encounters_told=tuple(told.values()))
+    return tuple(replace(one, encounter=now[key].encounter) if (
+        key := (one.vessel.mmsi, one.vessel.branch)) in now else one for one in found)
 
 
 def _say(turn: Turn, found: Sequence[Assessment]) -> None:

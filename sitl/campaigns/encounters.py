@@ -1,0 +1,143 @@
+"""Encounters by the hundred: vessels that would hit our boat, and what both did about it by the rules of the road.
+
+A seed gives the weather and the other vessel (``sitl.campaigns.encounter_draw``); some keep the rules, some keep their
+course whatever. Each voyage is sailed on the embedded autopilot under the virtual clock and judged by its true tracks
+(``sitl.scene.encounter``): the distance to keep, and under the policy "rules" the rules too.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sitl.campaigns.encounter_draw import KINDS, Kind, Policy, draw
+from sitl.campaigns.pool import in_processes
+
+EXPANSIONS = 4_000
+_SOURCE = Path(__file__).parents[1] / "scenarios" / "crossing.toml"   # the drawn ones are as if they lay beside it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One voyage."""
+
+    kind: Kind
+    policy: Policy
+    seed: int
+    keep: Path | None = None
+
+
+def sail_encounter(job: Job) -> dict[str, Any]:
+    """Sail one encounter and return how it went; a voyage folder is left in ``job.keep``."""
+    from companion.clock import run_virtual
+    from sitl.run.embedded import run_embedded
+
+    began_s = time.process_time()
+    scenario = draw(job.seed, job.kind, job.policy)
+    figures: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory(prefix="encounter-") as scratch:
+        folder = job.keep if job.keep is not None else Path(scratch) / "voyage"
+        try:
+            verdict = run_virtual(run_embedded(scenario, _SOURCE, job.seed, folder, expansions=EXPANSIONS))
+            figures = verdict.figures
+            faults = [f"{c.name}: {c.figure}" for c in verdict.checks if not c.passed]
+        except Exception as error:
+            faults = [repr(error)]
+    met = (figures.get("encounters") or [None])[0]
+    if met is None:
+        faults.append("nobody was met")
+    else:
+        if not met["kept_distance"]:
+            faults.append(f"{met['nearest_m']:.0f} m between the hulls")
+        if job.policy == "rules":
+            faults += met["faults"]
+    event = scenario.events[0]
+    return {
+        "kind": job.kind, "policy": job.policy, "seed": job.seed, "passed": not faults, "faults": faults, "met": met,
+        "shoal": "shoal" in scenario.mission, "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}",
+        "vessel": f"{event.craft} of {event.length_m:g} m, {event.sog_mps:g} m/s, {event.course_deg:+g} deg off our "
+                  f"course, every {event.every_s:g} s by {event.receiver}, "
+                  + ("keeps the rules" if event.manner == "rules" else "keeps her course"),
+        "replans": figures.get("replans"), "cpu_s": time.process_time() - began_s,
+    }
+
+
+def run_encounters(
+    *, runs: int, kinds: Sequence[Kind] = KINDS, policies: Sequence[Policy] = ("rules",), first_seed: int = 0,
+    workers: int | None = None, json_path: Path | None = None,
+) -> int:
+    """Sail ``runs`` seeds of each kind and policy, print what failed and the table; return the exit code."""
+    began_s = time.perf_counter()
+    jobs = [Job(kind=kind, policy=policy, seed=first_seed + n)
+            for n in range(runs) for kind in kinds for policy in policies]
+    records: list[dict[str, Any]] = []
+    for record in in_processes(sail_encounter, jobs, workers):
+        records.append(record)
+        if not record["passed"]:
+            print(f"\rFAILED {record['kind']}, {record['policy']}, seed {record['seed']}: "
+                  f"{'; '.join(record['faults'])} ({record['vessel']}; wind {record['wind']}"
+                  f"{'; shoal' if record['shoal'] else ''})", flush=True)
+        left_s = (time.perf_counter() - began_s) / len(records) * (len(jobs) - len(records))
+        failed = sum(not r["passed"] for r in records)
+        sys.stderr.write(f"\r{len(records)}/{len(jobs)} sailed, {failed} failed, {left_s:.0f} s left   ")
+        sys.stderr.flush()
+    sys.stderr.write("\n")
+    records.sort(key=lambda r: (r["policy"], r["kind"], r["seed"]))
+    rows = [row(kind, policy, found) for policy in policies for kind in kinds
+            if (found := [r for r in records if (r["kind"], r["policy"]) == (kind, policy)])]
+    print_rows(rows)
+    print(f"{len(records)} voyages in {time.perf_counter() - began_s:.0f} s, "
+          f"{statistics.mean(r['cpu_s'] for r in records):.2f} CPU s each")
+    for record in records:
+        if not record["passed"]:
+            print(f"again: sitl encounters --kind {record['kind']} --policy \"{record['policy']}\" "
+                  f"--first-seed {record['seed']} --keep DIR")
+    if json_path is not None:
+        json_path.write_text(json.dumps({"table": rows, "voyages": records}, indent=1) + "\n", encoding="utf-8")
+    return 0 if all(r["passed"] for r in records) else 1
+
+
+def row(kind: str, policy: str, records: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return one row of the table."""
+    met = [r["met"] for r in records if r["met"] is not None]
+    ours = [m for m in met if m["duty"] == "we give way"]
+    stood = [m for m in met if m["duty"] == "we stand on"]
+    gaps = [m["nearest_m"] for m in met]
+    left = [m["altered_left_s"] for m in ours if m["altered_left_s"] is not None]
+    return {
+        "kind": kind, "policy": policy, "voyages": len(records), "passed": sum(r["passed"] for r in records),
+        "rules kept": sum(m["kept_rules"] for m in met), "distance kept": sum(m["kept_distance"] for m in met),
+        "touched": sum(g <= 0.0 for g in gaps),
+        "give way": len(ours), "kept giving way": sum(m["kept_rules"] for m in ours),
+        "stand on": len(stood), "kept standing on": sum(m["kept_rules"] for m in stood),
+        "stubborn": sum(m["manner"] == "keeps" and m["duty"] != "we give way" for m in met),
+        "altered median deg": statistics.median(m["altered_deg"] for m in ours) if ours else None,
+        "before median s": statistics.median(left) if left else None,
+        "crossed": dict(Counter(m["crossed"] for m in ours if m["crossed"])),
+        "nearest m": min(gaps, default=None), "nearest median m": statistics.median(gaps) if gaps else None,
+        "failed seeds": [r["seed"] for r in records if not r["passed"]],
+    }
+
+
+def print_rows(rows: Sequence[dict[str, Any]]) -> None:
+    """Print the table."""
+    for r in rows:
+        print(f"{r['kind']}, {r['policy']}: {r['passed']} of {r['voyages']} passed; rules kept {r['rules kept']}, "
+              f"distance kept {r['distance kept']}, touched {r['touched']}; nearest {_figure(r['nearest m'])} m, "
+              f"median {_figure(r['nearest median m'])} m")
+        print(f"  gave way {r['kept giving way']} of {r['give way']} by the rules (by "
+              f"{_figure(r['altered median deg'])} deg, {_figure(r['before median s'])} s before, medians; crossed "
+              f"{r['crossed'].get('astern', 0)} astern, {r['crossed'].get('ahead', 0)} ahead); stood on "
+              f"{r['kept standing on']} of {r['stand on']} ({r['stubborn']} others did not act)")
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0f}"

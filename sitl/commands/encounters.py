@@ -1,0 +1,50 @@
+"""``sitl encounters``: vessels that would hit our boat, and the rules of the road, by the hundred."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from companion.arguments import out_file, out_folder, whole
+from sitl.campaigns.encounter_draw import KINDS, POLICIES, Policy
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "encounters", help=summary,
+        description="Sail short voyages in each of which a vessel would hit our boat: crossing, head-on, overtaking or "
+        "overtaken, under sail. Some of the others keep the rules of the road, some keep their course whatever. Judged "
+        'by the true tracks: the distance that the mission keeps, and under the policy "rules" who stood on and who '
+        "gave way, how early, by how much and on which side. A failing seed is printed and repeats exactly.",
+        epilog="Example: sitl encounters --runs 100, then sitl encounters --kind sailing --first-seed 17 --keep v",
+    )
+    parser.add_argument("--runs", type=whole(at_least=1), default=100, metavar="N",
+                        help="seeds to sail of each kind (default: 100)")
+    parser.add_argument("--kind", choices=KINDS, default=None, help="only these (default: all four)")
+    parser.add_argument("--policy", choices=(*POLICIES, "both"), default="rules",
+                        help="[traffic] policy of our boat (default: rules)")
+    parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
+    parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
+                        help="processes (default: one per core)")
+    parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
+    parser.add_argument("--keep", type=out_folder, metavar="DIR",
+                        help="sail only the first seed and keep its voyage folder")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from sitl.campaigns.encounters import Job, run_encounters, sail_encounter
+    from sitl.run.compiled import compile_ahead
+
+    compile_ahead()
+    kinds = KINDS if args.kind is None else (args.kind,)
+    policies: tuple[Policy, ...] = POLICIES if args.policy == "both" else (args.policy,)
+    if args.keep is not None:
+        record = sail_encounter(Job(kind=kinds[0], policy=policies[0], seed=args.first_seed, keep=args.keep))
+        for key, value in record.items():
+            print(f"{key}: {value}")
+        return 0 if record["passed"] else 1
+    return run_encounters(runs=args.runs, kinds=kinds, policies=policies, first_seed=args.first_seed,
+                          workers=args.workers, json_path=args.json)
