@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -157,8 +157,11 @@ def _stand_on_faults(
     movers: Sequence[tuple[Mover, Mover]], turned: NDArray[np.float64], her_turn: NDArray[np.float64], nearest: int,
     clear_m: float,
 ) -> list[str]:
+    began = movers[0][0]
     for i in range(nearest + 1):
-        cpa_m, left_s = closest(*movers[i])
+        ours, hers = movers[i]
+        # By our first course: a turn of ours makes the time that is left look short, and must not excuse itself.
+        cpa_m, left_s = closest(replace(ours, course_rad=began.course_rad, heading_rad=began.heading_rad), hers)
         acts = bool(her_turn[: i + 1].max() >= SHOWS_DEG)
         evident = left_s <= EVIDENT_S and not acts and cpa_m < clear_m + 0.5 * clear_m
         if evident:

@@ -118,6 +118,14 @@ def test_turning_away_early_from_who_must_give_way_is_a_fault():
     assert "did not stand on" in found.faults[0]
 
 
+@pytest.mark.parametrize("start_s", [15, 18, 20])
+@pytest.mark.parametrize("rate_dps", [2.0, 4.0])
+def test_a_turn_by_which_less_time_seems_to_be_left_does_not_excuse_itself(start_s, rate_dps):
+    """By the courses of the moment the meeting comes sooner while we turn: what counts is the first course."""
+    found = tracks("power", ours=lambda t: min(150.0, rate_dps * max(0.0, t - start_s)))
+    assert "did not stand on" in found.faults[0]
+
+
 def test_getting_clear_of_one_who_evidently_does_not_act_is_none():
     found = tracks("power", ours=between(60, 110, 70.0))
     assert (found.duty, found.faults, found.kept_distance) == ("we stand on", (), True)

@@ -51,7 +51,7 @@ def test_without_the_policy_the_distance_is_kept_and_nobody_is_stood_on_to():
 
 
 def test_the_table_names_what_failed_and_how_to_sail_it_again(capsys):
-    """Her wind is light and the autopilot passes no size on: a yacht is a ship of 100 m, and we act early."""
+    """The autopilot passes no size on: a yacht is taken for a ship of 100 m, and we act early."""
     assert run_encounters(runs=1, kinds=("sailing",), first_seed=85, workers=1) == 1
     out = capsys.readouterr().out
     assert "FAILED sailing, rules, seed 85: did not stand on" in out
