@@ -28,8 +28,8 @@ LEFT_S = 120.0               # for so long she has drawn away on a course of her
 # Getting clear by ourselves: seeing it, a plan, its upload and the turn; then a way that is not straight across.
 REACTION_S, DETOUR = 15.0, 1.5
 SLOW_MPS = 1.0
-# A change of course that is readily apparent (rule 8 b). The rule has no number: 30 degrees is the usual reading
-# (Woerner et al. 2018 grade from 20 to 30); once this much of it shows, the change is made.
+# A change of course that is readily apparent (rule 8 b). The rule has no number: 30 degrees is the usual reading; once
+# the lesser of these shows, the change is made.
 APPARENT_RAD, SHOWN_RAD = math.radians(30.0), math.radians(24.0)
 ACTS_RAD, SHE_ACTS_CPA = math.radians(15.0), 0.4   # she has turned by this much; then this share of the distance does
 TACK_RAD = math.radians(10.0)   # nearer to the wind's line than this a tack is not told from a heading

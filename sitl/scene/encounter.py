@@ -11,7 +11,7 @@ Then, from the tracks alone:
   tell, giving way is no fault either (12 a iii);
 - **both**: the hulls stay ``keep_m`` apart.
 
-Thresholds after the grades of Woerner, Benjamin, Novitzky and Leonard (Autonomous Robots 2019): the rules have none.
+The thresholds are this project's: the rules have none.
 """
 
 from __future__ import annotations
