@@ -1,9 +1,11 @@
 """From drawn items to a voyage: what ArduPilot would sail, in that order, and everything else refused by name."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -78,6 +80,27 @@ def test_jumps_are_laps_as_ardupilot_counts_them():
     assert numbers(A, order(177, 1, 2), B, order(177, 1, 1)) == [1, 1, 1, 3, 1, 3]
 
 
+@pytest.mark.parametrize(("items", "stays"), [
+    ([item(0.1, command=19, p1=30.0), B], [30.0, 0.0]),
+    ([A, item(0.2, p1=5.0), RTL], [0.0, 5.0]),
+    ([A, item(0.2, command=19, p1=30.0)], [0.0, 0.0]),                       # the end keeps her
+    ([A, item(0.2, command=19, p1=30.0), order(177, 1, 1)], [0.0, 30.0]),    # of each lap
+    ([A, item(0.2, command=19, p1=-5.0), B], [0.0, 0.0, 0.0]),
+])
+def test_a_loiter_for_a_time_and_a_hold_are_a_stay(items, stays):
+    course = course_of(items)
+    assert not course.refusals
+    assert [stop.stay_s for stop in course.stops] == stays
+    for stop in course.stops:
+        goal = stop.goal("x")
+        assert getattr(goal, "for_s", None) == (stop.stay_s or None)
+        if stop.stay_s:
+            box = shapely.from_wkt(goal.polygon)
+            assert box.covers(shapely.Point(stop.point.lon_deg, stop.point.lat_deg))
+            area_m2 = box.area * 111_320.0**2 * math.cos(math.radians(stop.point.lat_deg))
+            assert area_m2 == pytest.approx(2500.0, rel=0.02)
+
+
 @pytest.mark.parametrize(("items", "words"), [
     ([A, order(178, 1, 3), B, order(183), item(0.1, command=82), order(30000)],
      ["item 2: error: DO_CHANGE_SPEED is nothing", "item 4: error: DO_SET_SERVO is nothing",
@@ -91,9 +114,6 @@ def test_jumps_are_laps_as_ardupilot_counts_them():
     ([A, order(177, 1, 900), order(177, 1, 900)], ["item 3: error: with this DO_JUMP the voyage has more than 1000"]),
     ([replace(order(16), frame=3), A], ["item 1: error: NAV_WAYPOINT has no place (0, 0)"]),
     ([A, replace(B, frame=1)], ["item 2: error: NAV_WAYPOINT is in frame 1"]),
-    ([item(0.1, command=19, p1=30.0), B], ["item 1: error: NAV_LOITER_TIME stays for 30 s before the voyage's end"]),
-    ([item(0.1, p1=5.0), B], ["item 1: error: NAV_WAYPOINT stays for 5 s before the voyage's end"]),
-    ([item(0.1, command=19, p1=30.0), RTL], ["item 1: error: NAV_LOITER_TIME stays for 30 s before"]),
     ([item(0.1, command=18, p1=2.0)], ["item 1: error: NAV_LOITER_TURNS: a sailboat does not sail circles"]),
     ([A, item(0.2, command=17), B], ["item 3: error: stands behind item 2 (NAV_LOITER_UNLIM)"]),
     ([A, RTL, B], ["item 3: error: stands behind item 2 (NAV_RETURN_TO_LAUNCH)"]),

@@ -147,6 +147,25 @@ def test_a_drawing_is_sailed_by_planning_between_its_points(tmp_path):
     assert any("or the drawing that is sailed: it is replaced" in text for text in bay.announced())
 
 
+def test_a_loiter_for_a_time_is_stayed_in_on_the_way(tmp_path):
+    bay = Bay(tmp_path)
+    place, near_s = (180.0, 0.0), []
+
+    def look(step):
+        here = FRAME.en_from_geo(bay.boat.truth.position)
+        if max(abs(here[0] - place[0]), abs(here[1] - place[1])) <= 25.0:
+            near_s.append(step.snapshot.t_s)
+
+    async def work():
+        await bay.draw([(60.0, 0.0), {"command": 19, "en": place, "p1": 90.0}, (60.0, 60.0)])
+        return await bay.sail(on_step=look)
+
+    summary = bay.run(work)
+    assert (summary["arrived"], summary["goals_reached"]) == (True, 3)
+    assert 90.0 <= len(near_s) <= 160.0, "a step a second"
+    assert replay(bay.folder).differences == ()
+
+
 def test_killed_under_way_she_sails_on_by_the_drawing_that_was_kept(tmp_path):
     bay = Bay(tmp_path)
 

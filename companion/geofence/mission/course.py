@@ -12,11 +12,14 @@ from typing import Any, Literal
 
 import msgspec
 
+from companion.geo.frame import LocalFrame
 from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.mission.goal_options import BoxOptions, GoalOptions, PointOptions
 from companion.geofence.mission.options import SkipperOptions
 from companion.messages import Command, GeoPoint, MissionItem
 
 MAX_GOALS = 1000   # that laps may make of a drawing; a voyage of more is meant otherwise
+STAY_M = 25.0      # half the side of the box in which she stays: her loiter swings 12 m
 MAX_STEPS = 20 * MAX_GOALS   # jumps among jumps that pass no waypoint end here
 GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})   # MAV_FRAMEs whose x and y are latitude and longitude
 REDRAW = "change the drawing and upload it again"
@@ -28,10 +31,21 @@ _ENDS = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """A place to reach, and the number of the item that it was drawn as (from 1: 0 is home)."""
+    """A place to reach, the number of the item that it was drawn as (from 1: 0 is home), and how long to stay [s]."""
 
     number: int
     point: GeoPoint
+    stay_s: float = 0.0
+
+    def goal(self, name: str, radius_m: float | None = None) -> GoalOptions:
+        """Return it as a goal of a mission file: where she stays, a box about it."""
+        if self.stay_s <= 0.0:
+            there = PointOptions(lat=self.point.lat_deg, lon=self.point.lon_deg, name=name)
+            return there if radius_m is None else msgspec.structs.replace(there, radius_m=radius_m)
+        frame = LocalFrame(self.point)
+        corners = (frame.geo_from_en(e * STAY_M, n * STAY_M) for e, n in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)))
+        ring = ", ".join(f"{corner.lon_deg:.7f} {corner.lat_deg:.7f}" for corner in corners)
+        return BoxOptions(polygon=f"POLYGON (({ring}))", for_s=self.stay_s, name=name)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,15 +105,13 @@ def course_of(items: Sequence[MissionItem]) -> Course:
         found.say(last + 1, f"stands behind item {last} ({found.name(last)}), where the mission ends: it would never "
                   "be sailed", "take one of them out")
     final = walked[-1] if walked and end != "home" else None
-    for number in walked if final is None else walked[:-1]:
-        stay_s = _stay_s(items[number - 1])
-        if stay_s > 0.0:
-            found.say(number, f"{found.name(number)} stays for {stay_s:g} s before the voyage's end",
-                      "draw a waypoint without hold time, or let it be the last")
     station_s = 0.0 if final is None else max(0.0, _stay_s(items[final - 1]))
     if final is not None and station_s > 0.0:
         found.say(final, f"{found.name(final)} of {station_s:g} s is the last: she stays until told", "", Severity.NOTE)
-    stops = [Stop(number=n, point=items[n - 1].point) for n in walked if _has_place(items[n - 1])]
+    stays = {n: max(0.0, _stay_s(items[n - 1])) for n in walked}
+    if final is not None and walked.count(final) == 1:
+        stays[final] = 0.0   # the mission's own end keeps her
+    stops = [Stop(number=n, point=items[n - 1].point, stay_s=stays[n]) for n in walked if _has_place(items[n - 1])]
     lap = _lap(stops) if jumps else len(stops)
     return Course(stops=tuple(stops[:lap]), laps=len(stops) // lap if lap else 1, end=end, station_s=station_s,
                   findings=found.ordered())

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import msgspec
 
+from companion.errors import InputError
 from companion.geofence.document import Document
 from companion.geofence.findings import Code, Finding, Severity
 from companion.geofence.formats.fence_items import items_to_zones
@@ -16,7 +17,6 @@ from companion.geofence.formats.losses import Written
 from companion.geofence.formats.qgc_plan import read_plan, write_plan
 from companion.geofence.formats.rings import Findings
 from companion.geofence.mission.course import REDRAW, course_of
-from companion.geofence.mission.goal_options import PointOptions
 from companion.geofence.mission.mission import Mission, assembled, place_troubles
 from companion.geofence.mission.options import MissionOptions, RefugeOptions
 from companion.geofence.shapes import ZoneKind
@@ -87,18 +87,22 @@ def drawn_mission(document: Document, settings: MissionOptions, path: Path, plan
         return Drawn(mission=None, refusals=tuple(refusals))
     options = msgspec.structs.replace(
         settings, name=f"{settings.name or NO_NAME} {tag(document)}", from_autopilot=True,
-        goal=tuple(PointOptions(lat=s.point.lat_deg, lon=s.point.lon_deg, name=f"item {s.number}")
-                   for s in course.stops),
+        goal=tuple(stop.goal(f"item {stop.number}") for stop in course.stops),
         refuge=(*settings.refuge, *(RefugeOptions(
             lat=r.point.lat_deg, lon=r.point.lon_deg, name=f"rally {n}")
             for n, r in enumerate(document.rally, start=1))),
         skipper=course.skipper(settings.skipper))
     # The file of the drawing belongs to the area by name; its zones are taken from the drawing itself.
-    mission = assembled(options, path, document)
-    area = msgspec.structs.replace(options.area, obstacles=(*options.area.obstacles, str(plan.absolute())))
-    mission = replace(mission, options=msgspec.structs.replace(options, area=area))
     names = {f"[[goal]] {n}": f"item {stop.number}" for n, stop in enumerate(course.stops, start=1)}
     names |= {f"[[refuge]] {len(settings.refuge) + n}": f"rally point {n}" for n, _ in enumerate(document.rally, 1)}
+    try:
+        mission = assembled(options, path, document)
+    except InputError as error:
+        if error.place not in names:
+            raise
+        return Drawn(mission=None, refusals=(_refusal(names[error.place], error.problem),))
+    area = msgspec.structs.replace(options.area, obstacles=(*options.area.obstacles, str(plan.absolute())))
+    mission = replace(mission, options=msgspec.structs.replace(options, area=area))
     refusals = [_refusal(names.get(place, f"{path}: {place}"), problem, REDRAW if place in names else remedy)
                 for place, problem, remedy in place_troubles(mission)]
     if refusals:

@@ -9,8 +9,7 @@ from companion.geofence.document import Document
 from companion.geofence.findings import Finding, Severity
 from companion.geofence.formats.losses import Losses, Written
 from companion.geofence.formats.registry import write
-from companion.geofence.mission.course import course_of
-from companion.geofence.mission.goal_options import PointOptions
+from companion.geofence.mission.course import Stop, course_of
 from companion.geofence.mission.mission import Mission
 from companion.geofence.mission.options import (
     AreaOptions,
@@ -95,12 +94,10 @@ def mission_files(
         losses.add(Severity.WARNING if is_loss else Severity.NOTE,
                    f"{finding.place}: {finding.text}" + (": not carried over" if is_loss else ""))
     names = document.item_names or ("",) * len(document.items)
-    goal_options = [PointOptions(lat=g.lat_deg, lon=g.lon_deg) for g in goals] or [
-        PointOptions(lat=s.point.lat_deg, lon=s.point.lon_deg, name=names[s.number - 1]) for s in course.stops]
+    points = [Stop(number=n, point=point).goal("", radius_m) for n, point in enumerate(goals, start=1)]
+    goal_options = points or [stop.goal(names[stop.number - 1], radius_m) for stop in course.stops]
     if not goal_options:
         raise ValueError("there is no goal: give --goal, or draw waypoints")
-    if radius_m is not None:
-        goal_options = [PointOptions(lat=g.lat, lon=g.lon, name=g.name, radius_m=radius_m) for g in goal_options]
     home = start or document.home
     whole = replace(document, zones=(*document.zones, *(land.zones if land else ())),
                     marks=(*document.marks, *(land.marks if land else ())))
