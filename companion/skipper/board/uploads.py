@@ -23,7 +23,11 @@ def upload(
     on_board = old.items if old is not None and known else ()
     number = turn.new_id()
     keep = common_prefix(on_board, route.items)
-    closing = stopgap(old, keep, turn.state.index) if old is not None and known else None
+    if old is not None and known:
+        closing = stopgap(old, keep, turn.state.index)
+    else:
+        # A list that is not ours to keep a part of: whoever gives an armed boat AUTO meanwhile must not sail a mixture.
+        closing = stopgap(route, 0, 0) if turn.autopilot is not None and turn.autopilot.is_armed else None
     action = UploadMission(
         upload_id=number, items=route.items, keep_first=keep, set_current=set_current, plan_id=route.plan_id,
         text=text, stopgap=None if closing is None else marked([closing])[0], change=change or Change(),

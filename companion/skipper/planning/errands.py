@@ -158,7 +158,9 @@ def _kept_in(turn: Turn) -> Errand | None:
     route = turn.state.route
     is_bound = route is not None and route.bound_for == name
     if here is None or (turn.circle.inside_m(here) >= room_m and not is_bound):
-        return _stay(turn, trouble)
+        staying = _stay(turn, trouble)
+        if staying is not None or here is None:
+            return staying
     place = route.points_en_m[turn.last_waypoint()] if route is not None and is_bound else (
         turn.circle.place_inside(turn.voyage.area, here, room_m))
     return Errand(kind=Kind.INSIDE, name=name, why=trouble, en_m=place)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from companion.messages import Mode
+from companion.skipper.deeds.adrift import STEERAGE_MPS
 from companion.skipper.planning.ends import words
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.state import Raised
@@ -30,7 +31,7 @@ def watch(turn: Turn) -> tuple[str, ...]:
                 entering.pop(dog.name, None)
                 continue
             since = entering.setdefault(dog.name, turn.t_s)
-            if turn.t_s - since >= dog.enter_s:
+            if turn.t_s - since >= _patience_s(turn, dog):
                 raised[dog.name] = Raised(name=dog.name, since_s=turn.t_s)
                 entering.pop(dog.name)
                 fresh.append(dog.name)
@@ -56,6 +57,13 @@ def watch(turn: Turn) -> tuple[str, ...]:
         figure = "" if value is None or not dog.unit else f" ({value:.1f} {dog.unit})"
         turn.say(dog.severity, name, f"{name}{figure}: {_done_about(turn, dog)}", every_s=0.0)
     return tuple(fresh)
+
+
+def _patience_s(turn: Turn, dog: Watchdog) -> float:
+    """Return how long the entry condition must hold [s]."""
+    wind = turn.wind_now
+    is_calm = wind is not None and wind[1] < STEERAGE_MPS
+    return dog.calm_enter_s if is_calm and dog.calm_enter_s is not None else dog.enter_s
 
 
 def _done_about(turn: Turn, dog: Watchdog) -> str:
