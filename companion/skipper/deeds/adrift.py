@@ -221,6 +221,13 @@ def _stop(turn: Turn, ahead: DriftAhead) -> None:
         turn.say(Severity.WARNING, "drift", f"{ahead.sentence()}: {means.name}", every_s=CALL_S)
 
 
+def _lies_in_loiter(turn: Turn) -> bool:
+    """Return whether she is at the loiter that ends the mission: its place was chosen for its room."""
+    route, boat = turn.state.route, turn.boat_en
+    return route is not None and boat is not None and not turn.ahead() and (
+        distance_m(boat, route.points_en_m[-1]) <= AWAY_M)
+
+
 def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
     """Keep LOITER, or ask for it where she drifts; a person who sets AUTO meanwhile is let have it."""
     status, state, memory = turn.autopilot, turn.state, turn.state.adrift
@@ -233,7 +240,7 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
         turn.update(adrift=replace(memory, loitered=True, loiter_en_m=place))
         turn.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until she can sail")
         return True
-    if status.mode is not Mode.AUTO or memory.loitered or ahead is None:
+    if status.mode is not Mode.AUTO or memory.loitered or ahead is None or (ahead.is_clear and _lies_in_loiter(turn)):
         return False
     if not is_busy(turn, Mode.LOITER.name) and set_mode(turn, Mode.LOITER, f"{what}, {how}"):
         turn.update(after_operator=True)
