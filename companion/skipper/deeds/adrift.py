@@ -244,5 +244,5 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
         return False
     if not is_busy(turn, Mode.LOITER.name) and set_mode(turn, Mode.LOITER, f"{what}, {how}"):
         turn.update(after_operator=True)
-    turn.phase(state.phase, f"{what}, {how}: asking for LOITER")
+    turn.phase(state.phase, f"{what}, {how}: waiting for the autopilot to take LOITER")
     return True
