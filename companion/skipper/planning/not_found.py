@@ -18,6 +18,7 @@ from companion.skipper.way.judge import judge
 from companion.skipper.way.voyage import PointEn
 
 UNDER_WAY_TRIES, ASHORE_TRIES = 2, 5   # of a planner that does not answer, before the next step of the ladder
+HOLD_ROOM = 2.0   # times the loiter's radius: she may lie here for hours, and a HOLD carries her off before help comes
 
 
 def asks_again(turn: Turn, pending: PendingPlan, reason: str) -> bool:
@@ -104,7 +105,9 @@ def hold(turn: Turn, why: str, *, anew: bool = False) -> None:
         return   # not under way
     if state.index >= len(state.route.items) - 1 and not anew:
         return   # already in the safe end of the mission
-    place, room = loiter_place(turn.voyage, turn.known_config, boat, wind[0] if wind else 0.0)
+    config = turn.known_config
+    place, room = loiter_place(
+        turn.voyage, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m)
     keep = state.index
     end = waypoint(turn.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
     route = replace(

@@ -67,21 +67,27 @@ def ends_safely(items: Sequence[MissionItem]) -> bool:
 LEEWARD_ROOM_M = 40.0   # a boat with eased sails drifts this far before somebody looks
 RINGS_M = (0.0, 15.0, 30.0, 50.0, 80.0, 120.0)
 DIRECTIONS = 16
+ROOMIER_M = 50.0      # a place with the room that is wanted is worth sailing this far
+ROOMIER_BY_M = 3.0    # ... and a somewhat roomier one only for this much of room
 
 
 def loiter_place(
-    voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float,
+    voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float, *, wanted_m: float = 0.0,
 ) -> tuple[PointEn, float]:
     """Return where to loiter after ``end_en`` and the room there [m].
 
     The first place with ``loiter_radius_m`` all round and to leeward, looked for in growing rings that a straight
     line reaches; without one, the roomiest found. A line that the wind has closed is one that the autopilot beats
-    about: it needs the room of that corridor as well.
+    about: it needs the room of that corridor as well. With ``wanted_m`` of room to be had within ``ROOMIER_M``, the
+    first place with that comes before the nearest that will do.
     """
     corridor_m = config.tack_corridor_m if config.tack_corridor_m > 0.0 else math.inf
     best, best_room = end_en, -math.inf
+    will_do: tuple[PointEn, float] | None = None
     leeward = twd_from_rad + math.pi
     for ring_m in RINGS_M:
+        if will_do is not None and ring_m > ROOMIER_M:
+            return will_do
         count = 1 if ring_m == 0.0 else DIRECTIONS
         for n in range(count):
             place = moved(end_en, 2.0 * math.pi * n / DIRECTIONS, ring_m)
@@ -94,11 +100,13 @@ def loiter_place(
             clearance = voyage.area.clearance_m(np.asarray(down))
             # Drifting out of the end of the leeward strip is slow: there half the room is enough.
             room = float(min(clearance[0], np.min(clearance[1:] + 0.5 * config.loiter_radius_m)))
-            if room >= config.loiter_radius_m:
+            if room >= max(config.loiter_radius_m, wanted_m):
                 return place, room
+            if room >= config.loiter_radius_m and (will_do is None or room > will_do[1] + ROOMIER_BY_M):
+                will_do = place, room
             if room > best_room + 1.0:
                 best, best_room = place, room
-    return best, best_room
+    return will_do or (best, best_room)
 
 
 def end_item(

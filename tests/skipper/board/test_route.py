@@ -1,6 +1,7 @@
 """Missions: the splice keeps what is being sailed, the end is safe, ours is told from foreign."""
 
 import json
+import math
 from dataclasses import replace
 
 import pytest
@@ -88,6 +89,22 @@ def test_the_loiter_has_room_all_round_and_to_leeward():
     assert place[1] > 110.0
     there, _ = loiter_place(voyage(), CONFIG, (0.0, 100.0), 0.0)
     assert there == (0.0, 100.0)
+
+
+def test_a_roomier_place_is_taken_where_there_is_one_near_by():
+    near_a_rock = voyage(obstacles=(box(-10, 116, 10, 130),))
+    spot, _ = loiter_place(near_a_rock, CONFIG, (0.0, 100.0), 0.0)
+    assert spot == (0.0, 100.0)     # 16 m will do for the end of a mission: that is where its sailor wants her
+    wanted_m = 2.0 * CONFIG.loiter_radius_m
+    roomy, room = loiter_place(near_a_rock, CONFIG, (0.0, 100.0), 0.0, wanted_m=wanted_m)
+    assert room >= wanted_m
+    assert 0.0 < math.dist(roomy, spot) <= 50.0
+    # in a pond with no such place the nearest that will do is no worse than before
+    banks = (box(-60, 116, 60, 130), box(-60, 30, 60, 40), box(-60, 30, -45, 130), box(45, 30, 60, 130))
+    pond = voyage(obstacles=banks)
+    place, room = loiter_place(pond, CONFIG, (0.0, 95.0), 0.0, wanted_m=wanted_m)
+    assert CONFIG.loiter_radius_m <= room < wanted_m
+    assert math.dist(place, (0.0, 95.0)) <= 30.0
 
 
 @CHECK
