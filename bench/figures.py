@@ -31,8 +31,9 @@ from companion.boat import MPS_PER_KNOT, Boat, avalon
 from companion.planner import Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.plan import Plan, PlanStatus
-from companion.planner.reference.astar import AstarSettings, search_with
+from companion.planner.reference.astar import search as search_astar
 from companion.planner.risk import simulate_entries
+from companion.planner.settings import AstarSettings
 from companion.plots.plan import draw_plan
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "figures"
@@ -136,7 +137,7 @@ def lake(wind_from, knots=10.0):
 
 
 def sail(p, **settings):
-    outcome = search_with(p, Effort(60.0, None), AstarSettings(grid_m=20.0, **settings))
+    outcome = search_astar(p, Effort(60.0, None), 0, AstarSettings(grid_m=20.0, **settings))
     if outcome.waypoints_en is None:
         return Plan(status=PlanStatus.TIMEOUT, reason=outcome.reason, waypoints_en=np.empty((0, 2))), outcome
     judged = evaluate(p, outcome.waypoints_en)

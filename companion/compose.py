@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from companion.boat import Boat, Hull, Polar, ardurover_sitl, constant, read_polar
+from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant, read_polar
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
 from companion.geofence.mission import Gate, free_water
 from companion.geofence.shapes import polygon_en
 from companion.orders import ALL, Verb, unknown
+from companion.planner.settings import AUTO, KNOT_MPS, SETTINGS, Choice
 from companion.skipper.step import (
     CHOICES,
     SHORE,
@@ -29,6 +31,8 @@ from companion.traffic import Policy, TargetLimits
 from companion.traffic.feeds import parse_feed
 from companion.wind import Estimator, make
 
+_POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
+_KALMAN = {"kalman_window": "n", "kalman_r_deg": "r_deg", "kalman_r_mps": "r_mps"}
 _SIDES = {None: Side.NONE, "port": Side.PORT, "starboard": Side.STARBOARD}
 
 
@@ -42,10 +46,11 @@ def polar_of(mission: Mission) -> Polar:
         return file.polar
     polar = mission.boat.polar
     if isinstance(polar, str):
-        if polar != "ardurover":
+        maker = _POLARS.get(polar)
+        if maker is None:
             raise InputError(str(mission.path), "[boat] polar", f"there is no polar {polar!r}",
-                             'write "ardurover", a polar file beside the mission, or a speed in m/s')
-        return ardurover_sitl()
+                             'write "ardurover", "avalon", a polar file beside the mission, or a speed in m/s')
+        return maker()
     return constant(float(polar))
 
 
@@ -107,6 +112,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "delta_s_ladder": tuple(d for d in SkipperConfig().delta_s_ladder if d < mission.risk.delta_s),
         "margin_m": mission.margin_m,
         "margin_floor_m": mission.margin_floor_m,
+        "planner": planner_of(mission),
         "plan_budget_s": options.planning_budget_s,
         "first_plan_budget_s": options.planning_budget_s,
         "autopilot_beats": options.autopilot_beats,
@@ -127,6 +133,14 @@ def config_of(mission: Mission) -> SkipperConfig:
     if options.max_replan_s is not None:
         changes["plan_age_s"] = options.max_replan_s
     return replace(SkipperConfig(), **changes)
+
+
+# The keys of [planner] by planner, and what they are called among its settings.
+_ASTAR = frozenset({"grid_m", "turn_s_per_rad", "tack_s", "gybe_s", "tunnel", "tunnel_width_m", "heuristic_kn",
+                    "min_twa_deg", "max_twa_deg", "max_turn_deg", "ship_match_s"})
+_RRTSTAR = frozenset({"goal_bias", "range_m", "rewiring", "risk_weight_s", "state_risk_weight_s"})
+_NUMBERS = {"tunnel": "is_tunnel_abrupt", "heuristic_kn": "heuristic_mps", "min_twa_deg": "min_twa_rad",
+            "max_twa_deg": "max_twa_rad", "max_turn_deg": "max_turn_rad", "rewiring": "is_rewired"}
 
 
 def _ends(mission: Mission) -> Ends:
@@ -169,10 +183,54 @@ def _orders(mission: Mission, key: str, given: tuple[str, ...] | str) -> tuple[s
 def estimator_of(mission: Mission) -> Estimator:
     """Return the mission's wind estimator. Raises InputError for a name unknown."""
     try:
-        return make(mission.wind.estimator)
+        return make(mission.wind.estimator, **_kalman(mission))
     except InputError as error:
         name = mission.wind.estimator
         raise InputError(str(mission.path), "[wind] estimator", f"{name!r} {error.problem}", error.remedy) from error
+
+
+def _kalman(mission: Mission) -> dict[str, Any]:
+    """Return the numbers of Wolsieffer's filter that the mission gives. Raises InputError for another estimator."""
+    given = {key: value for key in _KALMAN if (value := getattr(mission.wind, key)) is not None}
+    if given and mission.wind.estimator != "kalman":
+        raise InputError(str(mission.path), f"[wind] {next(iter(given))}",
+                         f"is for the estimator \"kalman\", and this mission's is {mission.wind.estimator!r}",
+                         'write estimator = "kalman", or leave it out')
+    return {_KALMAN[key]: value for key, value in given.items()}
+
+
+def planner_of(mission: Mission) -> Choice:
+    """Return the mission's planner and its numbers.
+
+    Raises:
+        InputError: a number is another planner's, or a tunnel has no width.
+    """
+    options, algorithm = mission.options.planner, mission.skipper.planner
+    given = {key: value for key in options.__struct_fields__ if (value := getattr(options, key)) is not None}
+    expansions = given.pop("expansions", None)
+    if expansions is not None and algorithm == AUTO.algorithm:
+        raise InputError(str(mission.path), "[planner] expansions", 'is for "rrtstar" and "astar"',
+                         "write [skipper] expansions for auto's")
+    own = _ASTAR if algorithm == "astar" else _RRTSTAR if algorithm == "rrtstar" else frozenset()
+    for key in given:
+        if key not in own:
+            whose = "astar" if key in _ASTAR else "rrtstar"
+            raise InputError(str(mission.path), f"[planner] {key}",
+                             f"is a number of {whose!r}, and this mission plans by {algorithm!r}",
+                             f'write [skipper] planner = "{whose}", or leave it out')
+    if "tunnel" in given and "tunnel_width_m" not in given:
+        raise InputError(str(mission.path), "[planner] tunnel", "a tunnel has a width", "add tunnel_width_m")
+    if algorithm == AUTO.algorithm:
+        return AUTO
+    numbers: dict[str, Any] = {_NUMBERS.get(key, key): value for key, value in given.items()}
+    for key in ("min_twa_rad", "max_twa_rad", "max_turn_rad"):
+        if key in numbers:
+            numbers[key] = math.radians(numbers[key])
+    if "heuristic_mps" in numbers:
+        numbers["heuristic_mps"] = numbers["heuristic_mps"] * KNOT_MPS or None
+    if "is_tunnel_abrupt" in numbers:
+        numbers["is_tunnel_abrupt"] = numbers["is_tunnel_abrupt"] == "abrupt"
+    return Choice(algorithm=algorithm, settings=SETTINGS[algorithm](**numbers), expansions=expansions)
 
 
 def target_limits_of(mission: Mission) -> TargetLimits:

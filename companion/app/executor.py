@@ -19,6 +19,7 @@ from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.transfers import CommandAnswer
 from companion.mavlink.transfers import Outcome as WireOutcome
 from companion.planner import Plan, Problem
+from companion.planner.settings import Settings
 from companion.skipper.step import (
     Acknowledge,
     Action,
@@ -79,7 +80,7 @@ class Planner(Protocol):
 
     async def plan(
         self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
-        algorithm: str = "auto",
+        algorithm: str = "auto", settings: Settings | None = None,
     ) -> Plan:
         """Plan; never raises for a problem, however bad."""
         ...
@@ -169,9 +170,10 @@ class Executor:
             request = self._plan
             if request is None:
                 continue
+            by = request.planner
             plan = await self._planner.plan(
-                request.problem, budget_s=self._budget_s(request), expansions=self._expansions,
-                seed=self._seed + request.seed,
+                request.problem, budget_s=self._budget_s(request), expansions=by.expansions or self._expansions,
+                seed=self._seed + request.seed, algorithm=by.algorithm, settings=by.settings,
             )
             # A request that was cancelled or overtaken while it was computed is answered by the newer one.
             if self._plan is not None and self._plan.request_id == request.request_id:

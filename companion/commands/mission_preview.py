@@ -49,8 +49,11 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
 
     Home is taken to be the start: the autopilot's is where it was armed.
     """
+    from companion.compose import planner_of
     from companion.planner import plan
     from companion.skipper.planning import HOME_RADIUS_M
+
+    by = planner_of(mission)
 
     if mission.start is None:
         return []
@@ -65,7 +68,8 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
         east_m, north_m = frame.en_from_geo(point)
         problem = leg_problem(mission, here, heading_deg, (east_m, north_m), radius_m, tws_mps=tws_mps,
                               from_deg=math.degrees(twd_from_rad))
-        answer = plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0)
+        answer = plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0, algorithm=by.algorithm,
+                      settings=by.settings)
         plans.append(answer)
         if not answer.has_path:
             break

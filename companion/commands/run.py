@@ -240,7 +240,7 @@ async def _sail(
     for end in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
             loop.add_signal_handler(end, stop.set)
-    async with PlannerWorker() as planner:
+    async with PlannerWorker(algorithm=mission.skipper.planner) as planner:
         # The child loads its kernels while this process imports the rest.
         from companion.app.sail import sail
         from companion.telemetry.progress import ProgressLine

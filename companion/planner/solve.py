@@ -10,6 +10,7 @@ import importlib
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import shapely
@@ -21,6 +22,7 @@ from companion.planner.problem.defects import defect_of
 from companion.planner.problem.evaluate import clearances, evaluate
 from companion.planner.problem.sharing import resolved
 from companion.planner.problem.value import Problem
+from companion.planner.settings import SETTINGS, Settings
 from companion.planner.warm import warm_problems
 
 DEFAULT_BUDGET_S = 1.0
@@ -44,6 +46,7 @@ def plan(
     expansions: int | None = None,
     seed: int = 0,
     algorithm: str = "auto",
+    settings: Settings | None = None,
 ) -> Plan:
     """Plan ``problem``; never raises for a bad problem, that is ``PlanStatus.INVALID``.
 
@@ -55,13 +58,17 @@ def plan(
             machine, unless ``budget_s`` is given too and ends the search first.
         seed: of every random choice.
         algorithm: one of ``ALGORITHMS``.
+        settings: the algorithm's numbers, None: its defaults.
 
     Raises:
-        InputError: the algorithm is unknown or a budget is not positive.
+        InputError: the algorithm is unknown, the settings are another's, or a budget is not positive.
 
     """
     if algorithm not in ALGORITHMS:
         raise InputError("plan", "algorithm", f"{algorithm!r} is unknown", "choose " + ", ".join(ALGORITHMS))
+    if settings is not None and type(settings) is not SETTINGS.get(algorithm):
+        raise InputError("plan", "settings", f"{type(settings).__name__} is not for {algorithm!r}",
+                         "give those of the algorithm, or none")
     if budget_s is not None and not budget_s > 0.0:
         raise InputError("plan", "budget_s", f"{budget_s} is not positive", "give seconds")
     if expansions is not None and not expansions > 0:
@@ -77,7 +84,7 @@ def plan(
     try:
         # Numbers that overflow or underflow on the way (1e-180 m in a WKT) end as inf or NaN, which no check passes.
         with np.errstate(all="ignore"):
-            return _solved(problem, effort, empty)
+            return _solved(problem, effort, empty, settings)
     except shapely.errors.GEOSException as error:
         reason = f"the obstacles or the fence cannot be made valid ({str(error).splitlines()[0]})"
         return replace(empty, reason=reason, elapsed_s=effort.elapsed_s, why=Why(text=reason))
@@ -91,9 +98,10 @@ def warm(algorithm: str = "auto") -> None:
             plan(problem, expansions=20_000 if algorithm == "auto" else 2000, algorithm=algorithm)
 
 
-def _solved(problem: Problem, effort: Effort, empty: Plan) -> Plan:
+def _solved(problem: Problem, effort: Effort, empty: Plan, settings: Settings | None) -> Plan:
     module, name = ALGORITHMS[empty.algorithm]
-    search: Search = getattr(importlib.import_module(module), name)
+    found = getattr(importlib.import_module(module), name)
+    search: Search = found if settings is None else partial(found, settings=settings)
     from companion.planner.risk.wind import keep_limit, search_within, with_risk
 
     def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:

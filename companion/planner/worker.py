@@ -27,6 +27,7 @@ from companion.clock import effort_s
 from companion.kernels.build import prepare
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
+from companion.planner.settings import Settings
 from companion.planner.solve import DEFAULT_BUDGET_S, plan
 
 _LOG = logging.getLogger(__name__)
@@ -69,11 +70,12 @@ class InlinePlanner:
 
     async def plan(
         self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
-        algorithm: str = "auto",
+        algorithm: str = "auto", settings: Settings | None = None,
     ) -> Plan:
         """Return the plan of ``expansions`` (or the default number) after ``virtual_s``."""
         del budget_s
-        answer = plan(problem, expansions=expansions or self.expansions, seed=seed, algorithm=algorithm)
+        answer = plan(problem, expansions=expansions or self.expansions, seed=seed, algorithm=algorithm,
+                      settings=settings)
         await asyncio.sleep(self.virtual_s)
         return answer
 
@@ -82,12 +84,14 @@ class PlannerWorker:
     """A child process with warm kernels, one request at a time; a second caller waits for the first.
 
     ``async with PlannerWorker() as planner`` starts the child and returns at once: it warms up while the loop runs
-    and the first request waits for it. ``restarts`` counts replacements.
+    and the first request waits for it: ``auto`` always, and ``algorithm``. ``restarts`` counts replacements.
     """
 
-    def __init__(self, *, grace_s: float = DEFAULT_GRACE_S, command: list[str] | None = None) -> None:
+    def __init__(
+        self, *, grace_s: float = DEFAULT_GRACE_S, command: list[str] | None = None, algorithm: str = "auto",
+    ) -> None:
         self._grace_s = grace_s
-        self._command = command or [sys.executable, "-m", "companion.planner.worker"]
+        self._command = command or [sys.executable, "-m", "companion.planner.worker", algorithm]
         self._child: asyncio.subprocess.Process | None = None
         self._is_warm, self._silence_s = False, math.inf
         self._lock = asyncio.Lock()
@@ -129,7 +133,7 @@ class PlannerWorker:
 
     async def plan(
         self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
-        algorithm: str = "auto",
+        algorithm: str = "auto", settings: Settings | None = None,
     ) -> Plan:
         """Return the child's plan; ``PlanStatus.TIMEOUT`` when it hangs or dies, and it is then replaced.
 
@@ -138,7 +142,8 @@ class PlannerWorker:
         if budget_s is None and expansions is None:
             budget_s = DEFAULT_BUDGET_S
         request = pickle.dumps(
-            {"problem": problem, "budget_s": budget_s, "expansions": expansions, "seed": seed, "algorithm": algorithm}
+            {"problem": problem, "budget_s": budget_s, "expansions": expansions, "seed": seed, "algorithm": algorithm,
+             "settings": settings}
         )
         async with self._lock:
             began_s = effort_s()
@@ -224,8 +229,8 @@ class PlannerWorker:
 
 
 # ------------------------------------------------------------------------------------- in the child
-def serve() -> None:
-    """Answer requests on standard input until it closes: the child's main."""
+def serve(algorithm: str) -> None:
+    """Answer requests on standard input until it closes: the child's main. ``auto`` gets warm, and ``algorithm``."""
     source = sys.stdin.buffer
     sink = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints must not break the frames
@@ -237,6 +242,8 @@ def serve() -> None:
     with _Pulse(sink) as pulse:
         prepare(("companion",), say=pulse.say)
         warm()
+        pulse.say(f"loading the kernels of {algorithm}")
+        warm(algorithm)
     _write(sink, _READY)
     while True:
         head = source.read(_LENGTH.size)
@@ -288,4 +295,4 @@ def _write(sink: Any, payload: bytes) -> None:
 
 
 if __name__ == "__main__":
-    serve()
+    serve(sys.argv[1])

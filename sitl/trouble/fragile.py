@@ -11,6 +11,7 @@ from pathlib import Path
 
 from companion.clock import now_s
 from companion.planner import Plan, Problem
+from companion.planner.settings import Settings
 from companion.planner.worker import DEFAULT_GRACE_S, InlinePlanner, PlannerWorker, failed
 
 START_S = 1.5   # what it takes to start another worker
@@ -40,7 +41,7 @@ class FragilePlanner(InlinePlanner):
 
     async def plan(
         self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
-        algorithm: str = "auto",
+        algorithm: str = "auto", settings: Settings | None = None,
     ) -> Plan:
         """Plan as the worker would: a dead one is replaced first, a hung one when its time is over."""
         if not self.is_alive:
@@ -55,7 +56,7 @@ class FragilePlanner(InlinePlanner):
             return failed("the planner's worker failed: MemoryError()", seed=seed, algorithm=algorithm)
         deaths = self._deaths
         answer = await super().plan(
-            problem, budget_s=budget_s, expansions=expansions, seed=seed, algorithm=algorithm)
+            problem, budget_s=budget_s, expansions=expansions, seed=seed, algorithm=algorithm, settings=settings)
         if deaths != self._deaths:
             return failed("the planner's worker died", seed=seed, algorithm=algorithm)
         return answer

@@ -4,6 +4,7 @@ import argparse
 import ast
 import datetime as dt
 import inspect
+import math
 import tomllib
 from dataclasses import fields
 from importlib import import_module
@@ -69,6 +70,13 @@ TASK_KEYS = {
     "mark_radius_m": 8.0, "after_s": 400.0, "not_before": dt.datetime(2026, 11, 21, 12, tzinfo=dt.UTC),
 }
 
+# The numbers of one planner or estimator: in a mission that asks for it.
+ASTAR = {"expansions": 5000, "grid_m": 5.0, "turn_s_per_rad": 4.0, "tack_s": 9.0, "gybe_s": 9.0, "tunnel": "abrupt",
+         "tunnel_width_m": 80.0, "heuristic_kn": 0.0, "min_twa_deg": 50.0, "max_twa_deg": 150.0, "max_turn_deg": 120.0,
+         "ship_match_s": 30.0}
+RRTSTAR = {"goal_bias": 0.1, "range_m": 70.0, "rewiring": False, "risk_weight_s": 20.0, "state_risk_weight_s": 30.0}
+KALMAN = {"kalman_window": 50, "kalman_r_deg": 5.0, "kalman_r_mps": 1.0}
+
 # Every key with another value than the mission's or its default.
 OTHER = {
     "goal": {"lat": 50.8189, "lon": -1.3099, "radius_m": 30.0, "rounding": "starboard", "name": "other",
@@ -81,13 +89,14 @@ OTHER = {
     "boat": {"polar": 2.0, "no_go_half_deg": 50.0, "max_twa_deg": 170.0, "turn_rate_deg_s": 20.0, "tack_loss_s": 6.0,
              "gybe_loss_s": 3.0, "can_tack": False, "gybe_room_m": 40.0, "length_m": 3.0, "beam_m": 1.5, "motor": True},
     "autopilot": {"system": 7, "frame": "motor"},
-    "wind": {"estimator": "mean90", "preview_from_deg": 40.0, "preview_speed_mps": 8.0},
+    "wind": {"estimator": "mean90", "preview_from_deg": 40.0, "preview_speed_mps": 8.0, **KALMAN},
     "operator": {"arm": False, "set_auto": True, "guided": True, "upload_fence": True, "replace_foreign": True,
                  "orders": ["hold"], "local_orders": ["stop"], "far_orders": ["home"]},
     "skipper": {"replan": "forecast", "end": "home", "autopilot_beats": False, "guidance": "field", "station_s": 60.0,
                 "laps": 2, "bandwidth_m": 90.0, "planning_budget_s": 1.0, "expansions": 123, "seed": 7,
                 "min_replan_s": 25.0, "max_replan_s": 700.0, "wind_shift_deg": 30.0, "off_track_m": 45.0,
-                "voyage_timeout_s": 900.0},
+                "voyage_timeout_s": 900.0, "planner": "astar"},
+    "planner": {**ASTAR, **RRTSTAR},
     "safety": {"battery": "stay", "battery_v": 10.5, "leak": "home", "out_of_time": "say", "dark": "refuge",
                "dark_below_deg": 0.0, "shore_lost": "stay", "shore_lost_s": 60.0, "battery_reserve": 3.0,
                "position_failsafe": "leave", "battery_failsafe": "stay", "fence_failsafe": "refuge",
@@ -123,6 +132,12 @@ def mission(path, table="", key="", value=None):
     elif table == "goal-kind":
         raw["goal"].append(dict(TASKS[key]))
     elif table:
+        for others, keys in ((RRTSTAR, {"skipper": {"planner": "rrtstar"}}), (ASTAR, {"skipper": {"planner": "astar"}}),
+                             (KALMAN, {"wind": {"estimator": "kalman"}})):
+            if table in {"planner", "wind"} and key in others:
+                raw |= keys
+        if key == "tunnel":
+            raw["planner"] = {"tunnel_width_m": 60.0}
         place = raw[table][0] if table in {"goal", "refuge"} else raw.setdefault(table, {})
         place[key] = value
     elif key:
@@ -138,6 +153,12 @@ def kind_with(key):
 def base_for(path, table, key):
     if table == "goal" and key in TASK_KEYS and key != "kind":
         return mission(path, "goal-kind", kind_with(key))
+    if key == "tunnel":
+        return mission(path, "planner", "tunnel_width_m", 60.0)
+    if table == "planner":
+        return mission(path, "skipper", "planner", "rrtstar" if key in RRTSTAR else "astar")
+    if key in KALMAN:
+        return mission(path, "wind", "estimator", "kalman")
     if table == "area" and key == "point_radius_m":
         return mission(path, "area", "obstacles", ["point.wkt"])
     return mission(path)
@@ -149,10 +170,13 @@ def sailed(m):
     speeds = [[round(boat.polar.speed_mps(twa, tws), 6) for twa in np.arange(0.6, 3.1, 0.3)] for tws in (3.0, 8.0)]
     rest = {f.name: getattr(boat, f.name) for f in fields(boat) if f.name != "polar"}
     estimator = estimator_of(m)
+    for n in range(80):
+        estimator.update(float(n), 0.3 * math.sin(n), 5.0 + math.cos(n))
+    wind = estimator.forecast(60.0)
     return repr((
         m.name, voyage.frame.origin, voyage.goals, voyage.laps, voyage.refuges, gates_of(voyage),
         voyage.area.obstacles_wkt(0.0), voyage.area.fence_wkt(0.0), speeds, rest, config_of(m), permissions_of(m),
-        target_limits_of(m), feeds_of(m), type(estimator).__name__, needs_of(m),
+        target_limits_of(m), feeds_of(m), type(estimator).__name__, wind, needs_of(m),
     ))
 
 

@@ -26,6 +26,13 @@ BAD = [
     ("field", '[skipper]\nguidance = "field"\n', '[skipper] guidance: "field" steers in GUIDED, which nobody allows'),
     ("heading", '[skipper]\nguidance = "heading"\n', "write guided = true in [operator]"),
     ("replan", "[skipper]\nmin_replan_s = 60.0\nmax_replan_s = 30.0\n", "[skipper] max_replan_s: 30 s is less than"),
+    ("numbers", '[skipper]\nplanner = "astar"\n[planner]\nrewiring = false\n',
+     "[planner] rewiring: is a number of 'rrtstar', and this mission plans by 'astar'"),
+    ("numbers of none", "[planner]\ngrid_m = 5.0\n", "[planner] grid_m: is a number of 'astar'"),
+    ("effort", "[planner]\nexpansions = 5\n", "[planner] expansions: is for"),
+    ("tunnel", '[skipper]\nplanner = "astar"\n[planner]\ntunnel = "abrupt"\n',
+     "[planner] tunnel: a tunnel has a width"),
+    ("filter", "[wind]\nkalman_window = 50\n", "[wind] kalman_window: is for the estimator"),
     ("polar", '[boat]\npolar = "ardurovr"\n', "[boat] polar: there is no polar 'ardurovr'"),
 ]
 

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from companion.errors import InputError
 from companion.planner import ALGORITHMS, PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
+from companion.planner.settings import AstarSettings, RrtstarSettings
 
 PROBLEMS = Path(__file__).resolve().parents[2] / "bench" / "problems"
 # For each: expansions that suffice; with them the tests do not depend on how busy the machine is.
@@ -21,6 +23,12 @@ def fixture(name):
 
 def run(problem, algorithm, **more):
     return plan(problem, algorithm=algorithm, expansions=EFFORT[algorithm], **more)
+
+
+@pytest.mark.parametrize(("algorithm", "settings"), [("auto", AstarSettings()), ("astar", RrtstarSettings())])
+def test_the_numbers_of_another_planner_are_refused(algorithm, settings):
+    with pytest.raises(InputError, match="is not for"):
+        plan(fixture("open-reach"), algorithm=algorithm, settings=settings)
 
 
 @pytest.mark.parametrize("name", ["open-beat", "open-reach", "open-run", "avalon-reach", "avalon-run", "four-run"])

@@ -31,8 +31,17 @@ def ends_by_itself(folder):
     assert summary(folder)["end_reason"] == "over"
 
 
+def plans_by(algorithm):
+    """Every plan is by that planner, and none was left to auto."""
+    def check(folder):
+        decisions = [json.loads(line) for line in (folder / "decisions.jsonl").read_text().splitlines()]
+        assert {d["plan"]["algorithm"] for d in decisions if d["kind"] == "plan"} == {algorithm}
+    return check
+
+
 # What the record of one must show besides.
-RECORDED = {"foreign-mission": is_said_once_in_a_while, "out-of-time": ends_by_itself}
+RECORDED = {"foreign-mission": is_said_once_in_a_while, "out-of-time": ends_by_itself,
+            "by-astar": plans_by("astar"), "by-rrtstar": plans_by("rrtstar")}
 
 
 def sail(name, seed, out):

@@ -61,7 +61,8 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """``[boat]``: what the boat can do."""
 
     polar: str | Positive = "ardurover"
-    """``ardurover`` (the simulator's), a polar file beside the mission, or a constant speed [m/s]."""
+    """``ardurover`` (the simulator's), ``avalon`` (Büsser's eq. 4.1), a polar file beside the mission, or a constant
+    speed [m/s]."""
     no_go_half_deg: Annotated[float, Meta(ge=0.0, lt=90.0)] = 47.0
     max_twa_deg: Annotated[float, Meta(gt=90.0, le=180.0)] = 180.0
     turn_rate_deg_s: Annotated[float, Meta(gt=0.0, le=360.0)] = 30.0
@@ -82,6 +83,11 @@ class WindOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """``[wind]``: how the wind is estimated, and what previews assume before there is any."""
 
     estimator: str = "default"
+    kalman_window: Annotated[int, Meta(ge=2, le=100_000)] | None = None
+    """``estimator = "kalman"``: N of eq. 8, the samples that its spread is taken from."""
+    kalman_r_deg: Positive | None = None
+    """... and R: the noise of the vane and of the anemometer."""
+    kalman_r_mps: Positive | None = None
     preview_from_deg: Heading = 0.0
     preview_speed_mps: Annotated[float, Meta(gt=0.0, le=50.0)] = 5.0
 
@@ -101,6 +107,43 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """The same over the socket on board (``companion run --socket``)."""
     far_orders: tuple[str, ...] | str = ()
     """The same over a satellite link (``companion run --far``)."""
+
+
+class PlannerOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[planner]``: the numbers of ``[skipper] planner = "rrtstar"`` or ``"astar"``; a key of the other is refused."""
+
+    expansions: Annotated[int, Meta(gt=0)] | None = None
+    """Its effort in its own steps (states taken, samples drawn), in place of the voyage's."""
+    grid_m: Positive | None = None
+    """A*: the spacing of its grid (GRID SIZE); None: a fortieth of the distance."""
+    turn_s_per_rad: NonNegative | None = None
+    """A*: f of eq. 4.4."""
+    tack_s: NonNegative | None = None
+    """A*: what a tack costs beyond its time, and so for a gybe."""
+    gybe_s: NonNegative | None = None
+    tunnel: Literal["linear", "abrupt"] | None = None
+    """A*: a cost that grows with the distance from the direct line (eq. 4.6), or one beyond a border."""
+    tunnel_width_m: Positive | None = None
+    """A*: TUNNEL WIDTH of eq. 4.6, or the width between the borders."""
+    heuristic_kn: NonNegative | None = None
+    """A*: the speed of its estimate; 0: none (Dijkstra)."""
+    min_twa_deg: Annotated[float, Meta(ge=0.0, lt=90.0)] | None = None
+    max_twa_deg: Annotated[float, Meta(gt=90.0, le=180.0)] | None = None
+    """A*: the headings off the wind that it sails."""
+    max_turn_deg: Annotated[float, Meta(gt=0.0, le=180.0)] | None = None
+    """A*: the greatest change of heading from step to step; with his 90 it gybes round where a tack turns farther."""
+    ship_match_s: Positive | None = None
+    """A*: the tolerance of eq. 4.7."""
+    goal_bias: Annotated[float, Meta(ge=0.0, lt=1.0)] | None = None
+    """RRT*: the share of its samples that are the goal."""
+    range_m: Positive | None = None
+    """RRT*: its longest branch (eta); None: a fifth of the water's diagonal."""
+    rewiring: bool | None = None
+    """RRT*: whether states are given better parents."""
+    risk_weight_s: NonNegative | None = None
+    """RRT*: what certain failure costs, where ``[risk] max_path_risk`` bounds it."""
+    state_risk_weight_s: NonNegative | None = None
+    """RRT*: what the greatest risk of one state costs."""
 
 
 class AutopilotOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -130,6 +173,9 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     laps: Annotated[int, Meta(ge=1, le=10_000)] = 1
     bandwidth_m: Positive | None = None
     """Half width of the lane between two goals; None: no lane."""
+    planner: Literal["auto", "rrtstar", "astar"] = "auto"
+    """The project's own; or Wolsieffer's RRT*, or Büsser's A*, by the numbers of ``[planner]``. What these do not find
+    is planned by ``auto``."""
     planning_budget_s: Annotated[float, Meta(gt=0.0, le=600.0)] = 2.0
     expansions: Annotated[int, Meta(gt=0)] | None = None
     """Plan by this much effort in place of time, so that a voyage repeats; None: by time."""
@@ -210,6 +256,7 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     autopilot: AutopilotOptions = AutopilotOptions()
     operator: OperatorOptions = OperatorOptions()
     skipper: SkipperOptions = SkipperOptions()
+    planner: PlannerOptions = PlannerOptions()
     safety: SafetyOptions = SafetyOptions()
     traffic: TrafficOptions = TrafficOptions()
 

@@ -34,39 +34,15 @@ from companion.planner.problem.value import Problem
 from companion.planner.reference import astar_kernels as kernels
 from companion.planner.reference.rrtstar import simple_bound_s
 from companion.planner.reference.world import bounds_of, world_of
+from companion.planner.settings import AstarSettings
 
-KNOT_MPS = 1852.0 / 3600.0
 CELLS_ACROSS = 40        # of the default grid, start to goal: 20 m for the 800 m legs that AVALON was tested on
 STATE_BYTES = 8 + 8 + 4 + 1 + 2 * 12  # cost, clock, parent, closed, and room for two heap entries
 CHUNK = 2000
+BORDER_S = 60.0          # of each step outside an abrupt tunnel: a tack is worth it, a long board is not
 LEAST_SHARE = 0.25       # of the spacing: a goal nearer to the start's row or column than this counts as on it
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AstarSettings:
-    """The algorithm's numbers; the defaults are those the thesis ends with (5.3: no tunnel, no extra tack cost).
-
-    Attributes:
-        grid_m: GRID SIZE [m]; None: a fortieth of the distance.
-        turn_s_per_rad: f of eq. 4.4 [s/rad]; 0 for Figure 5.1.
-        tack_s, gybe_s: Added cost of a manoeuvre [s].
-        tunnel_width_m: TUNNEL WIDTH of eq. 4.6 [m]; None for no tunnel.
-        heuristic_mps: Speed of the estimate [m/s]; None for Dijkstra.
-        min_twa_rad, max_twa_rad: The sailable range of headings off the wind.
-        ship_match_s: Tolerance of eq. 4.7 [s].
-        memory_bytes: What the grid may take.
-    """
-
-    grid_m: float | None = None
-    turn_s_per_rad: float = 8.0
-    tack_s: float = 0.0
-    gybe_s: float = 0.0
-    tunnel_width_m: float | None = None
-    heuristic_mps: float | None = 7.0 * KNOT_MPS
-    min_twa_rad: float = math.radians(45.0)
-    max_twa_rad: float = math.radians(160.0)
-    ship_match_s: float = 20.0
-    memory_bytes: int = 256_000_000
+DEFAULTS = AstarSettings()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,13 +148,13 @@ def _discs_of(
     return out
 
 
-def search(problem: Problem, effort: Effort, seed: int) -> Outcome:  # noqa: ARG001
-    """Search with the default settings; an expansion is one state taken from the heap. The seed is not used."""
-    return search_with(problem, effort, AstarSettings())
+def search(
+    problem: Problem, effort: Effort, seed: int, settings: AstarSettings = DEFAULTS,  # noqa: ARG001
+) -> Outcome:
+    """Search one grid until the goal is reached, the heap is empty or the effort is over; the seed is not used.
 
-
-def search_with(problem: Problem, effort: Effort, settings: AstarSettings) -> Outcome:
-    """Search one grid until the goal is reached, the heap is empty or the effort is over."""
+    An expansion is one state taken from the heap.
+    """
     error = endpoint_error(problem)
     if error is not None:
         return Outcome(waypoints_en=None, status=PlanStatus.INVALID, reason=error)
@@ -221,8 +197,13 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: Grid, 
     if settings.heuristic_mps is not None:
         fast = max(settings.heuristic_mps, max(problem.boat.polar_mps) + problem.current.drift_mps)
     # Eq. 4.6: 10 d GRID SIZE / TUNNEL WIDTH, with d counted in cells, is 10 s a step at one tunnel width off the line.
-    tunnel = 10.0 / settings.tunnel_width_m if settings.tunnel_width_m is not None else 0.0
-    weight = np.array([settings.turn_s_per_rad, settings.tack_s, settings.gybe_s, tunnel, fast])
+    tunnel, border_m = 0.0, 0.0
+    if settings.tunnel_width_m is not None:
+        tunnel, border_m = 10.0 / settings.tunnel_width_m, 0.0
+        if settings.is_tunnel_abrupt:
+            tunnel, border_m = BORDER_S, 0.5 * settings.tunnel_width_m
+    weight = np.array([
+        settings.turn_s_per_rad, settings.tack_s, settings.gybe_s, tunnel, fast, border_m, settings.max_turn_rad])
     frame = np.array([grid.x0_m, grid.y0_m, grid.dx_m, grid.dy_m, problem.start_heading_rad])
     disc, w = ship_discs(problem, settings), world_of(problem)
     while count[kernels.REACHED] == 0 and count[kernels.HEAP] > 0 and not effort.is_over:

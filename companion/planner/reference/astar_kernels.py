@@ -10,12 +10,13 @@ from companion.kernels.heap import sift_down, sift_up
 from companion.kernels.jit import kernel
 from companion.planner.reference.kernels import TWD, first_hit, meets_target, turn_time, worst_no_go, wrap
 
-# Places in ``weight``: turning [s/rad], tack [s], gybe [s], tunnel [s per metre off the line], heuristic speed [m/s].
-TURN, TACK_COST, GYBE_COST, TUNNEL, FAST = range(5)
+# Places in ``weight``: turning [s/rad], tack [s], gybe [s], tunnel [s per metre off the line], heuristic speed [m/s],
+# half the width of an abrupt tunnel [m] (then TUNNEL is what a step beyond it costs [s]; 0: eq. 4.6),
+# the greatest turn from step to step [rad].
+TURN, TACK_COST, GYBE_COST, TUNNEL, FAST, BORDER, MAX_TURN = range(7)
 # Places in ``count``: heap size, states expanded, goal reached (0, 1), states seen.
 HEAP, EXPANDED, REACHED, SEEN = range(4)
 HEADINGS = 16
-MAX_STEP_TURN = 0.5 * math.pi
 
 
 @kernel
@@ -96,7 +97,7 @@ def expand(  # type: ignore[no-untyped-def]
             heading = way[k, 0]
             turn = abs(wrap(heading - before))
             # The first turn is free of the limit: a boat that lies the wrong way must get away somehow.
-            if turn > MAX_STEP_TURN + 1e-9 and state != first_state:
+            if turn > weight[MAX_TURN] + 1e-9 and state != first_state:
                 continue
             to = to_row * columns + to_column
             next_state = to * HEADINGS + k
@@ -108,8 +109,12 @@ def expand(  # type: ignore[no-untyped-def]
             if a * b < 0.0:  # eq. 4.5
                 cost += weight[TACK_COST] if abs(a + wrap(heading - before) - b) < 1e-6 else weight[GYBE_COST]
             to_x, to_y = frame[0] + to_column * frame[2], frame[1] + to_row * frame[3]
-            if weight[TUNNEL] > 0.0:  # eq. 4.6
-                cost += weight[TUNNEL] * abs((to_x - start_x) * line_y - (to_y - start_y) * line_x) / line
+            if weight[TUNNEL] > 0.0:
+                off = abs((to_x - start_x) * line_y - (to_y - start_y) * line_x) / line
+                if weight[BORDER] <= 0.0:
+                    cost += weight[TUNNEL] * off  # eq. 4.6
+                elif off > weight[BORDER]:
+                    cost += weight[TUNNEL]
             if cost >= g[next_state]:
                 continue
             t0 = clock[state] + (turn_time(before, heading, number) if turn > 1e-9 else 0.0)

@@ -7,8 +7,9 @@ rewiring is done only if nothing below it becomes slower or infeasible; sampling
 in a box of half the distance around everything.
 
 With ``problem.risk`` it is CC-RRT* (Luders, Karaman and How 2013): every state carries a bound on the risk that
-its path has accumulated, states above the limit are refused, and the cost is time plus ``RISK_WEIGHT_S`` per unit
-of risk. ``risk.leg_risk`` says how a leg's share is bounded.
+its path has accumulated, states above the limit are refused, and the cost is time plus ``risk_weight_s`` per unit
+of risk, plus ``state_risk_weight_s`` times the greatest risk of any one state. ``risk.leg_risk`` says how a leg's
+share is bounded. ``companion.planner.settings`` has the numbers.
 
 References:
     [1] B. Wolsieffer, Safe Navigation for Autonomous Sailboats under Uncertain Wind Conditions, 2020.
@@ -33,10 +34,10 @@ from companion.planner.problem.value import Problem
 from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.reference.world import World, bounds_of, world_of
 from companion.planner.risk.wind import PROMISE_FACTOR, process_of
+from companion.planner.settings import RrtstarSettings
 
-GOAL_BIAS = 0.05       # OMPL's default
 REACH_SHARE = 0.2      # of the search box's diagonal: OMPL's default range
-RISK_WEIGHT_S = 10.0   # cost of certain failure [s]: enough to prefer the safer of two equal paths
+DEFAULTS = RrtstarSettings()
 CHUNK = 256
 FIRST_CAPACITY = 20_000
 MOST_NODES = 2_000_000  # 200 bytes each
@@ -45,17 +46,18 @@ MOST_NODES = 2_000_000  # 200 bytes each
 class Tree:
     """The growing tree: the kernel's arrays and nothing else."""
 
-    def __init__(self, problem: Problem, world: World, seed: int, *, risk_weight_s: float = RISK_WEIGHT_S) -> None:
+    def __init__(self, problem: Problem, world: World, seed: int, settings: RrtstarSettings = DEFAULTS) -> None:
         self.world = world
         box = bounds_of(problem)
         self._box = np.array(box)
         self._goal = np.array([*problem.goal_en, max(problem.goal_radius_m, 1e-6)])
-        self._reach_m = max(1e-3, REACH_SHARE * math.hypot(box[2] - box[0], box[3] - box[1]))
+        self._settings = settings
+        self._reach_m = max(1e-3, settings.range_m or REACH_SHARE * math.hypot(box[2] - box[0], box[3] - box[1]))
         self._random = np.array([_scramble(seed)], dtype=np.uint64)
         self._near = np.zeros(256, np.int64)
         self._near_d = np.zeros(256)
         self.count = np.array([1, 0, -1, 0, 0, 0], dtype=np.int64)
-        self.node, self.link = np.zeros((0, 6), order="F"), np.zeros((0, 4), dtype=np.int64)
+        self.node, self.link = np.zeros((0, kernels.COLUMNS), order="F"), np.zeros((0, 4), dtype=np.int64)
         self._goal_node = np.zeros(0, dtype=np.int64)
         self._resize(FIRST_CAPACITY)
         self.node[0, :4] = *problem.start_en, wrap_pi(problem.start_heading_rad), 0.0
@@ -65,19 +67,20 @@ class Tree:
         limit = problem.risk.max_path_risk / PROMISE_FACTOR if problem.risk is not None else math.inf
         self._risk_number = np.array([
             float(problem.risk is not None), process.model, process.s0, process.s1, process.rho, process.tau, limit,
-            risk_weight_s if problem.risk is not None else 0.0,
+            settings.risk_weight_s if problem.risk is not None else 0.0, settings.state_risk_weight_s,
+            float(settings.is_rewired),
         ])
         self._risk_table = np.ascontiguousarray(np.array([process.table_t, process.table_s]))
 
     def _resize(self, capacity: int) -> None:
         # Column by column: the kernel looks through all places at each sample.
-        node, link = np.zeros((capacity, 6), order="F"), np.full((capacity, 4), -1, dtype=np.int64)
+        node, link = np.zeros((capacity, kernels.COLUMNS), order="F"), np.full((capacity, 4), -1, dtype=np.int64)
         goal_node = np.zeros(capacity, dtype=np.int64)
         if self.count[kernels.N] > 1:
             n = int(self.count[kernels.N])
             node[:n], link[:n], goal_node[:n] = self.node[:n], self.link[:n], self._goal_node[:n]
         self.node, self.link, self._goal_node = node, link, goal_node
-        self._stack, self._fresh = np.zeros(capacity, dtype=np.int64), np.zeros((capacity, 6), order="F")
+        self._stack, self._fresh = np.zeros(capacity, dtype=np.int64), np.zeros((capacity, kernels.COLUMNS), order="F")
 
     def grow(self, samples: int) -> None:
         """Draw that many samples."""
@@ -86,8 +89,8 @@ class Tree:
         w = self.world
         kernels.grow(
             samples, self.node, self.link, self._goal_node, self.count, self._random, self._box, self._goal,
-            self._reach_m, GOAL_BIAS, self._near, self._near_d, self._stack, self._fresh, w.edge, w.cell_first,
-            w.cell_edge, w.grid, w.shape, w.number, w.no_go_model, w.table, w.polar, w.course, w.target,
+            self._reach_m, self._settings.goal_bias, self._near, self._near_d, self._stack, self._fresh, w.edge,
+            w.cell_first, w.cell_edge, w.grid, w.shape, w.number, w.no_go_model, w.table, w.polar, w.course, w.target,
             self._risk_number, self._risk_table,
         )
 
@@ -117,7 +120,7 @@ class Tree:
         return np.column_stack([self.node[parent, :2], self.node[which, :2]])
 
 
-def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
+def search(problem: Problem, effort: Effort, seed: int, settings: RrtstarSettings = DEFAULTS) -> Outcome:
     """Grow the tree until the effort is over; an expansion is one sample drawn."""
     error = endpoint_error(problem)
     if error is not None:
@@ -125,7 +128,7 @@ def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
     if math.dist(problem.start_en, problem.goal_en) <= problem.goal_radius_m:
         effort.found()
         return Outcome(waypoints_en=np.array([problem.start_en]))
-    tree = Tree(problem, world_of(problem), seed)
+    tree = Tree(problem, world_of(problem), seed, settings)
     while not effort.is_over and tree.size < MOST_NODES:
         samples = effort.remaining(CHUNK)
         if samples <= 0:

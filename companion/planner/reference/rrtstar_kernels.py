@@ -9,10 +9,14 @@ import numpy as np
 from companion.kernels.jit import kernel
 from companion.kernels.xorshift import uniform
 from companion.planner.reference.kernels import HALF, TWD, TWO_PI, first_hit, meets_target, steer, straight, wrap
-from companion.planner.risk.wind_kernels import leg_risk
+from companion.planner.risk.wind_kernels import leg_risk, sigma_at
 
-# Columns of ``node``: place, heading of arrival, time, accumulated risk, cost = time + weight x risk.
-X, Y, H, T, R, C = range(6)
+# Columns of ``node``: place, heading of arrival, time, accumulated risk, cost, the greatest risk of a state so far.
+X, Y, H, T, R, C, M = range(7)
+COLUMNS = 7
+# Places in ``risk_number``: a limit is set, the wind process (model, s0, s1, rho, tau), that limit, weight of the
+# accumulated risk [s], of the greatest risk of a state [s], whether states are rewired.
+LIMITED, MODEL, S0, S1, RHO, TAU, LIMIT, WEIGHT, STATE_WEIGHT, REWIRES = range(10)
 # Columns of ``link``: parent, first child, next and previous sibling; -1 for none.
 PARENT, CHILD, NEXT, BEFORE = range(4)
 # Places in ``count``: nodes, goal nodes, best goal node, samples drawn, connections refused, rewirings.
@@ -40,22 +44,45 @@ def _hang(link, i, parent):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _state_risk(twa, t, number, risk_number, risk_table):  # type: ignore[no-untyped-def]
+    """Return the chance that the wind at time t has this heading in the boat's own no-go zone."""
+    margin = abs(twa) - number[HALF]
+    sigma = sigma_at(
+        t, int(risk_number[MODEL]), risk_number[S0], risk_number[S1], risk_number[RHO], risk_table[0], risk_table[1])
+    if sigma <= 1e-12:
+        return 0.0 if margin >= -1e-9 else 1.0
+    return 0.5 * math.erfc(margin / sigma / math.sqrt(2.0))
+
+
+@kernel
+def _cost(t, risk, most, risk_number):  # type: ignore[no-untyped-def]
+    return t + risk_number[WEIGHT] * risk + risk_number[STATE_WEIGHT] * most
+
+
+@kernel
 def _reach(  # type: ignore[no-untyped-def]
     node, i, tx, ty, before_twa, before_t, number, model, table, polar, course, target, risk_number, risk_table,
 ):
-    """Return (ok, heading, time, risk) at (tx, ty) sailed straight from node i; no test against the solids."""
+    """Return (ok, heading, time, risk, greatest risk of a state) at (tx, ty) sailed straight from node i.
+
+    No test against the solids. The risk of a leg's states is that at its ends: in between the spread is in between.
+    """
     ok, h, t0, t1 = straight(
         node[i, X], node[i, Y], node[i, H], node[i, T], tx, ty, number, model, table, polar, course)
     if not ok or (target.shape[0] > 0 and meets_target(node[i, X], node[i, Y], tx, ty, t0, t1, target)):
-        return False, h, t1, 0.0
-    risk = node[i, R]
-    if risk_number[0] > 0.5:
+        return False, h, t1, 0.0, 0.0
+    risk, most = node[i, R], node[i, M]
+    twa = wrap(h - number[TWD])
+    if risk_number[LIMITED] > 0.5:
         risk += leg_risk(
-            t0, t1, wrap(h - number[TWD]), before_twa, before_t, number[HALF], int(risk_number[1]), risk_number[2],
-            risk_number[3], risk_number[4], risk_number[5], risk_table[0], risk_table[1])
-        if risk > risk_number[6]:
-            return False, h, t1, risk
-    return True, h, t1, risk
+            t0, t1, twa, before_twa, before_t, number[HALF], int(risk_number[MODEL]), risk_number[S0],
+            risk_number[S1], risk_number[RHO], risk_number[TAU], risk_table[0], risk_table[1])
+        if risk > risk_number[LIMIT]:
+            return False, h, t1, risk, most
+    if risk_number[STATE_WEIGHT] > 0.0:
+        most = max(most, _state_risk(twa, t0, number, risk_number, risk_table),
+                   _state_risk(twa, t1, number, risk_number, risk_table))
+    return True, h, t1, risk, most
 
 
 @kernel
@@ -68,14 +95,14 @@ def _twa_before(node, link, i, number):  # type: ignore[no-untyped-def]
 
 @kernel
 def _adopt(  # type: ignore[no-untyped-def]
-    node, link, new, j, h, t, risk, stack, fresh, number, model, table, polar, course, target, risk_number,
+    node, link, new, j, h, t, risk, most, stack, fresh, number, model, table, polar, course, target, risk_number,
     risk_table,
 ):
     """Give node j the parent ``new`` if it and everything below it stays feasible and no cost rises."""
     top, n = 0, 0
-    weight = risk_number[7]
     stack[0] = j
-    fresh[0, H], fresh[0, T], fresh[0, R], fresh[0, C] = h, t, risk, t + weight * risk
+    fresh[0, H], fresh[0, T], fresh[0, R], fresh[0, M] = h, t, risk, most
+    fresh[0, C] = _cost(t, risk, most, risk_number)
     # A breadth-first copy of the subtree; fresh[k] belongs to stack[k].
     n = 1
     while top < n:
@@ -88,12 +115,14 @@ def _adopt(  # type: ignore[no-untyped-def]
                 return False
             fresh[n, X], fresh[n, Y] = node[i, X], node[i, Y]
             fresh[n, H], fresh[n, T], fresh[n, R] = fresh[top, H], fresh[top, T], fresh[top, R]
-            ok, ch, ct, cr = _reach(
+            fresh[n, M] = fresh[top, M]
+            ok, ch, ct, cr, cm = _reach(
                 fresh, n, node[child, X], node[child, Y], wrap(fresh[top, H] - number[TWD]), fresh[top, T],
                 number, model, table, polar, course, target, risk_number, risk_table)
             if not ok:
                 return False
-            fresh[n, H], fresh[n, T], fresh[n, R], fresh[n, C] = ch, ct, cr, ct + weight * cr
+            fresh[n, H], fresh[n, T], fresh[n, R], fresh[n, M] = ch, ct, cr, cm
+            fresh[n, C] = _cost(ct, cr, cm, risk_number)
             stack[n] = child
             n += 1
             child = link[child, NEXT]
@@ -103,6 +132,7 @@ def _adopt(  # type: ignore[no-untyped-def]
     for k in range(n):
         i = stack[k]
         node[i, H], node[i, T], node[i, R], node[i, C] = fresh[k, H], fresh[k, T], fresh[k, R], fresh[k, C]
+        node[i, M] = fresh[k, M]
     return True
 
 
@@ -117,7 +147,6 @@ def grow(  # type: ignore[no-untyped-def]
     ``fresh`` for a subtree. Returns when the samples are drawn or the arrays full.
     """
     capacity = node.shape[0]
-    weight = risk_number[7]
     for _ in range(samples):
         if count[N] >= capacity:
             return
@@ -171,26 +200,27 @@ def grow(  # type: ignore[no-untyped-def]
         if found > 0 and near_d[0] < 1e-12:
             count[REFUSED] += 1
             continue
-        best, best_c, best_h, best_t, best_r = -1, np.inf, 0.0, 0.0, 0.0
+        best, best_c, best_h, best_t, best_r, best_m = -1, np.inf, 0.0, 0.0, 0.0, 0.0
         for m in range(-1, found):
             i = nearest if m < 0 else near[m]
             if m >= 0 and i == nearest:
                 continue
             before_twa, before_t = _twa_before(node, link, i, number)
-            ok, h, t, risk = _reach(
+            ok, h, t, risk, most = _reach(
                 node, i, x, y, before_twa, before_t, number, model, table, polar, course, target, risk_number,
                 risk_table)
-            if not ok or t + weight * risk >= best_c:
+            cost = _cost(t, risk, most, risk_number)
+            if not ok or cost >= best_c:
                 continue
             if m >= 0 and first_hit(node[i, X], node[i, Y], x, y, edge, cell_first, cell_edge, grid, shape) <= 1.0:
                 continue
-            best, best_c, best_h, best_t, best_r = i, t + weight * risk, h, t, risk
+            best, best_c, best_h, best_t, best_r, best_m = i, cost, h, t, risk, most
         if best < 0:
             count[REFUSED] += 1
             continue
         new = n
         node[new, X], node[new, Y], node[new, H] = x, y, best_h
-        node[new, T], node[new, R], node[new, C] = best_t, best_r, best_c
+        node[new, T], node[new, R], node[new, C], node[new, M] = best_t, best_r, best_c, best_m
         link[new, CHILD] = -1
         _hang(link, new, best)
         count[N] += 1
@@ -198,18 +228,18 @@ def grow(  # type: ignore[no-untyped-def]
             goal_node[count[GOALS]] = new
             count[GOALS] += 1
         before_twa, before_t = _twa_before(node, link, new, number)
-        for m in range(found):  # rewire
+        for m in range(found if risk_number[REWIRES] > 0.5 else 0):
             j = near[m]
             if j == best or link[j, PARENT] < 0:
                 continue
-            ok, h, t, risk = _reach(
+            ok, h, t, risk, most = _reach(
                 node, new, node[j, X], node[j, Y], before_twa, before_t, number, model, table, polar, course, target,
                 risk_number, risk_table)
-            if not ok or t + weight * risk >= node[j, C] - 1e-9:
+            if not ok or _cost(t, risk, most, risk_number) >= node[j, C] - 1e-9:
                 continue
             if first_hit(x, y, node[j, X], node[j, Y], edge, cell_first, cell_edge, grid, shape) <= 1.0:
                 continue
-            if _adopt(node, link, new, j, h, t, risk, stack, fresh, number, model, table, polar, course, target,
+            if _adopt(node, link, new, j, h, t, risk, most, stack, fresh, number, model, table, polar, course, target,
                       risk_number, risk_table):
                 count[REWIRED] += 1
         best_goal, best_cost = -1, np.inf

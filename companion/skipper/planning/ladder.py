@@ -1,25 +1,29 @@
 """What to give up, and in which order, when no plan is found.
 
+The first thing is a planner of somebody's choice: what it does not find is looked for by ``auto``.
+
 Each rung is named in the status and in the decision record. The old plan is looked at before the first rung, a
 repaired start belongs to every rung, and after the last the boat holds in a safe loiter and waits, longer each time.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from companion.planner.settings import AUTO, Choice
 from companion.skipper.step.config import SkipperConfig
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rung:
-    """One step: margin [m], delta_s, the limit on a path's risk, and whether a nearer safe place may be the goal."""
+    """One step: margin [m], delta_s, the path's limit of risk, a nearer safe place as the goal, and the planner."""
 
     name: str
     margin_m: float
     delta_s: float
     max_path_risk: float | None = None
     nearer_goal: bool = False
+    planner: Choice = AUTO
 
 
 def rungs(config: SkipperConfig) -> tuple[Rung, ...]:
@@ -30,7 +34,10 @@ def rungs(config: SkipperConfig) -> tuple[Rung, ...]:
     limit = config.max_path_risk
     floor = min(config.margin_floor_m, config.margin_m)
     room = config.margin_m - floor
-    out = [Rung(name="", margin_m=config.margin_m, delta_s=config.delta_s, max_path_risk=limit)]
+    out = [Rung(name="", margin_m=config.margin_m, delta_s=config.delta_s, max_path_risk=limit,
+                planner=config.planner)]
+    if config.planner.algorithm != AUTO.algorithm:
+        out.append(replace(out[0], name=f"planner {AUTO.algorithm}", planner=AUTO))
     for share in (*config.margin_ladder, 0.0):
         margin = floor + share * room
         if margin < out[-1].margin_m - 1e-9:

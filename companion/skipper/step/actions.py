@@ -8,6 +8,7 @@ from typing import Any
 
 from companion.messages import MissionItem, Mode
 from companion.orders import Result
+from companion.planner.settings import AUTO, Choice
 
 
 class ReplanReason(enum.Enum):
@@ -58,6 +59,7 @@ class RequestPlan:
     budget_s: float
     seed: int
     from_seq: int | None
+    planner: Choice = AUTO
     rung: str = ""
     text: str = ""
 

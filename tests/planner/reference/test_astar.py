@@ -8,7 +8,8 @@ import pytest
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.reference.astar import AstarSettings, grid_of, search_with, ship_discs, steps_of, target_heading
+from companion.planner.reference.astar import grid_of, search, ship_discs, steps_of, target_heading
+from companion.planner.settings import AstarSettings
 
 AVALON_TWA = list(range(0, 181, 5))
 AVALON_MPS = [
@@ -30,7 +31,7 @@ def problem(**change):
 
 
 def run(p, **settings):
-    outcome = search_with(p, Effort(None, 10**8), AstarSettings(**settings))
+    outcome = search(p, Effort(None, 10**8), 0, AstarSettings(**settings))
     return outcome, (None if outcome.waypoints_en is None else evaluate(p, outcome.waypoints_en))
 
 
@@ -98,6 +99,30 @@ def test_the_tack_cost_makes_fewer_tacks_and_the_tunnel_keeps_to_the_line():
     _, tunnel = run(p, turn_s_per_rad=8.0, tunnel_width_m=40.0)
     _, free = run(p, turn_s_per_rad=8.0)
     assert widest(tunnel) < widest(free)
+
+
+def test_an_abrupt_tunnel_costs_nothing_inside_and_keeps_within_its_borders():
+    p = problem()
+
+    def widest(judged):
+        return max(abs(leg.to_en[0]) for leg in judged.legs)
+
+    free, wide = run(p, turn_s_per_rad=8.0), run(p, tunnel_width_m=2000.0, is_tunnel_abrupt=True)
+    assert wide[0].trace["objective"] == free[0].trace["objective"]
+    narrow_m = 0.8 * widest(free[1])
+    narrow, judged = run(p, tunnel_width_m=2.0 * narrow_m, is_tunnel_abrupt=True)
+    assert narrow.trace["objective"] > free[0].trace["objective"]
+    assert widest(judged) <= narrow_m + 1e-6
+
+
+def test_with_his_largest_turn_of_90_degrees_it_gybes_round_where_the_wind_blows_across_the_grid():
+    across = problem(wind={"from_deg": 5, "speed_mps": 5, "sigma": {"model": "none"}})
+    _, his = run(across)
+    assert (his.tacks, his.gybes > 0) == (0, True)
+    _, judged = run(across, max_turn_rad=math.radians(150.0))
+    assert judged.is_feasible
+    assert judged.tacks > 0
+    assert judged.time_s < his.time_s
 
 
 def test_the_goal_heading_is_the_bearing_turned_out_of_the_wind():

@@ -15,6 +15,7 @@ from companion.planner.reference.kernels import first_hit, turn_time, wrap
 from companion.planner.reference.kernels import steer as steer_kernel
 from companion.planner.reference.rrtstar import Tree, search
 from companion.planner.reference.world import bounds_of, world_of
+from companion.planner.settings import RrtstarSettings
 
 BLOCK = "POLYGON((-60 150,60 150,60 220,-60 220,-60 150))"
 AR1 = {"model": "ar1", "sigma0_deg": 2.0, "sigma_inf_deg": 8.0, "rho_hz": 0.036}
@@ -219,6 +220,56 @@ def test_the_risk_limit_is_kept_and_costs_time():
     assert held.has_path
     assert held.risk <= 0.1
     assert held.cost_s > free.cost_s
+
+
+def test_the_weight_of_the_worst_state_buys_angle_to_the_wind():
+    p = problem(delta_s=0.5, wind=wind(sigma={"model": "ar1", "sigma0_deg": 8.0, "sigma_inf_deg": 8.0, "rho_hz": 0.03}))
+    worst = []
+    for weight in (0.0, 3000.0):
+        outcome = search(p, Effort(None, 4000), 1, RrtstarSettings(state_risk_weight_s=weight))
+        legs = evaluate(p, outcome.waypoints_en).legs
+        worst.append(min(abs(leg.twa_rad) for leg in legs))
+    assert worst[1] > worst[0] + math.radians(2.0)
+
+
+def test_a_state_s_cost_is_its_time_and_its_two_risks():
+    p = problem(risk={"max_path_risk": 0.5})
+    settings = RrtstarSettings(risk_weight_s=7.0, state_risk_weight_s=11.0)
+    tree = Tree(p, world_of(p), 2, settings)
+    tree.grow(1500)
+    node = tree.node[:tree.size]
+    time_s, risk, most = (node[:, k] for k in (kernels.T, kernels.R, kernels.M))
+    assert node[:, kernels.C] == pytest.approx(time_s + 7.0 * risk + 11.0 * most)
+    parent = tree.link[1:tree.size, kernels.PARENT]
+    assert (node[1:, kernels.M] >= node[parent, kernels.M]).all()
+    assert tree.count[kernels.REWIRED] > 0
+
+
+def test_without_rewiring_no_state_is_given_another_parent_and_the_path_is_no_better():
+    p = problem()
+    plain, star = (Tree(p, world_of(p), 1, RrtstarSettings(is_rewired=rewired)) for rewired in (False, True))
+    plain.grow(3000)
+    star.grow(3000)
+    assert plain.count[kernels.REWIRED] == 0
+    assert star.node[star.best, kernels.T] <= plain.node[plain.best, kernels.T]
+
+
+def test_no_branch_is_longer_than_the_range_and_the_goal_bias_draws_the_goal():
+    p = problem()
+    tree = Tree(p, world_of(p), 1, RrtstarSettings(range_m=25.0, is_rewired=False))
+    tree.grow(1500)
+    eager = Tree(p, world_of(p), 1, RrtstarSettings(goal_bias=0.9))
+    eager.grow(300)
+    lazy = Tree(p, world_of(p), 1, RrtstarSettings(goal_bias=0.0))
+    lazy.grow(300)
+    # A state is grown from the nearest; it may then hang on one of its neighbours, which is farther off.
+    for n in range(1, tree.size):
+        assert np.hypot(*(tree.node[:n, :2] - tree.node[n, :2]).T).min() <= 25.0 + 1e-9
+
+    def near_goal(t):
+        return np.mean(np.hypot(t.node[:t.size, 0], t.node[:t.size, 1] - 400.0) < 60.0)
+
+    assert near_goal(eager) > near_goal(lazy)
 
 
 def test_no_state_of_the_tree_is_above_the_limit():

@@ -11,6 +11,7 @@ from shapely.geometry import box
 from companion.boat import Boat, ardurover_sitl
 from companion.planner import Problem, plan
 from companion.planner.problem.defects import defect_of
+from companion.planner.settings import AUTO, AstarSettings, Choice
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired, wind_part
 from companion.skipper.step.config import SkipperConfig
@@ -151,6 +152,15 @@ def test_the_ladder_never_goes_below_the_floor_and_never_repeats_itself():
     assert [s.delta_s for s in steps] == sorted((s.delta_s for s in steps), reverse=True)
     tight = rungs(SkipperConfig(margin_m=5.0, margin_floor_m=8.0))
     assert all(s.margin_m == 5.0 for s in tight)
+
+
+def test_a_planner_of_somebodys_choice_is_the_first_thing_to_be_given_up():
+    chosen = Choice(algorithm="astar", settings=AstarSettings(grid_m=5.0))
+    steps, plain = rungs(SkipperConfig(planner=chosen)), rungs(SkipperConfig())
+    assert [s.planner for s in steps] == [chosen, *[AUTO] * (len(steps) - 1)]
+    assert steps[1].name == "planner auto"
+    assert (steps[1].margin_m, steps[1].delta_s) == (steps[0].margin_m, steps[0].delta_s)
+    assert steps[2:] == plain[1:]
 
 
 def test_a_limit_on_the_paths_risk_reaches_the_problem_and_is_given_up_before_delta_s():

@@ -1,0 +1,84 @@
+"""The numbers of the papers' planners, and the choice among them: ``rrtstar`` is Wolsieffer's, ``astar`` Büsser's.
+
+``auto`` has none: it is what the project sails by, and sets itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+KNOT_MPS = 1852.0 / 3600.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AstarSettings:
+    """A*'s numbers; the defaults are those the thesis ends with (5.3: no tunnel, no extra tack cost).
+
+    Attributes:
+        grid_m: GRID SIZE [m]; None: a fortieth of the distance.
+        turn_s_per_rad: f of eq. 4.4 [s/rad]; 0 for Figure 5.1.
+        tack_s, gybe_s: Added cost of a manoeuvre [s].
+        tunnel_width_m: TUNNEL WIDTH of eq. 4.6 [m]; None for no tunnel.
+        is_tunnel_abrupt: No cost within half the width of the direct line, ``BORDER_S`` a step beyond it (4.3.2,
+            the third form), in place of one that grows with the distance (eq. 4.6, the first).
+        heuristic_mps: Speed of the estimate [m/s]; None for Dijkstra.
+        min_twa_rad, max_twa_rad: The sailable range of headings off the wind.
+        max_turn_rad: The greatest heading change from step to step (4.1.1). With his 90 degrees there is no tack
+            unless the wind blows along the grid and the no-go zone is not widened: it gybes round.
+        ship_match_s: Tolerance of eq. 4.7 [s].
+        memory_bytes: What the grid may take.
+
+    """
+
+    grid_m: float | None = None
+    turn_s_per_rad: float = 8.0
+    tack_s: float = 0.0
+    gybe_s: float = 0.0
+    tunnel_width_m: float | None = None
+    is_tunnel_abrupt: bool = False
+    heuristic_mps: float | None = 7.0 * KNOT_MPS
+    min_twa_rad: float = math.radians(45.0)
+    max_twa_rad: float = math.radians(160.0)
+    max_turn_rad: float = 0.5 * math.pi
+    ship_match_s: float = 20.0
+    memory_bytes: int = 256_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RrtstarSettings:
+    """RRT*'s numbers; the defaults are OMPL's, which Wolsieffer used.
+
+    Attributes:
+        goal_bias: Share of the samples that are the goal.
+        range_m: eta, the longest branch that is grown [m]; None: a fifth of the search box's diagonal.
+        is_rewired: Whether states are given better parents (RRT*); without it the tree is an RRT that chooses its
+            parents.
+        risk_weight_s: Cost of certain failure [s], with a limit on the path's risk: enough to prefer the safer of
+            two equal paths.
+        state_risk_weight_s: Cost of the greatest risk of any state [s per unit of probability]: the second risk
+            term of CC-RRT* (Luders, Karaman and How 2013), which Wolsieffer leaves out.
+
+    """
+
+    goal_bias: float = 0.05
+    range_m: float | None = None
+    is_rewired: bool = True
+    risk_weight_s: float = 10.0
+    state_risk_weight_s: float = 0.0
+
+
+Settings = AstarSettings | RrtstarSettings
+SETTINGS: dict[str, type[Settings]] = {"astar": AstarSettings, "rrtstar": RrtstarSettings}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """An algorithm by name, its numbers (None: its defaults), and its effort in its own steps (None: the voyage's)."""
+
+    algorithm: str = "auto"
+    settings: Settings | None = None
+    expansions: int | None = None
+
+
+AUTO = Choice()
