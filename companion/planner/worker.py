@@ -229,7 +229,7 @@ class PlannerWorker:
 
 
 # ------------------------------------------------------------------------------------- in the child
-def serve(algorithm: str) -> None:
+def serve(algorithm: str = "auto") -> None:
     """Answer requests on standard input until it closes: the child's main. ``auto`` gets warm, and ``algorithm``."""
     source = sys.stdin.buffer
     sink = os.fdopen(os.dup(1), "wb")
@@ -295,4 +295,4 @@ def _write(sink: Any, payload: bytes) -> None:
 
 
 if __name__ == "__main__":
-    serve(sys.argv[1])
+    serve(*sys.argv[1:2])
