@@ -20,6 +20,7 @@ from typing import Any, NoReturn
 from companion import __version__
 from companion.disk import reason
 from companion.errors import CompanionError, InputError
+from companion.extras import missing
 
 INTERRUPTED = 130
 # No option of ours begins with a digit, so this is a value; of all that begins with a minus argparse knows a lone
@@ -98,6 +99,12 @@ class Program:
         except CompanionError as error:
             sys.stderr.write(f"{self.name} {args.command}: {error}\n")
             return error.exit_code
+        except ModuleNotFoundError as error:
+            refusal = missing(error)
+            if refusal is None:
+                raise
+            sys.stderr.write(f"{self.name} {args.command}: {refusal}\n")
+            return refusal.exit_code
         except KeyboardInterrupt:
             return INTERRUPTED
         except BrokenPipeError:

@@ -17,11 +17,14 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from companion.arguments import number, out_folder, system_id, whole
 from companion.errors import InputError
+from companion.extras import missing
 from companion.program import INTERRUPTED
 from companion.words import counted, file_name
 
 if TYPE_CHECKING:
     from companion.commands.starting import Sailed
+    from companion.geofence.mission import MissionOptions
+    from companion.planner.nursery import Nursery
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
     from companion.telemetry.service import ServiceManager
@@ -89,17 +92,13 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.errors import UnreadableError
-    from companion.telemetry.console import Console
 
-    with (
-        _outliving_the_terminal(), Console(sys.stdout) as out, Console(sys.stderr) as err,
-        contextlib.redirect_stderr(cast("TextIO", err)),   # what is logged must not wait for a terminal either
-    ):
-        try:
-            return _run(args, out, err)
-        except UnreadableError as error:
-            err.write(f"companion run: {error}\n")
-            return NOT_THERE
+    try:
+        with _outliving_the_terminal():
+            return _run(args)
+    except UnreadableError as error:
+        sys.stderr.write(f"companion run: {error}\n")
+        return NOT_THERE
 
 
 @contextlib.contextmanager
@@ -116,13 +115,15 @@ def _outliving_the_terminal() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
-    from companion.commands.starting import Sailed, alone, read_drawn, settings_of
+def _run(args: argparse.Namespace) -> int:
+    from companion.commands.starting import Sailed, settings_of
     from companion.geofence import load_mission
     from companion.geofence.mission import NO_NAME
     from companion.mavlink.transports import parse_link
+    from companion.planner.nursery import Nursery
+    from companion.planner.worker import answer_requests
     from companion.sailable import require_sailable
-    from companion.telemetry.service import ServiceManager
+    from companion.telemetry.console import Console
     from companion.traffic.feeds import parse_feed
 
     for name in args.feed:
@@ -135,6 +136,27 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
         sailed, name = Sailed(mission=named), file_name(named.name)
     else:
         name = file_name(settings.name or NO_NAME)
+    import companion.app.sail  # noqa: F401 - so that a planner has it in common with this process
+
+    # before there are threads, locks and sockets: those of the consoles are the first
+    with contextlib.ExitStack() as stack:
+        nursery = Nursery.begin(answer_requests)
+        if nursery is not None:
+            stack.callback(nursery.close)
+        out, err = stack.enter_context(Console(sys.stdout)), stack.enter_context(Console(sys.stderr))
+        # what is logged must not wait for a terminal either
+        stack.enter_context(contextlib.redirect_stderr(cast("TextIO", err)))
+        return _start(args, settings, sailed, name, nursery, out, err)
+
+
+def _start(
+    args: argparse.Namespace, settings: MissionOptions | None, sailed: Sailed | None, name: str,
+    nursery: Nursery | None, out: Console, err: Console,
+) -> int:
+    """Sail what is named, and what is drawn one after the other; return the exit code."""
+    from companion.commands.starting import alone, read_drawn
+    from companion.telemetry.service import ServiceManager
+
     folder = _new_folder(args.out, name, 1)
     state_path = args.state or (folder.parent / f"{name}.state.json")
     # one for all voyages of this start: it tells the service manager that the program ends
@@ -145,7 +167,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
                 sailed = read_drawn(args, settings, folder, state_path, _signing(args.signing_key), manager, err)
             if sailed is None:
                 return NOT_THERE
-            code = _voyage(args, sailed, folder, state_path, manager, out, err)
+            code = _voyage(args, sailed, folder, state_path, manager, nursery, out, err)
             if code is not None:
                 return code
             number += 1
@@ -160,8 +182,8 @@ def _new_folder(named: Path | None, name: str, number: int) -> Path:
 
 
 def _voyage(
-    args: argparse.Namespace, sailed: Sailed, folder: Path, state_path: Path, manager: ServiceManager, out: Console,
-    err: Console,
+    args: argparse.Namespace, sailed: Sailed, folder: Path, state_path: Path, manager: ServiceManager,
+    nursery: Nursery | None, out: Console, err: Console,
 ) -> int | None:
     """Sail; return the exit code, None when the voyage has given way to what was drawn under way."""
     from companion.app.adoption import ADOPTED
@@ -195,7 +217,7 @@ def _voyage(
             token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
-    summary = run_loop(_sail(mission, transport, folder, options, manager, out), speedup=args.speedup)
+    summary = run_loop(_sail(mission, transport, folder, options, manager, nursery, out), speedup=args.speedup)
     if summary is None:
         return INTERRUPTED
     if not summary["arrived_before"] and summary["end_reason"] != ADOPTED:   # the next voyage waits for no picture
@@ -230,7 +252,8 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 
 async def _sail(
-    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager, out: Console,
+    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager,
+    nursery: Nursery | None, out: Console,
 ) -> dict[str, Any] | None:
     """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker
@@ -240,7 +263,7 @@ async def _sail(
     for end in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
             loop.add_signal_handler(end, stop.set)
-    async with PlannerWorker(algorithm=mission.skipper.planner) as planner:
+    async with PlannerWorker(algorithm=mission.skipper.planner, nursery=nursery) as planner:
         # The child loads its kernels while this process imports the rest.
         from companion.app.sail import sail
         from companion.telemetry.progress import ProgressLine
@@ -312,4 +335,5 @@ def _report(folder: Path, err: Console) -> None:
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:
-        err.write(f"companion run: the picture could not be drawn: {error!r}\n")
+        refusal = missing(error) if isinstance(error, ModuleNotFoundError) else None
+        err.write(f"companion run: the picture could not be drawn: {refusal or repr(error)}\n")

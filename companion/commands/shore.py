@@ -82,14 +82,14 @@ class Shore:
         self.home: GeoPoint | None = None  # item 0 of the mission last downloaded
 
     def __enter__(self) -> Self:
-        url = mavsdk_url(self._link)
-        wanted = find_system(self._link, self._timeout_s, self._wanted)
         from mavsdk import Configuration, Mavsdk
         from mavsdk import logging as mavsdk_logging
         from mavsdk.component_type import ComponentType
         from mavsdk.plugins.mavlink_direct import MavlinkDirect
         from mavsdk.plugins.mission_raw import MissionRaw
 
+        url = mavsdk_url(self._link)
+        wanted = find_system(self._link, self._timeout_s, self._wanted)
         mavsdk_logging.log_subscribe(lambda *_: True)
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
         result = self._mavsdk.add_any_connection(url)

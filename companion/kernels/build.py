@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from companion.kernels.places import looked_in, mark, sweep, written_to
+from companion.kernels.places import looked_in, mark, misfit, sweep, written_to
 
 KILLED = 9   # exit code of a crew whose hands were killed
 
@@ -28,6 +28,7 @@ class Progress:
     of: int
     done_s: float
     of_s: float
+    why: str = ""   # the package's own were of no use
 
     def say(self, elapsed_s: float, first: Progress) -> str:
         """Return it in words; ``first`` was the progress ``elapsed_s`` ago."""
@@ -35,7 +36,8 @@ class Progress:
         left = ""
         if self.done < self.of and made_s > 0.05 * (self.of_s - first.done_s):
             left = f", about {_rough(elapsed_s * (self.of_s - self.done_s) / made_s)} left"
-        return f"compiling kernels, once on each machine: {self.done} of {self.of}{left}"
+        why = f" ({self.why})" if self.why else ""
+        return f"compiling kernels, once on each machine: {self.done} of {self.of}{left}{why}"
 
 
 def _rough(seconds: float) -> str:
@@ -59,10 +61,11 @@ def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
                           stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, start_new_session=True) as crew:
         try:
             assert crew.stdout is not None
-            began_s, first = time.monotonic(), None
+            began_s, first, why = time.monotonic(), None, misfit()
             for line in crew.stdout:
                 done, of, done_s, of_s = line.split()
-                progress = Progress(done=int(done), of=int(of), done_s=float(done_s), of_s=float(of_s))
+                progress = Progress(done=int(done), of=int(of), done_s=float(done_s), of_s=float(of_s),
+                                    why=why)
                 first = first or progress
                 say(progress.say(time.monotonic() - began_s, first))
             code = crew.wait()

@@ -14,16 +14,47 @@ import time
 from pathlib import Path
 from typing import Any
 
+from llvmlite import binding as llvm
 from numba.core.caching import _Cache
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 
+from companion.errors import JobError
 from companion.kernels.places import folder, looked_in, used, versions, written_to
 from companion.kernels.stamp import name_of, stamp
 
 _LOG = logging.getLogger(__name__)
 _DIGEST_BYTES = hashlib.sha256().digest_size
+_LIBRARY, _ANNOTATION = 0, 6   # of what numba writes of a compiled function
+
+
+class _Loaded(JITCodeLibrary):  # type: ignore[misc]
+    """Loaded machine code without LLVM's form of it, which is read when another kernel is compiled that calls it.
+
+    That form of a planner's kernels takes 12 MB, and nobody asks for it where nothing is compiled.
+    """
+
+    path: Path
+    parsed: Any
+
+    @classmethod
+    def lighten(cls, library: Any, path: Path) -> None:
+        """Make a library that was loaded from the file at ``path`` one of these."""
+        library._shared_module.close()  # noqa: SLF001
+        del library._shared_module  # noqa: SLF001
+        library.__class__, library.path, library.parsed = cls, path, None
+
+    @property
+    def _shared_module(self) -> Any:
+        if self.parsed is None:
+            payload = _read(self.path)
+            if payload is None:
+                raise JobError(f"{self.path} has gone while a kernel was compiled that needs it")
+            _, _, (_, bitcode) = pickle.loads(payload)[_LIBRARY]  # noqa: S301 - our own
+            self.parsed = llvm.parse_bitcode(bitcode)
+        return self.parsed
 
 
 class KernelCache(_Cache):  # type: ignore[misc]
@@ -53,9 +84,12 @@ class KernelCache(_Cache):  # type: ignore[misc]
             if payload is None:
                 continue
             try:
-                return CompileResult._rebuild(target_context, *pickle.loads(payload))  # noqa: S301, SLF001 - our own
+                result = CompileResult._rebuild(target_context, *pickle.loads(payload))  # noqa: S301, SLF001 - our own
+                _Loaded.lighten(result.library, place / name)
             except Exception:
                 _LOG.warning("%s cannot be loaded: compiled again", place / name, exc_info=True)
+            else:
+                return result
         return None
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
@@ -63,7 +97,9 @@ class KernelCache(_Cache):  # type: ignore[misc]
         if data.library.has_dynamic_globals or any(not x.can_cache for x in data.lifted):
             return
         try:
-            _write(written_to() / self.file_name(sig, data.codegen), dumps(data._reduce()))  # noqa: SLF001
+            parts = list(data._reduce())  # noqa: SLF001
+            parts[_ANNOTATION] = ""   # the source with its types, for a person who asks; none does
+            _write(written_to() / self.file_name(sig, data.codegen), dumps(tuple(parts)))
         except OSError as error:
             _LOG.warning("compiled kernels cannot be kept in %s (%s)", folder(), error.strerror)
 

@@ -15,7 +15,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import numba
+from companion.kernels.numba_alone import numba
+
+# isort: split
+
 from numba.core.registry import cpu_target
 
 from companion.errors import JobError

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import numba
+from companion.kernels.numba_alone import numba
+
+# isort: split
+
 from numba.core.registry import CPUDispatcher
 from numba.core.types.misc import unliteral
 

@@ -14,6 +14,7 @@ import hashlib
 import os
 import platform
 import stat
+import sys
 import tempfile
 from collections.abc import Iterator
 from importlib import metadata
@@ -22,7 +23,8 @@ from pathlib import Path
 FILE = "kernels.txt"   # in each package: see ``listed``
 PACKAGES = Path(__file__).resolve().parents[2]
 IN_MEMORY = (Path("/dev/shm"), Path("/run"))  # noqa: S108 - see _is_private
-CARRIED = Path(__file__).resolve().parent / "carried"   # filled when a package is built
+CARRIED = Path(__file__).resolve().parent / "carried"   # filled when a package is built: see ``carry``
+MADE_FOR = "made-for.txt"                               # in it: the versions that it was made for
 KEPT_S = 30 * 86_400.0     # a file that nobody has used for this long goes ...
 KEPT_BYTES = 200 * 2**20   # ... and the oldest beyond this, a dozen versions of everything
 _USED_S = 86_400.0         # the time of use is noted once a day: an SD card wears
@@ -81,9 +83,23 @@ def _tried(place: Path) -> Path:
 
 @functools.cache
 def versions() -> str:
-    """Return what machine code depends on besides kernels, types and processor."""
+    """Return what machine code depends on besides kernels, types and processor.
+
+    Of Python the tag of its byte code: within a minor version neither that nor the layout of its objects changes.
+    """
     libraries = " ".join(f"{name} {metadata.version(name)}" for name in ("numba", "llvmlite", "numpy"))
-    return f"{platform.python_implementation()} {platform.python_version()} {libraries} {platform.machine()}"
+    return f"{sys.implementation.cache_tag} {libraries} {platform.machine()}"
+
+
+def misfit() -> str:
+    """Return why the kernels that the package carries are of no use here; empty: it carries none, or all fit."""
+    try:
+        made_for = (CARRIED / MADE_FOR).read_text(encoding="utf-8").strip()
+    except OSError:
+        return ""
+    if made_for != versions():
+        return f"those of the package are for {made_for}, this is {versions()}"
+    return "those of the package are of another source"
 
 
 def mark(package: str) -> str:

@@ -24,7 +24,10 @@ from typing import Any, Self
 import numpy as np
 
 from companion.clock import effort_s
+from companion.errors import JobError
 from companion.kernels.build import prepare
+from companion.planner.child import Child, Forked, Started
+from companion.planner.nursery import Nursery
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
 from companion.planner.settings import Settings
@@ -84,15 +87,17 @@ class PlannerWorker:
     """A child process with warm kernels, one request at a time; a second caller waits for the first.
 
     ``async with PlannerWorker() as planner`` starts the child and returns at once: it warms up while the loop runs
-    and the first request waits for it: ``auto`` always, and ``algorithm``. ``restarts`` counts replacements.
+    and the first request waits for it: ``auto`` always, and ``algorithm``. With a ``nursery`` the child is forked
+    there, warm for ``auto`` from the beginning. ``restarts`` counts replacements.
     """
 
     def __init__(
         self, *, grace_s: float = DEFAULT_GRACE_S, command: list[str] | None = None, algorithm: str = "auto",
+        nursery: Nursery | None = None,
     ) -> None:
-        self._grace_s = grace_s
+        self._grace_s, self._nursery = grace_s, nursery if algorithm == "auto" else None
         self._command = command or [sys.executable, "-m", "companion.planner.worker", algorithm]
-        self._child: asyncio.subprocess.Process | None = None
+        self._child: Child | None = None
         self._is_warm, self._silence_s = False, math.inf
         self._lock = asyncio.Lock()
         self.restarts = 0
@@ -100,7 +105,7 @@ class PlannerWorker:
     @property
     def is_alive(self) -> bool:
         """Is there a child that runs?"""
-        return self._child is not None and self._child.returncode is None
+        return self._child is not None and self._child.is_alive
 
     @property
     def pid(self) -> int | None:
@@ -171,10 +176,15 @@ class PlannerWorker:
     # ------------------------------------------------------------------------------------ the child
     async def _start(self) -> None:
         self._is_warm, self._silence_s = False, math.inf
-        # In a session of its own: Ctrl-C is for this process, which ends its child itself.
-        self._child = await asyncio.create_subprocess_exec(
-            *self._command, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, start_new_session=True,
-        )
+        if self._nursery is not None:
+            try:
+                self._child = await Forked.begin(self._nursery)
+            except JobError as error:
+                _LOG.warning("%s; it is started as a program of its own", error)
+                self._nursery = None
+            else:
+                return
+        self._child = await Started.begin(self._command)
 
     async def _warm(self, say: Callable[[str], None] = lambda _: None) -> None:
         """Wait for the child's kernels; it is alive as long as it says so, and until its first word while it runs."""
@@ -189,9 +199,7 @@ class PlannerWorker:
         child, self._child = self._child, None
         if child is None:
             return
-        with contextlib.suppress(ProcessLookupError):
-            child.kill()
-        await child.wait()
+        await child.end()
 
     async def _replace(self) -> None:
         await self._stop()
@@ -200,16 +208,14 @@ class PlannerWorker:
 
     async def _send(self, payload: bytes) -> None:
         assert self._child is not None
-        assert self._child.stdin is not None
-        self._child.stdin.write(_LENGTH.pack(len(payload)))
-        self._child.stdin.write(payload)
-        await self._child.stdin.drain()
+        self._child.writer.write(_LENGTH.pack(len(payload)))
+        self._child.writer.write(payload)
+        await self._child.writer.drain()
 
     async def _receive(self) -> bytes:
         assert self._child is not None
-        assert self._child.stdout is not None
-        head = await self._child.stdout.readexactly(_LENGTH.size)
-        return await self._child.stdout.readexactly(_LENGTH.unpack(head)[0])
+        head = await self._child.reader.readexactly(_LENGTH.size)
+        return await self._child.reader.readexactly(_LENGTH.unpack(head)[0])
 
     async def _answer(self, limit_s: float) -> bytes:
         """Return the next message; ``TimeoutError`` after ``limit_s`` of computing time (the loop may be scaled)."""
@@ -230,7 +236,7 @@ class PlannerWorker:
 
 # ------------------------------------------------------------------------------------- in the child
 def serve(algorithm: str = "auto") -> None:
-    """Answer requests on standard input until it closes: the child's main. ``auto`` gets warm, and ``algorithm``."""
+    """Get warm for ``auto`` and ``algorithm``, then answer requests on standard input: the child's main."""
     source = sys.stdin.buffer
     sink = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints must not break the frames
@@ -244,6 +250,11 @@ def serve(algorithm: str = "auto") -> None:
         warm()
         pulse.say(f"loading the kernels of {algorithm}")
         warm(algorithm)
+    answer_requests(source, sink)
+
+
+def answer_requests(source: Any, sink: Any) -> None:
+    """Answer requests on a stream of bytes until it closes, all being loaded."""
     _write(sink, _READY)
     while True:
         head = source.read(_LENGTH.size)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.arguments import number, out_folder, whole
+from companion.extras import missing
 from companion.words import counted, file_name
 
 OURS = {path.stem: path for path in (Path(__file__).resolve().parents[1] / "scenarios").rglob("*.toml")}
@@ -101,7 +102,8 @@ def draw(folder: Path) -> None:
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:
-        sys.stderr.write(f"sitl run: the picture could not be drawn: {error!r}\n")
+        refusal = missing(error) if isinstance(error, ModuleNotFoundError) else None
+        sys.stderr.write(f"sitl run: the picture could not be drawn: {refusal or repr(error)}\n")
 
 
 def words(figure: Any) -> str:

@@ -13,6 +13,7 @@ import pytest
 
 from companion.kernels import places
 from companion.kernels.build import Progress, is_ready, prepare
+from companion.kernels.carry import carry
 from companion.kernels.listed import read_list
 from companion.kernels.signatures import as_text
 from sitl.scene.ships import free_port
@@ -89,6 +90,27 @@ def test_it_goes_on_where_it_was_in_little_memory(whole, empty):
     assert last[0] == last[1]
     assert last[1] - 2 <= first[0] < last[1]
     prepare(ALL, say=pytest.fail)   # nothing is left to do
+
+
+def test_what_the_package_carries_and_does_not_fit_is_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(places, "CARRIED", tmp_path)
+    assert places.misfit() == ""   # it carries none
+    (tmp_path / places.MADE_FOR).write_text("cpython-310 numba 0.60.0\n")
+    assert places.misfit().startswith("those of the package are for cpython-310 numba 0.60.0, this is cpython-3")
+    (tmp_path / places.MADE_FOR).write_text(f"{places.versions()}\n")
+    assert places.misfit() == "those of the package are of another source"
+    first = Progress(done=10, of=100, done_s=5.0, of_s=65.0, why=places.misfit())
+    assert first.say(0.2, first).endswith("10 of 100 (those of the package are of another source)")
+
+
+@pytest.mark.campaign
+def test_what_is_carried_is_whole_and_readable_by_all(empty, tmp_path, monkeypatch):
+    monkeypatch.setattr(places, "CARRIED", tmp_path / "carried")
+    assert carry() > 1e6
+    assert is_ready(ALL)
+    assert all(path.stat().st_mode & 0o444 == 0o444 for path in (tmp_path / "carried").iterdir())
+    assert places.misfit() == "those of the package are of another source"   # what would be said if it were not
+    assert not list(empty.iterdir())
 
 
 def test_progress_says_how_long_it_takes_when_it_knows():

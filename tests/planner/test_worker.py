@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import subprocess
 import sys
+import threading
 
 import pytest
 
 from companion.clock import now_s, run, run_virtual
 from companion.planner import PlanStatus, Problem, plan, worker
+from companion.planner.nursery import Nursery
 from companion.planner.worker import InlinePlanner, PlannerWorker
 from tests.planner.problems import load, simple
 
@@ -37,6 +40,60 @@ def test_plans_dies_hangs_and_comes_back():
             assert (await worker.plan(p, expansions=3_000)).has_path
 
     run(main())
+
+
+# A fork of a test's own process, which has threads, would not be safe.
+NURSED = """
+import asyncio, os, signal, sys
+from companion.clock import run
+from companion.kernels.build import prepare
+from companion.planner import PlanStatus, Problem, plan
+from companion.planner.nursery import Nursery
+from companion.planner.worker import PlannerWorker, answer_requests
+from tests.planner.problems import simple
+
+prepare(("companion",), say=lambda _: None)
+nursery = Nursery.begin(answer_requests)
+
+async def main():
+    p = Problem.from_json(simple())
+    wanted = plan(p, expansions=3_000, seed=2).waypoints_en.tolist()
+    async with PlannerWorker(grace_s=1.0, nursery=nursery) as worker:
+        await worker.ready()
+        assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
+        os.kill(worker.pid, signal.SIGKILL)
+        await asyncio.sleep(0.2)
+        assert not worker.is_alive
+        assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
+        os.kill(worker.pid, signal.SIGSTOP)
+        assert (await worker.plan(p, budget_s=0.1)).status is PlanStatus.UNANSWERED
+        assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
+        os.kill(nursery._pid, signal.SIGKILL)   # with nobody to fork, it is started
+        os.kill(worker.pid, signal.SIGKILL)
+        await asyncio.sleep(0.2)
+        assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
+        print(worker.restarts)
+
+run(main())
+nursery.close()
+"""
+
+
+def test_forked_by_a_nursery_it_plans_the_same_dies_hangs_and_comes_back():
+    done = subprocess.run([sys.executable, "-c", NURSED], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "3\n"), done.stderr
+    assert "it is started as a program of its own" in done.stderr
+
+
+def test_a_process_with_threads_is_not_forked():
+    waiting = threading.Event()
+    other = threading.Thread(target=waiting.wait)
+    other.start()
+    try:
+        assert Nursery.begin(worker.answer_requests) is None
+    finally:
+        waiting.set()
+        other.join()
 
 
 def test_a_worker_that_cannot_start_is_an_outcome():

@@ -48,7 +48,7 @@ def voyage_record(mission: Mission, permissions: Permissions, run: dict[str, Any
         "permissions": {name: getattr(permissions, name) for name in type(permissions).__slots__},
         "versions": {
             "companion": __version__, "python": platform.python_version(), "machine": platform.machine(),
-            **{name: metadata.version(name) for name in ("numpy", "numba", "shapely", "pymavlink", "filterpy")},
+            **{name: metadata.version(name) for name in ("numpy", "numba", "shapely", "pymavlink")},
         },
         "argv": sys.argv[1:],
     }
