@@ -245,7 +245,10 @@ class Turn:
 
     def is_raised(self, name: str) -> bool:
         """Return whether a watchdog is raised."""
-        return any(r.name == name for r in self.state.raised)
+        for raised in self.state.raised:   # asked for dozens of times a step: a loop, not a generator
+            if raised.name == name:
+                return True
+        return False
 
     @property
     def is_taken(self) -> bool:
