@@ -216,11 +216,11 @@ class WindForecast:
 
     def __post_init__(self) -> None:
         n = self.horizon_s.shape[0]
-        if n == 0 or not bool(np.all(np.diff(self.horizon_s) > 0.0)):
+        if n == 0 or not bool((self.horizon_s[1:] > self.horizon_s[:-1]).all()):
             raise ValueError("horizon_s must be strictly increasing and not empty")
         for name in ("mean_twd_from_rad", "sigma_twd_rad", "mean_tws_mps", "sigma_tws_mps"):
             array = getattr(self, name)
-            if array.shape != (n,) or not bool(np.all(np.isfinite(array))):
+            if array.shape != (n,) or not bool(np.isfinite(array).all()):
                 raise ValueError(f"{name} must be {n} finite numbers")
         if self.half_width_rad.shape != (n, self.level.shape[0]):
             raise ValueError("half_width_rad must be (horizons, levels)")

@@ -7,8 +7,9 @@ below the first angle it falls linearly to nothing head to wind, beyond the last
 
 from __future__ import annotations
 
+import bisect
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,6 +45,8 @@ class Polar:
     tws_mps: NDArray[np.float64]
     speed_mps_table: NDArray[np.float64]
     name: str = ""
+    # the curve in the wind of the moment, which a step asks for several times: (wind speed, angles, boat speeds)
+    _last: list[tuple[float, list[float], list[float]]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
         twa = np.array(self.twa_rad, dtype=np.float64)
@@ -107,7 +110,23 @@ class Polar:
         >>> constant(2.0).speed_mps(-1.0, 5.0)
         2.0
         """
-        return float(self.speeds_mps(twa_rad, tws_mps))
+        if not math.isfinite(twa_rad):
+            raise ValueError("a true wind angle is not a finite number")
+        folded = abs((twa_rad + math.pi) % (2.0 * math.pi) - math.pi)
+        nodes, speed = self._curve_of(tws_mps)
+        i = bisect.bisect_right(nodes, folded) - 1
+        if i + 1 >= len(nodes) or nodes[i] == folded:
+            return speed[min(i, len(nodes) - 1)]
+        return (speed[i + 1] - speed[i]) / (nodes[i + 1] - nodes[i]) * (folded - nodes[i]) + speed[i]   # as np.interp
+
+    def _curve_of(self, tws_mps: float) -> tuple[list[float], list[float]]:
+        """Return ``curve`` as lists."""
+        for known, nodes, speed in self._last:
+            if known == tws_mps:
+                return nodes, speed
+        nodes, speed = (array.tolist() for array in self.curve(tws_mps))
+        self._last[:] = [(tws_mps, nodes, speed), *self._last[:3]]
+        return nodes, speed
 
     def speeds_mps(self, twa_rad: ArrayLike, tws_mps: float) -> NDArray[np.float64]:
         """Return the boat speeds [m/s] at an array of true wind angles [rad]."""

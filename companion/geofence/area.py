@@ -141,6 +141,19 @@ class LocalArea:
         return union
 
     @functools.cached_property
+    def _shore(self) -> BaseGeometry:
+        """The obstacles' edges."""
+        return self.solid.boundary
+
+    @functools.cached_property
+    def _edge(self) -> BaseGeometry | None:
+        """The limits' edge, None without a fence; the limits are prepared."""
+        if self.limits is None:
+            return None
+        shapely.prepare(self.limits)
+        return self.limits.boundary
+
+    @functools.cached_property
     def _index(self) -> PolygonIndex:
         """The obstacles on a grid, for many points at once."""
         from companion.geo.segments import PolygonIndex
@@ -179,7 +192,7 @@ class LocalArea:
         if wanted.shape[0] >= MANY_POINTS:
             return self._index.distance_m(wanted)
         points = shapely.points(wanted)
-        outside = np.asarray(shapely.distance(self.solid.boundary, points))
+        outside = np.asarray(shapely.distance(self._shore, points))
         return np.where(shapely.covers(self.solid, points), -outside, outside)
 
     def limit_clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
@@ -189,8 +202,7 @@ class LocalArea:
             return np.full(points.shape, np.inf)
         if self.limits.is_empty:
             return np.full(points.shape, -np.inf)
-        shapely.prepare(self.limits)
-        inside = np.asarray(shapely.distance(self.limits.boundary, points))
+        inside = np.asarray(shapely.distance(self._edge, points))
         return np.where(shapely.covers(self.limits, points), inside, -inside)
 
     def clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
@@ -215,7 +227,7 @@ class LocalArea:
             clearance = float(shapely.distance(self.solid, line))
         if self.limits is not None:
             inside = bool(shapely.covers(self.limits, line))
-            clearance = min(clearance, float(shapely.distance(self.limits.boundary, line)) if inside else -1.0)
+            clearance = min(clearance, float(shapely.distance(self._edge, line)) if inside else -1.0)
         return clearance
 
     def nearest_name(self, point_en: ArrayLike) -> str:

@@ -93,7 +93,7 @@ class Link:
         self._stamp, self._on_fault = stamp, on_fault
         self._codec = Codec(
             self._reception.own_system, self._identity.component, signing.state if signing else None)
-        self._subscribers: list[OnMessage] = []
+        self._subscribers: tuple[tuple[str, OnMessage], ...] = ()   # each with its name for a fault
         self._heartbeat_s: float | None = None
         self._found, self._decided = asyncio.Event(), asyncio.Event()
         self._boot_s: float | None = None
@@ -224,11 +224,11 @@ class Link:
     # ---------------------------------------------------------------------------------------- messages
     def subscribe(self, callback: OnMessage) -> Callable[[], None]:
         """Hand every message of the autopilot's system to ``callback(t_s, message)``; call the result to stop."""
-        self._subscribers.append(callback)
+        entry = (getattr(callback, "__qualname__", repr(callback)), callback)
+        self._subscribers = (*self._subscribers, entry)
 
         def stop() -> None:
-            if callback in self._subscribers:
-                self._subscribers.remove(callback)
+            self._subscribers = tuple(other for other in self._subscribers if other is not entry)
 
         return stop
 
@@ -347,8 +347,8 @@ class Link:
         self._hand_out(now, message)
 
     def _hand_out(self, now: float, message: Message) -> None:
-        for callback in tuple(self._subscribers):
-            self.guard(getattr(callback, "__qualname__", repr(callback)), callback, now, message)
+        for name, callback in self._subscribers:
+            self.guard(name, callback, now, message)
 
     def _decide(self, now: float) -> None:
         """Begin, once our autopilot is known; or give up, when it cannot be."""

@@ -46,11 +46,11 @@ class Server:
 
     # ----------------------------------------------------------------------------------------------- ports
     def add_port(self, write: Any) -> int:
-        """Open a port of the autopilot whose output goes to ``write(bytes)``; return its number."""
+        """Open a port of the autopilot whose output goes to ``write(bytes)``, None: nowhere; return its number."""
         number = self._numbers
         self._numbers += 1
         self._ports[number] = write
-        self.autopilot.open_link(number)
+        self.autopilot.open_link(number).is_plugged = write is not None
         self._kick()
         return number
 
@@ -185,8 +185,11 @@ def pieces(data: bytes, limit: int = 1200) -> list[bytes]:
     return out
 
 
-async def _open(server: Server, endpoint: Transport | str, stack: contextlib.AsyncExitStack) -> None:
+async def _open(server: Server, endpoint: Transport | str | None, stack: contextlib.AsyncExitStack) -> None:
     loop = asyncio.get_running_loop()
+    if endpoint is None:
+        server.add_port(None)
+        return
     if isinstance(endpoint, str):
         name = parse_link(endpoint)
         if name.kind in {"udpin", "tcpin"}:
@@ -214,13 +217,13 @@ async def _listen(
 
 
 @contextlib.asynccontextmanager
-async def serve(autopilot: Autopilot, endpoints: Sequence[Transport | str]) -> AsyncIterator[Server]:
+async def serve(autopilot: Autopilot, endpoints: Sequence[Transport | str | None]) -> AsyncIterator[Server]:
     """Run ``autopilot`` on the running loop's clock while the block runs.
 
     Args:
         autopilot: the core; nobody else may step it meanwhile.
         endpoints: transports (``MemoryLink.far``) or LINK names. ``udpin:`` and ``tcpin:`` serve several clients,
-            each on a port of the autopilot of its own; ``udpout:`` speaks first.
+            each on a port of the autopilot of its own; ``udpout:`` speaks first. None: a port with nothing plugged in.
 
     Raises:
         LinkError: an endpoint cannot be had.

@@ -94,6 +94,8 @@ def replace_struct(struct: Any, **changes: Any) -> Any:
     return msgspec.structs.replace(struct, **changes)
 
 
+# What is done ashore over a port of the autopilot's own; into which nothing is plugged where none of it is.
+SHORE_EVENTS = frozenset({"foreign_mission", "parameter", "order"})
 RADIO_EVENTS = frozenset({"intruder", "second_boat"})
 
 
@@ -141,7 +143,8 @@ async def run_embedded(
         world.satellite = Satellite(scenario.satellite, folder / FAR, seed=seed, epoch_s=scenario.epoch_s)
     folder.mkdir(parents=True, exist_ok=True)
     station = [world.station.far] if any(e.kind == "station" for e in scenario.events) else []
-    async with serve(autopilot, [link.far, world.shore.far, *station]):
+    shore = world.shore.far if any(e.kind in SHORE_EVENTS for e in scenario.events) else None
+    async with serve(autopilot, [link.far, shore, *station]):
         side_tasks = [
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
             *([asyncio.create_task(world.satellite.run(), name="satellite")] if world.satellite is not None else []),

@@ -6,6 +6,7 @@ is carried out after stated delays, so that outcomes arrive in later snapshots a
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -52,6 +53,12 @@ from companion.skipper.way.voyage import Goal, Refuge, Voyage
 
 FRAME = LocalFrame(GeoPoint(lat_deg=51.1, lon_deg=-1.3))
 HORIZONS = (0.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
+
+
+@functools.lru_cache(maxsize=1024)
+def en_of(lat_e7: int, lon_e7: int) -> tuple[float, float]:
+    """Return where an item is [m]: it is asked for six times a step."""
+    return FRAME.en_from_geo(GeoPoint(lat_deg=lat_e7 / 1e7, lon_deg=lon_e7 / 1e7))
 
 
 def area(*polygons, limits=None) -> LocalArea:
@@ -150,7 +157,7 @@ class World:
         if not 1 <= self.seq <= len(self.mission):
             return None
         item = self.mission[self.seq - 1]
-        return FRAME.en_from_geo(item.point)
+        return en_of(item.lat_e7, item.lon_e7)
 
     def sail(self, dt: float) -> None:
         water = self.current(self.t)
@@ -295,8 +302,7 @@ class World:
     # ------------------------------------------------------------------------------------------ fold
     def snapshot(self) -> Snapshot:
         twd, tws = self.wind(self.t)
-        self.winds.append((self.t, twd, tws))
-        recent = [w for w in self.winds if w[0] > self.t - 90.0]
+        recent = self.winds = [*(w for w in self.winds if w[0] > self.t - 90.0), (self.t, twd, tws)]
         mean = math.atan2(sum(math.sin(w[1]) for w in recent), sum(math.cos(w[1]) for w in recent))
         mean_tws = sum(w[2] for w in recent) / len(recent)
         short = [w for w in recent if w[0] > self.t - 5.0]

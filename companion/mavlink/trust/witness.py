@@ -165,7 +165,10 @@ class Witness:
 
     def _stream_of(self, t_s: float, seq: int, boot_s: float | None) -> _Stream:
         """Return the stream that the frame belongs to, one that is vouched for first; a new one where none can be."""
-        for stream in sorted(self._streams, key=lambda s: -min(s.vouchers, VOUCHERS)):
+        streams = self._streams
+        if len(streams) > 1:
+            streams = sorted(streams, key=lambda s: -min(s.vouchers, VOUCHERS))
+        for stream in streams:
             if stream.holds(t_s, seq, is_timed=boot_s is not None):
                 stream.take(t_s, seq, boot_s)
                 return stream

@@ -2,6 +2,7 @@
 
 from companion.mavlink.wire.assembler import VehicleAssembler
 from companion.mavlink.wire.codec import AUTOPILOT_COMPONENT, autopilot_version, is_autopilot_heartbeat
+from companion.mavlink.wire.dialect import Dialect
 from companion.mavlink.wire.fixes import LEAP_M, MEMORY_S, leap_m
 from companion.mavlink.wire.frames import Codec, Drop, Message
 from companion.mavlink.wire.high_latency import CONTROL_COMMAND, HIGH_LATENCY_S
@@ -11,7 +12,7 @@ from companion.mavlink.wire.status import StatusReader
 from companion.mavlink.wire.streams import Stream
 
 __all__ = [
-    "AUTOPILOT_COMPONENT", "CONTROL_COMMAND", "HIGH_LATENCY_S", "LEAP_M", "MEMORY_S", "RANGES", "Codec", "Drop",
-    "Message", "StatusReader", "Stream", "VehicleAssembler", "autopilot_version", "believable", "first_difference",
-    "is_autopilot_heartbeat", "leap_m", "mission_hash",
+    "AUTOPILOT_COMPONENT", "CONTROL_COMMAND", "HIGH_LATENCY_S", "LEAP_M", "MEMORY_S", "RANGES", "Codec", "Dialect",
+    "Drop", "Message", "StatusReader", "Stream", "VehicleAssembler", "autopilot_version", "believable",
+    "first_difference", "is_autopilot_heartbeat", "leap_m", "mission_hash",
 ]

@@ -8,11 +8,11 @@ a position that leaps is one when the next ones stay there; a breach of the fenc
 from __future__ import annotations
 
 from collections import Counter, deque
-from dataclasses import replace
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
+from companion.frozen import changed
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.fixes import FixFilter
 from companion.mavlink.wire.frames import Drop, Message
@@ -194,7 +194,7 @@ class VehicleAssembler:
         told = self._told(t_s, kind, message)
         if told is None:
             return []
-        self._status = replace(
+        self._status = changed(
             self._status or AutopilotStatus(t_s=t_s), **{**self._quiet(t_s), **told}, t_s=t_s, boot_s=self._boot_s)
         return [self._status]
 

@@ -15,6 +15,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
+from companion.mavlink.wire.dialect import Dialect
+
 # pymavlink builds its message classes at run time; to mypy a message is Any with the attributes of its XML.
 Message = Any
 
@@ -76,7 +78,7 @@ class Codec:
         self.signed_in = 0   # of them, those with a signature, whether or not it was checked
         self.frames_out = 0
         self._buffer = bytearray()
-        self._mav = wire.MAVLink(None, srcSystem=system, srcComponent=component)
+        self._mav = Dialect(None, srcSystem=system, srcComponent=component)
         self._signing = signing
         if signing is not None:
             state = self._mav.signing
@@ -101,12 +103,12 @@ class Codec:
 
     def pack(self, message: Message) -> bytes:
         """Return ``message`` as the next frame of ours, signed if the link is."""
-        frame = message.pack(self._mav)
+        frame = self._mav.packed(message)
         self._mav.seq = (self._mav.seq + 1) % 256
         self.frames_out += 1
         if self._signing is not None:
             self._signing.timestamp = self._mav.signing.timestamp
-        return bytes(frame)
+        return frame
 
     def set_signing_time(self, timestamp: int) -> None:
         """Move the signing timestamp forward to ``timestamp`` [10 µs since 2015]; never back."""

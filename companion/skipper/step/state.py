@@ -180,9 +180,12 @@ class Charge:
     is_short: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class SkipperState:
-    """Everything that ``step`` needs from before. ``Skipper.initial`` makes the first."""
+    """Everything that ``step`` needs from before. ``Skipper.initial`` makes the first.
+
+    Without slots: it changes a dozen times a step, and ``companion.frozen`` copies it in one piece.
+    """
 
     phase: Phase = Phase.IDLE
     why: str = "just started"

@@ -10,6 +10,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
+from companion.frozen import changed
 from companion.mavlink.wire import LEAP_M, MEMORY_S, leap_m
 from companion.messages import AutopilotStatus, Mode
 from companion.skipper.step.actions import (
@@ -77,11 +78,12 @@ class Turn:
         self.voyage, self.config = _kept_in(voyage, self.circle), config
         self.state, self.snapshot = state, snapshot
         self.actions: list[Action] = []
+        self._gates: tuple[tuple[Approach, ...], tuple[Gate, ...]] | None = None
 
     # ------------------------------------------------------------------------------------- changing
     def update(self, **changes: Any) -> None:
         """Change the state."""
-        self.state = replace(self.state, **changes)
+        self.state = changed(self.state, **changes)
 
     def new_id(self) -> int:
         """Return a number not used before in this voyage."""
@@ -147,7 +149,10 @@ class Turn:
     @property
     def gates(self) -> tuple[Gate, ...]:
         """The voyage's gates, in order."""
-        return gates_of(self.voyage, self.state.approaches)
+        approaches = self.state.approaches
+        if self._gates is None or self._gates[0] is not approaches:
+            self._gates = (approaches, gates_of(self.voyage, approaches))   # which hashes the whole voyage
+        return self._gates[1]
 
     @property
     def t_s(self) -> float:
@@ -240,7 +245,10 @@ class Turn:
 
     def is_raised(self, name: str) -> bool:
         """Return whether a watchdog is raised."""
-        return any(r.name == name for r in self.state.raised)
+        for raised in self.state.raised:   # asked for dozens of times a step: a loop, not a generator
+            if raised.name == name:
+                return True
+        return False
 
     @property
     def is_taken(self) -> bool:

@@ -17,6 +17,7 @@ from companion.skipper.way.geometry import bearing_rad
 from companion.skipper.way.voyage import Area, PointEn
 
 HORIZON_S = 300.0   # time to wake a crew, clear an anchor and let it go
+HAIR_M = 1e-6       # what rounding may make of a distance
 LOOKS = 241         # places looked at on the way; a dip between two of them still counts, at the nearest
 
 
@@ -85,10 +86,13 @@ def drift_ahead(
     if not (floor_m >= 0.0 and horizon_s > 0.0):
         raise ValueError(f"floor {floor_m} m must be 0 or more, horizon {horizon_s} s above 0")
     end = (here_en_m[0] + horizon_s * velocity_en_mps[0], here_en_m[1] + horizon_s * velocity_en_mps[1])
+    path_m = area.path_clearance_m([here_en_m, end])
+    if path_m > floor_m + HAIR_M:   # no place on the way is nearer than the way: there is nothing to look at
+        return DriftAhead(velocity_en_mps=velocity_en_mps, end_en_m=end, clearance_m=path_m)
     t_s = np.linspace(0.0, horizon_s, LOOKS)
     places = np.asarray(here_en_m) + t_s[:, None] * np.asarray(velocity_en_mps)
     clear_m = area.clearance_m(places)
-    least_m = min(area.path_clearance_m([here_en_m, end]), float(clear_m.min()))
+    least_m = min(path_m, float(clear_m.min()))
     if least_m > floor_m:
         return DriftAhead(velocity_en_mps=velocity_en_mps, end_en_m=end, clearance_m=least_m)
     floor_s = _first_s(t_s, clear_m, floor_m)

@@ -27,6 +27,7 @@ class Vehicle:
         polar: Polar | None = None,
     ) -> None:
         self.state = np.zeros(k.S_SIZE)
+        self.tick = 0   # loops since the start: the state's own count
         self.wind = wind
         self._parameters = parameters
         self._settings = np.zeros(k.P_SIZE)
@@ -72,11 +73,6 @@ class Vehicle:
         s[k.S_VANE_SET] = 1.0
 
     @property
-    def tick(self) -> int:
-        """Loops since the start."""
-        return int(self.state[k.S_TICK])
-
-    @property
     def t_s(self) -> float:
         """Simulated time [s]."""
         return self.tick * LOOP_S
@@ -96,6 +92,7 @@ class Vehicle:
         if self.state[k.S_VANE_FAULT] == k.FAULT_SPIKES:
             noise = np.array([_hash01(self._seed, self.tick + 1 + i) for i in range(loops)])
         done, events = k.advance(self.state, self._settings, wind, first, noise, loops, self._polar)
+        self.tick = int(self.state[k.S_TICK])
         return int(done), int(events)
 
     # ----------------------------------------------------------------------------------------- orders

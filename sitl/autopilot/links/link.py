@@ -8,6 +8,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from companion.mavlink.wire import Dialect
+
 LOOP_S = 0.02
 # What a port sends at 1 Hz without being asked, in the order seen on the real one.
 DEFAULT_STREAMS: tuple[int, ...] = (
@@ -52,8 +54,9 @@ class Link:
     def __init__(self, number: int, sysid: int) -> None:
         self.number = number
         self.is_heard = False
+        self.is_plugged = True    # else what is said on it goes nowhere, and its bytes are not made
         self.last_heard_s = -math.inf
-        self._codec = mav.MAVLink(None, srcSystem=sysid, srcComponent=1)
+        self._codec = Dialect(None, srcSystem=sysid, srcComponent=1)
         self._codec.robust_parsing = True
         self._out = bytearray()
         self.inbox = bytearray()
@@ -89,7 +92,9 @@ class Link:
 
     def send(self, message: Any) -> None:
         """Pack a message of our own; when nobody drains the port, it is dropped whole."""
-        self.forward(message.pack(self._codec))
+        if not self.is_plugged:
+            return
+        self.forward(self._codec.packed(message))
         self._codec.seq = (self._codec.seq + 1) & 0xFF
 
     def forward(self, frame: bytes) -> None:

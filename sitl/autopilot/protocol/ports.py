@@ -106,6 +106,8 @@ class Ports:
         due = link.take_due(t_s)
         if self._core.boot_s < FIRST_STREAMS_S:
             due = [i for i in due if i == mav.MAVLINK_MSG_ID_HEARTBEAT]
+        if not link.is_plugged:
+            due = [i for i in due if i == mav.MAVLINK_MSG_ID_WIND]   # which is heard of on the other ports too
         for msgid in due:
             if msgid == mav.MAVLINK_MSG_ID_AIS_VESSEL:
                 message = self.ais_list.next_message(link.number, t_s)
