@@ -23,6 +23,7 @@ PROGRAM = Program(
         "doctor": "is this autopilot set up to be sailed?",
         "key": "make a signing key, put it on the autopilot, take it off",
         "replay": "fold a recorded voyage again",
+        "view": "a voyage in a browser, recorded or heard by radio",
         "report": "pictures and a summary of a voyage",
     },
 )

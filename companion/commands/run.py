@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from companion.arguments import number, out_folder, system_id, whole
+from companion.arguments import host_name, http_address, number, out_folder, system_id, whole
 from companion.errors import InputError
 from companion.program import INTERRUPTED
 from companion.words import counted, file_name
@@ -59,6 +59,14 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         "folder is one boat's, and locked")
     parser.add_argument("--socket", type=Path, metavar="PATH", help="take orders from on board at this Unix socket: "
                         "companion order VERB --socket PATH, as [operator] local_orders permits")
+    parser.add_argument("--http", type=http_address, metavar="[HOST:]PORT",
+                        help="serve the live page here; without HOST to this machine alone (127.0.0.1). It shows; it "
+                        "takes orders only with --http-token")
+    parser.add_argument("--http-token", type=Path, metavar="FILE",
+                        help="let who has the token in this file (made, mode 0600, where there is none) give orders "
+                        "from the page, as [operator] local_orders permits")
+    parser.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
+                        help="a further name under which this machine's page may be asked for")
     parser.add_argument("--far", type=out_folder, metavar="DIR", help="the folder shared with the program of a "
                         "satellite modem: the newest status in DIR/out, orders in DIR/in, as [operator] far_orders "
                         "permits; `companion far` is its end ashore")
@@ -129,6 +137,7 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
         parse_feed(name)
     parse_link(args.link)
     _far(args)
+    _http(args)
     settings, sailed = settings_of(args.mission, is_drawn=args.from_autopilot, system=args.system), None
     if settings is None:
         named = require_sailable(load_mission(args.mission))
@@ -191,7 +200,7 @@ def _voyage(
             expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
             wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
             exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
-            settings=sailed.settings, socket=args.socket, far=_far(args), command=" ".join(sys.argv),
+            settings=sailed.settings, socket=args.socket, http=_http(args), far=_far(args), command=" ".join(sys.argv),
             token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
@@ -285,6 +294,20 @@ def _signing(path: Path | None) -> Any:
     from companion.mavlink.transports import SigningStore
 
     return SigningStore(path, time.time())
+
+
+def _http(args: argparse.Namespace) -> Any:
+    """Return where the page is served. Raises InputError: the token cannot be used."""
+    if args.http is None:
+        named = "--http-token" if args.http_token is not None else "--http-name" if args.http_name else ""
+        if named:
+            raise InputError(named, "", "there is no page to use it on", "say where it is served: --http PORT")
+        return None
+    from companion.page import Address, read_token
+
+    host, port = args.http
+    return Address(host=host, port=port, names=tuple(args.http_name),
+                   token="" if args.http_token is None else read_token(args.http_token))
 
 
 def _far(args: argparse.Namespace) -> Any:

@@ -87,7 +87,7 @@ class Leg:
     ends_s: float | None = None
     sigma_deg: float | None = None
     no_go_half_deg: float | None = None
-    clearance_m: float | None = None
+    clearance_m: float | None = None     # beyond the margin, to the nearest obstacle or limit
     risk: float | None = None            # of being forced into the no-go zone, or too near to a vessel, on this leg
     manoeuvre: str = ""                  # the turn into it: tack, gybe or empty
 
