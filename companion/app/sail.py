@@ -24,6 +24,7 @@ from companion.app.keepers import keep_fence, keep_identity, keep_parameters
 from companion.app.local import served
 from companion.app.options import Far, SailOptions
 from companion.app.page import LivePage, opened
+from companion.app.showing import OnView, Showing
 from companion.clock import now_s
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
 from companion.fold import Step, VoyageFold
@@ -57,11 +58,12 @@ OnStatus = Callable[[CompanionStatus, Step], None]
 async def sail(
     mission: Mission, transport: Transport, planner: Planner, folder: Path, options: SailOptions,
     *, on_status: OnStatus | None = None, on_refusal: Callable[[str], None] | None = None,
-    stop: asyncio.Event | None = None,
+    on_view: OnView | None = None, stop: asyncio.Event | None = None,
 ) -> dict[str, Any]:
     """Sail ``mission`` and watch the boat at its end until stopped or out of time; return the summary.
 
-    ``on_status`` hears of every step, ``on_refusal`` of what was given and is not used (a saved state, a feed).
+    ``on_status`` hears of every step, ``on_refusal`` of what was given and is not used (a saved state, a feed),
+    ``on_view`` of every step as a view.
 
     Raises:
         LinkError: no autopilot was heard within ``options.wait_s``.
@@ -70,6 +72,8 @@ async def sail(
     with Recorder(folder, disk=options.disk, shelf=options.shelf, is_durable=options.is_durable) as recorder:
         shell = _Shell(mission, planner, recorder, options, stop or asyncio.Event())
         shell.on_status, shell.on_refusal = on_status, on_refusal
+        if on_view is not None:
+            shell.showing.watchers.append(on_view)
         return await shell.run(transport)
 
 
@@ -86,6 +90,7 @@ class _Shell:
         self.voyage = voyage_of(mission)
         self.config = config_of(mission)
         self.log = Logbook(recorder, self.config, options.epoch_s)
+        self.showing = Showing(self.voyage, self.config, options.epoch_s, self._on_fault)
         self.state_file = StateFile(
             options.state_path or recorder.folder / STATE, disk=options.disk, offload=options.offload,
             is_durable=options.is_durable, pace=1.0 / options.budget_scale)
@@ -318,6 +323,7 @@ class _Shell:
             self._page.show(status, step, self.log.figures)
         if self.on_status is not None:
             self.on_status(status, step)
+        self.showing.take(step, status, self.log.figures)
 
     def _trouble(self) -> str:
         """Return what cannot be written now and why, empty when all is well."""

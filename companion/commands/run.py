@@ -22,6 +22,7 @@ from companion.words import counted, file_name
 
 if TYPE_CHECKING:
     from companion.commands.starting import Sailed
+    from companion.outputs import Wanted
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
     from companion.telemetry.service import ServiceManager
@@ -88,6 +89,14 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--feed", action="append", default=[], metavar="FEED",
                         help="hear other vessels here too, besides the mission's [traffic] feeds: udpin:HOST:PORT, "
                         "tcp:HOST:PORT, /dev/NAME:BAUD; may be given more than once")
+    parser.add_argument("--nmea", action="append", default=[], metavar="OUT",
+                        help="tell OpenCPN and its like in NMEA 0183, besides the mission's [output] nmea: "
+                        "udp:HOST:PORT, or tcp:[HOST:]PORT to be a server; may be given more than once")
+    parser.add_argument("--signalk", action="append", default=[], metavar="SERVER",
+                        help="tell a Signal K server, besides the mission's [output] signalk: ws://HOST:3000 or "
+                        "tcp:HOST:8375; may be given more than once")
+    parser.add_argument("--signalk-token", type=Path, metavar="FILE",
+                        help="the token that the Signal K server asks for (mode 0600)")
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (32 bytes, mode 0600)")
     parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=1.0, metavar="N",
                         help="the autopilot is a simulator that runs N times as fast as time (default: 1)")
@@ -125,6 +134,7 @@ def _outliving_the_terminal() -> Iterator[None]:
 
 
 def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
+    from companion.addresses import parse_nmea, parse_signalk
     from companion.commands.starting import Sailed, alone, read_drawn, settings_of
     from companion.geofence import load_mission
     from companion.geofence.mission import NO_NAME
@@ -135,6 +145,10 @@ def _run(args: argparse.Namespace, out: Console, err: Console) -> int:
 
     for name in args.feed:
         parse_feed(name)
+    for name in args.nmea:
+        parse_nmea(name)
+    for name in args.signalk:
+        parse_signalk(name)
     parse_link(args.link)
     _far(args)
     _http(args)
@@ -176,14 +190,18 @@ def _voyage(
     from companion.app.adoption import ADOPTED
     from companion.clock import run as run_loop
     from companion.commands.starting import asked
+    from companion.compose import displays_of
     from companion.mavlink.transports import open_link
+    from companion.outputs import wanted
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
 
     signing = _signing(args.signing_key)
     shelf = None   # a folder that was named is not ours to tidy
     if args.out is None or args.keep_gb is not None:
         shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
-    mission = sailed.mission.with_feeds(*args.feed).with_system(args.system)
+    mission = sailed.mission.with_feeds(*args.feed).with_system(args.system).with_outputs(
+        args.nmea, args.signalk, args.signalk_token)
+    told = wanted(displays_of(mission))
     for finding in mission.findings:
         err.write(f"companion run: {finding.line(str(mission.path))}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
@@ -204,7 +222,7 @@ def _voyage(
             token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
-    summary = run_loop(_sail(mission, transport, folder, options, manager, out), speedup=args.speedup)
+    summary = run_loop(_sail(mission, transport, folder, options, manager, out, told), speedup=args.speedup)
     if summary is None:
         return INTERRUPTED
     if not summary["arrived_before"] and summary["end_reason"] != ADOPTED:   # the next voyage waits for no picture
@@ -240,6 +258,7 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 async def _sail(
     mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager, out: Console,
+    told: Wanted,
 ) -> dict[str, Any] | None:
     """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker
@@ -252,6 +271,8 @@ async def _sail(
     async with PlannerWorker(algorithm=mission.skipper.planner) as planner:
         # The child loads its kernels while this process imports the rest.
         from companion.app.sail import sail
+        from companion.outputs import Outputs
+        from companion.telemetry.far import unix_of_boat
         from companion.telemetry.progress import ProgressLine
 
         if not await _is_ready(planner, stop, out, manager):
@@ -259,13 +280,17 @@ async def _sail(
         chosen = options()
 
         with ProgressLine(out, chosen.epoch_s) as progress:
-            def show(status: Any, step: Any) -> None:
-                progress.show(status, step)
-                manager.alive(f"{step.state.phase.value}: {step.state.why}")
+            async with Outputs(told, mission.frame(), progress.note, seed=chosen.seed) as outputs:
+                def show(status: Any, step: Any) -> None:
+                    progress.show(status, step)
+                    manager.alive(f"{step.state.phase.value}: {step.state.why}")
 
-            return await sail(
-                mission, transport, planner, folder, chosen, on_status=show, stop=stop,
-                on_refusal=lambda text: out.write(f"note: {text}\n"))
+                def tell(view: Any, _: Any, step: Any) -> None:
+                    outputs.tell(view, unix_of_boat(step.snapshot, step.snapshot.t_s))
+
+                return await sail(
+                    mission, transport, planner, folder, chosen, on_status=show, stop=stop, on_refusal=progress.note,
+                    on_view=tell if outputs.are_any else None)
 
 
 async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, manager: ServiceManager) -> bool:
