@@ -91,6 +91,7 @@ class _Shell:
         self.config = config_of(mission)
         self.log = Logbook(recorder, self.config, options.epoch_s)
         self.showing = Showing(self.voyage, self.config, options.epoch_s, self._on_fault)
+        self.showing.is_kept = options.socket is not None
         self.state_file = StateFile(
             options.state_path or recorder.folder / STATE, disk=options.disk, offload=options.offload,
             is_durable=options.is_durable, pace=1.0 / options.budget_scale)
@@ -141,7 +142,7 @@ class _Shell:
                                     budget_scale=self.options.budget_scale, config=self.config,
                                     on_adopt=adoption.ask, on_answer=crew.answered)
                 if self.options.socket is not None:
-                    await stack.enter_async_context(served(self.options.socket, crew))
+                    await stack.enter_async_context(served(self.options.socket, crew, self.showing))
                 mailbox = () if self.options.far is None else (self._mailbox(self.options.far, autopilot, crew),)
                 radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
                 async with asyncio.TaskGroup() as group:

@@ -28,11 +28,11 @@ class Showing:
         self._on_fault = on_fault
         self._faults: set[str] = set()
         self.watchers: list[OnView] = []
-        self.newest: View | None = None
+        self.is_kept = False   # made although nobody watches yet: who comes later wants to know of the plan in force
 
     def take(self, step: Step, status: CompanionStatus, figures: VoyageFigures) -> None:
         """Show one step."""
-        if not self.watchers:
+        if not (self.watchers or self.is_kept):
             return
         try:
             if self._fold is None:
@@ -42,7 +42,6 @@ class Showing:
         except Exception as error:
             self._failed(f"the view of this step could not be made: {error!r}")
             return
-        self.newest = view
         for watcher in tuple(self.watchers):
             try:
                 watcher(view, events, step)

@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Any
 
 from companion.geo.frame import LocalFrame
 from companion.outputs.course import course_of, is_fresh, place_of
 from companion.outputs.nmea import UNTRUSTED
-from companion.view.air import PointEn, Polar
+from companion.view.air import PointEn
 from companion.view.values import Alarm, View
 
 # As $source: into a source with a label a server puts a label of its own.
@@ -111,7 +110,7 @@ def _performance(view: View) -> Values:
     if not is_fresh(boat.age_s) or wind is None or wind.health in UNTRUSTED or not is_fresh(wind.age_s):
         return {}
     course = course_of(view)
-    speed = None if polar is None or wind.twa_deg is None else polar_speed_mps(polar, wind.twa_deg)
+    speed = None if polar is None or wind.twa_deg is None else polar.at_mps(wind.twa_deg)
     return {
         "performance.velocityMadeGood": boat.vmg_mps,
         "performance.velocityMadeGoodToWaypoint": None if course is None else course.closing_mps,
@@ -145,15 +144,6 @@ def _notification(alarm: Alarm) -> Values:
     return {f"notifications.{name}": {
         "state": state, "method": ["visual", "sound"] if state in LOUD else ["visual"],
         "message": f"{alarm.code}: {alarm.text}" if alarm.text else alarm.code}}
-
-
-def polar_speed_mps(polar: Polar, twa_deg: float) -> float | None:
-    """Return the polar's speed at an angle, None where it has no nodes about it."""
-    angle, nodes = abs(twa_deg), list(zip(polar.twa_deg, polar.speed_mps, strict=True))
-    for (low, slow), (high, fast) in pairwise(nodes):
-        if low <= angle <= high and high > low:
-            return slow + (fast - slow) * (angle - low) / (high - low)
-    return None
 
 
 def _place(frame: LocalFrame, en_m: PointEn) -> dict[str, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 PointEn = tuple[float, float]   # metres east and north of the area's origin
@@ -100,3 +101,11 @@ class Polar:
     run_deg: float | None = None
     live_twa_deg: float | None = None
     live_mps: float | None = None
+
+    def at_mps(self, twa_deg: float) -> float | None:
+        """Return its speed at an angle, None where it has no nodes about it."""
+        angle = abs(twa_deg)
+        for (low, slow), (high, fast) in pairwise(zip(self.twa_deg, self.speed_mps, strict=True)):
+            if low <= angle <= high and high > low:
+                return slow + (fast - slow) * (angle - low) / (high - low)
+        return None
