@@ -6,14 +6,17 @@ everything a command is given is believed before it begins to work.
 
 from __future__ import annotations
 
+import ipaddress
 import math
 import os
+import re
 from argparse import ArgumentTypeError
 from collections.abc import Callable
 from pathlib import Path
 
 from companion.messages import GeoPoint
 
+_HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]{0,252}[A-Za-z0-9])?")
 # What matplotlib writes without a further program.
 PICTURES = (".png", ".svg", ".pdf", ".jpg")
 
@@ -73,6 +76,33 @@ def system_id(text: str) -> int:
     if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 255):
         raise ArgumentTypeError(f"{text!r} is not a system id from 1 to 255")
     return int(text)
+
+
+def http_address(text: str) -> tuple[str, int]:
+    """Return host and port to serve a page at, of ``[HOST:]PORT``; without a host this machine's own.
+
+    >>> http_address("8765"), http_address("[::1]:80"), http_address("0.0.0.0:8765")
+    (('127.0.0.1', 8765), ('::1', 80), ('0.0.0.0', 8765))
+    """
+    host, _, port = text.rpartition(":")
+    bare = host[1:-1] if host.startswith("[") and host.endswith("]") else host
+    if not (port.isascii() and port.isdigit() and len(port) < 6 and 0 < int(port) < 65536):
+        raise ArgumentTypeError(f"{text[:60]!r} has no port from 1 to 65535; write PORT or HOST:PORT")
+    is_address = True
+    try:
+        ipaddress.ip_address(bare)
+    except ValueError:
+        is_address = False
+    if bare and not is_address and ("[" in host or not _HOST.fullmatch(bare)):
+        raise ArgumentTypeError(f"{host[:60]!r} is no name or address to listen on; write PORT or HOST:PORT")
+    return bare or "127.0.0.1", int(port)
+
+
+def host_name(text: str) -> str:
+    """Return the name of a machine."""
+    if not _HOST.fullmatch(text):
+        raise ArgumentTypeError(f"{text[:60]!r} is no host name")
+    return text.lower()
 
 
 def _is_within(value: float, above: float | None, at_least: float | None, at_most: float | None) -> bool:

@@ -16,6 +16,7 @@ PROGRAM = Program(
         "plan": "plan a path on a problem",
         "wind": "forecast a wind record and score the forecasts",
         "status": "what the companion says over the radio",
+        "watch": "a dashboard for a terminal, with keys for orders",
         "order": "tell the companion on board what to do",
         "far": "orders and statuses over a satellite link",
         "fence": "check, convert, upload, download fences",
@@ -23,6 +24,7 @@ PROGRAM = Program(
         "doctor": "is this autopilot set up to be sailed?",
         "key": "make a signing key, put it on the autopilot, take it off",
         "replay": "fold a recorded voyage again",
+        "view": "a voyage in a browser, recorded or heard by radio",
         "report": "pictures and a summary of a voyage",
     },
 )

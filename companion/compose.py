@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from companion.addresses import Displays, OutputName, parse_nmea, parse_signalk
 from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant, read_polar
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
@@ -251,3 +252,29 @@ def feeds_of(mission: Mission) -> tuple[str, ...]:
         except InputError as error:
             raise InputError(str(mission.path), "[traffic] feeds", f"{name!r} is not a feed", error.remedy) from error
     return names
+
+
+def displays_of(mission: Mission) -> Displays:
+    """Return the other displays that are told of the voyage.
+
+    Raises:
+        InputError: a name is none, or there is a token for nobody.
+    """
+    output = mission.output
+    nmea, signalk = (_named(mission, *named) for named in (
+        ("nmea", output.nmea, parse_nmea), ("signalk", output.signalk, parse_signalk)))
+    if output.signalk_token is not None and all(name.kind == "tcp" for name in signalk):
+        raise InputError(str(mission.path), "[output] signalk_token", "there is no WebSocket to use it on",
+                         'name the server: signalk = ["ws://HOST:3000"]')
+    token = None if output.signalk_token is None else mission.path.parent / output.signalk_token
+    return Displays(nmea=nmea, signalk=signalk, token_file=token)
+
+
+def _named(
+    mission: Mission, key: str, names: tuple[str, ...], parse: Callable[[str], OutputName],
+) -> tuple[OutputName, ...]:
+    try:
+        return tuple(parse(name) for name in dict.fromkeys(names))
+    except InputError as error:
+        raise InputError(str(mission.path), f"[output] {key}", f"{error.place!r} {error.problem}",
+                         error.remedy) from error

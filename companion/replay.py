@@ -10,13 +10,13 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from companion.compose import config_of, estimator_of, target_limits_of, voyage_of
 from companion.errors import InputError
-from companion.fold import VoyageFold
+from companion.fold import Step, VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.tlog import read_tlog
 from companion.mavlink.trust import OWN_COMPONENT
@@ -84,62 +84,94 @@ class ReplayReport:
     differences: tuple[Difference, ...]
 
 
-def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
-    """Fold the voyage in ``folder`` again.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Folded:
+    """A step of a recorded voyage, folded again: what it decided, what was recorded of it.
+
+    ``messages`` were counted by the step and ``lost`` of them are not in the telemetry log. Without a ``step`` it came
+    after a gap in the records, and could not be folded.
+    """
+
+    t_s: float
+    step: Step | None
+    messages: int = 0
+    lost: int = 0
+    replayed: list[dict[str, Any]] = field(default_factory=list)
+    recorded: list[dict[str, Any]] = field(default_factory=list)
+
+
+class Recorded:
+    """The voyage in ``folder``, to be folded again.
 
     Args:
         folder: what ``companion run`` or ``sitl run`` left.
         mission_path: the mission file, where it is not at the recorded place any more.
 
     Raises:
-        InputError: a file is missing or is not one of a voyage, or the telemetry log is empty.
+        InputError: a file is missing or is not one of a voyage.
     """
-    require_files(folder, VOYAGE, TLOG, DECISIONS, TRACK)
-    description = read_description(folder)
-    with believed(folder / VOYAGE, "[run], [mission] and [permissions]"):
-        epoch_s = float(description["run"]["epoch_s"])
-        recorded_path = _mission_path(folder, description["mission"])
-        permitted = description["permissions"]
-        verbs: Any = {name: tuple(words) for name, words in permitted.items() if isinstance(words, list)}
-        permissions = Permissions(**{**permitted, **verbs})
-    mission = load_mission(mission_path or recorded_path)
-    skipper = Skipper(voyage=voyage_of(mission), config=config_of(mission))
-    decisions = read_decisions(folder)
-    rows = _rows(folder / TRACK)
-    with believed(folder / DECISIONS, "a start"):
-        starts = [
-            (float(d["t_s"]), None if d["persisted"] is None else Persisted.from_dict(d["persisted"]),
-             tuple(d.get("known", ()))) for d in decisions if d["kind"] == "start"
-        ] or [(-1e18, None, ())]
-    ends = [*(start[0] for start in starts[1:]), 1e18]
-    differences: list[Difference] = []
-    steps = unrecorded = messages = lost = actions = 0
-    for (start_s, persisted, known), end_s, gap_s in zip(starts, ends, _gaps(decisions), strict=True):
-        fold = VoyageFold(
-            skipper, WindRoom(estimator=estimator_of(mission)), permissions, persisted, known=known,
-            traffic=target_limits_of(mission),
-        )
-        found = next((d for d in decisions if d["kind"] == "autopilot" and start_s <= d["t_s"] < end_s), None)
-        system, unheard = (0, 0) if found is None else (int(found["system"]), int(found["unheard"]))
-        heard = _messages(folder / TLOG, epoch_s, start_s, end_s, fold, system, unheard)
-        outcomes = iter([d for d in decisions if start_s <= d["t_s"] < end_s and d["kind"] in {"plan", "outcome"}])
+
+    def __init__(self, folder: Path, mission_path: Path | None = None) -> None:
+        require_files(folder, VOYAGE, TLOG, DECISIONS, TRACK)
+        description = read_description(folder)
+        with believed(folder / VOYAGE, "[run], [mission] and [permissions]"):
+            self.epoch_s = float(description["run"]["epoch_s"])
+            recorded_path = _mission_path(folder, description["mission"])
+            permitted = description["permissions"]
+            verbs: Any = {name: tuple(words) for name, words in permitted.items() if isinstance(words, list)}
+            self._permissions = Permissions(**{**permitted, **verbs})
+        self.folder = folder
+        self.mission = load_mission(mission_path or recorded_path)
+        self.voyage, self.config = voyage_of(self.mission), config_of(self.mission)
+        self._decisions = read_decisions(folder)
+        self.rows = _rows(folder / TRACK)
+        with believed(folder / DECISIONS, "a start"):
+            self._starts = [
+                (float(d["t_s"]), None if d["persisted"] is None else Persisted.from_dict(d["persisted"]),
+                 tuple(d.get("known", ()))) for d in self._decisions if d["kind"] == "start"
+            ] or [(-1e18, None, ())]
+
+    @property
+    def restarts(self) -> int:
+        """How often the companion was started again."""
+        return len(self._starts) - 1
+
+    def steps(self) -> Iterator[Folded]:
+        """Yield the steps in their order."""
+        skipper = Skipper(voyage=self.voyage, config=self.config)
+        ends = [*(start[0] for start in self._starts[1:]), 1e18]
         fed: dict[float, list[dict[str, Any]]] = {}
-        for record in decisions:
+        for record in self._decisions:
             if record["kind"] in {"ais", "others", "order"}:
                 fed.setdefault(float(record["t_s"]), []).append(record)
-        recorded = _actions_by_time([d for d in decisions if start_s <= d["t_s"] < end_s])
-        for t_s, n_messages, n_outcomes in rows:
+        for (start_s, persisted, known), end_s, gap_s in zip(self._starts, ends, _gaps(self._decisions), strict=True):
+            fold = VoyageFold(
+                skipper, WindRoom(estimator=estimator_of(self.mission)), self._permissions, persisted, known=known,
+                traffic=target_limits_of(self.mission),
+            )
+            yield from self._life(fold, start_s, end_s, gap_s, fed)
+
+    def _life(
+        self, fold: VoyageFold, start_s: float, end_s: float, gap_s: float, fed: dict[float, list[dict[str, Any]]],
+    ) -> Iterator[Folded]:
+        """Yield the steps between a start of the companion and the next."""
+        folder, mine = self.folder, [d for d in self._decisions if start_s <= d["t_s"] < end_s]
+        found = next((d for d in mine if d["kind"] == "autopilot"), None)
+        system, unheard = (0, 0) if found is None else (int(found["system"]), int(found["unheard"]))
+        heard = _messages(folder / TLOG, self.epoch_s, start_s, end_s, fold, system, unheard)
+        outcomes = iter([d for d in mine if d["kind"] in {"plan", "outcome"}])
+        recorded = _actions_by_time(mine)
+        for t_s, n_messages, n_outcomes in self.rows:
             if not start_s <= t_s < end_s:
                 continue
             if t_s >= gap_s:
-                unrecorded += 1
+                yield Folded(t_s=t_s, step=None)
                 continue
             # A power cut may take the last line of one file and leave the row that counted it in another.
             unread = n_messages
             for at_s, message in itertools.islice(heard, n_messages):
                 fold.message(at_s, message)
                 unread -= 1
-            lost += unread
             for record in itertools.islice(outcomes, n_outcomes):
                 with believed(folder / DECISIONS, f"t_s = {record['t_s']}"):
                     outcome = _outcome(record)
@@ -154,19 +186,38 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
                         fold.others(tuple(record["neighbours"]), has_company=record["company"],
                                     has_shore=record.get("shore", False))
             step = fold.tick(t_s)
-            mine = [
-                _plain(action_record(a, step.snapshot, skipper.config)) for a in step.actions
-            ]
-            theirs = recorded.get(t_s, [])
-            steps, messages, actions = steps + 1, messages + n_messages, actions + len(mine)
-            if not _same(mine, theirs):
-                differences.append(Difference(t_s=t_s, recorded=theirs, replayed=mine))
+            yield Folded(
+                t_s=t_s, step=step, messages=n_messages, lost=unread, recorded=recorded.get(t_s, []),
+                replayed=[_plain(action_record(a, step.snapshot, self.config)) for a in step.actions])
+
+
+def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
+    """Fold the voyage in ``folder`` again.
+
+    Args:
+        folder: what ``companion run`` or ``sitl run`` left.
+        mission_path: the mission file, where it is not at the recorded place any more.
+
+    Raises:
+        InputError: a file is missing or is not one of a voyage, or the telemetry log is empty.
+    """
+    voyage = Recorded(folder, mission_path)
+    differences: list[Difference] = []
+    steps = unrecorded = messages = lost = actions = 0
+    for folded in voyage.steps():
+        if folded.step is None:
+            unrecorded += 1
+            continue
+        steps, messages, lost = steps + 1, messages + folded.messages, lost + folded.lost
+        actions += len(folded.replayed)
+        if not _same(folded.replayed, folded.recorded):
+            differences.append(Difference(t_s=folded.t_s, recorded=folded.recorded, replayed=folded.replayed))
     if lost and next(iter(read_tlog(folder / TLOG)), None) is None:
         raise InputError(
             str(folder / TLOG), "", f"is empty, and the steps heard {counted(messages, 'message')}",
             "nothing can be folded without them: copy the voyage's folder again")
     return ReplayReport(
-        steps=steps, unrecorded=unrecorded, messages=messages, lost=lost, actions=actions, restarts=len(starts) - 1,
+        steps=steps, unrecorded=unrecorded, messages=messages, lost=lost, actions=actions, restarts=voyage.restarts,
         differences=tuple(differences))
 
 

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
+from companion.compose import (
+    config_of,
+    displays_of,
+    estimator_of,
+    feeds_of,
+    permissions_of,
+    target_limits_of,
+    voyage_of,
+)
 from companion.errors import InputError
 from companion.geofence import Mission
 from companion.geofence.mission import AreaOptions, kind_of
@@ -19,6 +27,7 @@ def require_sailable(mission: Mission) -> Mission:
     try:
         estimator_of(mission)
         feeds_of(mission)
+        displays_of(mission)
         permissions_of(mission)
         target_limits_of(mission)
         config_of(mission)

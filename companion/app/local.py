@@ -1,5 +1,7 @@
 """The socket on board: orders of who may open it, a line of words each, and their answers, a line of JSON each.
 
+The word ``watch`` asks for the views of the voyage: a line of JSON for each step, until the connection is closed.
+
 It is a Unix socket of mode 0600: the user that runs the companion, and root. What it may order is the mission's
 ``[operator] local_orders``. The live page and ``companion order --socket`` speak to it.
 """
@@ -11,21 +13,30 @@ import contextlib
 import itertools
 import json
 import socket
+from collections import deque
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+import msgspec
+
 from companion.app.crew import Crew
+from companion.app.showing import Showing
 from companion.disk import reason
 from companion.errors import InputError
+from companion.fold import Step
 from companion.orders import Answer, Result, phrase
+from companion.view import Event, View
 
 MAX_LINE = 500     # bytes; an order is shorter
 MOST = 8           # connections at a time
+WATCH = b"watch"   # asks for the views
+STUCK_S = 10.0     # who does not read for so long is hung up on
+EVENTS_KEPT = 100  # for who reads late; of the views there is only the newest
 
 
 @contextlib.asynccontextmanager
-async def served(path: Path, crew: Crew) -> AsyncIterator[None]:
-    """Take orders at ``path`` while the body runs; afterwards it is gone.
+async def served(path: Path, crew: Crew, showing: Showing) -> AsyncIterator[None]:
+    """Take orders at ``path``, and tell who watches, while the body runs; afterwards it is gone.
 
     Raises:
         InputError: another program listens there, something else is there, or it cannot be made.
@@ -38,8 +49,11 @@ async def served(path: Path, crew: Crew) -> AsyncIterator[None]:
         number = next(numbers)
         writers.add(writer)
         try:
-            with contextlib.suppress(ConnectionError, ValueError):   # gone, or a line without end
+            with contextlib.suppress(ConnectionError, ValueError, TimeoutError):   # gone, or a line without end
                 while len(writers) <= MOST and (line := await reader.readline()):
+                    if line.strip() == WATCH:
+                        await _show(writer, showing)
+                        break
                     answer = await _answer(line, crew, number)
                     writer.write(json.dumps({"result": answer.result.value, "text": answer.text}).encode() + b"\n")
                     await writer.drain()
@@ -62,6 +76,30 @@ async def served(path: Path, crew: Crew) -> AsyncIterator[None]:
         path.unlink(missing_ok=True)
         for writer in tuple(writers):
             writer.close()
+
+
+async def _show(writer: asyncio.StreamWriter, showing: Showing) -> None:
+    """Tell of each step until the other end is gone or does not read."""
+    newest: list[View] = []
+    events: deque[Event] = deque(maxlen=EVENTS_KEPT)
+    has_news = asyncio.Event()
+
+    def take(view: View, happened: tuple[Event, ...], _: Step) -> None:
+        newest[:] = [view]
+        events.extend(happened)
+        has_news.set()
+
+    showing.watchers.append(take)
+    try:
+        while not writer.is_closing():
+            await has_news.wait()
+            has_news.clear()
+            writer.write(msgspec.json.encode({"view": newest[0], "events": tuple(events)}) + b"\n")
+            events.clear()
+            async with asyncio.timeout(STUCK_S):
+                await writer.drain()
+    finally:
+        showing.watchers.remove(take)
 
 
 def _clear(path: Path) -> None:

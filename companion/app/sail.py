@@ -23,6 +23,8 @@ from companion.app.far import Mailbox
 from companion.app.keepers import keep_fence, keep_identity, keep_parameters
 from companion.app.local import served
 from companion.app.options import Far, SailOptions
+from companion.app.page import LivePage, opened
+from companion.app.showing import OnView, Showing
 from companion.clock import now_s
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
 from companion.fold import Step, VoyageFold
@@ -56,11 +58,12 @@ OnStatus = Callable[[CompanionStatus, Step], None]
 async def sail(
     mission: Mission, transport: Transport, planner: Planner, folder: Path, options: SailOptions,
     *, on_status: OnStatus | None = None, on_refusal: Callable[[str], None] | None = None,
-    stop: asyncio.Event | None = None,
+    on_view: OnView | None = None, stop: asyncio.Event | None = None,
 ) -> dict[str, Any]:
     """Sail ``mission`` and watch the boat at its end until stopped or out of time; return the summary.
 
-    ``on_status`` hears of every step, ``on_refusal`` of what was given and is not used (a saved state, a feed).
+    ``on_status`` hears of every step, ``on_refusal`` of what was given and is not used (a saved state, a feed),
+    ``on_view`` of every step as a view.
 
     Raises:
         LinkError: no autopilot was heard within ``options.wait_s``.
@@ -69,6 +72,8 @@ async def sail(
     with Recorder(folder, disk=options.disk, shelf=options.shelf, is_durable=options.is_durable) as recorder:
         shell = _Shell(mission, planner, recorder, options, stop or asyncio.Event())
         shell.on_status, shell.on_refusal = on_status, on_refusal
+        if on_view is not None:
+            shell.showing.watchers.append(on_view)
         return await shell.run(transport)
 
 
@@ -85,6 +90,8 @@ class _Shell:
         self.voyage = voyage_of(mission)
         self.config = config_of(mission)
         self.log = Logbook(recorder, self.config, options.epoch_s)
+        self.showing = Showing(self.voyage, self.config, options.epoch_s, self._on_fault)
+        self.showing.is_kept = options.socket is not None
         self.state_file = StateFile(
             options.state_path or recorder.folder / STATE, disk=options.disk, offload=options.offload,
             is_durable=options.is_durable, pace=1.0 / options.budget_scale)
@@ -102,6 +109,7 @@ class _Shell:
         self._autopilot: Autopilot | None = None
         self._crew: Crew | None = None
         self._counted = LinkStats()
+        self._page: LivePage | None = None
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
@@ -118,6 +126,10 @@ class _Shell:
                 self._counted = link.stats
                 crew = self._crew = Crew(link, has_key=self.options.signing is not None)
                 link.subscribe(self._on_message)
+                if self.options.http is not None:
+                    self._page = await opened(
+                        stack, self.options.http, self.fold, self.planner, crew, epoch_s=self.options.epoch_s,
+                        pace=1.0 / self.options.budget_scale, on_fault=self._on_fault, refuse=self._refuse)
                 await self._wait_autopilot(link)
                 autopilot = self._autopilot = await stack.enter_async_context(Autopilot(link))
                 for text in await self.feeds.open(stack, feeds_of(self.mission), self.options.seed):
@@ -130,7 +142,7 @@ class _Shell:
                                     budget_scale=self.options.budget_scale, config=self.config,
                                     on_adopt=adoption.ask, on_answer=crew.answered)
                 if self.options.socket is not None:
-                    await stack.enter_async_context(served(self.options.socket, crew))
+                    await stack.enter_async_context(served(self.options.socket, crew, self.showing))
                 mailbox = () if self.options.far is None else (self._mailbox(self.options.far, autopilot, crew),)
                 radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
                 async with asyncio.TaskGroup() as group:
@@ -308,8 +320,11 @@ class _Shell:
         if trouble and not status.alert_code:
             status = replace(status, alert_code=DISK, alert_text=trouble)
         self.status, self._step = status, step
+        if self._page is not None:
+            self._page.show(status, step, self.log.figures)
         if self.on_status is not None:
             self.on_status(status, step)
+        self.showing.take(step, status, self.log.figures)
 
     def _trouble(self) -> str:
         """Return what cannot be written now and why, empty when all is well."""

@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 async def _give(args: argparse.Namespace, wanted: Wanted) -> Answer:
     if args.socket is not None:
-        return await _give_on_board(args.socket, " ".join(args.words), args.timeout)
+        return await give_on_board(args.socket, " ".join(args.words), args.timeout)
     import time
 
     from companion.mavlink.link import Link
@@ -110,7 +110,8 @@ async def _give(args: argparse.Namespace, wanted: Wanted) -> Answer:
         return await give(link, wanted, give_up_s=args.timeout)
 
 
-async def _give_on_board(path: Path, words: str, give_up_s: float) -> Answer:
+async def give_on_board(path: Path, words: str, give_up_s: float) -> Answer:
+    """Give an order at the socket of a companion on board. Raises LinkError: it is not there."""
     from companion.disk import reason
     from companion.errors import LinkError
     from companion.orders import Answer, Result

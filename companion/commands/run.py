@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from companion.arguments import number, out_folder, system_id, whole
+from companion.arguments import host_name, http_address, number, out_folder, system_id, whole
 from companion.errors import InputError
 from companion.extras import missing
 from companion.program import INTERRUPTED
@@ -24,6 +24,7 @@ from companion.words import counted, file_name
 if TYPE_CHECKING:
     from companion.commands.starting import Sailed
     from companion.geofence.mission import MissionOptions
+    from companion.outputs import Wanted
     from companion.planner.nursery import Nursery
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
@@ -62,6 +63,14 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         "folder is one boat's, and locked")
     parser.add_argument("--socket", type=Path, metavar="PATH", help="take orders from on board at this Unix socket: "
                         "companion order VERB --socket PATH, as [operator] local_orders permits")
+    parser.add_argument("--http", type=http_address, metavar="[HOST:]PORT",
+                        help="serve the live page here; without HOST to this machine alone (127.0.0.1). It shows; it "
+                        "takes orders only with --http-token")
+    parser.add_argument("--http-token", type=Path, metavar="FILE",
+                        help="let who has the token in this file (made, mode 0600, where there is none) give orders "
+                        "from the page, as [operator] local_orders permits")
+    parser.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
+                        help="a further name under which this machine's page may be asked for")
     parser.add_argument("--far", type=out_folder, metavar="DIR", help="the folder shared with the program of a "
                         "satellite modem: the newest status in DIR/out, orders in DIR/in, as [operator] far_orders "
                         "permits; `companion far` is its end ashore")
@@ -83,6 +92,14 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--feed", action="append", default=[], metavar="FEED",
                         help="hear other vessels here too, besides the mission's [traffic] feeds: udpin:HOST:PORT, "
                         "tcp:HOST:PORT, /dev/NAME:BAUD; may be given more than once")
+    parser.add_argument("--nmea", action="append", default=[], metavar="OUT",
+                        help="tell OpenCPN and its like in NMEA 0183, besides the mission's [output] nmea: "
+                        "udp:HOST:PORT, or tcp:[HOST:]PORT to be a server; may be given more than once")
+    parser.add_argument("--signalk", action="append", default=[], metavar="SERVER",
+                        help="tell a Signal K server, besides the mission's [output] signalk: ws://HOST:3000 or "
+                        "tcp:HOST:8375; may be given more than once")
+    parser.add_argument("--signalk-token", type=Path, metavar="FILE",
+                        help="the token that the Signal K server asks for (mode 0600)")
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (32 bytes, mode 0600)")
     parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=1.0, metavar="N",
                         help="the autopilot is a simulator that runs N times as fast as time (default: 1)")
@@ -116,6 +133,7 @@ def _outliving_the_terminal() -> Iterator[None]:
 
 
 def _run(args: argparse.Namespace) -> int:
+    from companion.addresses import parse_nmea, parse_signalk
     from companion.commands.starting import Sailed, settings_of
     from companion.geofence import load_mission
     from companion.geofence.mission import NO_NAME
@@ -128,8 +146,13 @@ def _run(args: argparse.Namespace) -> int:
 
     for name in args.feed:
         parse_feed(name)
+    for name in args.nmea:
+        parse_nmea(name)
+    for name in args.signalk:
+        parse_signalk(name)
     parse_link(args.link)
     _far(args)
+    _http(args)
     settings, sailed = settings_of(args.mission, is_drawn=args.from_autopilot, system=args.system), None
     if settings is None:
         named = require_sailable(load_mission(args.mission))
@@ -189,14 +212,18 @@ def _voyage(
     from companion.app.adoption import ADOPTED
     from companion.clock import run as run_loop
     from companion.commands.starting import asked
+    from companion.compose import displays_of
     from companion.mavlink.transports import open_link
+    from companion.outputs import wanted
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
 
     signing = _signing(args.signing_key)
     shelf = None   # a folder that was named is not ours to tidy
     if args.out is None or args.keep_gb is not None:
         shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
-    mission = sailed.mission.with_feeds(*args.feed).with_system(args.system)
+    mission = sailed.mission.with_feeds(*args.feed).with_system(args.system).with_outputs(
+        args.nmea, args.signalk, args.signalk_token)
+    told = wanted(displays_of(mission))
     for finding in mission.findings:
         err.write(f"companion run: {finding.line(str(mission.path))}\n")
     seed = mission.skipper.seed if args.seed is None else args.seed
@@ -213,11 +240,11 @@ def _voyage(
             expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
             wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
             exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
-            settings=sailed.settings, socket=args.socket, far=_far(args), command=" ".join(sys.argv),
+            settings=sailed.settings, socket=args.socket, http=_http(args), far=_far(args), command=" ".join(sys.argv),
             token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
-    summary = run_loop(_sail(mission, transport, folder, options, manager, nursery, out), speedup=args.speedup)
+    summary = run_loop(_sail(mission, transport, folder, options, manager, nursery, out, told), speedup=args.speedup)
     if summary is None:
         return INTERRUPTED
     if not summary["arrived_before"] and summary["end_reason"] != ADOPTED:   # the next voyage waits for no picture
@@ -253,7 +280,7 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 async def _sail(
     mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager,
-    nursery: Nursery | None, out: Console,
+    nursery: Nursery | None, out: Console, told: Wanted,
 ) -> dict[str, Any] | None:
     """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker
@@ -266,6 +293,8 @@ async def _sail(
     async with PlannerWorker(algorithm=mission.skipper.planner, nursery=nursery) as planner:
         # The child loads its kernels while this process imports the rest.
         from companion.app.sail import sail
+        from companion.outputs import Outputs
+        from companion.telemetry.far import unix_of_boat
         from companion.telemetry.progress import ProgressLine
 
         if not await _is_ready(planner, stop, out, manager):
@@ -273,13 +302,17 @@ async def _sail(
         chosen = options()
 
         with ProgressLine(out, chosen.epoch_s) as progress:
-            def show(status: Any, step: Any) -> None:
-                progress.show(status, step)
-                manager.alive(f"{step.state.phase.value}: {step.state.why}")
+            async with Outputs(told, mission.frame(), progress.note, seed=chosen.seed) as outputs:
+                def show(status: Any, step: Any) -> None:
+                    progress.show(status, step)
+                    manager.alive(f"{step.state.phase.value}: {step.state.why}")
 
-            return await sail(
-                mission, transport, planner, folder, chosen, on_status=show, stop=stop,
-                on_refusal=lambda text: out.write(f"note: {text}\n"))
+                def tell(view: Any, _: Any, step: Any) -> None:
+                    outputs.tell(view, unix_of_boat(step.snapshot, step.snapshot.t_s))
+
+                return await sail(
+                    mission, transport, planner, folder, chosen, on_status=show, stop=stop, on_refusal=progress.note,
+                    on_view=tell if outputs.are_any else None)
 
 
 async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, manager: ServiceManager) -> bool:
@@ -308,6 +341,20 @@ def _signing(path: Path | None) -> Any:
     from companion.mavlink.transports import SigningStore
 
     return SigningStore(path, time.time())
+
+
+def _http(args: argparse.Namespace) -> Any:
+    """Return where the page is served. Raises InputError: the token cannot be used."""
+    if args.http is None:
+        named = "--http-token" if args.http_token is not None else "--http-name" if args.http_name else ""
+        if named:
+            raise InputError(named, "", "there is no page to use it on", "say where it is served: --http PORT")
+        return None
+    from companion.page import Address, read_token
+
+    host, port = args.http
+    return Address(host=host, port=port, names=tuple(args.http_name),
+                   token="" if args.http_token is None else read_token(args.http_token))
 
 
 def _far(args: argparse.Namespace) -> Any:

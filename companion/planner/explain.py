@@ -51,6 +51,11 @@ def explain(problem: Problem, plan: Plan, budget_s: float = 5.0, *, expansions: 
     return replace(plan, why=with_parts(why, problem, path_risk(problem, plan)) if problem.is_shared else why)
 
 
+def bounds_in_words(problem: Problem, plan: Plan) -> str:
+    """Return what holds the plan where it is, in words; no replanning, so that it costs milliseconds."""
+    return _courses_in_words(problem, plan, [leg_bounds(problem, leg) for leg in plan.legs])
+
+
 # -------------------------------------------------------------------------------------- each leg
 def with_clearance(problem: Problem, plan: Plan) -> Plan:
     """Return the plan with each leg's distance to the nearest obstacle or fence filled in."""
@@ -206,6 +211,8 @@ def _bind_in_words(bind: dict[str, Any]) -> str:
         verb = {"along it": "along", "turns at it": "up to a turn at", "leaves it": "from a turn at",
                 "brushes it": "brushing"}[bind["where"]]
         return f"{verb} {bind['name']} (around {east:.0f} E, {north:.0f} N)"
+    if bind["by"] == "beat":
+        return f"beaten by the autopilot, {bind['corridor_m']:.0f} m to either side of its line"
     if bind["by"] == "fence":
         return "along or up to the fence"
     return f"as deep as the boat may go, {bind['angle_deg']:.0f}°"

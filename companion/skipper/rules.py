@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from companion.messages import Mode
+from companion.orders import Wanted
 from companion.skipper.board.custody import judge, stand_by
 from companion.skipper.board.on_board import mission_is_known
 from companion.skipper.deeds.adrift import follow_ground
@@ -17,6 +18,7 @@ from companion.skipper.deeds.failsafe import follow_answer, follow_stops, take_o
 from companion.skipper.deeds.helm import is_busy
 from companion.skipper.deeds.launch import finished, launch, start
 from companion.skipper.deeds.ordered import holds_ashore, leaves_alone, take_orders
+from companion.skipper.deeds.preview import preview
 from companion.skipper.deeds.sailing import sail
 from companion.skipper.intake import (
     count_time,
@@ -27,7 +29,7 @@ from companion.skipper.intake import (
     take_outcomes,
 )
 from companion.skipper.planning.ladder import rungs
-from companion.skipper.step.actions import Action, CancelPlan, Severity
+from companion.skipper.step.actions import Action, CancelPlan, RequestPlan, Severity
 from companion.skipper.step.causes import PERSON
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.saved import Persisted
@@ -95,6 +97,10 @@ class Skipper:
         speak_of_stop(turn)
         remember_fix(turn)
         return turn.state, tuple(turn.actions)
+
+    def preview(self, state: SkipperState, snapshot: Snapshot, wanted: Wanted) -> RequestPlan | str:
+        """Return the plan that an order to sail somewhere would ask for, or why it would ask for none."""
+        return preview(Turn(self.voyage, self.config, state, snapshot), wanted)
 
     def prepare(self) -> None:
         """Grow the obstacles by the margins once, before sailing; on a coast of thousands of points it takes long.

@@ -54,6 +54,7 @@ class ProgressLine:
         self._is_terminal = stream.isatty()
         self._last: tuple[float, str] = (-math.inf, "")
         self._standing = 0   # lines that are rewritten
+        self._notes: list[str] = []   # to be said with the next step
 
     def __enter__(self) -> Self:
         return self
@@ -63,14 +64,21 @@ class ProgressLine:
     ) -> None:
         if self._standing:
             self._stream.write("\n")
-            self._stream.flush()
+        if self._notes:
+            self._stream.write("".join(f"{line}\n" for line in self._notes))
+        self._stream.flush()
+
+    def note(self, text: str) -> None:
+        """Say something that is not of a step, as a line that stays."""
+        self._notes.append(f"note: {text}")
 
     def show(self, status: CompanionStatus, step: Step) -> None:
         """Show one step."""
         text = progress_text(step, status.next_tack_s)
         if status.alert_code == DISK:
             text += f" | {status.alert_text}"
-        said = [self._said(step.snapshot.t_s, a) for a in step.actions
+        said, self._notes = self._notes, []
+        said += [self._said(step.snapshot.t_s, a) for a in step.actions
                 if isinstance(a, Announce) and a.severity <= LOUD]
         t_s, phase = step.snapshot.t_s, step.state.phase.value
         if self._is_terminal:

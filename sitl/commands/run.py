@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from companion.arguments import number, out_folder, whole
+from companion.arguments import http_address, number, out_folder, whole
 from companion.extras import missing
 from companion.words import counted, file_name
 
@@ -51,6 +51,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--live", action="store_true", help="separate processes over UDP, in (sped-up) real time")
     parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), metavar="N",
                         help="with --live or ardurover (default: the scenario's)")
+    parser.add_argument("--http", type=http_address, metavar="[HOST:]PORT",
+                        help="with --live or ardurover: the companion serves its live page here")
+    parser.add_argument("--http-token", type=Path, metavar="FILE", help="orders from the page, as of companion run")
     parser.add_argument("--seed", type=whole(), default=0)
     parser.add_argument("--out", type=out_folder, metavar="DIR", help="the voyage folder")
     parser.set_defaults(run=run)
@@ -76,13 +79,14 @@ def run(args: argparse.Namespace) -> int:
     scenario_wind(scenario, args.scenario, args.seed)
     if own_polar(mission) is not None and args.autopilot == "ardurover":
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
+    page = _page(args)
     compile_ahead()
     if args.autopilot == "ardurover" or args.live:
         from sitl.run.live import run_live
 
         verdict = run_live(
             scenario, args.scenario, args.seed, folder, autopilot=args.autopilot, program=args.ardurover,
-            speedup=args.speedup,
+            speedup=args.speedup, page=page,
         )
     else:
         with ProgressLine(sys.stdout) as progress:
@@ -92,6 +96,21 @@ def run(args: argparse.Namespace) -> int:
     print_verdict(verdict)
     print(folder)
     return 0 if verdict.passed else 1
+
+
+def _page(args: argparse.Namespace) -> list[str]:
+    """Return what the companion is told of its live page. Raises InputError: it cannot be served."""
+    from companion.errors import InputError
+
+    if args.http is None:
+        if args.http_token is not None:
+            raise InputError("--http-token", str(args.http_token), "there is no page to use it on", "say --http PORT")
+        return []
+    if not (args.live or args.autopilot == "ardurover"):
+        raise InputError("--http", "", "no browser can be waited for under the virtual clock", "say --live, too")
+    host, port = args.http
+    return ["--http", f"{f'[{host}]' if ':' in host else host}:{port}",
+            *([] if args.http_token is None else ["--http-token", str(args.http_token)])]
 
 
 def draw(folder: Path) -> None:

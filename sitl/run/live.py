@@ -12,6 +12,7 @@ import contextlib
 import json
 import signal
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -100,9 +101,11 @@ class _Companion:
 
 def run_live(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, autopilot: str, program: Path | None,
-    speedup: float | None, truth: Truth | None = None,
+    speedup: float | None, truth: Truth | None = None, page: Sequence[str] = (),
 ) -> Verdict:
     """Run ``scenario``; leaves a voyage folder with verdict.json. The judge's track is noted in ``truth``.
+
+    ``page`` is what the companion is told of its live page.
 
     Raises:
         JobError: it has an event that this autopilot cannot play, or the companion left nothing.
@@ -115,12 +118,12 @@ def run_live(
             f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}")
     pace = speedup or scenario.speedup
     track = Truth() if truth is None else truth
-    return run(_run(scenario, source, seed, folder, autopilot, program, pace, track), speedup=pace)
+    return run(_run(scenario, source, seed, folder, autopilot, program, pace, track, page), speedup=pace)
 
 
 async def _run(
     scenario: Scenario, source: Path, seed: int, folder: Path, kind: str, program: Path | None, pace: float,
-    truth: Truth,
+    truth: Truth, page: Sequence[str],
 ) -> Verdict:
     mission_path = scenario.mission_path(source)
     mission = load_mission(mission_path)
@@ -144,7 +147,7 @@ async def _run(
             sys.executable, "-m", "companion.cli", "run", str(mission_path), "--link", link, "--out", str(folder),
             "--state", str(folder / "state.json"), "--seed", str(seed), "--speedup", f"{pace:g}",
             "--limit", f"{scenario.limit_s:g}", *feeds, *(["--exit-on-arrival"] if scenario.exit_on_arrival else []),
-            *(["--dry-run"] if scenario.dry_run else []),
+            *(["--dry-run"] if scenario.dry_run else []), *page,
         ])
         await companion.start()
         # The scenario's clock starts when the companion does its first work, as it does on the embedded autopilot.

@@ -18,12 +18,26 @@ from companion.skipper.step import Acknowledge
 from sitl.autopilot import MemoryLink
 
 
+def showing():
+    from pathlib import Path
+
+    from companion.app.showing import Showing
+    from companion.compose import config_of, voyage_of
+    from companion.geofence import load_mission
+
+    mission = load_mission(Path("missions/archipelago.toml"))
+    return Showing(voyage_of(mission), config_of(mission), 0.0, print)
+
+
+SHOWING = showing()
+
+
 def with_socket(path, talk):
     """Run ``talk(crew)`` with the socket served; what nobody takes is answered by nobody."""
     async def whole():
         crew = Crew(Link(MemoryLink().near), has_key=False)
         crew.begin()
-        async with served(path, crew):
+        async with served(path, crew, SHOWING):
             return await talk(crew)
 
     return run(whole())
@@ -105,7 +119,7 @@ def test_a_place_that_is_taken_is_left_alone_and_what_a_kill_left_is_not(tmp_pat
 
     async def twice(crew):
         with pytest.raises(InputError, match="another program listens"):
-            async with served(tmp_path / "s", crew):
+            async with served(tmp_path / "s", crew, SHOWING):
                 pass
         return await said(tmp_path / "s", b"jump\n")
 

@@ -15,7 +15,15 @@ import pytest
 
 from companion import cli
 from companion.commands.doctor import needs_of
-from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
+from companion.compose import (
+    config_of,
+    displays_of,
+    estimator_of,
+    feeds_of,
+    permissions_of,
+    target_limits_of,
+    voyage_of,
+)
 from companion.geofence import load_mission
 from companion.geofence.mission.goal_options import KINDS
 from companion.geofence.mission.options import tables
@@ -103,6 +111,7 @@ OTHER = {
                "shore_failsafe": "sail_on"},
     "traffic": {"feeds": ["udpin:127.0.0.1:10110"], "safe_distance_m": 60.0, "safe_time_s": 80.0,
                 "drop_after_s": 300.0, "policy": "rules"},
+    "output": {"nmea": ["udp:127.0.0.1:10110"], "signalk": ["tcp:127.0.0.1:8375"], "signalk_token": "token"},
 }
 # What does not sail: pictures and previews, and what `companion run` itself takes. Tried below.
 DRAWN = {("start", "heading_deg"), ("wind", "preview_from_deg")}
@@ -120,6 +129,8 @@ def mission(path, table="", key="", value=None):
     import tomli_w
 
     raw = tomllib.loads(MISSION)
+    if key == "signalk_token":
+        raw["output"] = {"signalk": ["ws://127.0.0.1:3000"]}
     if table == "area" and key in {"axis", "point_radius_m"}:
         raw["area"]["obstacles"] = ["point.wkt"]
     if (table, key) == ("area", "axis"):
@@ -176,7 +187,7 @@ def sailed(m):
     return repr((
         m.name, voyage.frame.origin, voyage.goals, voyage.laps, voyage.refuges, gates_of(voyage),
         voyage.area.obstacles_wkt(0.0), voyage.area.fence_wkt(0.0), speeds, rest, config_of(m), permissions_of(m),
-        target_limits_of(m), feeds_of(m), type(estimator).__name__, wind, needs_of(m),
+        target_limits_of(m), feeds_of(m), displays_of(m), type(estimator).__name__, wind, needs_of(m),
     ))
 
 

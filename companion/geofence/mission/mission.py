@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from companion.geofence.mission.options import (
     BoatOptions,
     MissionOptions,
     OperatorOptions,
+    OutputOptions,
     RiskOptions,
     SafetyOptions,
     SkipperOptions,
@@ -111,10 +112,23 @@ class Mission:
         """The ``[traffic]`` table."""
         return self.options.traffic
 
+    @property
+    def output(self) -> OutputOptions:
+        """The ``[output]`` table."""
+        return self.options.output
+
     def with_feeds(self, *names: str) -> Mission:
         """Return the mission with ``names`` after its own feeds of other vessels."""
         traffic = msgspec.structs.replace(self.traffic, feeds=(*self.traffic.feeds, *names))
         return replace(self, options=msgspec.structs.replace(self.options, traffic=traffic))
+
+    def with_outputs(self, nmea: Sequence[str], signalk: Sequence[str], token_file: Path | None) -> Mission:
+        """Return the mission that is told to these too, after its own displays."""
+        own = self.output
+        output = msgspec.structs.replace(
+            own, nmea=(*own.nmea, *nmea), signalk=(*own.signalk, *signalk),
+            signalk_token=own.signalk_token if token_file is None else str(token_file.absolute()))
+        return replace(self, options=msgspec.structs.replace(self.options, output=output))
 
     def with_system(self, system: int | None) -> Mission:
         """Return the mission for the autopilot of ``system``, None: as it is."""

@@ -239,6 +239,17 @@ class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     early, by much and astern where they ask for it."""
 
 
+class OutputOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[output]``: other displays that are told of the voyage under way (docs/displays.md)."""
+
+    nmea: tuple[str, ...] = ()
+    """NMEA 0183: ``udp:HOST:PORT``, or ``tcp:[HOST:]PORT`` to be a server."""
+    signalk: tuple[str, ...] = ()
+    """Signal K servers: ``ws://HOST:PORT``, or ``tcp:HOST:PORT``."""
+    signalk_token: str | None = None
+    """A file beside the mission, of mode 0600, with the token that the server asks for."""
+
+
 class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The whole file."""
 
@@ -259,6 +270,7 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     planner: PlannerOptions = PlannerOptions()
     safety: SafetyOptions = SafetyOptions()
     traffic: TrafficOptions = TrafficOptions()
+    output: OutputOptions = OutputOptions()
 
 
 def tables() -> dict[str, tuple[str, ...]]:

@@ -55,7 +55,7 @@ def dump_options(options: MissionOptions) -> str:
     data = _without_defaults(options)
     order = [
         "name", "description", "from_autopilot", "start", "goal", "refuge", "area", "wind", "risk", "boat", "autopilot",
-        "operator", "skipper", "planner", "safety", "traffic"]
+        "operator", "skipper", "planner", "safety", "traffic", "output"]
     return tomli_w.dumps({k: data[k] for k in order if k in data})
 
 

@@ -8,11 +8,11 @@ from companion.mavlink.wire.frames import Codec, Drop, Message
 from companion.mavlink.wire.high_latency import CONTROL_COMMAND, HIGH_LATENCY_S
 from companion.mavlink.wire.items import first_difference, mission_hash
 from companion.mavlink.wire.parameter_ranges import RANGES, believable
-from companion.mavlink.wire.status import StatusReader
+from companion.mavlink.wire.status import StatusReader, StatusReport
 from companion.mavlink.wire.streams import Stream
 
 __all__ = [
     "AUTOPILOT_COMPONENT", "CONTROL_COMMAND", "HIGH_LATENCY_S", "LEAP_M", "MEMORY_S", "RANGES", "Codec", "Dialect",
-    "Drop", "Message", "StatusReader", "Stream", "VehicleAssembler", "autopilot_version", "believable",
+    "Drop", "Message", "StatusReader", "StatusReport", "Stream", "VehicleAssembler", "autopilot_version", "believable",
     "first_difference", "is_autopilot_heartbeat", "leap_m", "mission_hash",
 ]

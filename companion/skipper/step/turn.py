@@ -245,7 +245,7 @@ class Turn:
 
     def is_raised(self, name: str) -> bool:
         """Return whether a watchdog is raised."""
-        for raised in self.state.raised:   # asked for dozens of times a step: a loop, not a generator
+        for raised in self.state.raised:   # noqa: SIM110 - asked for dozens of times a step: a loop, not a generator
             if raised.name == name:
                 return True
         return False

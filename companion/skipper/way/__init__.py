@@ -2,10 +2,11 @@
 
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.geometry import cross_track_m, moved
+from companion.skipper.way.judge import half_width_rad, mean_twd_rad
 from companion.skipper.way.sweeps import Sweep, length_m, sweeps_over
 from companion.skipper.way.voyage import Box, Goal, Line, PointEn, Refuge, Search, Side, Voyage
 
 __all__ = [
     "Box", "Goal", "Line", "PointEn", "Refuge", "Search", "Side", "Sweep", "Voyage", "cross_track_m", "gates_of",
-    "length_m", "moved", "sweeps_over",
+    "half_width_rad", "length_m", "mean_twd_rad", "moved", "sweeps_over",
 ]

@@ -1,0 +1,75 @@
+"""Addresses of other displays: where NMEA 0183 goes to, and where a Signal K server is."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from companion.errors import InputError
+
+LOOPBACK = "127.0.0.1"
+STREAM = "/signalk/v1/stream"   # of a Signal K server
+_NMEA = "write udp:HOST:PORT, or tcp:[HOST:]PORT to be a server (default HOST: 127.0.0.1)"
+_SIGNALK = "write ws://HOST:3000 or tcp:HOST:8375"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputName:
+    """Where to: ``kind`` is udp, tcp, ws or wss; ``text`` is as it was given; ``url`` a WebSocket's."""
+
+    text: str
+    kind: str
+    host: str
+    port: int
+    url: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Displays:
+    """Whom a voyage is told to; ``token_file`` holds the token of the Signal K servers."""
+
+    nmea: tuple[OutputName, ...] = ()
+    signalk: tuple[OutputName, ...] = ()
+    token_file: Path | None = None
+
+
+def parse_nmea(text: str) -> OutputName:
+    """Return the name of an output of sentences.
+
+    >>> parse_nmea("tcp:10110").host, parse_nmea("udp:255.255.255.255:10110").port
+    ('127.0.0.1', 10110)
+
+    Raises:
+        InputError: it is none.
+    """
+    match = re.fullmatch(r"(?:(udp):([^:\s/]+)|(tcp)(?::([^:\s/]+))?):(\d{1,5})", text)
+    if match is None or not 0 < int(match[5]) < 65536:
+        raise InputError("--nmea", text, "is no place to send NMEA 0183 to", _NMEA)
+    return OutputName(text=text, kind=match[1] or match[3], host=match[2] or match[4] or LOOPBACK, port=int(match[5]))
+
+
+def parse_signalk(text: str) -> OutputName:
+    """Return the name of a Signal K server.
+
+    >>> parse_signalk("ws://boat:3000").url
+    'ws://boat:3000/signalk/v1/stream?subscribe=none'
+
+    Raises:
+        InputError: it is none.
+    """
+    match = re.fullmatch(r"tcp:([^:\s/]+):(\d{1,5})", text)
+    if match and 0 < int(match[2]) < 65536:
+        return OutputName(text=text, kind="tcp", host=match[1], port=int(match[2]))
+    try:
+        parts = urlsplit(text)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host, port = None, None
+    if not host or parts.scheme not in {"ws", "wss"} or parts.username or parts.query or parts.fragment or " " in text:
+        raise InputError("--signalk", text, "is no Signal K server", _SIGNALK)
+    port = port or (443 if parts.scheme == "wss" else 80)
+    path = parts.path if parts.path not in {"", "/"} else STREAM
+    return OutputName(text=text, kind=parts.scheme, host=host, port=port,
+                      url=f"{parts.scheme}://{parts.netloc}{path}?subscribe=none")

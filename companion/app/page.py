@@ -1,0 +1,117 @@
+"""The live page of a voyage: every step is shown, orders of the page come in as those of the socket on board."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from companion.app.crew import Crew
+from companion.app.executor import Planner
+from companion.errors import JobError
+from companion.fold import Step, VoyageFold
+from companion.messages import CompanionStatus
+from companion.orders import LOCAL, Answer, Verb, Wanted, permitted
+from companion.page import Address, Live, served
+from companion.planner import Plan
+from companion.skipper import Skipper
+from companion.telemetry.folder import VoyageFigures
+from companion.view import ViewFold
+
+# All browsers are one station: an order that is sent twice in haste is done once. No connection of the socket on
+# board has this number.
+BROWSERS = 1_000_000
+PREVIEW_S = 0.5        # for a plan that is only looked at: the boat's own may have to wait for it so long
+LAST_S = 5.0           # for one that is being made when the voyage ends
+
+
+class LivePage:
+    """Shows the steps of a voyage on ``live``."""
+
+    def __init__(self, live: Live, fold: ViewFold, skipper: Skipper, planner: Planner, crew: Crew,
+                 on_fault: Callable[[str], None]) -> None:
+        self._live, self._fold, self._skipper, self._planner, self._crew = live, fold, skipper, planner, crew
+        self._on_fault = on_fault
+        self._step: Step | None = None
+        self._plan: asyncio.Task[Plan] | None = None
+        self._has_failed = False
+
+    def show(self, status: CompanionStatus, step: Step, figures: VoyageFigures) -> None:
+        """Show a step; a fault of the page's is said once, and is not worth the voyage."""
+        self._step = step
+        try:
+            view, events = self._fold.take(step, status, figures)
+            self._live.show(view, events, self._fold.area)
+        except Exception as error:
+            if not self._has_failed:
+                self._has_failed = True
+                self._on_fault(f"the live page: {error!r}")
+
+    async def ask(self, wanted: Wanted) -> Answer:
+        """Give an order."""
+        return await self._crew.ask(wanted, BROWSERS, LOCAL)
+
+    async def preview(self, wanted: Wanted) -> dict[str, Any]:
+        """Return the plan that an order would lead to; ``error`` says why there is none."""
+        step = self._step
+        if step is None:
+            return {"error": "nothing is known of the boat yet"}
+        asked = self._skipper.preview(step.state, step.snapshot, wanted)
+        if isinstance(asked, str):
+            return {"error": asked}
+        if step.state.pending_plan is not None or (self._plan is not None and not self._plan.done()):
+            return {"error": "a plan is being made: again in a moment"}
+        # A task of its own: who hangs up must not end the planner's work, which would end the planner.
+        self._plan = asyncio.create_task(
+            self._planner.plan(asked.problem, budget_s=PREVIEW_S, seed=asked.seed), name="preview")
+        return {"order": wanted.words, **_in_figures(await asyncio.shield(self._plan))}
+
+    async def end(self) -> None:
+        """Wait for a plan that is being made."""
+        if self._plan is not None and not self._plan.done():
+            await asyncio.wait({self._plan}, timeout=LAST_S)
+            self._plan.cancel()
+            await asyncio.gather(self._plan, return_exceptions=True)
+
+
+def _in_figures(plan: Plan) -> dict[str, Any]:
+    if not plan.has_path:
+        return {"error": f"no way there was found: {plan.reason}"}
+    clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
+    return {
+        "error": None, "way_en_m": np.round(plan.waypoints_en, 1).tolist(), "time_s": round(plan.cost_s, 1),
+        "length_m": round(sum(leg.length_m for leg in plan.legs), 1),
+        "risk": None if plan.risk is None or not math.isfinite(plan.risk) else round(plan.risk, 4),
+        "risks": [None if leg.risk is None else round(leg.risk, 4) for leg in plan.legs],
+        "tacks": sum(leg.manoeuvre == "tack" for leg in plan.legs),
+        "gybes": sum(leg.manoeuvre == "gybe" for leg in plan.legs),
+        "clearance_m": round(min(clear), 1) if clear else None,
+    }
+
+
+async def opened(
+    stack: contextlib.AsyncExitStack, address: Address, fold: VoyageFold, planner: Planner, crew: Crew, *,
+    epoch_s: float, pace: float, on_fault: Callable[[str], None], refuse: Callable[[str, str], None],
+) -> LivePage | None:
+    """Serve the page of a voyage for as long as ``stack``; None where it cannot be: she is sailed without it.
+
+    ``pace``: seconds of the loop for each second. ``refuse`` hears why it is not served.
+    """
+    skipper, verbs = fold.skipper, fold.permissions.local_orders
+    view = ViewFold(skipper.voyage, skipper.config, epoch_s=epoch_s)
+    live = Live(name=skipper.voyage.name, unix_s=epoch_s, area=view.area,
+                permitted=tuple(verb.value for verb in Verb if permitted(verb, verbs)))
+    page = LivePage(live, view, skipper, planner, crew, on_fault)
+    if address.token:
+        live.ask, live.preview = page.ask, page.preview
+    try:
+        await stack.enter_async_context(served(address, live, pace=pace))
+    except JobError as error:
+        refuse("live page", f"{error}; she is sailed without a page")
+        return None
+    stack.push_async_callback(page.end)
+    return page

@@ -1,0 +1,84 @@
+"""``companion view``: a voyage in a browser, recorded or heard by radio, or packed into one file."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from companion.arguments import host_name, http_address, out_file, system_id
+from companion.commands.output import force_option, write_files
+from companion.errors import InputError
+
+PORT = 8765
+SAID_EVERY = 500      # recorded steps between two words on how far it is
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "view", help=summary,
+        description="Serve the page over a recorded voyage, with a timeline, or ashore over what a radio brings of a "
+        "companion; or pack a recorded voyage into one HTML file that needs nothing else.",
+        epilog="Examples: companion view voyages/20260714T101500Z-archipelago; companion view --link "
+        "/dev/ttyUSB0:57600; companion view voyages/20260714T101500Z-archipelago --export voyage.html",
+    )
+    parser.add_argument("voyage", type=Path, nargs="?", metavar="VOYAGE_DIR",
+                        help="the folder that `companion run` left")
+    parser.add_argument("--link", metavar="LINK", help="the shore end of a telemetry radio: /dev/ttyUSB0:57600, "
+                        "udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument("--system", type=system_id, metavar="N",
+                        help="with --link: the autopilot's MAVLink system id (default: the only one heard)")
+    parser.add_argument("--http", type=http_address, default=("127.0.0.1", PORT), metavar="[HOST:]PORT",
+                        help=f"where to serve it (default: 127.0.0.1:{PORT})")
+    parser.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
+                        help="a further name under which this machine's page may be asked for")
+    parser.add_argument("--export", type=out_file, metavar="FILE.html", help="write one file and serve nothing")
+    force_option(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from companion.clock import run as run_loop
+    from companion.commands.view.serving import ashore, serve
+    from companion.page import Address, export
+
+    if (args.voyage is None) == (args.link is None):
+        raise InputError("companion view", "", "what to view is not said" if args.link is None else
+                         "a folder and a link are two things", "name a voyage's folder, or --link LINK")
+    if args.link is not None:
+        if args.export is not None:
+            raise InputError("--export", str(args.export), "what is heard by radio is no voyage yet",
+                             "export the folder that the companion leaves")
+        return run_loop(ashore(args))
+    record = read_record(args.voyage)
+    if args.export is not None:
+        data = export(record)
+        write_files({str(args.export): data}, force=args.force)
+        print(f"{args.export}: {len(data) / 1e6:.1f} MB, {len(record.times)} moments")
+        return 0
+    host, port = args.http
+    return run_loop(serve(Address(host=host, port=port, names=tuple(args.http_name)), record))
+
+
+def read_record(folder: Path) -> Any:
+    """Return the recorded voyage for the page. Raises InputError."""
+    from companion.page import Record
+    from companion.view import recorded_views
+
+    recorded = recorded_views(folder)
+    record = Record(recorded.name, recorded.area, is_whole=recorded.is_whole, count=recorded.count)
+    for number, (view, events) in enumerate(recorded.moments, start=1):
+        record.take(view, events)
+        if number % SAID_EVERY == 0 and sys.stderr.isatty():
+            sys.stderr.write(f"\rfolding the voyage again: {100 * number // recorded.count} %")
+    record.finish()
+    if sys.stderr.isatty() and recorded.count >= SAID_EVERY:
+        sys.stderr.write("\r\x1b[K")
+    if not record.times:
+        raise InputError(str(folder), "track.csv", "has no step in it", "name a voyage that was sailed")
+    if not recorded.is_whole:
+        sys.stderr.write("companion view: note: without its telemetry log the voyage is shown by its track alone\n")
+    return record

@@ -1,0 +1,104 @@
+"""What a page is shown: a voyage under way, or one that is recorded."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+
+from companion import __version__
+from companion.orders import Answer, Wanted
+from companion.page.hub import Hub
+from companion.view import SCHEMA, Area, Event, Past, Trail, View, sample_of
+
+CHUNK = 60            # recorded views in one answer
+MOST_MOMENTS = 7200   # of a recorded voyage: more are thinned out
+GZIP_LEVEL = 5
+
+Ask = Callable[[Wanted], Awaitable[Answer]]
+Preview = Callable[[Wanted], Awaitable[dict[str, Any]]]
+
+
+@dataclass(kw_only=True)
+class Live:
+    """A voyage under way (or the radio's): ``show`` takes the steps; ``ask`` and ``preview`` None: it only shows."""
+
+    name: str
+    kind: str = "live"
+    unix_s: float | None = None          # of t_s = 0
+    ask: Ask | None = None
+    preview: Preview | None = None
+    permitted: tuple[str, ...] = ()
+    hub: Hub = field(default_factory=Hub)
+    area: Area | None = None
+    trail: Trail = field(default_factory=Trail)
+
+    def show(self, view: View, events: Sequence[Event], area: Area | None) -> None:
+        """Show the next step."""
+        self.area = area
+        self.trail.add(sample_of(view))
+        self.hub.publish(view, events)
+
+    def hello(self) -> dict[str, Any]:
+        """Return what a page has to know first."""
+        return {"schema": SCHEMA, "version": __version__, "kind": self.kind, "name": self.name,
+                "orders": list(self.permitted) if self.ask is not None else None, "count": None, "chunk": None,
+                "area": None if self.area is None else self.area.hash}
+
+    def past(self) -> bytes:
+        """Return the samples so far, as JSON."""
+        return msgspec.json.encode(Past.of(self.trail.samples, self.unix_s))
+
+
+class Record:
+    """A recorded voyage, whole in memory: its views packed by chunks."""
+
+    def __init__(self, name: str, area: Area, *, is_whole: bool, count: int) -> None:
+        self.name, self.area, self.is_whole = name, area, is_whole
+        self._every = max(1, -(-count // MOST_MOMENTS))
+        self._trail = Trail(most=2 * MOST_MOMENTS)
+        self._events: list[Event] = []
+        self._waiting: list[bytes] = []
+        self.chunks: list[bytes] = []
+        self.times: list[float] = []
+        self._seen = 0
+        self._unix_s: float | None = None
+
+    def take(self, view: View, events: Sequence[Event]) -> None:
+        """Take the next moment; of a very long voyage those in which nothing happened are thinned out."""
+        self._events += events
+        self._seen += 1
+        if view.unix_s is not None:
+            self._unix_s = view.unix_s - view.t_s
+        if self._every > 1 and self._seen % self._every and not events:
+            return
+        self.times.append(view.t_s)
+        self._trail.add(sample_of(view))
+        self._waiting.append(msgspec.json.encode(view))
+        if len(self._waiting) == CHUNK:
+            self._pack()
+
+    def finish(self) -> None:
+        """Pack what is left."""
+        if self._waiting:
+            self._pack()
+
+    def _pack(self) -> None:
+        self.chunks.append(gzip.compress(b"[" + b",".join(self._waiting) + b"]", GZIP_LEVEL, mtime=0))
+        self._waiting = []
+
+    def hello(self) -> dict[str, Any]:
+        """Return what a page has to know first."""
+        return {"schema": SCHEMA, "version": __version__, "kind": "recorded", "name": self.name, "orders": None,
+                "count": len(self.times), "chunk": CHUNK, "area": self.area.hash}
+
+    def log(self) -> bytes:
+        """Return the log, as JSON."""
+        return msgspec.json.encode(self._events)
+
+    def past(self) -> bytes:
+        """Return the samples of the whole voyage, as JSON: a row for each moment."""
+        return msgspec.json.encode(Past.of(self._trail.samples, self._unix_s))

@@ -1,0 +1,119 @@
+// Geometry of the pictures: pure functions, tried by node.
+
+/** @typedef {[number, number]} Point */
+/** @typedef {{centre: Point, scale: number, up: number, width: number, height: number}} Camera  metres; px a metre; degrees that are up; px */
+
+const RAD = Math.PI / 180;
+
+/** @param {number} degrees */
+export function wrap(degrees) {
+  return ((degrees + 180) % 360 + 360) % 360 - 180;
+}
+
+/** Where a place on the water is on the screen. @param {Camera} camera @param {Point} en @returns {Point} */
+export function project(camera, en) {
+  const east = en[0] - camera.centre[0], north = en[1] - camera.centre[1];
+  const c = Math.cos(camera.up * RAD), s = Math.sin(camera.up * RAD);
+  return [camera.width / 2 + camera.scale * (east * c - north * s),
+          camera.height / 2 - camera.scale * (east * s + north * c)];
+}
+
+/** Which place is at a point of the screen. @param {Camera} camera @param {Point} at @returns {Point} */
+export function unproject(camera, at) {
+  const x = (at[0] - camera.width / 2) / camera.scale, y = (camera.height / 2 - at[1]) / camera.scale;
+  const c = Math.cos(camera.up * RAD), s = Math.sin(camera.up * RAD);
+  return [camera.centre[0] + x * c + y * s, camera.centre[1] - x * s + y * c];
+}
+
+/** The camera's matrix, for what is drawn in metres. @param {Camera} camera */
+export function matrix(camera) {
+  const c = camera.scale * Math.cos(camera.up * RAD), s = camera.scale * Math.sin(camera.up * RAD);
+  const [e, n] = camera.centre;
+  const x = camera.width / 2 - c * e + s * n, y = camera.height / 2 + s * e + c * n;
+  return `matrix(${c} ${-s} ${-s} ${-c} ${x} ${y})`;
+}
+
+/** A point so far off in a direction. @param {Point} from @param {number} degrees @param {number} by @returns {Point} */
+export function moved(from, degrees, by) {
+  return [from[0] + by * Math.sin(degrees * RAD), from[1] + by * Math.cos(degrees * RAD)];
+}
+
+/** A point of a dial: 0 is up, clockwise. @param {number} degrees @param {number} radius @returns {Point} */
+export function onDial(degrees, radius) {
+  return [radius * Math.sin(degrees * RAD), -radius * Math.cos(degrees * RAD)];
+}
+
+/** A sector of a dial as a path. @param {number} from @param {number} to @param {number} inner @param {number} outer */
+export function sector(from, to, inner, outer) {
+  const wide = Math.min(359.9, Math.max(0, to - from));
+  const [a, b, c, d] = [onDial(from, outer), onDial(from + wide, outer), onDial(from + wide, inner), onDial(from, inner)];
+  const large = wide > 180 ? 1 : 0;
+  const r = (/** @type {Point} */ p) => `${p[0].toFixed(2)} ${p[1].toFixed(2)}`;
+  return `M${r(a)}A${outer} ${outer} 0 ${large} 1 ${r(b)}L${r(c)}` +
+    (inner > 0 ? `A${inner} ${inner} 0 ${large} 0 ${r(d)}` : "") + "Z";
+}
+
+/** @param {readonly Point[]} points @param {boolean} [closed] */
+export function path(points, closed = false) {
+  if (points.length === 0) return "";
+  return "M" + points.map((p) => `${p[0].toFixed(1)} ${p[1].toFixed(1)}`).join("L") + (closed ? "Z" : "");
+}
+
+/** The track in pieces of one tack, each beginning where the one before ends. A gap in the positions parts it, too.
+ * @param {readonly (number | null)[]} east @param {readonly (number | null)[]} north @param {readonly (boolean | null)[]} starboard
+ * @returns {{starboard: boolean | null, points: Point[]}[]} */
+export function byTack(east, north, starboard) {
+  /** @type {{starboard: boolean | null, points: Point[]}[]} */
+  const out = [];
+  /** @type {Point | null} */
+  let last = null;
+  for (let n = 0; n < east.length; n++) {
+    const e = east[n], m = north[n], side = starboard[n] ?? null;
+    if (e === null || e === undefined || m === null || m === undefined) { last = null; continue; }
+    const point = /** @type {Point} */ ([e, m]);
+    const open = out[out.length - 1];
+    if (last === null || open === undefined) out.push({ starboard: side, points: [point] });
+    else if (open.starboard !== side) out.push({ starboard: side, points: [last, point] });
+    else open.points.push(point);
+    last = point;
+  }
+  return out;
+}
+
+/** The class of a leg by its risk: 0 to 2, or "unknown". @param {number | null | undefined} risk */
+export function riskClass(risk) {
+  if (risk === null || risk === undefined) return "unknown";
+  return risk < 0.02 ? "0" : risk < 0.1 ? "1" : "2";
+}
+
+/** Directions made continuous, each within half a turn of the one before. @param {readonly (number | null)[]} degrees @returns {(number | null)[]} */
+export function unwrapped(degrees) {
+  /** @type {number | null} */
+  let before = null;
+  return degrees.map((value) => {
+    if (value === null || value === undefined) return null;
+    before = before === null ? value : before + wrap(value - before);
+    return before;
+  });
+}
+
+/** Round figures between two bounds, at most so many. @param {number} low @param {number} high @param {number} most @param {readonly number[]} [steps] */
+export function marks(low, high, most, steps = [1, 2, 5]) {
+  const span = Math.max(1e-9, high - low);
+  let size = Math.pow(10, Math.floor(Math.log10(span / most)));
+  let step = size;
+  for (let n = 0; span / step > most && n < 60; n++) {
+    step = size * (steps[n % steps.length] ?? 1) * Math.pow(10, Math.floor(n / steps.length));
+  }
+  const out = [];
+  for (let value = Math.ceil(low / step - 1e-9) * step; value <= high + 1e-9 * step; value += step) out.push(Number(value.toFixed(9)));
+  return out;
+}
+
+/** A scale bar: a round length and its pixels, at most so wide. @param {number} scale px a metre @param {number} most px */
+export function scaleBar(scale, most) {
+  const longest = most / scale;
+  const size = Math.pow(10, Math.floor(Math.log10(longest)));
+  const metres = [5, 2, 1].map((n) => n * size).find((m) => m <= longest) ?? size;
+  return { metres, pixels: metres * scale };
+}

@@ -1,0 +1,444 @@
+// The chart: own water first. Metres on a local frame; symbols and words stay upright and of one size.
+import { get, picture, set, svg } from "./dom.js";
+import { bearing, distance, duration, percent } from "./format.js";
+import { byTack, matrix, moved, path, project, riskClass, scaleBar, unproject } from "./geometry.js";
+
+/** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Area} Area @typedef {import("../../view/view").Past} Past @typedef {import("./geometry.js").Point} Point @typedef {import("./geometry.js").Camera} Camera */
+
+const ROOM = 1.25;
+const LAY_M = 4000;
+
+/** @type {Camera} */
+const camera = { centre: [0, 0], scale: 1, up: 0, width: 600, height: 400 };
+/** @typedef {{way: Point[], risks: (number | null)[]}} Preview */
+/** @type {{up: string, follow: boolean, fitted: boolean, view: View | null, area: Area | null, past: Past | null, preview: Preview | null, picks: ((en: Point) => void) | null}} */
+const state = { up: "north", follow: true, fitted: false, view: null, area: null, past: null, preview: null, picks: null };
+/** @type {Record<string, SVGElement>} */
+const layers = {};
+const root = picture("map");
+
+export function build() {
+  const world = svg("g", { class: "world" });
+  for (const name of ["limits", "grown", "obstacles", "fan", "track"]) world.append(layers[name] = svg("g", { class: name }));
+  root.append(svg("defs", {}, pattern()), layers.world = world);
+  for (const name of ["grid", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "boat", "furniture"]) {
+    root.append(layers[name] = svg("g", { class: name }));
+  }
+  new ResizeObserver(() => { measure(); draw(); }).observe(root);
+  measure();
+  listen();
+}
+
+function pattern() {
+  return svg("pattern", { id: "hatch", width: 6, height: 6, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" },
+    svg("line", { x1: 0, y1: 0, x2: 0, y2: 6, class: "hatch" }));
+}
+
+function measure() {
+  const box = root.getBoundingClientRect();
+  camera.width = Math.max(50, box.width);
+  camera.height = Math.max(50, box.height);
+}
+
+/** @param {View | null} view @param {Area | null} area @param {Past | null} past */
+export function show(view, area, past) {
+  state.view = view;
+  state.past = past;
+  if (area !== state.area) { state.area = area; water(); }
+  if (!state.fitted && (area !== null || view?.boat.at_en_m)) { all(); state.fitted = true; }
+  draw();
+}
+
+/** @param {Preview | null} preview */
+export function showPreview(preview) {
+  state.preview = preview;
+  draw();
+}
+
+/** Let the next click choose a place. @param {((en: Point) => void) | null} picks */
+export function pick(picks) {
+  state.picks = picks;
+  root.classList.toggle("picking", picks !== null);
+}
+
+/** @param {string} up */
+export function orient(up) {
+  state.up = up;
+  for (const button of document.querySelectorAll("[data-up]")) {
+    set(button, { "aria-pressed": /** @type {HTMLElement} */ (button).dataset.up === up ? "true" : "false" });
+  }
+  draw();
+}
+
+/** @param {boolean} follow */
+export function follow(follow) {
+  state.follow = follow;
+  set(get("follow"), { "aria-pressed": follow ? "true" : "false" });
+  draw();
+}
+
+export function isFollowing() {
+  return state.follow;
+}
+
+/** @param {number} factor */
+export function zoom(factor) {
+  camera.scale = Math.min(60, Math.max(0.002, camera.scale * factor));
+  draw();
+}
+
+/** Show all that matters: the way left, where she was, the goals. */
+export function all() {
+  /** @type {Point[]} */
+  const points = [];
+  const { view, past, area } = state;
+  if (view) {
+    for (const goal of view.goals) points.push(goal.at_en_m);
+    for (const leg of view.plan?.legs ?? []) points.push(leg.from_en_m, leg.to_en_m);
+    if (view.boat.at_en_m) points.push(view.boat.at_en_m);
+    if (view.home) points.push(view.home.at_en_m);
+  }
+  if (past) for (let n = 0; n < past.t_s.length; n++) {
+    const e = past.east_m[n], m = past.north_m[n];
+    if (e !== null && e !== undefined && m !== null && m !== undefined) points.push([e, m]);
+  }
+  if (points.length < 2 && area) for (const shape of [...area.limits, ...area.obstacles]) points.push(...(shape[0] ?? []));
+  if (points.length === 0) return;
+  const low = [Math.min(...points.map((p) => p[0])), Math.min(...points.map((p) => p[1]))];
+  const high = [Math.max(...points.map((p) => p[0])), Math.max(...points.map((p) => p[1]))];
+  const wide = Math.max(40, (high[0] ?? 0) - (low[0] ?? 0)), tall = Math.max(40, (high[1] ?? 0) - (low[1] ?? 0));
+  camera.centre = [((low[0] ?? 0) + (high[0] ?? 0)) / 2, ((low[1] ?? 0) + (high[1] ?? 0)) / 2];
+  camera.scale = Math.min(camera.width / wide, camera.height / tall) / ROOM;
+  follow(false);
+}
+
+/** What does not move. */
+function water() {
+  for (const name of ["limits", "grown", "obstacles"]) layers[name]?.replaceChildren();
+  if (state.area === null) return;
+  const rings = (/** @type {[number, number][][]} */ shape) => shape.map((ring) => path(ring, true)).join("");
+  const draw = (/** @type {string} */ name, /** @type {[number, number][][][]} */ shapes) =>
+    layers[name]?.append(svg("path", { d: shapes.map(rings).join(""), "fill-rule": "evenodd" }));
+  draw("grown", state.area.grown);
+  draw("obstacles", state.area.obstacles);
+  draw("limits", state.area.limits);
+}
+
+function draw() {
+  const { view } = state;
+  const boat = view?.boat;
+  const wind = view?.wind?.mean_twd_from_deg ?? view?.wind?.twd_from_deg ?? null;
+  camera.up = state.up === "head" ? boat?.heading_deg ?? boat?.cog_deg ?? 0 : state.up === "wind" ? wind ?? 0 : 0;
+  if (state.follow && boat?.at_en_m) {
+    camera.centre = state.up === "north" ? boat.at_en_m : moved(boat.at_en_m, camera.up, 0.15 * camera.height / camera.scale);
+  }
+  set(/** @type {SVGElement} */ (layers.world), { transform: matrix(camera) });
+  const at = (/** @type {Point} */ en) => project(camera, en);
+  grid(at);
+  track();
+  laylines(view, at);
+  wedge(view, at);
+  plan(view, at);
+  expected(view, at);
+  previewed(at);
+  places(view, at);
+  vessels(view, at);
+  own(view, at);
+  furniture(view, wind);
+}
+
+/** @param {string} name @param {SVGElement[]} children */
+function fill(name, children) {
+  layers[name]?.replaceChildren(...children);
+}
+
+/** @param {(en: Point) => Point} at */
+function grid(at) {
+  const step = scaleBar(camera.scale, 170).metres;
+  const corners = [[0, 0], [camera.width, 0], [0, camera.height], [camera.width, camera.height]].map(
+    (p) => unproject(camera, /** @type {Point} */ (p)));
+  const es = corners.map((p) => p[0]), ns = corners.map((p) => p[1]);
+  const lines = [];
+  for (let e = Math.ceil(Math.min(...es) / step) * step; e <= Math.max(...es); e += step) {
+    lines.push(path([at([e, Math.min(...ns)]), at([e, Math.max(...ns)])]));
+  }
+  for (let n = Math.ceil(Math.min(...ns) / step) * step; n <= Math.max(...ns); n += step) {
+    lines.push(path([at([Math.min(...es), n]), at([Math.max(...es), n])]));
+  }
+  fill("grid", [svg("path", { d: lines.join("") })]);
+}
+
+function track() {
+  const past = state.past;
+  if (past === null) return fill("track", []);
+  // what has not come yet of a recorded voyage is shown faintly: what was known then against what came
+  const now = state.view?.t_s ?? Infinity;
+  let count = past.t_s.length;
+  while (count > 0 && (past.t_s[count - 1] ?? 0) > now + 0.05) count -= 1;
+  const pieces = byTack(past.east_m.slice(0, count), past.north_m.slice(0, count), past.starboard.slice(0, count));
+  const children = pieces.map((piece) => svg("path", {
+    d: path(piece.points), class: piece.starboard === null ? "unknown" : piece.starboard ? "starboard" : "port" }));
+  if (count < past.t_s.length) {
+    const rest = byTack(past.east_m.slice(Math.max(0, count - 1)), past.north_m.slice(Math.max(0, count - 1)), []);
+    children.unshift(...rest.map((piece) => svg("path", { d: path(piece.points), class: "tocome" })));
+  }
+  fill("track", children);
+}
+
+/** @param {View | null} view @param {(en: Point) => Point} at */
+function laylines(view, at) {
+  const lay = view?.laylines;
+  if (!lay) return fill("lay", []);
+  /** @type {SVGElement[]} */
+  const children = [];
+  for (const line of lay.lines) {
+    const end = (/** @type {number} */ off) => at(moved(lay.mark_en_m, line.course_deg + 180 + off, LAY_M));
+    children.push(svg("path", { class: `fan ${line.tack}`, d: path([at(lay.mark_en_m), end(-line.swing_deg), end(line.swing_deg)], true) }));
+    children.push(svg("path", { class: `line ${line.tack}`, d: path([at(lay.mark_en_m), end(0)]) }));
+  }
+  fill("lay", children);
+}
+
+/** The no-go zone about the boat, now, in a minute and in five. @param {View | null} view @param {(en: Point) => Point} at */
+function wedge(view, at) {
+  const boat = view?.boat.at_en_m, zone = view?.no_go;
+  if (!boat || !zone) return fill("wedge", []);
+  const [x, y] = at(boat);
+  /** @type {SVGElement[]} */
+  const children = [];
+  [...zone.wedges].reverse().forEach((one, n) => {
+    const radius = 46 + 16 * (zone.wedges.length - 1 - n);
+    const side = (/** @type {number} */ degrees) => {
+      const angle = (degrees - camera.up) * Math.PI / 180;
+      return [x + radius * Math.sin(angle), y - radius * Math.cos(angle)];
+    };
+    const [a, b] = [side(one.from_deg - one.half_deg), side(one.from_deg + one.half_deg)];
+    const large = one.half_deg > 90 ? 1 : 0;
+    children.push(svg("path", { class: `zone z${zone.wedges.length - 1 - n}`,
+      d: `M${x} ${y}L${a[0]} ${a[1]}A${radius} ${radius} 0 ${large} 1 ${b[0]} ${b[1]}Z` }));
+  });
+  fill("wedge", children);
+}
+
+/** @param {View | null} view @param {(en: Point) => Point} at */
+function plan(view, at) {
+  /** @type {SVGElement[]} */
+  const children = [];
+  const legs = view?.plan?.legs ?? [];
+  legs.forEach((leg, n) => {
+    if (leg.is_loiter) return;
+    const from = n === 0 && view?.boat.at_en_m ? leg.from_en_m : leg.from_en_m;
+    children.push(svg("path", { d: path([at(from), at(leg.to_en_m)]), class: `leg r${riskClass(leg.risk)}${leg.is_beat ? " beat" : ""}` }));
+  });
+  legs.forEach((leg, n) => {
+    if (leg.is_loiter) return;
+    const [x, y] = at(leg.to_en_m);
+    children.push(svg("circle", { cx: x, cy: y, r: 3, class: "waypoint" }));
+    const words = [];
+    if (leg.manoeuvre && n > 0) words.push(leg.manoeuvre);
+    if (leg.risk !== null && leg.risk >= 0.02) words.push(percent(leg.risk));
+    const [a, b] = [at(leg.from_en_m), at(leg.to_en_m)];
+    if (words.length && Math.hypot(a[0] - b[0], a[1] - b[1]) > 45) {
+      const off = 11 / Math.max(1, Math.hypot(b[0] - a[0], b[1] - a[1]));
+      const right = (b[1] - a[1]) > 0 === (b[0] - a[0]) > 0;
+      children.push(svg("text", { x: (a[0] + b[0]) / 2 + off * Math.abs(b[1] - a[1]), y: (a[1] + b[1]) / 2 + (right ? -4 : 12), class: "word" }, words.join(" ")));
+    }
+  });
+  fill("plan", children);
+}
+
+/** @param {View | null} view @param {(en: Point) => Point} at */
+function expected(view, at) {
+  const ahead = view?.predicted ?? [];
+  const children = [svg("path", { d: path(ahead.map((p) => at(p.at_en_m))), class: "way" })];
+  let minute = 60;
+  for (let n = 1; n < ahead.length; n++) {
+    const a = ahead[n - 1], b = ahead[n];
+    if (!a || !b) continue;
+    while (minute <= b.in_s && b.in_s > a.in_s) {
+      const f = (minute - a.in_s) / (b.in_s - a.in_s);
+      const [x, y] = at([a.at_en_m[0] + f * (b.at_en_m[0] - a.at_en_m[0]), a.at_en_m[1] + f * (b.at_en_m[1] - a.at_en_m[1])]);
+      children.push(svg("circle", { cx: x, cy: y, r: 2.2, class: "minute" }), svg("text", { x: x + 5, y: y - 4, class: "word small" }, `${minute / 60}′`));
+      minute += 60;
+    }
+  }
+  fill("ahead", children);
+}
+
+/** @param {(en: Point) => Point} at */
+function previewed(at) {
+  const preview = state.preview;
+  if (preview === null) return fill("preview", []);
+  const children = [];
+  for (let n = 1; n < preview.way.length; n++) {
+    const a = preview.way[n - 1], b = preview.way[n];
+    if (a && b) children.push(svg("path", { d: path([at(a), at(b)]), class: `leg r${riskClass(preview.risks[n - 1])}` }));
+  }
+  const end = preview.way[preview.way.length - 1];
+  if (end) {
+    const [x, y] = at(end);
+    children.push(svg("circle", { cx: x, cy: y, r: 9, class: "target" }), svg("path", { d: `M${x - 14} ${y}h28M${x} ${y - 14}v28`, class: "target" }));
+  }
+  fill("preview", children);
+}
+
+/** @param {View | null} view @param {(en: Point) => Point} at */
+function places(view, at) {
+  const children = [];
+  /** @type {[Point, string, string][]} */
+  const words = [];
+  for (const goal of view?.goals ?? []) {
+    const [x, y] = at(goal.at_en_m);
+    const kind = goal.is_reached ? "reached" : goal.is_next ? "next" : "later";
+    if (goal.radius_m) children.push(svg("circle", { cx: x, cy: y, r: Math.max(3, goal.radius_m * camera.scale), class: `goal ${kind}` }));
+    if (goal.line_en_m) {
+      const [p, s] = goal.line_en_m.map(at);
+      if (p && s) children.push(svg("path", { d: path([p, s]), class: `gate ${kind}` }), svg("circle", { cx: p[0], cy: p[1], r: 4, class: "mark port" }), svg("circle", { cx: s[0], cy: s[1], r: 4, class: "mark starboard" }));
+    }
+    children.push(svg("path", { d: `M${x} ${y - 6}l5 9h-10z`, class: `goal flag ${kind}` }));
+    words.push([[x + 9, y - 6], goal.name + (goal.side ? ` (${goal.side})` : ""), kind]);
+  }
+  for (const refuge of view?.refuges ?? []) {
+    const [x, y] = at(refuge.at_en_m);
+    children.push(svg("rect", { x: x - 5, y: y - 5, width: 10, height: 10, class: "refuge" }));
+    words.push([[x + 9, y + 4], refuge.name || "refuge", "refuge"]);
+  }
+  if (view?.home) {
+    const [x, y] = at(view.home.at_en_m);
+    children.push(svg("path", { d: `M${x} ${y - 6}l6 5v6h-12v-6z`, class: "home" }));
+    words.push([[x + 9, y + 14], "home", "home"]);
+  }
+  if (view?.safe_end && view.plan) {
+    const [x, y] = at(view.safe_end.at_en_m);
+    children.push(svg("circle", { cx: x, cy: y, r: 7, class: "safeend" }));
+    if (!view.goals.some((goal) => Math.hypot(at(goal.at_en_m)[0] - x, at(goal.at_en_m)[1] - y) < 30)) words.push([[x + 9, y + 14], "safe end", "safeend"]);
+  }
+  if (view?.orders.standing?.at_en_m) {
+    const [x, y] = at(view.orders.standing.at_en_m);
+    children.push(svg("path", { d: `M${x - 8} ${y}h16M${x} ${y - 8}v16`, class: "ordered" }));
+    words.push([[x + 9, y + 4], "ordered", "ordered"]);
+  }
+  /** @type {Point[]} */
+  const taken = [];
+  for (const [[x, y], text, kind] of words) {
+    let line = y;
+    while (taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - line) < 12)) line += 12;
+    taken.push([x, line]);
+    children.push(svg("text", { x, y: line, class: `word ${kind}` }, text));
+  }
+  fill("places", children);
+}
+
+/** @param {View | null} view @param {(en: Point) => Point} at */
+function vessels(view, at) {
+  const children = [];
+  for (const vessel of view?.vessels ?? []) {
+    if (!vessel.at_en_m) continue;
+    const [x, y] = at(vessel.at_en_m);
+    const heading = vessel.heading_deg ?? vessel.course_deg;
+    const alarm = vessel.alarm && vessel.alarm !== "none" ? vessel.alarm : "clear";
+    if (vessel.cpa_en_m && vessel.own_cpa_en_m && view?.boat.at_en_m) {
+      const [a, b] = [at(vessel.cpa_en_m), at(vessel.own_cpa_en_m)];
+      children.push(svg("path", { d: path([[x, y], a]), class: "vector" }), svg("path", { d: path([at(view.boat.at_en_m), b]), class: "vector own" }),
+        svg("path", { d: path([a, b]), class: `cpa ${alarm}` }));
+      children.push(svg("circle", { cx: a[0], cy: a[1], r: 4, class: `ghost ${alarm}` }));
+    }
+    const length = Math.max(16, (vessel.length_m ?? 12) * camera.scale), beam = Math.max(7, (vessel.beam_m ?? 4) * camera.scale);
+    children.push(heading === null
+      ? svg("rect", { x: x - 5, y: y - 5, width: 10, height: 10, class: `vessel ${alarm}`, transform: `rotate(45 ${x} ${y})` })
+      : svg("path", { d: `M0 ${-length / 2}L${beam / 2} ${-length / 6}V${length / 2}H${-beam / 2}V${-length / 6}Z`, class: `vessel ${alarm}`, transform: `translate(${x} ${y}) rotate(${heading - camera.up})` }));
+    const cpa = vessel.cpa_s === null ? "opening" : `CPA ${distance(vessel.cpa_m)} in ${duration(vessel.cpa_s)}`;
+    children.push(svg("text", { x: x + beam / 2 + 6, y: y - 4, class: `word vesselword ${alarm}` }, vessel.name),
+      svg("text", { x: x + beam / 2 + 6, y: y + 9, class: `word small vesselword ${alarm}` }, cpa));
+  }
+  fill("vessels", children);
+}
+
+/** @param {View | null} view @param {(en: Point) => Point} at */
+function own(view, at) {
+  const boat = view?.boat;
+  if (!boat?.at_en_m) return fill("boat", []);
+  const [x, y] = at(boat.at_en_m);
+  const children = [];
+  if (boat.cog_deg !== null && boat.sog_mps !== null && boat.sog_mps > 0.2) {
+    children.push(svg("path", { d: path([[x, y], at(moved(boat.at_en_m, boat.cog_deg, 30 * boat.sog_mps))]), class: "course" }));
+  }
+  const turn = boat.heading_deg ?? boat.cog_deg;
+  children.push(turn === null
+    ? svg("circle", { cx: x, cy: y, r: 6, class: "hull" })
+    : svg("path", { d: "M0-13C5-6 5 3 3.5 9H-3.5C-5 3-5-6 0-13Z", class: "hull", transform: `translate(${x} ${y}) rotate(${turn - camera.up})` }));
+  fill("boat", children);
+}
+
+/** North, wind, scale. @param {View | null} view @param {number | null} wind */
+function furniture(view, wind) {
+  const bar = scaleBar(camera.scale, Math.min(170, camera.width / 3));
+  const x = 14, y = camera.height - 16;
+  const children = [
+    svg("path", { d: `M${x} ${y - 5}v5h${bar.pixels}v-5`, class: "scale" }),
+    svg("text", { x: x + bar.pixels + 6, y: y + 2, class: "word" }, distance(bar.metres).replace(".0", "")),
+    svg("g", { transform: `translate(${camera.width - 30} 34) rotate(${-camera.up})`, class: "north" },
+      svg("path", { d: "M0-18L5 6L0 2L-5 6Z" }), svg("text", { x: 0, y: 19, "text-anchor": "middle", transform: `rotate(${camera.up} 0 15)` }, "N")),
+  ];
+  if (wind !== null) {
+    children.push(svg("g", { transform: `translate(${camera.width - 72} 34) rotate(${wind - camera.up})`, class: "windarrow" }, svg("path", { d: "M0 18V-10M-5 8L0 18L5 8" })),
+      svg("text", { x: camera.width - 72, y: 68, "text-anchor": "middle", class: "word wind" }, bearing(view?.wind?.mean_twd_from_deg ?? wind)));
+  }
+  fill("furniture", children);
+}
+
+function listen() {
+  /** @type {Map<number, Point>} */
+  const down = new Map();
+  let wasMoved = false;
+  const here = (/** @type {PointerEvent | WheelEvent} */ event) => {
+    const box = root.getBoundingClientRect();
+    return /** @type {Point} */ ([event.clientX - box.left, event.clientY - box.top]);
+  };
+  root.addEventListener("pointerdown", (event) => { root.setPointerCapture(event.pointerId); down.set(event.pointerId, here(event)); wasMoved = false; });
+  root.addEventListener("pointermove", (event) => {
+    const from = down.get(event.pointerId);
+    if (from === undefined) return;
+    const to = here(event);
+    if (!wasMoved && Math.hypot(to[0] - from[0], to[1] - from[1]) < 4) return;
+    wasMoved = true;
+    if (down.size === 2) {
+      const other = [...down.entries()].find(([id]) => id !== event.pointerId)?.[1];
+      if (other) zoom(Math.hypot(to[0] - other[0], to[1] - other[1]) / Math.max(1, Math.hypot(from[0] - other[0], from[1] - other[1])));
+    } else {
+      const [a, b] = [unproject(camera, from), unproject(camera, to)];
+      camera.centre = [camera.centre[0] + a[0] - b[0], camera.centre[1] + a[1] - b[1]];
+      if (state.follow) follow(false); else draw();
+    }
+    down.set(event.pointerId, to);
+  });
+  const up = (/** @type {PointerEvent} */ event) => {
+    const at = here(event);
+    if (down.delete(event.pointerId) && !wasMoved && state.picks !== null && event.type === "pointerup") {
+      const picks = state.picks;
+      pick(null);
+      picks(unproject(camera, at));
+    }
+  };
+  root.addEventListener("pointerup", up);
+  root.addEventListener("pointercancel", up);
+  root.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    const at = here(event), before = unproject(camera, at);
+    camera.scale = Math.min(60, Math.max(0.002, camera.scale * Math.exp(-event.deltaY / 500)));
+    const after = unproject(camera, at);
+    if (!state.follow) camera.centre = [camera.centre[0] + before[0] - after[0], camera.centre[1] + before[1] - after[1]];
+    draw();
+  }, { passive: false });
+}
+
+/** Where the chart's metres are on the globe. @param {Point} en @returns {Point | null} latitude, longitude */
+export function onGlobe(en) {
+  const area = state.area;
+  return area === null ? null : [area.origin_lat_deg + en[1] / area.lat_m, area.origin_lon_deg + en[0] / area.lon_m];
+}
+
+/** The place on the screen, for tests. @param {Point} en */
+export function onScreen(en) {
+  return project(camera, en);
+}

@@ -1,0 +1,129 @@
+// State, alarms, figures and tables.
+import { el, get, say, table } from "./dom.js";
+import { atBow, bearing, bearingUnit, clock, distance, duration, figure, NONE, percent, position, speed, speedUnit } from "./format.js";
+import { riskClass } from "./geometry.js";
+
+/** @typedef {import("../../view/view").View} View */
+
+const OLD_S = 5;
+
+/** @param {View | null} view @param {string} kind */
+export function show(view, kind) {
+  say("name", view?.name || "Companion");
+  document.title = view ? `${view.name}: ${view.state.phase}` : "Companion";
+  say("kind", { live: "live", radio: "by radio", recorded: "recorded" }[kind] ?? kind);
+  say("phase", view?.state.phase ?? "not heard");
+  get("phase").dataset.phase = view?.state.phase ?? "";
+  say("why", view ? [view.state.why, view.state.task].filter(Boolean).join(" · ") : "");
+  say("mode", view?.state.mode ? `${view.state.mode}${view.state.is_armed === false ? ", disarmed" : view.state.is_armed ? ", armed" : ""}` : NONE);
+  say("clock", view ? clock(view.unix_s, view.t_s) : NONE);
+  alarms(view);
+  figures(view);
+  plan(view);
+  tables(view);
+}
+
+/** How old the data are, with what has passed since they came. @param {View | null} view @param {number} since_s @param {boolean} isLost */
+export function age(view, since_s, isLost) {
+  const age_s = view && view.age_s !== null ? view.age_s + since_s : null;
+  const isOld = isLost || (age_s !== null && age_s > OLD_S);
+  say("age", age_s === null ? NONE : age_s < 2 ? "now" : `${duration(age_s)} old`);
+  document.body.classList.toggle("stale", isOld);
+  const strip = get("stale");
+  strip.hidden = !isOld;
+  if (isOld) {
+    const words = isLost ? `No link to the companion. What is shown is ${age_s === null ? "not" : duration(age_s)} old` : `Data ${duration(age_s)} old: the boat is not heard`;
+    if (strip.textContent !== words) strip.textContent = words;
+  }
+}
+
+/** @param {View | null} view */
+function alarms(view) {
+  const wanted = (view?.alarms ?? []).map((alarm) => ({ key: `${alarm.code}|${alarm.level}`, ...alarm }));
+  const box = get("alarms");
+  const have = new Map([...box.children].map((child) => [/** @type {HTMLElement} */ (child).dataset.key, child]));
+  for (const [key, child] of have) if (!wanted.some((a) => a.key === key)) child.remove();
+  for (const alarm of wanted) {
+    const known = have.get(alarm.key);
+    // the age runs on; only the words are read out
+    const words = alarm.text;
+    if (known) {
+      const text = known.querySelector("p");
+      if (text && text.textContent !== words) text.textContent = words;
+      const since = known.querySelector("time");
+      if (since) since.textContent = duration(alarm.age_s);
+    } else {
+      box.append(el("div", { class: `alarm ${alarm.level}`, "data-key": alarm.key }, el("strong", {}, alarm.level), el("p", {}, words), el("time", { "aria-hidden": "true" }, duration(alarm.age_s))));
+    }
+  }
+}
+
+/** @param {string} name @param {string} value @param {string} unit @param {string} [kind] */
+function one(name, value, unit, kind = "") {
+  return el("div", { class: kind }, el("dt", {}, name), el("dd", {}, value, value === NONE || !unit ? "" : el("small", {}, ` ${unit}`)));
+}
+
+/** @param {View | null} view */
+function figures(view) {
+  const boat = view?.boat, wind = view?.wind, plan = view?.plan;
+  const tack = boat?.tack ?? "";
+  get("figures").replaceChildren(
+    one("TWA", atBow(wind?.twa_deg), "", tack), one("AWA", atBow(wind?.awa_deg), "", tack),
+    one("AWS", speed(wind?.aws_mps), speedUnit()), one("VMG", speed(boat?.vmg_mps), speedUnit()),
+    one("COG", bearing(boat?.cog_deg), bearingUnit()), one("to mark", distance(boat?.goal_m), ""),
+    one("TWD σ 1 min", wind?.sigma_deg == null ? NONE : `±${figure(wind.sigma_deg, 0)}°`, ""), one("clearance", distance(boat?.clearance_m), ""),
+    one("next tack", duration(plan?.next_tack_s), ""), one("risk, instant", percent(plan?.promised_risk), ""),
+    one("off the leg", boat?.cross_track_m == null ? NONE : `${figure(Math.abs(boat.cross_track_m), 1)} m ${boat.cross_track_m < -0.05 ? "left" : boat.cross_track_m > 0.05 ? "right" : ""}`, ""),
+    one("battery", figure(boat?.battery_v, 1), boat?.battery_share == null ? "V" : `V ${percent(boat.battery_share)}`));
+}
+
+/** @param {View | null} view */
+function plan(view) {
+  const p = view?.plan;
+  say("planwhy", p ? p.why || "The plan in force gives no reason." : view ? "There is no plan." : "");
+  const facts = !p ? [] : [
+    ["plan", `${p.number ?? NONE}${p.reason ? `, for ${p.reason.replaceAll("_", " ")}` : ""}`], ["age", duration(p.age_s)],
+    ["made for", p.twd_from_deg === null ? NONE : `${bearing(p.twd_from_deg)} ${speed(p.tws_mps)} ${speedUnit()}`],
+    ["time", p.cost_s === null ? NONE : `${duration(p.cost_s)}${p.bound_s ? `, no less than ${duration(p.bound_s)}` : ""}`],
+    ["risk each instant", percent(p.promised_risk)], ["risk of it all", percent(p.path_risk)],
+    ["margin", distance(p.margin_m)], ["leg", `${p.leg ?? NONE} of ${p.count ?? NONE}`],
+    ...(p.rung ? [["found by", p.rung]] : []), ...(p.bound_for ? [["bound for", p.bound_for]] : [])];
+  get("planfacts").replaceChildren(...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
+  const legs = p?.legs ?? [];
+  const first = p?.leg ?? 1;
+  keep("plantable", table("Legs that are left", ["leg", "risk", "course", "TWA", "length", "no-go", "over margin"], legs.map((leg, n) => [
+    `${first + n}${leg.is_loiter ? " loiter" : leg.manoeuvre ? ` ${leg.manoeuvre}` : ""}`, el("span", { class: `risk r${riskClass(leg.risk)}` }, leg.is_beat ? `${percent(leg.risk)} beat` : percent(leg.risk)),
+    bearing(leg.course_deg), atBow(leg.twa_deg), leg.is_loiter ? NONE : distance(leg.length_m), figure(leg.no_go_half_deg, 0, "°"), distance(leg.clearance_m)])));
+}
+
+/** Replace a table without moving who reads it. @param {string} id @param {Element} content */
+function keep(id, content) {
+  const box = get(id), top = box.scrollTop, left = box.scrollLeft;
+  box.replaceChildren(content);
+  box.scrollTop = top;
+  box.scrollLeft = left;
+}
+
+/** @param {View | null} view */
+function tables(view) {
+  keep("vesseltable", table("Vessels", ["vessel", "range", "bearing", "CPA", "in", "alarm", "we must", "report"], (view?.vessels ?? []).map((v) => [
+    v.name, distance(v.range_m), bearing(v.bearing_deg), distance(v.cpa_m), v.cpa_s === null ? "opening" : duration(v.cpa_s),
+    el("span", { class: `grade ${v.alarm || "none"}` }, v.alarm || NONE), v.role ? `${v.role}${v.rule ? ` (${v.rule})` : ""}` : NONE, v.age_s === null ? NONE : `${duration(v.age_s)} old`])));
+  const wind = view?.wind, zone = view?.no_go;
+  keep("windtable", table(`Forecast${zone ? `; the no-go zone holds with ${percent(zone.probability)}` : ""}`, ["in", "TWD", "σ", "80 %", "95 %", `TWS ${speedUnit()}`, "no-go"], (wind?.bands ?? []).map((band) => {
+    const wedge = zone?.wedges.find((w) => w.horizon_s === band.horizon_s);
+    const half = (/** @type {number} */ level) => { const n = wind?.levels.indexOf(level) ?? -1; return n < 0 ? NONE : `±${figure(band.half_deg[n], 0)}°`; };
+    return [band.horizon_s === 0 ? "now" : duration(band.horizon_s), bearing(band.twd_from_deg), figure(band.sigma_deg, 1, "°"), half(0.8), half(0.95), `${speed(band.tws_mps)} ± ${speed(band.tws_sigma_mps)}`,
+      wedge ? `±${figure(wedge.half_deg, 0)}° (+${figure(wedge.widening_deg, 0)}°)` : NONE];
+  })));
+  keep("goaltable", table("Goals and places", ["place", "kind", "distance", "bearing"], [
+    ...(view?.goals ?? []).map((g) => [g.name, `${g.kind}${g.side ? `, to ${g.side}` : ""}${g.is_reached ? ", reached" : g.is_next ? ", next" : ""}`, distance(g.distance_m), bearing(g.bearing_deg)]),
+    ...(view?.refuges ?? []).map((r) => [r.name || "refuge", "refuge", NONE, NONE]),
+    ...(view && view.boat.lat_deg !== null && view.boat.lon_deg !== null ? [["boat", position(view.boat.lat_deg, view.boat.lon_deg), NONE, NONE]] : [])]));
+  keep("healthtable", table("Health of every part", ["part", "is", "says", "age"], (view?.health ?? []).map((part) => [
+    part.name, el("span", { class: `grade ${part.grade}` }, part.grade), part.text || NONE, part.age_s === null ? NONE : duration(part.age_s)])));
+  const f = view?.figures;
+  keep("voyagetable", table("The voyage so far", ["figure", "value"], !f ? [] : [
+    ["time under way", duration(f.time_s)], ["distance", distance(f.distance_m)], ["tacks, gybes", `${f.tacks ?? NONE}, ${f.gybes ?? NONE}`], ["plans, replans", `${f.plans ?? NONE}, ${f.replans ?? NONE}`],
+    ["least clearance", distance(f.min_clearance_m)], ["contacts", figure(f.contacts)], ["no-go entries", figure(f.no_go_entries)], ["goals reached", `${f.goals_reached ?? NONE} of ${f.goals ?? NONE}`]]));
+}

@@ -1,0 +1,118 @@
+// Histories: direction, strength, speed, clearance; with what was forecast a minute before, and what is forecast now.
+import { picture, svg } from "./dom.js";
+import { bearing, clock, distance, scaled, speed, speedUnit } from "./format.js";
+import { marks, path, unwrapped, wrap } from "./geometry.js";
+
+/** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Past} Past @typedef {import("./geometry.js").Point} Point */
+/** @typedef {{name: string, unit: string, values: (number | null)[], low: (number | null)[], high: (number | null)[], ahead: [number, number, number][], label: (v: number) => string, now: string, least: number, line: number | null, floor: number | null, steps: number[]}} Strip */
+
+const LEFT = 58, RIGHT = 64, TALL = 92, GAP = 10, TOP = 6, FOOT = 20;
+const AHEAD_S = 60;
+const root = picture("stripchart");
+let windowS = 600;
+
+/** @param {number} seconds */
+export function over(seconds) {
+  windowS = seconds;
+}
+
+/** @param {View | null} view @param {Past | null} past @param {number | null} margin */
+export function show(view, past, margin) {
+  const width = Math.max(280, root.clientWidth || 600);
+  const height = TOP + 4 * (TALL + GAP) + FOOT;
+  root.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  root.style.height = `${height}px`;
+  if (!view || !past || past.t_s.length === 0) return root.replaceChildren();
+  const now = view.t_s;
+  const begin = Math.max(past.t_s[0] ?? 0, now - windowS);
+  const ahead = Math.min(300, Math.max(60, 0.18 * (now - begin)));
+  const end = now + ahead;
+  let first = 0, last = past.t_s.length;
+  while (first < last && (past.t_s[first] ?? 0) < begin - AHEAD_S - 5) first += 1;
+  while (last > first && (past.t_s[last - 1] ?? 0) > now + 0.05) last -= 1;
+  const cut = (/** @type {readonly any[]} */ column) => column.slice(first, last);
+  const t = cut(past.t_s);
+  const x = (/** @type {number} */ at) => LEFT + (width - LEFT - RIGHT) * (at - begin) / Math.max(1, end - begin);
+  const children = [];
+  const every = Math.max(60, marks(0, (end - begin) / 60, Math.max(2, Math.floor(width / 130)), [1, 2, 5])[1] ?? 1) && 60 * (marks(0, (end - begin) / 60, Math.max(2, Math.floor(width / 130)), [1, 2, 5])[1] ?? 1);
+  const bottom = TOP + 4 * (TALL + GAP) - GAP;
+  for (let at = Math.ceil(begin / every) * every; at <= end; at += every) {
+    children.push(svg("path", { class: "grid", d: path([[x(at), TOP], [x(at), bottom]]) }),
+      svg("text", { x: x(at), y: bottom + 15, class: "axis middle" }, past.unix_s === null ? clock(null, at) : clock(past.unix_s + at).slice(0, 5)));
+  }
+  for (const [n, strip] of strips(view, past, cut, now, margin).entries()) {
+    children.push(...draw(strip, TOP + n * (TALL + GAP), t, x, now, width, begin));
+  }
+  children.push(svg("path", { class: "present", d: path([[x(now), TOP], [x(now), bottom]]) }));
+  root.replaceChildren(...children);
+}
+
+/** @param {View} view @param {Past} past @param {(column: readonly any[]) => any[]} cut @param {number} now @param {number | null} margin @returns {Strip[]} */
+function strips(view, past, cut, now, margin) {
+  const twd = unwrapped(cut(past.twd_from_deg));
+  const base = [...twd].reverse().find((v) => v !== null) ?? 0;
+  const near = (/** @type {number | null} */ value, /** @type {number | null | undefined} */ to) => value === null || value === undefined ? null : (to ?? base) + wrap(value - (to ?? base));
+  const mean = cut(past.ahead_twd_deg).map((v, n) => near(v, twd[n]));
+  const half = cut(past.ahead_half_deg);
+  const tws = cut(past.ahead_tws_mps), sigma = cut(past.ahead_tws_sigma_mps);
+  const off = (/** @type {(number | null)[]} */ a, /** @type {(number | null)[]} */ b, /** @type {number} */ k) => a.map((v, n) => v === null || b[n] === null || b[n] === undefined ? null : v + k * /** @type {number} */ (b[n]));
+  const levels = view.wind?.levels ?? [];
+  const at80 = levels.indexOf(0.8);
+  const bands = view.wind?.bands ?? [];
+  return [
+    { name: "TWD", unit: "", values: twd, low: off(mean, half, -1), high: off(mean, half, 1), steps: [1, 2, 3, 4.5], line: null, floor: null, least: 20,
+      ahead: bands.map((b) => { const m = near(b.twd_from_deg, base) ?? 0, h = b.half_deg[at80] ?? b.sigma_deg; return [now + b.horizon_s, m - h, m + h]; }),
+      label: (v) => bearing(v), now: bearing(view.wind?.twd_from_deg) },
+    { name: "TWS", unit: speedUnit(), values: cut(past.tws_mps), low: off(tws, sigma, -1.28), high: off(tws, sigma, 1.28), steps: [1, 2, 5], line: null, floor: 0, least: 2,
+      ahead: bands.map((b) => [now + b.horizon_s, b.tws_mps - 1.28 * b.tws_sigma_mps, b.tws_mps + 1.28 * b.tws_sigma_mps]),
+      label: (v) => speed(v, 0), now: speed(view.wind?.tws_mps) },
+    { name: "SOG", unit: speedUnit(), values: cut(past.sog_mps), low: [], high: [], ahead: [], steps: [1, 2, 5], line: null, floor: 0, least: 1, label: (v) => speed(v, 0), now: speed(view.boat.sog_mps) },
+    { name: "clear", unit: "m", values: cut(past.clearance_m), low: [], high: [], ahead: [], steps: [1, 2, 5], line: margin, floor: 0, least: 20, label: (v) => String(Math.round(v)), now: distance(view.boat.clearance_m) },
+  ];
+}
+
+/** @param {Strip} strip @param {number} top @param {number[]} t @param {(at: number) => number} x @param {number} now @param {number} width @param {number} begin */
+function draw(strip, top, t, x, now, width, begin) {
+  const right = width - RIGHT;
+  const shown = strip.values.filter((v, n) => v !== null && (t[n] ?? 0) >= begin).map(Number);
+  const before = [...strip.low, ...strip.high].filter((v, n) => v !== null && (t[n % Math.max(1, strip.low.length)] ?? 0) >= begin - AHEAD_S).map(Number);
+  const bounds = [...shown, ...before, ...strip.ahead.filter((a) => x(a[0]) <= right).flatMap((a) => [a[1], a[2]]), ...(strip.line === null || shown.length === 0 || Math.min(...shown) > 3 * strip.line ? [] : [strip.line])];
+  let low = Math.min(...bounds), high = Math.max(...bounds);
+  if (bounds.length === 0) { low = 0; high = strip.least; }
+  if (strip.floor !== null) low = Math.max(strip.floor, low);
+  const lacks = Math.max(0, strip.least - (high - low)) / 2 + 0.06 * (high - low);
+  low = strip.floor !== null ? Math.max(strip.floor, low - lacks) : low - lacks;
+  high += lacks;
+  const y = (/** @type {number} */ v) => top + TALL - TALL * (Math.min(high, Math.max(low, v)) - low) / Math.max(1e-9, high - low);
+  /** @type {SVGElement[]} */
+  const out = [svg("rect", { x: LEFT, y: top, width: right - LEFT, height: TALL, class: "frame" })];
+  const toUnit = strip.unit === "kn" || strip.unit === "m/s" ? scaled(1) : 1;
+  for (const mark of marks(low * toUnit, high * toUnit, 3, strip.steps)) {
+    const v = mark / toUnit;
+    out.push(svg("path", { class: "grid", d: path([[LEFT, y(v)], [right, y(v)]]) }), svg("text", { x: LEFT - 6, y: y(v) + 4, class: "axis end" }, strip.label(v)));
+  }
+  // what was forecast a minute before for this moment
+  /** @type {Point[]} */ const lows = [];
+  /** @type {Point[]} */ const highs = [];
+  strip.low.forEach((v, n) => {
+    const at = (t[n] ?? 0) + AHEAD_S, h = strip.high[n];
+    if (v !== null && h !== null && h !== undefined && at >= begin && at <= now) { lows.push([x(at), y(v)]); highs.push([x(at), y(h)]); }
+  });
+  if (lows.length > 1) out.push(svg("path", { class: "band", d: path([...lows, ...highs.reverse()], true) }));
+  const coming = strip.ahead.filter((a) => x(a[0]) <= right + 1);
+  if (coming.length > 1) {
+    out.push(svg("path", { class: "coming", d: path([...coming.map((a) => /** @type {Point} */ ([x(a[0]), y(a[1])])), ...coming.reverse().map((a) => /** @type {Point} */ ([x(a[0]), y(a[2])]))], true) }));
+  }
+  if (strip.line !== null && strip.line >= low && strip.line <= high) {
+    out.push(svg("path", { class: "limit", d: path([[LEFT, y(strip.line)], [right, y(strip.line)]]) }), svg("text", { x: right - 4, y: y(strip.line) - 4, class: "axis end" }, "margin"));
+  }
+  /** @type {Point[][]} */ const pieces = [[]];
+  strip.values.forEach((v, n) => {
+    const at = t[n] ?? 0;
+    if (v === null || v === undefined || at < begin) pieces.push([]);
+    else pieces[pieces.length - 1]?.push([x(at), y(v)]);
+  });
+  out.push(svg("path", { class: `line ${strip.name}`, d: pieces.filter((p) => p.length > 1).map((p) => path(p)).join("") }));
+  out.push(svg("text", { x: right + 8, y: top + 14, class: "stripname" }, strip.unit ? `${strip.name} ${strip.unit}` : strip.name), svg("text", { x: right + 8, y: top + 38, class: "stripvalue" }, strip.now.replace(" m", "")));
+  return out;
+}

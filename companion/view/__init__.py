@@ -1,0 +1,18 @@
+"""The view of a voyage: one typed value and its JSON, from a live step, a recorded voyage or what a radio brings.
+
+``ViewFold(voyage, config).take(step, ...)`` aboard, ``recorded_views(folder)`` afterwards, ``HeardFold().take(...)``
+ashore; all give a ``View`` and the ``Event``s that led to it.
+"""
+
+from companion.view.area import Area, area_of, drawn
+from companion.view.events import Event
+from companion.view.fold import ViewFold
+from companion.view.heard import HeardFold
+from companion.view.past import Past, Sample, Trail, sample_of
+from companion.view.recorded import RecordedViews, recorded_views
+from companion.view.values import SCHEMA, View
+
+__all__ = [
+    "SCHEMA", "Area", "Event", "HeardFold", "Past", "RecordedViews", "Sample", "Trail", "View", "ViewFold", "area_of",
+    "drawn", "recorded_views", "sample_of",
+]

@@ -1,0 +1,124 @@
+"""The view of a voyage, step by step: live and from its records alike."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+from companion.fold import Step
+from companion.messages import CompanionStatus
+from companion.planner import Leg
+from companion.planner.explain import bounds_in_words
+from companion.skipper.step import Announce, PlanOutcome, RequestPlan, SkipperConfig
+from companion.skipper.way import PointEn, Voyage
+from companion.telemetry.folder import VoyageFigures
+from companion.view import air, parts, values
+from companion.view.area import area_of
+from companion.view.company import vessels_of
+from companion.view.events import Event, happenings
+from companion.view.numbers import place, rounded, tack_of
+from companion.view.way import Chosen, plan_of, predicted_of, safe_end_of
+from companion.view.wind import laylines_of, no_go_of, polar_of, wind_of
+
+TRACK_S = 60.0        # of the track that each view brings: what a page missed while its link was lost
+TRACK_STEP_S = 3.0
+PLANS_KEPT = 4        # a route may be spliced from as many
+
+
+class ViewFold:
+    """Turns steps into views and events. ``epoch_s``: the Unix time [s] of the voyage's t_s = 0, None: not known."""
+
+    def __init__(
+        self, voyage: Voyage, config: SkipperConfig, *, source: values.Source = "live", epoch_s: float | None = None,
+    ) -> None:
+        self.area = area_of(voyage, config.margin_m)
+        self._voyage, self._config, self._source, self._epoch_s = voyage, config, source, epoch_s
+        self._asked: dict[int, tuple[float, RequestPlan]] = {}
+        self._plans: dict[int, Chosen] = {}
+        self._whys: dict[int, str] = {}
+        self._phase, self._phase_s = "", 0.0
+        self._said: dict[str, str] = {}
+        self._track: deque[tuple[float, PointEn, air.Tack | None]] = deque()
+        self._number = 0
+        self._refuges = tuple(
+            values.Place(name=r.name, at_en_m=place(r.en_m), radius_m=rounded(r.radius_m, 1)) for r in voyage.refuges)
+
+    def unix_s(self, t_s: float) -> float | None:
+        """Return the Unix time at ``t_s`` [s]."""
+        return None if self._epoch_s is None else round(self._epoch_s + t_s, 3)
+
+    def take(
+        self, step: Step, status: CompanionStatus, figures: VoyageFigures,
+    ) -> tuple[values.View, tuple[Event, ...]]:
+        """Return the view at a step, and what happened in it."""
+        t_s = step.snapshot.t_s
+        self._note(step)
+        events = []
+        for found in happenings(step, self._phase, self._whys):
+            self._number += 1
+            events.append(Event(
+                number=self._number, t_s=round(t_s, 2), unix_s=self.unix_s(t_s), kind=found.kind, level=found.level,
+                title=found.title, text=found.text, facts=found.facts))
+        if step.state.phase.value != self._phase:
+            self._phase, self._phase_s = step.state.phase.value, t_s
+        return self._view(step, status, figures), tuple(events)
+
+    def _note(self, step: Step) -> None:
+        """Keep what later views need: plans, what was said, the track."""
+        for action in step.actions:
+            if isinstance(action, RequestPlan):
+                self._asked = {action.request_id: (step.snapshot.t_s, action)}
+            elif isinstance(action, Announce):
+                self._said[action.code] = action.text
+        for outcome in step.snapshot.outcomes:
+            asked = self._asked.get(outcome.request_id) if isinstance(outcome, PlanOutcome) else None
+            if isinstance(outcome, PlanOutcome) and asked is not None and outcome.plan is not None:
+                t_s, request = asked
+                why = bounds_in_words(request.problem, outcome.plan) if outcome.plan.has_path else outcome.plan.reason
+                self._plans[outcome.request_id] = Chosen(
+                    t_s=t_s, reason=request.reason.value, plan=outcome.plan, why=why)
+                self._plans = dict(list(self._plans.items())[-PLANS_KEPT:])
+                self._whys = {number: chosen.why for number, chosen in self._plans.items()}
+        here, t_s = step.snapshot.position_en_m, step.snapshot.t_s
+        if here is not None and (not self._track or t_s - self._track[-1][0] >= TRACK_STEP_S):
+            self._track.append((t_s, place(here), self._tack(step)))
+        while self._track and t_s - self._track[0][0] > TRACK_S:
+            self._track.popleft()
+
+    @staticmethod
+    def _tack(step: Step) -> air.Tack | None:
+        vehicle, twd_rad = step.snapshot.vehicle, step.snapshot.wind.present_twd_from_rad
+        if vehicle is None or twd_rad is None:
+            return None
+        from companion.geo.angles import difference_rad
+
+        return tack_of(difference_rad(twd_rad, vehicle.heading_rad))
+
+    def _view(self, step: Step, status: CompanionStatus, figures: VoyageFigures) -> values.View:
+        snapshot, state, voyage, config = step.snapshot, step.state, self._voyage, self._config
+        t_s, route = snapshot.t_s, step.state.route
+        chosen = None if route is None else self._plans.get(route.plan_id)
+        legs: tuple[Leg, ...] = tuple(leg for known in reversed(self._plans.values()) for leg in known.plan.legs)
+        goals = parts.goals_of(step, voyage)
+        following = next((g for g in goals if g.is_next), None)
+        ages = [a for a in (snapshot.heartbeat_age_s, snapshot.vehicle_age_s) if a is not None]
+        return values.View(
+            source=self._source, name=voyage.name, t_s=round(t_s, 3), unix_s=self.unix_s(t_s), area=self.area.hash,
+            age_s=rounded(min(ages), 1) if ages else None,
+            state=parts.state_of(step, self._phase_s), alarms=parts.alarms(step, status, self._said),
+            boat=parts.boat_of(step, status, voyage), wind=wind_of(step), no_go=no_go_of(step, voyage, config),
+            laylines=None if following is None or state.over else laylines_of(
+                step, voyage, config, following.name, following.at_en_m),
+            polar=polar_of(step, voyage, config),
+            plan=plan_of(step, voyage, chosen, legs),
+            predicted=predicted_of(step, voyage),
+            track=tuple(values.TrackPoint(ago_s=round(t_s - at_s, 1), at_en_m=at, tack=tack)
+                        for at_s, at, tack in self._track),
+            vessels=vessels_of(step), goals=goals, refuges=self._refuges, home=parts.home_of(step, voyage),
+            safe_end=safe_end_of(route), orders=parts.orders_of(step),
+            figures=parts.figures_of(step, figures, voyage), health=parts.health_of(step, status))
+
+
+def aged(view: values.View, passed_s: float) -> values.View:
+    """Return a view with ``passed_s`` more on its age: of a link that has fallen silent."""
+    return view if view.age_s is None else replace(view, age_s=round(view.age_s + passed_s, 1))

@@ -1,0 +1,213 @@
+"""The view of a voyage: whole, true to its step, the same from the records, null where nothing is known."""
+
+import json
+import math
+from dataclasses import replace
+
+import jsonschema
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.fold import Step
+from companion.geo.angles import difference_rad
+from companion.messages import CompanionStatus, GeoPoint, VehicleState, WindForecast
+from companion.skipper.step import SkipperConfig, SkipperState, Snapshot, WindHealth, WindView
+from companion.telemetry.folder import TLOG, VoyageFigures
+from companion.view import Past, ViewFold, recorded_views, sample_of
+from companion.view.schema import files, schema
+from companion.view.wind import apparent, laylines_of, no_go_of
+from tests.view.conftest import write_mission
+
+RULES = {name: jsonschema.Draft202012Validator({**schema(), "$ref": f"#/$defs/{name}"})
+         for name in ("View", "Event", "Area", "Past")}
+
+
+def valid(of, name="View"):
+    RULES[name].validate(json.loads(msgspec.json.encode(of)))
+
+
+def test_the_schema_and_the_pages_types_are_those_of_the_values():
+    for path, text in files().items():
+        assert path.read_text() == text, f"{path.name}: run python -m companion.view.schema"
+
+
+def test_every_view_event_and_area_of_a_voyage_is_what_the_schema_says(beat):
+    assert len(beat.views) > 100
+    for view, events in beat.moments:
+        valid(view)
+        for event in events:
+            valid(event, "Event")
+    valid(beat.area, "Area")
+    valid(Past.of([sample_of(view) for view in beat.views], 0.0), "Past")
+
+
+def test_the_schema_refuses_what_is_no_view(beat):
+    for wrong in ({"source": "guess"}, {"wind": 5.0}, {"surprise": 1}):
+        raw = json.loads(msgspec.json.encode(beat.views[-1])) | wrong
+        with pytest.raises(jsonschema.ValidationError):
+            RULES["View"].validate(raw)
+
+
+def test_under_way_everything_is_there_and_agrees_with_the_step(beat):
+    for view, step in zip(beat.views, beat.steps, strict=True):
+        assert view.state.phase == step.state.phase.value
+        assert view.state.why == step.state.why
+        if step.snapshot.position_en_m is not None:
+            assert view.boat.at_en_m == pytest.approx(step.snapshot.position_en_m, abs=0.06)
+    seen = beat.under_way[len(beat.under_way) // 2]
+    for part in (seen.wind, seen.no_go, seen.polar, seen.plan, seen.safe_end, seen.home):
+        assert part is not None
+    assert seen.predicted
+    assert seen.plan.legs
+    assert seen.area == beat.area.hash
+    assert [g.name for g in seen.goals if g.is_next] == ["mark"]
+    assert [r.name for r in seen.refuges] == ["Bay"]
+    assert {part.name for part in seen.health} >= {"autopilot", "position", "wind", "planner", "records"}
+    assert any(leg.risk is not None for view in beat.under_way for leg in view.plan.legs)
+    assert any(view.laylines is not None and view.laylines.is_beat for view in beat.under_way)
+    assert {v.boat.tack for v in beat.under_way} == {"port", "starboard"}
+
+
+def test_the_order_that_stands_is_seen_and_logged(beat):
+    held = [view for view in beat.views if view.orders.standing is not None]
+    assert held
+    assert {view.orders.standing.verb for view in held} == {"hold"}
+    assert held[-1].orders.standing.age_s > held[0].orders.standing.age_s
+    assert "hold" in held[-1].orders.answer
+    assert set(held[0].orders.permitted) >= {"hold", "go_on", "goal", "stop"}
+    events = [event for _, events in beat.moments for event in events]
+    assert [e.number for e in events] == list(range(1, len(events) + 1))
+    assert {"phase", "ask", "plan", "upload", "order", "answer"} <= {e.kind for e in events}
+    plans = [e for e in events if e.kind == "plan" and e.title.endswith(("found", "optimal"))]
+    assert all(e.text and dict(e.facts)["time"].endswith(" s") for e in plans)
+
+
+def test_the_records_give_the_same_views(beat):
+    """But for what is not in them: the loop's own words about the disk and the feeds."""
+    recorded = recorded_views(beat.folder)
+    assert recorded.is_whole
+    assert recorded.area == beat.area
+    again = list(recorded.moments)
+    assert len(again) == recorded.count == len(beat.moments)
+    for (live, events), (then, events_then) in zip(beat.moments, again, strict=True):
+        assert replace(then, source="live") == live
+        assert [(e.kind, e.title, e.t_s) for e in events] == [(e.kind, e.title, e.t_s) for e in events_then]
+
+
+def test_without_its_telemetry_log_a_voyage_is_seen_by_its_track(beat, tmp_path):
+    for name in ("track.csv", "decisions.jsonl", "area.json", "voyage.toml"):
+        (tmp_path / name).write_bytes((beat.folder / name).read_bytes())
+    assert not (tmp_path / TLOG).exists()
+    recorded = recorded_views(tmp_path)
+    assert not recorded.is_whole
+    moments = list(recorded.moments)
+    assert len(moments) == recorded.count == len(beat.views)
+    for (then, _), live in zip(moments, beat.views, strict=True):
+        valid(then)
+        if live.boat.at_en_m is not None:
+            assert then.boat.at_en_m == pytest.approx(live.boat.at_en_m, abs=0.11)   # rounded twice
+            assert then.boat.tack == live.boat.tack
+    assert {e.kind for _, events in moments for e in events} == {"phase", "plan"}
+
+
+# ------------------------------------------------------------------------------------------ nothing known
+def fold_of(tmp_path):
+    from companion.compose import config_of, voyage_of
+    from companion.geofence import load_mission
+
+    mission = load_mission(write_mission(tmp_path))
+    return ViewFold(voyage_of(mission), config_of(mission))
+
+
+def test_what_is_not_known_is_null_and_never_nought(tmp_path):
+    step = Step(snapshot=Snapshot(t_s=5.0), state=SkipperState(), actions=())
+    view, _ = fold_of(tmp_path).take(step, CompanionStatus(t_s=5.0, state="idle"), VoyageFigures())
+    valid(view)
+    assert (view.wind, view.no_go, view.laylines, view.polar, view.plan, view.safe_end) == (None,) * 6
+    assert view.age_s is None
+    known = {k: v for k, v in msgspec.to_builtins(view.boat).items() if v is not None}
+    assert known == {"length_m": 1.0}
+    parts = {"autopilot", "position", "wind", "mission on board"}
+    assert {p.grade for p in view.health if p.name in parts} == {"unknown"}
+
+
+# -------------------------------------------------------------------------------------------- signs
+ANGLES = st.floats(0.0, 2.0 * math.pi)
+
+
+def vehicle(east_mps, north_mps, heading_rad=0.0):
+    return VehicleState(t_s=0.0, boot_s=0.0, position=GeoPoint(lat_deg=50.8, lon_deg=-1.3),
+                        velocity_en_mps=(east_mps, north_mps), heading_rad=heading_rad)
+
+
+@given(twd=ANGLES, tws=st.floats(0.5, 20.0), heading=ANGLES)
+def test_at_rest_the_apparent_wind_is_the_true_one(twd, tws, heading):
+    awa, aws = apparent(twd, tws, vehicle(0.0, 0.0, heading))
+    assert aws == pytest.approx(tws)
+    assert difference_rad(awa, difference_rad(twd, heading)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_sailing_on_the_apparent_wind_comes_from_further_ahead():
+    heading = math.radians(310.0)   # wind from north: starboard tack, 50 degrees off
+    awa, aws = apparent(0.0, 5.0, vehicle(2.0 * math.sin(heading), 2.0 * math.cos(heading), heading))
+    assert 0.0 < awa < math.radians(50.0)
+    assert aws > 5.0
+
+
+def forecast(sigma_deg):
+    import numpy as np
+
+    horizons = np.array([0.0, 60.0, 300.0])
+    sigma = np.radians(np.array(sigma_deg))
+    return WindForecast(
+        t_s=0.0, horizon_s=horizons, mean_twd_from_rad=np.zeros(3), sigma_twd_rad=sigma, mean_tws_mps=np.full(3, 5.0),
+        sigma_tws_mps=np.full(3, 0.5), level=np.zeros(0), half_width_rad=np.zeros((3, 0)), correlation_time_s=60.0)
+
+
+def step_at(here, sigma_deg=(2.0, 6.0, 12.0), heading_deg=310.0):
+    heading = math.radians(heading_deg)
+    wind = WindView(health=WindHealth.GOOD, forecast=forecast(sigma_deg), mean_twd_from_rad=0.0, mean_tws_mps=5.0,
+                    present_twd_from_rad=0.0, present_tws_mps=5.0)
+    snapshot = Snapshot(t_s=0.0, vehicle=vehicle(2.0 * math.sin(heading), 2.0 * math.cos(heading), heading),
+                        position_en_m=here, wind=wind)
+    return Step(snapshot=snapshot, state=SkipperState(), actions=())
+
+
+def test_the_no_go_zone_widens_by_the_promises_quantile(tmp_path):
+    config = SkipperConfig(delta_s=0.95)
+    zone = no_go_of(step_at((0.0, 0.0)), fold_of(tmp_path)._voyage, config)
+    assert [w.horizon_s for w in zone.wedges] == [0.0, 60.0, 300.0]
+    for wedge, sigma in zip(zone.wedges, (2.0, 6.0, 12.0), strict=True):
+        assert wedge.widening_deg == pytest.approx(1.6449 * sigma, abs=0.02)   # the one-sided 95 % of a normal
+        assert wedge.half_deg == pytest.approx(zone.half_deg + wedge.widening_deg, abs=0.02)
+    assert zone.half_deg == pytest.approx(47.0, abs=0.01)
+
+
+@given(off_deg=st.floats(-30.0, 30.0), far_m=st.floats(50.0, 500.0))
+def test_a_mark_to_windward_has_two_laylines_and_each_fetches_it(off_deg, far_m, voyage):
+    mark = (far_m * math.sin(math.radians(off_deg)), far_m * math.cos(math.radians(off_deg)))
+    lines = laylines_of(step_at((0.0, 0.0)), voyage, SkipperConfig(), "mark", mark)
+    assert lines.is_beat
+    by = {line.tack: line for line in lines.lines}
+    assert by["starboard"].course_deg == pytest.approx(360.0 - lines.angle_deg, abs=0.1)   # wind over the right side
+    assert by["port"].course_deg == pytest.approx(lines.angle_deg, abs=0.1)
+    reach = by["port"].reach_s          # she is on starboard tack, and meets the other tack's layline
+    if reach is not None:
+        heading, course = math.radians(310.0), math.radians(by["port"].course_deg)
+        east, north = 2.0 * reach * math.sin(heading), 2.0 * reach * math.cos(heading)
+        off = (mark[0] - east) * math.cos(course) - (mark[1] - north) * math.sin(course)
+        assert abs(off) < 1.1           # reach_s is whole seconds
+        assert (mark[0] - east) * math.sin(course) + (mark[1] - north) * math.cos(course) > -1.1
+
+
+@pytest.mark.parametrize(("mark", "is_beat"), [((0.0, 100.0), True), ((100.0, 0.0), None), ((100.0, 30.0), None)])
+def test_a_mark_that_is_fetched_on_one_course_has_no_laylines(mark, is_beat, voyage):
+    lines = laylines_of(step_at((0.0, 0.0)), voyage, SkipperConfig(), "mark", mark)
+    assert (None if lines is None else lines.is_beat) == is_beat
+
+
+@pytest.fixture(scope="module")
+def voyage(tmp_path_factory):
+    return fold_of(tmp_path_factory.mktemp("voyage"))._voyage
