@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.arguments import number, system_id
 from companion.errors import InputError
+from companion.program.arguments import number, system_id
 from companion.words import counted
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.arguments import number, picture, place, system_id
 from companion.commands.output import (
     force_option,
     patience,
@@ -19,6 +18,7 @@ from companion.commands.output import (
     write_out,
 )
 from companion.errors import InputError, JobError
+from companion.program.arguments import number, picture, place, system_id
 from companion.words import counted
 
 if TYPE_CHECKING:

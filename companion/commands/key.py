@@ -16,8 +16,8 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from companion.arguments import system_id
 from companion.errors import InputError, JobError, LinkError
+from companion.program.arguments import system_id
 
 if TYPE_CHECKING:
     from companion.mavlink.autopilot import Autopilot

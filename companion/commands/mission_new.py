@@ -7,10 +7,10 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from companion.arguments import number, place, system_id
 from companion.commands.mission_preview import preview, preview_options, read_mission_file
 from companion.commands.output import force_option, print_findings, print_losses, refuse_existing, write_files
 from companion.errors import InputError
+from companion.program.arguments import number, place, system_id
 
 if TYPE_CHECKING:
     from companion.boat import ProposedMargin

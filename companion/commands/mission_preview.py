@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from companion.arguments import picture, wind
 from companion.commands.output import patience
+from companion.program.arguments import picture, wind
 
 if TYPE_CHECKING:
     from companion.geofence import Document, Mission

@@ -9,11 +9,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.arguments import number, system_id
 from companion.commands.output import force_option, write_files
 from companion.errors import InputError
 from companion.orders.phrase import phrase
 from companion.orders.verbs import TABLE
+from companion.program.arguments import number, system_id
 
 if TYPE_CHECKING:
     from companion.orders import Answer, Wanted

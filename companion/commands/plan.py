@@ -10,11 +10,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.arguments import number, out_file, picture, whole, wind
 from companion.commands.output import patience
 from companion.errors import InputError
 from companion.planner.courses import courses
 from companion.planner.problem import evaluate
+from companion.program.arguments import number, out_file, picture, whole, wind
 from companion.words import counted
 
 if TYPE_CHECKING:

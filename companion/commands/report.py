@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.arguments import out_file, picture
 from companion.commands.output import force_option, patience, write_out
+from companion.program.arguments import out_file, picture
 from companion.words import counted
 
 TRACKS = (".gpx", ".kml", ".kmz", ".geojson")   # the formats that hold a track

@@ -15,10 +15,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from companion.arguments import host_name, http_address, number, out_folder, system_id, whole
 from companion.errors import InputError
-from companion.extras import missing
 from companion.program import INTERRUPTED
+from companion.program.arguments import host_name, http_address, number, out_folder, system_id, whole
+from companion.program.extras import missing
 from companion.words import counted, file_name
 
 if TYPE_CHECKING:

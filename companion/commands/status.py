@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from companion.arguments import number, system_id
+from companion.program.arguments import number, system_id
 from companion.words import counted
 
 EXIT_NO_LINK, EXIT_STALE, EXIT_ALARM = 3, 4, 5

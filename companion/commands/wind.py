@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from companion.arguments import out_file, picture
 from companion.errors import InputError
+from companion.program.arguments import out_file, picture
 
 if TYPE_CHECKING:
     from companion.wind.study import Ar1Fit, HorizonScore, Record, Score

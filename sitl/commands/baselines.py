@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from companion.arguments import number, out_file, whole
+from companion.program.arguments import number, out_file, whole
 
 SAILORS = ("companion", "companion-ardurover", "alone-embedded", "alone", "dijkstra")
 

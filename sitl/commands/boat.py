@@ -7,8 +7,8 @@ import math
 import sys
 from pathlib import Path
 
-from companion.arguments import number, place, whole
 from companion.errors import InputError
+from companion.program.arguments import number, place, whole
 
 _EXAMPLE = """examples:
   sitl boat                                  TCP on 5760 (as SITL's SERIAL0), UDP on 14555; real time

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from companion.arguments import out_file, out_folder, whole
+from companion.program.arguments import out_file, out_folder, whole
 
 
 def add_parser(subparsers: Any, summary: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from companion.arguments import out_file, out_folder, whole
+from companion.program.arguments import out_file, out_folder, whole
 
 
 def add_parser(subparsers: Any, summary: str) -> None:

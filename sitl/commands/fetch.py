@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from companion.arguments import number
 from companion.errors import JobError
+from companion.program.arguments import number
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:

@@ -7,8 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from companion.arguments import number, system_id, whole
 from companion.errors import InputError
+from companion.program.arguments import number, system_id, whole
 
 MAX_COUNT, MAX_RATE_HZ, MAX_S = 100_000, 500.0, 3600.0
 LOOPBACK = ("127.0.0.1", "localhost", "::1")

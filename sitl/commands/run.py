@@ -10,8 +10,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from companion.arguments import http_address, number, out_folder, whole
-from companion.extras import missing
+from companion.program.arguments import http_address, number, out_folder, whole
+from companion.program.extras import missing
 from companion.words import counted, file_name
 
 OURS = {path.stem: path for path in (Path(__file__).resolve().parents[1] / "scenarios").rglob("*.toml")}

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from companion.arguments import duration, system_id, whole
 from companion.commands.far.ordering import COUNTER, run_order
 from companion.commands.far.reading import run_status
 from companion.commands.output import force_option
+from companion.program.arguments import duration, system_id, whole
 
 _EPILOG = """\
 examples:

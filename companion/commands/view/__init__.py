@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from companion.arguments import host_name, http_address, out_file, system_id
 from companion.commands.output import force_option, write_files
 from companion.errors import InputError
+from companion.program.arguments import host_name, http_address, out_file, system_id
 
 PORT = 8765
 SAID_EVERY = 500      # recorded steps between two words on how far it is

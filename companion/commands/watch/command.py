@@ -13,8 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.arguments import number, system_id
 from companion.errors import InputError
+from companion.program.arguments import number, system_id
 
 if TYPE_CHECKING:
     from companion.commands.watch.sources import Source

@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 from companion import __version__
 from companion.disk import reason
 from companion.errors import CompanionError, InputError
-from companion.extras import missing
+from companion.program.extras import missing
 
 INTERRUPTED = 130
 # No option of ours begins with a digit, so this is a value; of all that begins with a minus argparse knows a lone
