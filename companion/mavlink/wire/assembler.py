@@ -90,17 +90,18 @@ class VehicleAssembler:
 
         Texts that lost a chunk and have waited too long for it come first, with [...] for what is missing.
         """
-        return [*self._texts.expired(t_s), *self._completed(t_s, message)]
+        late = self._texts.expired(t_s)
+        values = self._completed(t_s, message)
+        return [*late, *values] if late else values
 
     def _completed(self, t_s: float, message: Message) -> list[Value]:
         kind = message.get_type()
-        component = message.get_srcComponent()
         try:
             if kind == "STATUSTEXT":
                 return list(self._texts.take(t_s, message))
             if kind == "AIS_VESSEL":
                 return [codec.ais_report(t_s, message)]
-            if component != codec.AUTOPILOT_COMPONENT:
+            if message.get_srcComponent() != codec.AUTOPILOT_COMPONENT:
                 return []
             self._notice_boot(message)
             return self._take(t_s, kind, message)
