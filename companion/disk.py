@@ -55,6 +55,7 @@ class Disk:
         """Append ``data`` whole, or not at all: a disk that fills in the middle of it leaves no half record."""
         done = 0
         try:
+            done = self.write(fd, data)
             while done < len(data):
                 done += self.write(fd, data[done:])
         except OSError:

@@ -42,11 +42,13 @@ async def keep_parameters(fold: VoyageFold, autopilot: Autopilot) -> None:
         if reboots != autopilot.link.stats.reboots:
             reboots = autopilot.link.stats.reboots
             asked_s.clear()
+        unread = fold.unread
         for name in RANGES:
-            again_s = PARAMETER_AGAIN_S if name in fold.unread else PARAMETERS_EVERY_S
+            again_s = PARAMETER_AGAIN_S if name in unread else PARAMETERS_EVERY_S
             if autopilot.link.is_alive and now_s() - asked_s.get(name, -math.inf) >= again_s:
                 asked_s[name] = now_s()
                 await autopilot.get_parameter(name)
+                unread = fold.unread
         await asyncio.sleep(LOOK_S)
 
 

@@ -15,8 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pyproj import Transformer
+from pyproj.enums import TransformDirection
 
 from companion.messages import GeoPoint
+
+_BACK = TransformDirection.INVERSE   # pyproj looks its name up at every call
 
 
 @lru_cache(maxsize=32)
@@ -46,7 +49,7 @@ class LocalFrame:
 
     def geo_from_en(self, east_m: float, north_m: float) -> GeoPoint:
         """Return the point at (east, north) [m]."""
-        lon_deg, lat_deg = self._forward.transform(east_m, north_m, direction="INVERSE")
+        lon_deg, lat_deg = self._forward.transform(east_m, north_m, direction=_BACK)
         return GeoPoint(lat_deg=float(lat_deg), lon_deg=math.remainder(lon_deg, 360.0))  # PROJ leaves 180.000000000004
 
     def array_en_from_lonlat(self, lonlat_deg: ArrayLike) -> NDArray[np.float64]:
@@ -58,6 +61,6 @@ class LocalFrame:
     def array_lonlat_from_en(self, en_m: ArrayLike) -> NDArray[np.float64]:
         """Return an (n, 2) array of lon, lat [deg] from an (n, 2) array of east, north [m]."""
         en = np.asarray(en_m, dtype=np.float64).reshape(-1, 2)
-        lon_deg, lat_deg = self._forward.transform(en[:, 0], en[:, 1], direction="INVERSE")
+        lon_deg, lat_deg = self._forward.transform(en[:, 0], en[:, 1], direction=_BACK)
         beyond = np.abs(lon_deg) > 180.0
         return np.column_stack([np.where(beyond, lon_deg - np.copysign(360.0, lon_deg), lon_deg), lat_deg])

@@ -102,13 +102,14 @@ class Autopilot:
                 self._lists.home = codec.geo_point(message.latitude, message.longitude) or self._lists.home
         elif kind == "AUTOPILOT_VERSION" and self.link.party.is_from_target(message):
             self._lists.version = codec.autopilot_version(message)
-        if message.get_srcSystem() != self.link.party.target_system:
+        if message.get_srcSystem() != self.link.target_system:
             return
-        bad_before = self.assembler.dropped_by_type[kind]
+        dropped = self.assembler.dropped_by_type
+        bad_before = dropped.get(kind, 0)
         values = self.assembler.take(t_s, message)
-        if self.assembler.dropped_by_type[kind] > bad_before:
+        if dropped.get(kind, 0) > bad_before:
             self.link.monitor.bad_value(t_s, kind)
-        for value in values:
+        for value in values if self._listeners else ():
             for callback in tuple(self._listeners):
                 self.link.guard(getattr(callback, "__qualname__", repr(callback)), callback, value)
         self._changed.set()

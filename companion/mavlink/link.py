@@ -154,10 +154,14 @@ class Link:
 
     # ------------------------------------------------------------------------------------------- state
     @property
+    def target_system(self) -> int:
+        """The autopilot's system id; before it was heard, the one that is wanted, or 1."""
+        return self._reception.target or self._reception.census.wanted or 1
+
+    @property
     def party(self) -> Party:
-        """The autopilot and we; before it was heard, the system that is wanted, or 1."""
-        target = self._reception.target or self._reception.census.wanted or 1
-        return Party(target, codec.AUTOPILOT_COMPONENT, self._codec.system, self._codec.component)
+        """The autopilot and we."""
+        return Party(self.target_system, codec.AUTOPILOT_COMPONENT, self._codec.system, self._codec.component)
 
     @property
     def has_autopilot(self) -> bool:
@@ -339,14 +343,11 @@ class Link:
         kind = message.get_type()
         if heard is Heard.OURS and message.get_srcComponent() == codec.AUTOPILOT_COMPONENT:
             self.monitor.heard(now, kind)
-            self._notice_boot(message)
+            self._notice_boot(kind, message)
             if kind == "HEARTBEAT" and codec.is_autopilot_heartbeat(message):
                 self._take_heartbeat(now)
         if kind in {"COMMAND_LONG", "COMMAND_INT"}:
             self._take_command(message)
-        self._hand_out(now, message)
-
-    def _hand_out(self, now: float, message: Message) -> None:
         for name, callback in self._subscribers:
             self.guard(name, callback, now, message)
 
@@ -378,9 +379,9 @@ class Link:
         if result != LATER:
             self.acknowledge(message.command, result, message.get_srcSystem(), message.get_srcComponent())
 
-    def _notice_boot(self, message: Message) -> None:
+    def _notice_boot(self, kind: str, message: Message) -> None:
         boot_ms = getattr(message, "time_boot_ms", None)
-        if boot_ms is None or message.get_type() == "NAMED_VALUE_FLOAT":
+        if boot_ms is None or kind == "NAMED_VALUE_FLOAT":
             return
         boot_s = boot_ms / 1e3
         if self._boot_s is not None and boot_s < self._boot_s - GAP_S:

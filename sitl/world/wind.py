@@ -85,12 +85,13 @@ class _Process:
     def _load(self, block: int) -> None:
         for b in range(min(block, len(self._first) - 1), block + 1):
             noise = np.random.default_rng((*self._seed, b)).standard_normal(_BLOCK) * self._noise
-            later, x = np.empty(_BLOCK), self._first[b]
-            for k, step in enumerate(noise.tolist()):
-                later[k] = x = step + self._phi * x
+            # value k of the block is phi x(k-1) + noise(k-1); a loop, for scipy's filters take a second to import
+            values = [self._first[b]]
+            for each in noise.tolist():
+                values.append(self._phi * values[-1] + each)
             if b + 1 == len(self._first):
-                self._first.append(float(later[-1]))
-        self._values = np.concatenate([[self._first[block]], later[:-1]])
+                self._first.append(values[-1])
+        self._values = np.array(values[:-1])
         self._cached = block
 
 

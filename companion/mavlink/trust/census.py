@@ -111,10 +111,12 @@ class Census:
 
     def take(self, t_s: float, message: Message) -> None:
         """Take the HEARTBEAT of an autopilot or a ground station; anything else is nothing to a census."""
+        if message.get_type() != "HEARTBEAT":
+            return
         system = message.get_srcSystem()
-        if message.get_type() == "HEARTBEAT" and message.type == wire.MAV_TYPE_GCS:
+        if message.type == wire.MAV_TYPE_GCS:
             self._station_s = t_s
-        if message.get_type() != "HEARTBEAT" or system == 0 or not codec.is_autopilot_heartbeat(message):
+        if system == 0 or not codec.is_autopilot_heartbeat(message):
             return
         before = self._speakers.get(system)
         self._speakers[system] = Speaker(

@@ -159,7 +159,11 @@ class Witness:
                 return Drop.WRONG_CLOCK
             if self.clock.is_new:
                 self._streams.clear()
-        is_guarded = any(s.is_vouched and t_s - s.last_s <= ALIVE_S for s in self._streams)
+        is_guarded = False
+        for s in self._streams:   # asked at every message: a loop, not a generator
+            if s.vouchers >= VOUCHERS and t_s - s.last_s <= ALIVE_S:
+                is_guarded = True
+                break
         stream = self._stream_of(t_s, message.get_seq(), boot_s)
         return Drop.OUT_OF_STEP if is_guarded and not stream.is_vouched else None
 

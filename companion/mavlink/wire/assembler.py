@@ -36,6 +36,11 @@ ATTITUDE_MAX_AGE_S = 1.5
 QUIET_S = 5.0
 LEAK = "LEAK"                     # the name under which a script tells of the bilge's switch: 1 wet, 0 dry
 KNOWS_TIME_S = 1_577_836_800.0    # 2020: an autopilot that has no time yet tells less
+# What tells of the status; an autopilot sends as many kinds again that tell nothing here.
+_TELLING = frozenset({
+    "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "NAV_CONTROLLER_OUTPUT", "EKF_STATUS_REPORT", "GPS_RAW_INT",
+    "SYS_STATUS", "RC_CHANNELS", "HOME_POSITION", "SYSTEM_TIME", "NAMED_VALUE_FLOAT", "FENCE_STATUS",
+})
 _APPARENT = ("AppWndSpd", "AppWndDir")
 # Heartbeats that say the same before a change is believed, of so many, none older than this [s].
 BEATS_AGREE, BEATS_KEPT, BEATS_S = 2, 3, 3.5
@@ -90,17 +95,18 @@ class VehicleAssembler:
 
         Texts that lost a chunk and have waited too long for it come first, with [...] for what is missing.
         """
-        return [*self._texts.expired(t_s), *self._completed(t_s, message)]
+        late = self._texts.expired(t_s)
+        values = self._completed(t_s, message)
+        return [*late, *values] if late else values
 
     def _completed(self, t_s: float, message: Message) -> list[Value]:
         kind = message.get_type()
-        component = message.get_srcComponent()
         try:
             if kind == "STATUSTEXT":
                 return list(self._texts.take(t_s, message))
             if kind == "AIS_VESSEL":
                 return [codec.ais_report(t_s, message)]
-            if component != codec.AUTOPILOT_COMPONENT:
+            if message.get_srcComponent() != codec.AUTOPILOT_COMPONENT:
                 return []
             self._notice_boot(message)
             return self._take(t_s, kind, message)
@@ -143,7 +149,7 @@ class VehicleAssembler:
             if message.command in _CHANGING and message.result == wire.MAV_RESULT_ACCEPTED:
                 self._acknowledged_s = t_s
             return []
-        return self._fold_status(t_s, kind, message)
+        return self._fold_status(t_s, kind, message) if kind in _TELLING else []
 
     def _position(self, t_s: float, message: Message) -> list[Value]:
         boot_s = message.time_boot_ms / 1e3

@@ -363,7 +363,9 @@ class TextAssembler:
 
     def expired(self, t_s: float) -> list[StatusText]:
         """Return texts that waited too long for a chunk, with [...] for what is missing."""
-        texts = []
+        texts: list[StatusText] = []
+        if not self._open:
+            return texts
         for key in [k for k, (since_s, _, _) in self._open.items() if t_s - since_s > self.WAIT_S]:
             _, severity, chunks = self._open.pop(key)
             whole = "".join(chunks.get(i, "[...]") for i in range(max(chunks) + 1))

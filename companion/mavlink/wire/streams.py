@@ -101,7 +101,7 @@ class StreamMonitor:
 
     def below_rate(self, t_s: float) -> tuple[Stream, ...]:
         """Return the vital streams that come at less than half of the rate asked for."""
-        return tuple(h.stream for h in self.health(t_s) if h.stream.is_vital and not h.is_on_rate)
+        return tuple(s for s in self.table if s.is_vital and not self._health(t_s, s).is_on_rate)
 
     def _health(self, t_s: float, stream: Stream) -> StreamHealth:
         times = self._times[stream.name]

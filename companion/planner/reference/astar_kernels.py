@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from companion.kernels.heap import sift_down, sift_up
+from companion.kernels.heap import pop, push
 from companion.kernels.jit import kernel
 from companion.planner.reference.kernels import TWD, first_hit, meets_target, turn_time, worst_no_go, wrap
 
@@ -17,22 +17,6 @@ TURN, TACK_COST, GYBE_COST, TUNNEL, FAST, BORDER, MAX_TURN = range(7)
 # Places in ``count``: heap size, states expanded, goal reached (0, 1), states seen.
 HEAP, EXPANDED, REACHED, SEEN = range(4)
 HEADINGS = 16
-
-
-@kernel
-def _push(heap_f, heap_state, count, f, state):  # type: ignore[no-untyped-def]
-    i = count[HEAP]
-    count[HEAP] += 1
-    heap_f[i], heap_state[i] = f, state
-    sift_up(heap_f, heap_state, i)
-
-
-@kernel
-def _pop(heap_f, heap_state, count):  # type: ignore[no-untyped-def]
-    top = heap_state[0]
-    count[HEAP] -= 1
-    sift_down(heap_f, heap_state, count[HEAP])
-    return top
 
 
 @kernel
@@ -71,7 +55,8 @@ def expand(  # type: ignore[no-untyped-def]
     line = max(1e-9, math.hypot(line_x, line_y))
     done = 0
     while count[HEAP] > 0 and done < most:
-        state = _pop(heap_f, heap_state, count)
+        state = heap_state[0]
+        count[HEAP] = pop(heap_f, heap_state, count[HEAP])
         if closed[state]:
             continue
         closed[state] = True
@@ -136,5 +121,5 @@ def expand(  # type: ignore[no-untyped-def]
                 count[REACHED] = -1
                 return done
             ahead = math.hypot(goal_x - to_x, goal_y - to_y) / weight[FAST] if weight[FAST] > 0.0 else 0.0
-            _push(heap_f, heap_state, count, cost + ahead, next_state)
+            _, _, count[HEAP] = push(heap_f, heap_state, count[HEAP], cost + ahead, next_state)
     return done

@@ -21,6 +21,7 @@ up-crossings that CC-RRT* can add up edge by edge (``risk_kernels.leg_risk``).
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -166,13 +167,19 @@ def _instant(margin_rad: float, sigma_rad: float) -> float:
     return 0.5 * math.erfc(margin_rad / sigma_rad / math.sqrt(2.0))
 
 
+@functools.cache
+def _full() -> NDArray[np.float64]:
+    """Return what is asked for on every path: the cells' probabilities over a whole step."""
+    return np.asarray(kernels.steps_of(kernels.R_STEP))
+
+
 def _first_passage(
     times: tuple[NDArray[np.float64], NDArray[np.float64]], twa: NDArray[np.float64], half: float, p: WindProcess,
     out: NDArray[np.float64],
 ) -> None:
     start, end = times
     steps = kernels.first_passage(start, end, twa, float(half), p.model, float(p.s0), float(p.s1), float(p.rho),
-                                  float(p.tau), p.table_t, p.table_s, MAX_STEPS, out)
+                                  float(p.tau), p.table_t, p.table_s, MAX_STEPS, _full(), out)
     if steps < 0:  # a voyage of days in a wind of seconds: whatever is not excluded happens
         out[-1] = max(0.0, 1.0 - out[:-1].sum())
 

@@ -21,6 +21,7 @@ NONE, KALMAN, AR1, TABLE = 0, 1, 2, 3
 
 Z_MAX = 6.5          # the grid ends here; beyond lies 4e-11 of the wind
 Z_CELLS = 260        # cells of 0.05 standard deviations
+NEVER = 10.0         # standard deviations that no step goes: 1e-23
 R_STEP = 0.965       # correlation over one step: its standard deviation, 0.26, is five cells
 # Between steps a continuous process peeks over the barrier; a barrier nearer by this many step deviations
 # accounts for it (Chernoff 1965; Broadie, Glasserman and Kou 1997: -zeta(1/2) / sqrt(2 pi)).
@@ -77,20 +78,31 @@ def _phi(x):  # type: ignore[no-untyped-def]
 
 @kernel
 def _kernel(r, dz, out):  # type: ignore[no-untyped-def]
-    """Fill out[i, j]: the probability to go from the centre of cell i into cell j."""
+    """Fill out[i, j]: the probability to go from the centre of cell i into cell j; 0 where it is below 1e-23."""
     n = out.shape[0]
     s = math.sqrt(max(1e-12, 1.0 - r * r))
     for i in range(n):
         mean = r * (-Z_MAX + (i + 0.5) * dz)
-        low = _phi((-Z_MAX - mean) / s)
+        first = max(0, min(n, int((mean - NEVER * s + Z_MAX) / dz)))
+        last = min(n, int((mean + NEVER * s + Z_MAX) / dz) + 2)
+        low = _phi((-Z_MAX + first * dz - mean) / s)
         total = 0.0
-        for j in range(n):
+        out[i, :] = 0.0
+        for j in range(first, last):
             high = _phi((-Z_MAX + (j + 1.0) * dz - mean) / s)
             out[i, j] = high - low
             total += high - low
             low = high
-        for j in range(n):
+        for j in range(first, last):
             out[i, j] /= total
+
+
+@kernel
+def steps_of(r):  # type: ignore[no-untyped-def]
+    """Return the probabilities to go from each cell into each other over a step of correlation ``r``."""
+    out = np.empty((Z_CELLS, Z_CELLS))
+    _kernel(r, 2.0 * Z_MAX / Z_CELLS, out)
+    return out
 
 
 @kernel
@@ -125,12 +137,12 @@ def _absorb(p, low, high, dz):  # type: ignore[no-untyped-def]
 
 @kernel
 def first_passage(  # type: ignore[no-untyped-def]
-    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, max_steps, out,
+    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, max_steps, full, out,
 ):
     """Fill out[k]: the probability that the wind first forces the boat into the no-go zone on leg k.
 
     start_s, end_s, twa_rad: (n,) legs in order of time, heading less mean wind [rad], positive on port tack.
-    half_rad: the boat's own no-go half angle, not widened [rad]. Returns the steps taken, or -1 when they ran out.
+    half_rad: the boat's own no-go half angle, not widened [rad]. full: ``steps_of(R_STEP)``. Returns the steps taken, or -1 when they ran out.
     """
     n = Z_CELLS
     dz = 2.0 * Z_MAX / n
@@ -139,9 +151,7 @@ def first_passage(  # type: ignore[no-untyped-def]
         p[j] = _phi(-Z_MAX + (j + 1.0) * dz) - _phi(-Z_MAX + j * dz)
     fresh = p.copy()
     q = np.empty(n)
-    full = np.empty((n, n))
     part = np.empty((n, n))
-    _kernel(R_STEP, dz, full)
     shift = BARRIER_SHIFT * math.sqrt(1.0 - R_STEP * R_STEP)
     t = 0.0
     steps = 0

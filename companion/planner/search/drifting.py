@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from companion.kernels.heap import sift_down, sift_up
+from companion.kernels.heap import pop, push
 from companion.kernels.jit import kernel
 from companion.planner.search.gauge import Gauge
 from companion.planner.search.kernels import (
@@ -53,8 +53,7 @@ def drift_search(
     parent = np.full(n_states, -1, np.int32)
     done = np.zeros(n_states, np.uint8)
     n_gauge = gauge.shape[0]
-    capacity = 1 << 14
-    keys, items, size = np.empty(capacity), np.empty(capacity, np.int32), 0
+    keys, items, size = np.empty(1 << 14), np.empty(1 << 14, np.int32), 0
     best, last, end_x, end_y, via_x, via_y, with_via = bound, -2, 0.0, 0.0, 0.0, 0.0, False
     pops, s = 0, -1
     x, y, t, h = 0.0, 0.0, 0.0, h0
@@ -134,20 +133,12 @@ def drift_search(
             ):
                 continue
             time[q], px[q], py[q], course[q], parent[q] = t2, x1, y1, wrap(a), s
-            if size >= capacity:
-                keys = np.concatenate((keys, np.empty(capacity)))
-                items = np.concatenate((items, np.empty(capacity, np.int32)))
-                capacity *= 2
-            keys[size], items[size] = f1, q
-            size += 1
-            sift_up(keys, items, size - 1)
+            keys, items, size = push(keys, items, size, f1, q)
         # ---- the next state
         s = -1
         while size > 0:
             f, q = keys[0], items[0]
-            size -= 1
-            if size > 0:
-                sift_down(keys, items, size)
+            size = pop(keys, items, size)
             if f >= best:
                 size = 0
                 break

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.kernels.heap import sift_down, sift_up
+from companion.kernels.heap import pop, push
 from companion.kernels.jit import kernel
 from companion.planner.search.gauge import Gauge
 from companion.planner.search.kernels import (
@@ -130,8 +130,7 @@ def lattice_search(
     came = np.zeros(n_states, np.uint8)
     done = np.zeros(n_states, np.uint8)
     h_node = np.full(ni * nj, -1.0, np.float32)
-    capacity = 1 << 15
-    keys, items, size = np.empty(capacity), np.empty(capacity, np.int32), 0
+    keys, items, size = np.empty(1 << 15), np.empty(1 << 15, np.int32), 0
     best, best_state, end_x, end_y, via_x, via_y, with_via = bound, -1, 0.0, 0.0, 0.0, 0.0, False
     n_gauge = gauge.shape[0]
 
@@ -144,16 +143,12 @@ def lattice_search(
         if cost[s] == np.inf:
             continue
         came[s] = _START
-        keys[size], items[size] = cost[s], s
-        size += 1
-        sift_up(keys, items, size - 1)
+        keys, items, size = push(keys, items, size, cost[s], s)
     pops = 0
     exhausted = True
     while size > 0:
         f, s = keys[0], items[0]
-        size -= 1
-        if size > 0:
-            sift_down(keys, items, size)
+        size = pop(keys, items, size)
         if f >= best:
             break
         if done[s]:
@@ -260,13 +255,7 @@ def lattice_search(
                     continue
             cost[s1] = t1
             came[s1] = label
-            if size >= capacity:
-                keys = np.concatenate((keys, np.empty(capacity)))
-                items = np.concatenate((items, np.empty(capacity, np.int32)))
-                capacity *= 2
-            keys[size], items[size] = f1, s1
-            size += 1
-            sift_up(keys, items, size - 1)
+            keys, items, size = push(keys, items, size, f1, s1)
     if best_state < 0:
         return math.inf, np.empty((0, 2)), pops, exhausted
     # ---- back along the parents; only the points where the course changes are kept

@@ -34,8 +34,11 @@ def follow_charge(turn: Turn) -> None:
     now = replace(before, last=min(share, before.last))
     if now != before:
         turn.update(charge=now)
-    left_s, needed_s, reserve = lasts_s(turn), way_s(turn), turn.config.ends.battery_reserve
-    if now.is_short or left_s is None or needed_s is None or left_s >= reserve * needed_s:
+    left_s = lasts_s(turn)
+    if now.is_short or left_s is None:
+        return
+    needed_s = way_s(turn)
+    if needed_s is None or left_s >= turn.config.ends.battery_reserve * needed_s:
         return
     turn.update(charge=replace(now, is_short=True))
     turn.say(Severity.WARNING, "charge", f"the charge lasts {math.floor(left_s / 60.0)} min at its rate, the way to "

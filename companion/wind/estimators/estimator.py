@@ -17,12 +17,15 @@ from statistics import NormalDist
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi
 from companion.messages import WindForecast
 
 HORIZONS_S = (0.0, 1.0, 3.0, 10.0, 20.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 450.0, 600.0, 900.0, 1800.0, 3600.0)
 LEVELS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.99)
+
+Floats = NDArray[np.float64]
 
 SIGMA_MAX_RAD = math.pi   # [rad] a normal this wide, wrapped, is uniform on the circle
 SIGMA_MIN_RAD = 1e-4
@@ -135,7 +138,10 @@ class Base:
         """
         if self._t_s is None:
             raise ValueError("no wind has been seen yet")
-        x, sigma, speed, sigma_speed = self._predict(max(0.0, float(horizon_s)))
+        return self._on_circle(*self._predict(max(0.0, float(horizon_s))))
+
+    def _on_circle(self, x: float, sigma: float, speed: float, sigma_speed: float) -> tuple[float, float, float, float]:
+        """Return what was predicted on the line as ``forecast`` tells it."""
         sigma = min(max(sigma, SIGMA_MIN_RAD), SIGMA_MAX_RAD)
         return wrap_pi(x + self._reference_rad), sigma, max(0.0, speed), max(sigma_speed, 1e-3)
 
@@ -161,17 +167,22 @@ class Base:
         """Return the forecast at ``t_s`` (not before the last update) as the planner's table."""
         horizon = np.asarray(HORIZONS_S if horizons_s is None else horizons_s, dtype=np.float64)
         level = np.asarray(LEVELS if levels is None else levels, dtype=np.float64)
-        age_s = max(0.0, t_s - self._t_s) if self._t_s is not None else 0.0
-        rows = np.array([self.forecast(age_s + h) for h in horizon.tolist()], dtype=np.float64)
-        half = np.array(
-            [[self._half_width(age_s + h, p, row[1]) for p in level.tolist()]
-             for h, row in zip(horizon.tolist(), rows.tolist(), strict=True)], dtype=np.float64,
-        ).reshape(horizon.size, level.size)
+        if self._t_s is None:
+            raise ValueError("no wind has been seen yet")
+        rows, half = self._rows(max(0.0, t_s - self._t_s) + horizon, level)
         return WindForecast(
             t_s=t_s, horizon_s=horizon, mean_twd_from_rad=rows[:, 0], sigma_twd_rad=rows[:, 1],
             mean_tws_mps=rows[:, 2], sigma_tws_mps=rows[:, 3], level=level, half_width_rad=half,
             correlation_time_s=self.correlation_time_s,
         )
+
+    def _rows(self, horizons_s: Floats, levels: Floats) -> tuple[Floats, Floats]:
+        """Return ``forecast`` (n, 4) and the half widths (n, m) at horizons [s, 0 or more] and levels."""
+        rows = np.array([self.forecast(h) for h in horizons_s.tolist()], dtype=np.float64).reshape(-1, 4)
+        half = np.array(
+            [[self._half_width(h, p, row[1]) for p in levels.tolist()]
+             for h, row in zip(horizons_s.tolist(), rows.tolist(), strict=True)], dtype=np.float64)
+        return rows, half.reshape(horizons_s.size, levels.size)
 
 
 @functools.lru_cache(maxsize=64)

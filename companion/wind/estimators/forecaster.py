@@ -18,11 +18,12 @@ Everything is weighted by elapsed time, not by samples: the sampling rate does n
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 
 from companion.wind.estimators import kernel
-from companion.wind.estimators.estimator import Base, normal_half_width
+from companion.wind.estimators.estimator import Base, Floats, normal_half_width
 from companion.wind.estimators.prior import CONSTANTS
 
 _Z = np.array([normal_half_width(float(p)) for p in kernel.QUANTILE_P])
@@ -35,6 +36,7 @@ def compile_kernels() -> None:
     kernel.update(state, CONSTANTS, kernel.prior_quantile(CONSTANTS), 0.0, 0.0, 1.0, 1.0, 1.0)
     kernel.predict(state, CONSTANTS, 60.0)
     kernel.half_width_ratio(state, 60.0, _Z, 1.0)
+    kernel.table(state, CONSTANTS, np.array([60.0]), _Z, np.array([1.0]))
     kernel.correlation_time(state)
 
 
@@ -60,6 +62,12 @@ class Forecaster(Base):
     def _quantile(self, horizon_s: float, p: float) -> float:
         """Return the tracked quantile of |error| / sigma, between levels linear in the normal quantile (equation 5)."""
         return kernel.half_width_ratio(self._state, float(horizon_s), _Z, normal_half_width(p))
+
+    def _rows(self, horizons_s: Floats, levels: Floats) -> tuple[Floats, Floats]:
+        normal = np.array([normal_half_width(p) for p in levels.tolist()], dtype=np.float64)
+        rows, ratio = kernel.table(self._state, self._constants, horizons_s, _Z, normal)
+        rows = np.array([self._on_circle(*row) for row in rows.tolist()], dtype=np.float64).reshape(-1, 4)
+        return rows, np.minimum(math.pi, rows[:, 1:2] * ratio)
 
     @property
     def correlation_time_s(self) -> float:

@@ -214,6 +214,17 @@ def half_width_ratio(st: State, h: float, z: Array, zp: float) -> float:
 
 
 @kernel
+def table(st: State, con: Constants, h: Array, z: Array, zp: Array) -> tuple[Array, Array]:
+    """Return the first four of ``predict`` (n, 4) and ``half_width_ratio`` (n, m), for horizons ``h`` and levels."""
+    rows, ratio = np.empty((h.size, 4)), np.empty((h.size, zp.size))
+    for i in range(h.size):
+        rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], _, _ = predict(st, con, h[i])
+        for k in range(zp.size):
+            ratio[i, k] = half_width_ratio(st, h[i], z, zp[k])
+    return rows, ratio
+
+
+@kernel
 def correlation_time(st: State) -> float:
     """Return where phi(h) / phi(shortest) falls to 1/e [s]; beyond 600 s by its slope so far, at most an hour."""
     top = max(0.05, st.knot[0, PHI])

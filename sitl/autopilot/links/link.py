@@ -64,6 +64,7 @@ class Link:
         self._interval_s: dict[int, float] = {}
         # messages of one rate are sent together: (interval, next due time, messages)
         self._buckets: list[tuple[float, float, tuple[int, ...]]] = []
+        self.due_s = math.inf     # when the next stream is
         self.restart(0.0)
 
     def sign(self, key: bytes, timestamp: int) -> None:
@@ -144,11 +145,10 @@ class Link:
             if interval is not None:
                 groups.setdefault(interval, []).append(msgid)
         self._buckets = [(i, due.get(i, t_s + i), tuple(ids)) for i, ids in sorted(groups.items())]
+        self._see_due()
 
-    @property
-    def due_s(self) -> float:
-        """When the next stream is due."""
-        return min((when for _, when, _ in self._buckets), default=math.inf)
+    def _see_due(self) -> None:
+        self.due_s = min((when for _, when, _ in self._buckets), default=math.inf)
 
     def take_due(self, t_s: float) -> list[int]:
         """Return the messages that are due, each once, and move their clocks on."""
@@ -159,6 +159,7 @@ class Link:
                 # whole intervals, so that a rate that does not divide the loop rate is kept on average
                 missed = math.floor((t_s - when) / interval + 1e-9)
                 self._buckets[n] = (interval, when + (missed + 1) * interval, msgids)
+        self._see_due()
         return out
 
 

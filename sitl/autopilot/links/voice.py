@@ -22,12 +22,17 @@ class Voice:
     @property
     def has_work(self) -> bool:
         """Whether bytes wait to be read or texts to be sent."""
-        return bool(self._late_texts) or any(link.inbox for link in self.links.values())
+        if self._late_texts:
+            return True
+        for link in self.links.values():   # asked for at every loop
+            if link.inbox:
+                return True
+        return False
 
     @property
     def due_s(self) -> float:
         """When the next stream of any port is due."""
-        return min((link.due_s for link in self.links.values()), default=float("inf"))
+        return min([link.due_s for link in self.links.values()], default=float("inf"))
 
     def open(self, number: int, t_s: float) -> Link:
         """Return a port; a new one sends the default streams from now on."""

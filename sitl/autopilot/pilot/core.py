@@ -36,6 +36,7 @@ class Core:
             wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed,
             polar=config.polar,
         )
+        self._told = (self.vehicle.position, self.chart.to_e7(self.vehicle.position))
         self.battery_v = config.battery_v
         self.leaks: bool | None = None   # what a script of the boat's tells of her bilge
         self.roll_rad = 0.0
@@ -91,7 +92,10 @@ class Core:
     @property
     def latlon_e7(self) -> tuple[int, int]:
         """Where the autopilot believes to be [deg x 1e7]."""
-        return self.chart.to_e7(self.vehicle.position)
+        here = self.vehicle.position
+        if self._told[0] != here:   # several messages of one loop tell it
+            self._told = (here, self.chart.to_e7(here))
+        return self._told[1]
 
     def take_origin(self) -> None:
         """Let local positions count from here."""

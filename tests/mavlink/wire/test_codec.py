@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.mavlink.wire import codec
-from companion.mavlink.wire.assembler import VehicleAssembler
+from companion.mavlink.wire.assembler import _TELLING, VehicleAssembler
 from companion.mavlink.wire.frames import Codec, Drop
 from companion.messages import (
     AisReport,
@@ -282,6 +282,18 @@ def test_a_text_with_a_lost_chunk_comes_out_with_a_gap():
 def last(assembler, message):
     values = assembler.take(0.0, heard(message))
     return values[-1] if values else None
+
+
+def test_what_is_not_looked_at_tells_nothing_of_the_status():
+    """The list of what tells, by which the rest is left out, is whole."""
+    assembler = VehicleAssembler()
+    last(assembler, wire.MAVLink_heartbeat_message(11, 3, 81, 10, 4, 3))
+    for kind in wire.mavlink_map.values():
+        if kind.msgname not in _TELLING:
+            lengths = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
+            zeros = [b"" if what == "char" else [0] * lengths[name] if lengths[name] else 0
+                     for name, what in zip(kind.fieldnames, kind.fieldtypes, strict=True)]
+            assert assembler._told(1.0, kind.msgname, kind(*zeros)) is None, kind.msgname
 
 
 def test_what_tells_a_failsafe_from_a_person_reaches_the_status():

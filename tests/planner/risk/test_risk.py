@@ -140,16 +140,16 @@ def test_cutting_a_leg_in_two_changes_nothing():
 
 
 def test_a_passage_of_a_day_costs_no_more_steps_than_the_wind_needs_to_settle():
-    p = process_of(problem(AR1))
+    p, full = process_of(problem(AR1)), kernels.steps_of(kernels.R_STEP)
     out = np.zeros(1)
     steps = kernels.first_passage(
         np.array([0.0]), np.array([86_400.0]), np.array([math.radians(80.0)]), math.radians(45.0), p.model, p.s0, p.s1,
-        p.rho, p.tau, p.table_t, p.table_s, 10**6, out)
+        p.rho, p.tau, p.table_t, p.table_s, 10**6, full, out)
     assert 0 < steps < 3000
     short = np.zeros(1)
     kernels.first_passage(
         np.array([0.0]), np.array([8640.0]), np.array([math.radians(80.0)]), math.radians(45.0), p.model, p.s0, p.s1,
-        p.rho, p.tau, p.table_t, p.table_s, 10**6, short)
+        p.rho, p.tau, p.table_t, p.table_s, 10**6, full, short)
     assert -math.log1p(-out[0]) == pytest.approx(-10.0 * math.log1p(-short[0]), rel=0.02)
 
 
