@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test check docs slowest campaign bench figures clean
+.PHONY: env demo test check docs slowest campaign bench figures deb clean
 env: $(ENV)
 
 # What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
@@ -79,6 +79,10 @@ bench: $(ENV)
 figures: $(ENV)
 	$(BIN)/python -m bench.rooms
 	$(BIN)/python -m bench.figures
+
+# The Debian package of this machine's release and architecture, into dist/ (about three minutes; see packaging/).
+deb:
+	python3 packaging/deb.py
 
 clean:
 	rm -rf $(VENV) build dist docs/api

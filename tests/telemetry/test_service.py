@@ -18,7 +18,7 @@ from companion import cli
 from companion.telemetry.service import STATUS_CHARACTERS, ServiceManager
 from sitl.scene.ships import free_port
 
-UNIT = Path("deploy/companion.service")
+UNIT = Path("deploy/companion@.service")
 
 
 @pytest.fixture
@@ -109,8 +109,13 @@ def test_the_unit_file_starts_the_program_as_it_is():
     assert service["RestartPreventExitStatus"] == "2"
     program, *arguments = shlex.split(service["ExecStart"])
     assert Path(program).name == "companion"
-    parsed = cli.PROGRAM.parser().parse_args(arguments)
-    assert str(parsed.link) == "udpin:127.0.0.1:14551"
+    assert arguments.pop() == "$OPTIONS"
+    parsed = cli.PROGRAM.parser().parse_args([word.replace("%i", "lake") for word in arguments])
+    assert (str(parsed.mission), parsed.link) == ("/etc/companion/lake.toml", "${LINK}")
+    # records and state of two instances are apart
+    assert {service["StateDirectory"], service["LogsDirectory"]} == {"companion/%i"}
+    assert service["WorkingDirectory"] == "/var/log/companion/%i"
+    assert parsed.state.as_posix() == "/var/lib/companion/lake/voyage.state.json"
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="needs systemd-analyze")
@@ -122,9 +127,9 @@ def test_the_unit_is_exposed_little(tmp_path):
         pytest.skip("this systemd-analyze reads no unit files")
     assert said.returncode == 0, said.stdout[-300:] + said.stderr
     unit = tmp_path / UNIT.name
-    unit.write_text(UNIT.read_text().replace("/opt/companion/.venv/bin/companion", "/bin/true"))
+    unit.write_text(UNIT.read_text().replace("/usr/bin/companion", "/bin/true"))
     checked = subprocess.run(["systemd-analyze", "verify", str(unit)], capture_output=True, text=True, check=False)
-    assert unit.name not in checked.stderr   # it names what it does not know
+    assert "companion@" not in checked.stderr   # it names what it does not know
 
 
 @pytest.mark.parametrize("number", [errno.ENOENT, errno.EIO, errno.ESTALE, errno.ENODEV, errno.ENOMEM])

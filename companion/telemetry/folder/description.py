@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import platform
 import sys
+from collections.abc import Iterator
 from importlib import metadata
 from typing import Any
 
@@ -48,7 +50,14 @@ def voyage_record(mission: Mission, permissions: Permissions, run: dict[str, Any
         "permissions": {name: getattr(permissions, name) for name in type(permissions).__slots__},
         "versions": {
             "companion": __version__, "python": platform.python_version(), "machine": platform.machine(),
-            **{name: metadata.version(name) for name in ("numpy", "numba", "shapely", "pymavlink")},
+            **dict(_versions("numpy", "numba", "shapely", "pymavlink", "filterpy")),
         },
         "argv": sys.argv[1:],
     }
+
+
+def _versions(*names: str) -> Iterator[tuple[str, str]]:
+    """Yield those that are installed: filterpy is an extra's."""
+    for name in names:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            yield name, metadata.version(name)

@@ -24,7 +24,7 @@ class Voice:
         """Whether bytes wait to be read or texts to be sent."""
         if self._late_texts:
             return True
-        for link in self.links.values():   # asked for at every loop
+        for link in self.links.values():   # noqa: SIM110 - asked for at every loop
             if link.inbox:
                 return True
         return False

@@ -1,0 +1,81 @@
+#!/bin/bash
+# Installs, starts, upgrades, removes and purges the Debian package in a clean Debian, and says what was wrong.
+#
+#   sudo packaging/try_in_a_clean_debian.sh PACKAGE.deb RELEASE [ARCHITECTURE]
+#
+# RELEASE is bookworm or trixie, ARCHITECTURE amd64 (default) or arm64 (by emulation: qemu-user-static, binfmt_misc).
+# Needs debootstrap; with systemd-nspawn, and on this machine's own architecture, the service runs under a real systemd,
+# beside a simulated autopilot. CLEAN=DIR: a tree that was bootstrapped before. MIRROR: of Debian.
+set -euo pipefail
+
+package=$(realpath "$1") release=$2 architecture=${3:-amd64}
+mirror=${MIRROR:-http://deb.debian.org/debian}
+work=$(mktemp -d /var/tmp/companion-clean.XXXXXX)
+root=$work/root
+trap 'umount -l "$root/proc" 2>/dev/null || true; rm -rf "$work"' EXIT
+
+say() { echo "== $*"; }
+wrong() { echo "WRONG: $*" >&2; exit 1; }
+inside() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 "$@"; }
+files() { (cd "$root" && find etc opt usr var/lib/companion var/log/companion var/cache/companion lib/systemd lib/udev \
+    -xdev \( -type f -o -type l \) 2>/dev/null || true) | grep -vE '__pycache__|^etc/(ld.so.cache|passwd-?|group-?|g?shadow-?|subuid|subgid)|^etc/mtab|^etc/apt' | sort; }
+
+say "a clean $release, $architecture"
+if [ -n "${CLEAN:-}" ]; then
+    cp -a "$CLEAN" "$root"
+else
+    debootstrap --arch="$architecture" --variant=minbase --include=systemd,systemd-sysv,dbus,udev,ca-certificates,adduser,libstdc++6 \
+        "$release" "$root" "$mirror" >"$work/debootstrap.log" || { tail -5 "$work/debootstrap.log"; exit 1; }
+fi
+cp /etc/resolv.conf "$root/etc/resolv.conf"
+inside apt-get -qq update
+python=$(dpkg-deb -f "$package" Depends | grep -oE 'python3\.[0-9]+')
+inside apt-get -qq install --yes --no-install-recommends "$python" adduser libstdc++6 libgcc-s1 >/dev/null 2>&1
+mount -t proc proc "$root/proc"
+files >"$work/before"   # (paths of this list are the package's or Debian's; voyages of the trial are removed)
+
+say "install"
+cp "$package" "$root/var/tmp/companion.deb"
+inside dpkg -i /var/tmp/companion.deb >"$work/install.log" 2>&1 || { cat "$work/install.log"; wrong "it does not install"; }
+inside companion --version
+inside id companion | grep -q dialout || wrong "the user is not in the group dialout"
+if [ "$(inside find /opt/companion -user root -perm -o+w ! -type l | wc -l)" != 0 ]; then wrong "others may write to /opt/companion"; fi
+
+say "nothing is compiled, and a voyage sails from an empty folder"
+inside sh -c 'mkdir -p /tmp/voyage && cd /tmp/voyage && companion mission example mine >/dev/null &&
+    companion mission check mine/lake.toml >/dev/null && sitl run rocks --out v' >"$work/sail.log" 2>&1 ||
+    { cat "$work/sail.log"; wrong "it does not sail"; }
+grep -q PASSED "$work/sail.log" || wrong "it does not sail"
+[ ! -d "$root/root/.cache/sailboat-companion" ] || [ -z "$(find "$root/root/.cache/sailboat-companion" -type f)" ] ||
+    wrong "kernels were compiled: $(find "$root/root/.cache/sailboat-companion" -type f | head -3)"
+rm -rf "$root/tmp/voyage" "$root/root/.cache"
+
+say "a conffile that was changed is kept"
+echo 'OPTIONS=--keep-gb 1' >"$root/etc/companion/service.env"
+inside dpkg -i --force-confold /var/tmp/companion.deb >"$work/upgrade.log" 2>&1 || { cat "$work/upgrade.log"; wrong "no upgrade"; }
+grep -q 'keep-gb 1' "$root/etc/companion/service.env" || wrong "the conffile was not kept"
+
+if [ "$architecture" = "$(dpkg --print-architecture)" ] && command -v systemd-nspawn >/dev/null; then
+    say "the service under a real systemd"
+    install -D -m 755 "$(dirname "$0")/try_service.sh" "$root/usr/local/bin/try_service"
+    printf '[Unit]\nAfter=multi-user.target\n[Service]\nType=oneshot\nExecStart=/usr/local/bin/try_service\nExecStopPost=/bin/systemctl --no-block poweroff\nStandardOutput=file:/var/tmp/service.log\nStandardError=file:/var/tmp/service.log\n[Install]\nWantedBy=multi-user.target\n' \
+        >"$root/etc/systemd/system/try.service"
+    inside systemctl enable try.service 2>/dev/null
+    umount -l "$root/proc"
+    timeout 600 systemd-nspawn -q -D "$root" --boot --register=no --keep-unit >"$work/boot.log" 2>&1 || true
+    mount -t proc proc "$root/proc"
+    cat "$root/var/tmp/service.log"
+    tail -1 "$root/var/tmp/service.log" | grep -q '^ALL IS WELL' || wrong "the service"
+    inside systemctl disable try.service 2>/dev/null || true
+    rm -f "$root/etc/systemd/system/try.service" "$root/usr/local/bin/try_service"
+fi
+
+say "remove, and what is the user's stays; purge, and nothing does"
+inside dpkg -r sailboat-companion >"$work/remove.log" 2>&1 || { cat "$work/remove.log"; wrong "it cannot be removed"; }
+[ -f "$root/etc/companion/service.env" ] || wrong "remove took the conffile"
+[ ! -e "$root/opt/companion" ] || wrong "remove left /opt/companion"
+inside dpkg -P sailboat-companion >"$work/purge.log" 2>&1 || { cat "$work/purge.log"; wrong "it cannot be purged"; }
+inside getent passwd companion >/dev/null && wrong "purge left the user"
+files >"$work/after"
+diff "$work/before" "$work/after" || wrong "purge left something"
+say "all is well on $release, $architecture"
