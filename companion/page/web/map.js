@@ -45,7 +45,7 @@ export function show(view, area, past) {
   state.view = view;
   state.past = past;
   if (area !== state.area) { state.area = area; water(); }
-  if (!state.fitted && (area !== null || view?.boat.at_en_m)) { all(); state.fitted = true; }
+  if (!state.fitted && view !== null && (view.goals.length > 0 || view.boat.at_en_m !== null)) { all(); state.fitted = true; }
   draw();
 }
 
