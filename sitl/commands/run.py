@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     if own_polar(mission) is not None and args.autopilot == "ardurover":
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
     page = _page(args)
-    compile_ahead()
+    compile_ahead(mission.skipper.planner)
     if args.autopilot == "ardurover" or args.live:
         from sitl.run.live import run_live
 

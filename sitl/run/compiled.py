@@ -8,7 +8,15 @@ from companion.kernels.build import prepare
 from companion.telemetry.preparing import Preparing
 
 
-def compile_ahead() -> None:
-    """Compile what is missing and say how far it is; before a boat is afloat, for a disarmed one drifts meanwhile."""
+def compile_ahead(planner: str = "auto") -> None:
+    """Compile what is missing and say how far it is; before a boat is afloat, for a disarmed one drifts meanwhile.
+
+    The kernels of a planner of somebody's choice are not on the list of those that every voyage needs.
+    """
     with Preparing(sys.stderr) as preparing:
         prepare(("companion", "sitl"), say=preparing.say)
+        if planner != "auto":
+            from companion.planner.solve import warm
+
+            preparing.say(f"compiling the kernels of {planner}, once on each machine")
+            warm(planner)
