@@ -207,7 +207,16 @@ class LocalArea:
 
     def clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
         """Return the smaller of the two clearances [m]: positive in free water."""
+        if isinstance(points_en, list) and len(points_en) == 1 and isinstance(points_en[0], tuple):
+            return np.array([self._clearance_at_m(points_en[0])])   # the boat's: asked for several times a step
         return np.minimum(self.obstacle_clearance_m(points_en), self.limit_clearance_m(points_en))
+
+    @functools.lru_cache(maxsize=16)  # noqa: B019 - an area lives as long as its voyage
+    def _clearance_at_m(self, point_en: tuple[float, float]) -> float:
+        """Return the clearance of one place [m]."""
+        if self.limits is None:
+            return float(self.obstacle_clearance_m([point_en])[0])
+        return min(self.unfenced._clearance_at_m(point_en), float(self.limit_clearance_m([point_en])[0]))  # noqa: SLF001
 
     def contains(self, points_en: ArrayLike, margin_m: float = 0.0) -> NDArray[np.bool_]:
         """Return which points are in free water, ``margin_m`` clear of obstacles and limits."""
@@ -220,6 +229,15 @@ class LocalArea:
 
     def path_clearance_m(self, path_en: ArrayLike) -> float:
         """Return the exact smallest distance of a polyline (n, 2) to obstacles and limits [m], ≤ 0 on contact."""
+        if isinstance(path_en, list) and len(path_en) == 2 and all(isinstance(place, tuple) for place in path_en):
+            return self._way_clearance_m(*path_en)   # the boat's to her waypoint: asked for several times a step
+        return self._path_clearance_m(path_en)
+
+    @functools.lru_cache(maxsize=16)  # noqa: B019 - an area lives as long as its voyage
+    def _way_clearance_m(self, from_en: tuple[float, float], to_en: tuple[float, float]) -> float:
+        return self._path_clearance_m([from_en, to_en])
+
+    def _path_clearance_m(self, path_en: ArrayLike) -> float:
         coordinates = np.asarray(path_en, dtype=np.float64).reshape(-1, 2)
         line = shapely.linestrings(coordinates) if len(coordinates) > 1 else shapely.points(coordinates[0])
         clearance = math.inf

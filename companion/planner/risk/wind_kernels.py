@@ -142,8 +142,8 @@ def first_passage(  # type: ignore[no-untyped-def]
     """Fill out[k]: the probability that the wind first forces the boat into the no-go zone on leg k.
 
     start_s, end_s, twa_rad: (n,) legs in order of time, heading less mean wind [rad], positive on port tack.
-    half_rad: the boat's own no-go half angle, not widened [rad]. full: ``steps_of(R_STEP)``. Returns the
-    steps taken, or -1 when they ran out.
+    half_rad: the boat's own no-go half angle, not widened [rad]. full: ``steps_of(R_STEP)``.
+    Returns the steps taken, or -1 when they ran out.
     """
     n = Z_CELLS
     dz = 2.0 * Z_MAX / n

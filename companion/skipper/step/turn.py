@@ -245,10 +245,7 @@ class Turn:
 
     def is_raised(self, name: str) -> bool:
         """Return whether a watchdog is raised."""
-        for raised in self.state.raised:   # noqa: SIM110 - asked for dozens of times a step: a loop, not a generator
-            if raised.name == name:
-                return True
-        return False
+        return name in [raised.name for raised in self.state.raised]
 
     @property
     def is_taken(self) -> bool:

@@ -22,12 +22,7 @@ class Voice:
     @property
     def has_work(self) -> bool:
         """Whether bytes wait to be read or texts to be sent."""
-        if self._late_texts:
-            return True
-        for link in self.links.values():   # noqa: SIM110 - asked for at every loop
-            if link.inbox:
-                return True
-        return False
+        return bool(self._late_texts) or True in [bool(link.inbox) for link in self.links.values()]
 
     @property
     def due_s(self) -> float:
