@@ -114,10 +114,10 @@ def around(stage: Path, work: Path) -> None:
 
 def changelog() -> str:
     """Return Debian's changelog: it refers to the project's own."""
-    date = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", run("git", "log", "-1", "--format=%ct"))),
+    date = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH") or run("git", "log", "-1", "--format=%ct")),
                                   UTC).strftime("%a, %d %b %Y %H:%M:%S +0000")
     return (f"{NAME} ({version()}~{release()}) unstable; urgency=medium\n\n  * Version {version()}: see the project's "
-            f"CHANGELOG.md.\n\n -- {NAME} <{NAME}@localhost.localdomain>  {date}\n")
+            f"CHANGELOG.md.\n\n -- {NAME} <maintainers@{NAME}.example>  {date}\n")
 
 
 def control(stage: Path) -> None:

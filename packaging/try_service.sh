@@ -11,17 +11,19 @@ systemd-run --quiet --unit=boat /usr/bin/sitl boat --port 0 --udp 0 --udp-out 12
 cp /tmp/missions/lake.* /etc/companion/
 echo 'LINK=udpin:127.0.0.1:14551' >/etc/companion/lake.env
 
+began=$(date +%s%N)
 systemctl start companion@lake || wrong "it does not start"
-echo "started: $(systemctl is-active companion@lake), $(status)"
+echo "ready after $((($(date +%s%N) - began) / 1000000)) ms: $(systemctl is-active companion@lake), $(status)"
 began=$(date +%s)
 wait_for 90 'grep -qs "\"kind\":\"plan\"" /var/log/companion/lake/voyages/*/decisions.jsonl' || wrong "no plan"
 echo "first plan after $(($(date +%s) - began)) s"
 [ -z "$(find /var/cache/companion -type f 2>/dev/null)" ] || wrong "kernels were compiled"
 total=0
-for pid in $(cat /sys/fs/cgroup/system.slice/system-companion.slice/companion@lake.service/cgroup.procs 2>/dev/null || systemctl show -p MainPID --value companion@lake); do
+pids=$(cat "/sys/fs/cgroup$(systemctl show -p ControlGroup --value companion@lake)/cgroup.procs")
+for pid in $pids; do
     kb=$(awk '/^Pss:/ {print $2}' "/proc/$pid/smaps_rollup"); total=$((total + kb))
 done
-echo "memory: $((total / 1000)) MB (PSS)"
+echo "memory: $((total / 1000)) MB (PSS) of $(echo "$pids" | wc -l) processes"
 [ $((total / 1000)) -lt 160 ] || wrong "more than 160 MB"
 
 echo "killed as a crash would"

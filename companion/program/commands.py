@@ -85,6 +85,10 @@ class Program:
 
     def run(self, argv: Sequence[str] | None = None) -> int:
         """Run one command of ``argv`` (None: of this process) and return its exit code."""
+        if sys.maxsize < 2**32:
+            sys.stderr.write(f"{self.name}: this is a 32-bit system, for which there are no libraries; install "
+                             "a 64-bit one (Raspberry Pi OS 64-bit)\n")
+            return CompanionError.exit_code
         arguments = with_negative_values(sys.argv[1:] if argv is None else argv)
         command = next((a for a in arguments if not a.startswith("-")), None)
         try:

@@ -1,0 +1,121 @@
+"""``companion setup``: finds the autopilot on a serial port, writes two files, and says what is wrong."""
+
+import os
+import pty
+import socket
+import subprocess
+import sys
+import threading
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from companion import cli
+from companion.commands.setup import ports
+from companion.errors import LinkError
+from companion.geofence import load_mission
+from sitl.scene.ships import free_port
+
+HERE = ["--start", "50.817,-1.31", "--goal", "50.8188,-1.3085"]
+
+
+@pytest.fixture(scope="module")
+def boat():
+    port = free_port()
+    with subprocess.Popen(
+            [sys.executable, "-m", "sitl.cli", "boat", "--port", str(port), "--udp", "0", "--warm", "--moored",
+             "--sysid", "7", "--home", "50.817,-1.31"], stdout=subprocess.PIPE, text=True) as process:
+        assert "sitl boat" in process.stdout.readline()
+        yield port
+        process.terminate()
+
+
+@pytest.fixture
+def serial(boat):
+    """The name of a serial port (a pseudo terminal) that the boat is on."""
+    ours, theirs = pty.openpty()
+    connection = socket.create_connection(("127.0.0.1", boat))
+
+    def to_boat():
+        try:
+            while data := os.read(ours, 4096):
+                connection.sendall(data)
+        except OSError:
+            return
+
+    def from_boat():
+        try:
+            while data := connection.recv(4096):
+                os.write(ours, data)
+        except OSError:
+            return
+
+    for work in (to_boat, from_boat):
+        threading.Thread(target=work, daemon=True).start()
+    yield Path(os.ttyname(theirs))
+    connection.close()
+    os.close(theirs)
+    os.close(ours)
+
+
+def test_it_finds_the_autopilot_writes_a_mission_that_can_be_sailed_and_runs_the_doctor(
+        serial, tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr(ports, "ports", lambda: [ports.Port(path=serial)])
+    code = cli.main(["setup", "lake", "--yes", "--dir", str(tmp_path), *HERE])
+    out, err = capfd.readouterr()
+    assert code in {0, 1}, err   # the doctor's: what it finds on a fresh autopilot
+    assert f"the autopilot of system 7 is on {serial}:921600" in out
+    assert "nothing was changed" in out
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["lake.env", "lake.toml"]
+    assert f"LINK={serial}:921600\n" in (tmp_path / "lake.env").read_text()
+    mission = load_mission(tmp_path / "lake.toml")
+    assert (mission.autopilot.system, mission.operator.arm, mission.operator.set_auto) == (7, False, False)
+    assert cli.main(["setup", "lake", "--yes", "--dir", str(tmp_path), *HERE]) == 2
+    assert "--force" in capfd.readouterr().err
+
+
+def test_a_drawn_mission_is_run_as_one(tmp_path, capfd):
+    assert cli.main(["setup", "pond", "--yes", "--drawn", "--no-go", "50", "--link", "udpin:127.0.0.1:14598",
+                     "--no-doctor", "--dir", str(tmp_path)]) == 0
+    written = tomllib.loads((tmp_path / "pond.toml").read_text())
+    assert (written["from_autopilot"], written["boat"]["no_go_half_deg"]) == (True, 50)
+    assert "systemctl enable --now companion@pond" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (["Lake", "--yes"], "is no name of an instance"),
+    (["lake", "--yes", "--dir", "/nowhere/at/all"], "/nowhere/at/all: no such folder; make it, or name another"),
+    (["lake", "--yes", "--link", "udpin:1", "--no-doctor", *HERE], "udpin:1"),
+])
+def test_bad_words_are_one_line_and_write_nothing(words, said, tmp_path, capfd):
+    where = [] if "--dir" in words else ["--dir", str(tmp_path)]
+    assert cli.main(["setup", *words, *where]) == 2
+    err = capfd.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def refusal(found):
+    with pytest.raises(LinkError) as error:
+        ports.find(found, lambda _: None)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_no_port_a_busy_one_and_one_without_permission(tmp_path, monkeypatch, serial):
+    assert "there is no serial port here; wire the autopilot" in refusal(ports.ports(tmp_path))
+    (tmp_path / "ttyACM0").symlink_to(serial)
+    (tmp_path / "autopilot").symlink_to("ttyACM0")
+    assert [p.path.name for p in ports.ports(tmp_path)] == ["autopilot"]   # one port, its best name
+    monkeypatch.setattr(os, "access", lambda *_: False)   # root may everything
+    assert "belongs to the group tty, and you are not in it; sudo adduser $USER tty" in refusal(ports.ports(tmp_path))
+
+
+def test_a_busy_port_says_who_to_end(serial):
+    import fcntl
+
+    with serial.open("r+b", buffering=0) as taken:
+        fcntl.flock(taken, fcntl.LOCK_EX)
+        assert "another program has it; end that, or share the port" in refusal([ports.Port(path=serial)])
