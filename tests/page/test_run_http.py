@@ -18,11 +18,11 @@ def tried(tmp_path, *words):
 
 
 @pytest.mark.parametrize("words", [
-    ("--http-token", "t"), ("--http-name", "boat.local"), ("--http", "x"), ("--http", "80", "--http-token", "no/such/folder/t"),
-    ("--http", "127.0.0.1:99999")])
-def test_a_page_that_cannot_be_is_one_line(words, tmp_path, capsys):
+    ("--http-token", "t"), ("--http-name", "boat.local"), ("--http", "x"), ("--http", "127.0.0.1:99999"),
+    ("--http", "80", "--http-token", "no/such/folder/t")])
+def test_a_page_that_cannot_be_is_one_line(words, tmp_path, capfd):
     code = tried(tmp_path, *words)
-    err = capsys.readouterr().err
+    err = capfd.readouterr().err
     assert (code, err.count("\n")) in {(2, 1), (66, 1)}
     assert not (tmp_path / "v").exists()
 
