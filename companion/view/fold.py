@@ -97,7 +97,8 @@ class ViewFold:
     def _view(self, step: Step, status: CompanionStatus, figures: VoyageFigures) -> values.View:
         snapshot, state, voyage, config = step.snapshot, step.state, self._voyage, self._config
         t_s, route = snapshot.t_s, step.state.route
-        chosen = None if route is None else self._plans.get(route.plan_id)
+        # a loiter that nobody planned has the number of the plan before it, and none of its reasons
+        chosen = None if route is None or route.cost_s is None else self._plans.get(route.plan_id)
         legs: tuple[Leg, ...] = tuple(leg for known in reversed(self._plans.values()) for leg in known.plan.legs)
         goals = parts.goals_of(step, voyage)
         following = next((g for g in goals if g.is_next), None)

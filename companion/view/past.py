@@ -75,7 +75,7 @@ def sample_of(view: View) -> Sample:
     minute = None if wind is None else next((b for b in wind.bands if b.horizon_s == 60.0), None)
     east, north = boat.at_en_m or (None, None)
     return Sample(
-        t_s=round(view.t_s, 1), east_m=east, north_m=north, heading_deg=boat.heading_deg, sog_mps=boat.sog_mps,
+        t_s=view.t_s, east_m=east, north_m=north, heading_deg=boat.heading_deg, sog_mps=boat.sog_mps,
         clearance_m=boat.clearance_m, starboard=None if boat.tack is None else boat.tack == "starboard",
         twd_from_deg=None if wind is None else wind.twd_from_deg, tws_mps=None if wind is None else wind.tws_mps,
         ahead_twd_deg=None if minute is None else minute.twd_from_deg,

@@ -14,6 +14,7 @@ import { Timeline } from "./timeline.js";
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Area} Area @typedef {import("../../view/view").Past} Past @typedef {import("./feed.js").Hello} Hello */
 
 const KEPT = 7200;
+const GAP_S = 8;        // after a hole in the views the past is asked for again
 /** @type {{view: View | null, area: Area | null, past: Past | null, hello: Hello | null, timeline: Timeline | null, heard: number, isUp: boolean, isOver: boolean}} */
 const page = { view: null, area: null, past: null, hello: null, timeline: null, heard: performance.now(), isUp: true, isOver: false };
 // for tests, and for who is curious
@@ -40,7 +41,7 @@ function old() {
 /** What a view adds to the past; names as in Sample. @param {Past} past @param {View} view */
 function remember(past, view) {
   const last = past.t_s[past.t_s.length - 1];
-  if (last !== undefined && view.t_s <= last) return;
+  if (last !== undefined && view.t_s <= last + 0.3) return;
   const minute = view.wind?.bands.find((b) => b.horizon_s === 60);
   const [east, north] = view.boat.at_en_m ?? [null, null];
   past.t_s.push(view.t_s); past.east_m.push(east); past.north_m.push(north); past.heading_deg.push(view.boat.heading_deg);
@@ -69,6 +70,7 @@ async function live() {
       const before = page.view;
       // a companion that was started again counts its time anew
       if (before && (view.t_s < before.t_s - 5 || view.name !== before.name)) { log.clear(); isBack = true; }
+      if (before && view.t_s > before.t_s + GAP_S) isBack = true;
       page.view = view;
       page.heard = performance.now();
       page.isUp = true;

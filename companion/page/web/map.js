@@ -133,6 +133,7 @@ function draw() {
     camera.centre = state.up === "north" ? boat.at_en_m : moved(boat.at_en_m, camera.up, 0.15 * camera.height / camera.scale);
   }
   set(/** @type {SVGElement} */ (layers.world), { transform: matrix(camera) });
+  set(/** @type {Element} */ (root.querySelector("#hatch")), { patternTransform: `rotate(45) scale(${1 / camera.scale})` });
   const at = (/** @type {Point} */ en) => project(camera, en);
   grid(at);
   track();
@@ -235,7 +236,8 @@ function plan(view, at) {
     const [x, y] = at(leg.to_en_m);
     children.push(svg("circle", { cx: x, cy: y, r: 3, class: "waypoint" }));
     const words = [];
-    if (leg.manoeuvre && n > 0) words.push(leg.manoeuvre);
+    const [fx, fy] = at(leg.from_en_m);
+    if (leg.manoeuvre && n > 0) children.push(svg("text", { x: fx + 7, y: fy - 6, class: "word small" }, leg.manoeuvre));
     if (leg.risk !== null && leg.risk >= 0.02) words.push(percent(leg.risk));
     const [a, b] = [at(leg.from_en_m), at(leg.to_en_m)];
     if (words.length && Math.hypot(a[0] - b[0], a[1] - b[1]) > 45) {

@@ -73,7 +73,7 @@ function figures(view) {
     one("COG", bearing(boat?.cog_deg), bearingUnit()), one("to mark", distance(boat?.goal_m), ""),
     one("TWD σ 1 min", wind?.sigma_deg == null ? NONE : `±${figure(wind.sigma_deg, 0)}°`, ""), one("clearance", distance(boat?.clearance_m), ""),
     one("next tack", duration(plan?.next_tack_s), ""), one("risk, instant", percent(plan?.promised_risk), ""),
-    one("off the leg", boat?.cross_track_m == null ? NONE : `${figure(Math.abs(boat.cross_track_m), 1)} m ${boat.cross_track_m < -0.05 ? "left" : boat.cross_track_m > 0.05 ? "right" : ""}`, ""),
+    one("off the leg", boat?.cross_track_m == null ? NONE : `${figure(Math.abs(boat.cross_track_m), 1)} m ${boat.cross_track_m < -0.05 ? "L" : boat.cross_track_m > 0.05 ? "R" : ""}`, ""),
     one("battery", figure(boat?.battery_v, 1), boat?.battery_share == null ? "V" : `V ${percent(boat.battery_share)}`));
 }
 
@@ -91,8 +91,8 @@ function plan(view) {
   get("planfacts").replaceChildren(...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
   const legs = p?.legs ?? [];
   const first = p?.leg ?? 1;
-  keep("plantable", table("Legs that are left", ["leg", "risk", "course", "TWA", "length", "no-go", "over margin"], legs.map((leg, n) => [
-    `${first + n}${leg.is_loiter ? " loiter" : leg.manoeuvre ? ` ${leg.manoeuvre}` : ""}`, el("span", { class: `risk r${riskClass(leg.risk)}` }, leg.is_beat ? `${percent(leg.risk)} beat` : percent(leg.risk)),
+  keep("plantable", table("Legs that are left; spare: nearest beyond the margin", ["leg", "risk", "course", "TWA", "length", "no-go", "spare"], legs.map((leg, n) => [
+    `${first + n}${leg.is_loiter ? " loiter" : leg.manoeuvre ? ` ${leg.manoeuvre}` : leg.is_beat ? " beat" : ""}`, el("span", { class: `risk r${riskClass(leg.risk)}` }, percent(leg.risk)),
     bearing(leg.course_deg), atBow(leg.twa_deg), leg.is_loiter ? NONE : distance(leg.length_m), figure(leg.no_go_half_deg, 0, "°"), distance(leg.clearance_m)])));
 }
 

@@ -1,0 +1,303 @@
+"""The page in a real browser: recorded, packed into a file, live with orders, with the link lost and back.
+
+Nothing may be complained about on its console, and nothing asked for but from its own server. With $SCREENSHOTS naming
+a folder, pictures of it are left there.
+"""
+
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+from companion.clock import run
+from companion.page import Address, Live, export, served
+from sitl.scene.ships import free_port
+from tests.page.asking import Asked
+from tests.page.browsing import Window, needs_browser
+
+pytestmark = needs_browser
+
+
+@contextlib.contextmanager
+def serving(source, token="", port=None):
+    """Serve a page from a thread; yields its address and a way to run something in its loop."""
+    port = port or free_port()
+    ready, over = threading.Event(), None
+    loops = []
+
+    async def whole():
+        nonlocal over
+        over = asyncio.Event()
+        loops.append(asyncio.get_running_loop())
+        async with served(Address(host="127.0.0.1", port=port, token=token), source):
+            ready.set()
+            await over.wait()
+
+    thread = threading.Thread(target=lambda: run(whole()), daemon=True)
+    thread.start()
+    assert ready.wait(10.0)
+    try:
+        yield f"http://127.0.0.1:{port}/", loops[0].call_soon_threadsafe
+    finally:
+        loops[0].call_soon_threadsafe(over.set)
+        thread.join(10.0)
+
+
+def keep(window, name):
+    folder = os.environ.get("SCREENSHOTS")
+    if folder:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        window.driver.save_screenshot(str(Path(folder) / f"{name}.png"))
+
+
+def is_own(window, url):
+    return [asked for asked in window.requests() if not asked.startswith((url, "data:"))] == []
+
+
+def test_a_recorded_voyage_is_scrubbed_played_and_read_by_everybody(record):
+    with serving(record) as (url, _), Window() as window:
+        took = window.open(url)
+        assert window.text("name") == "beat"
+        window.js("companion.timeline.go(companion.timeline.index(80))")
+        window.until("return document.getElementById('phase').textContent === 'holding'")
+        assert "hold" in window.text("log")
+        assert window.js("return document.querySelectorAll('#map .track path').length") >= 2
+        assert window.js("return document.querySelectorAll('#dial .zone').length") == 3
+        keep(window, "recorded")
+        window.keys("]")
+        window.until("return companion.view.t_s > 81")
+        later = window.js("return companion.view.t_s")
+        window.keys("[")
+        window.until("return companion.view.t_s < arguments[0]", 10.0, later)
+        window.js("document.getElementById('rate').value = '60'")
+        window.keys(" ")
+        window.until("return companion.timeline.at === companion.timeline.times.length - 1")
+        assert window.text("phase") == "done"
+        # what came later is no part of what is shown of a moment
+        window.js("companion.timeline.go(companion.timeline.index(60))")
+        window.until("return companion.view.t_s < 62")
+        assert "done" not in window.js("return document.getElementById('log').firstChild.textContent")
+        for palette in ("day", "dusk", "night"):
+            window.js("const p = document.getElementById('palette'); p.value = arguments[0]; "
+                      "p.dispatchEvent(new Event('change'))", palette)
+            assert window.barriers() == [], palette
+            keep(window, f"recorded-{palette}")
+        assert window.complaints() == []
+        assert is_own(window, url)
+        assert took < 5.0
+
+
+def test_units_and_bearings_are_as_one_likes_and_stay_so(record):
+    with serving(record) as (url, _), Window() as window:
+        window.open(url)
+        window.js("companion.timeline.go(companion.timeline.index(60))")
+        window.until("return companion.view.boat.sog_mps > 0.5")
+        knots = window.js("return document.querySelector('#figures').textContent")
+        window.keys("u")
+        assert window.js("return document.querySelector('#figures').textContent") != knots
+        window.keys("d")
+        chosen = window.js("return document.documentElement.dataset.palette")
+        window.driver.refresh()
+        window.until("return document.body.dataset.ready === '1'")
+        assert window.js("return document.documentElement.dataset.palette") == chosen
+        assert window.js("return document.getElementById('speeds').value") == "mps"
+        for key, up in (("h", "head"), ("w", "wind"), ("n", "north")):
+            window.keys(key)
+            assert window.js("return document.querySelector('[data-up][aria-pressed=true]').dataset.up") == up
+        assert window.complaints() == []
+
+
+def test_on_a_phone_nothing_is_wider_than_the_screen(record):
+    with serving(record) as (url, _), Window(390, 844, phone=True) as window:
+        window.open(url)
+        window.js("companion.timeline.go(companion.timeline.index(60))")
+        window.until("return companion.view.t_s > 59")
+        assert window.js("return document.documentElement.scrollWidth") <= 390
+        assert window.barriers() == []
+        keep(window, "phone")
+        assert window.complaints() == []
+
+
+def test_a_voyage_in_one_file_needs_nothing_and_nobody(record, tmp_path):
+    path = tmp_path / "voyage.html"
+    path.write_bytes(export(record))
+    with Window() as window:
+        window.open(path.as_uri())
+        window.js("companion.timeline.go(companion.timeline.index(80))")
+        window.until("return document.getElementById('phase').textContent === 'holding'")
+        assert window.complaints() == []
+        assert [a for a in window.requests() if not a.startswith(("file:", "data:", "blob:"))] == []
+    assert path.stat().st_size < 1_500_000
+
+
+def test_live_views_are_shown_the_link_is_lost_and_comes_back_and_old_data_look_old(sailed):
+    port = free_port()
+    live = Live(name="beat", unix_s=0.0)
+    moments = [m for m in sailed.moments if m[0].state.is_sailing]
+    with Window() as window:
+        with serving(live, port=port) as (url, call):
+            for view, events in moments[:20]:
+                call(live.show, view, events, sailed.area)
+            window.open(url)
+            window.until("return companion.view !== null")
+            for view, events in moments[20:40]:
+                call(live.show, view, events, sailed.area)
+            window.until("return companion.view.t_s === arguments[0]", 10.0, moments[39][0].t_s)
+            assert window.js("return document.body.classList.contains('stale')") is False
+            window.until("return companion.past.t_s.length === 40")
+            window.driver.refresh()
+            window.until("return companion.view !== null && companion.past.t_s.length === 40")
+            assert window.complaints() == []
+            port_before = live.hub
+        # the companion is gone, and comes back at the same port with what it goes on to do
+        again = Live(name="beat", unix_s=0.0)
+        window.until("return companion.isOver || !companion.isUp")
+        assert port_before.is_closed
+        window.driver.refresh()   # who reloads meanwhile gets the browser's own page
+        with serving(again, port=port) as (url, call):
+            for view, events in moments[:50]:
+                call(again.show, view, events, sailed.area)
+            window.open(url)
+            window.until("return companion.view && companion.view.t_s === arguments[0]", 10.0, moments[49][0].t_s)
+            # the boat falls silent: the views come on, with its age
+            from dataclasses import replace
+
+            call(again.show, replace(moments[50][0], age_s=12.0), (), sailed.area)
+            window.until("return document.body.classList.contains('stale')")
+            assert "12 s old" in window.text("stale")
+            keep(window, "stale")
+            assert window.barriers() == []
+            assert is_own(window, f"http://127.0.0.1:{port}/")
+
+
+def test_a_link_that_breaks_is_said_and_healed_without_a_reload(sailed):
+    port = free_port()
+    moments = [m for m in sailed.moments if m[0].state.is_sailing]
+    live = Live(name="beat", unix_s=0.0)
+    for view, events in moments[:10]:
+        live.show(view, events, sailed.area)
+    with Window() as window:
+        with serving(live, port=port) as (url, _):
+            window.open(url)
+            window.until("return companion.view !== null")
+            live.hub.close = lambda: None   # killed: nothing is said
+        window.until("return !companion.isUp")
+        window.until("return document.body.classList.contains('stale')")
+        assert "No link" in window.text("stale")
+        again = Live(name="beat", unix_s=0.0)
+        for view, events in moments[:30]:
+            again.show(view, events, sailed.area)
+        with serving(again, port=port):
+            window.until("return companion.isUp && companion.view.t_s === arguments[0]", 20.0, moments[29][0].t_s)
+            window.until("return companion.past.t_s.length === 30")
+            window.until("return !document.body.classList.contains('stale')")
+
+
+def test_words_of_others_are_shown_as_words(sailed):
+    from dataclasses import replace
+
+    from companion.view.values import Alarm, Vessel
+
+    nasty = "<img src=x onerror=alert(1)><script>alert(2)</script>"
+    view = next(v for v in sailed.views if v.state.is_sailing)
+    view = replace(view, name=nasty, alarms=(Alarm(code="x", level="error", text=nasty, age_s=1.0),),
+                   vessels=(Vessel(name=nasty, at_en_m=(10.0, 10.0), alarm="act", range_m=10.0),))
+    live = Live(name=nasty, unix_s=0.0)
+    live.show(view, (), sailed.area)
+    with serving(live) as (url, _), Window() as window:
+        window.open(url)
+        window.until("return companion.view !== null && document.querySelector('.alarm')")
+        assert window.js("return document.querySelector('.alarm p').textContent") == nasty
+        assert window.js("return document.querySelectorAll('img, main script').length") == 0
+        assert window.barriers() == []
+        assert window.complaints() == []
+
+
+def test_an_order_asks_for_the_token_once_and_a_wrong_one_is_told(sailed):
+    asked = Asked()
+    live = Live(name="beat", unix_s=0.0, ask=asked.ask, preview=asked.preview, permitted=("hold", "go_on", "why"))
+    view = next(v for v in sailed.views if v.state.is_sailing)
+    live.show(view, (), sailed.area)
+    with serving(live, token="the-right-token-of-24-letters") as (url, _), Window() as window:
+        window.open(url)
+        window.until("return companion.view !== null")
+        verbs = window.js("return [...document.querySelectorAll('[data-verb]')].map((b) => b.dataset.verb)")
+        assert verbs == ["hold", "go_on"]
+
+        def order(token=None):
+            window.click("[data-verb=hold]")
+            if token is not None:
+                window.until("return document.getElementById('token') !== null")
+                window.keys(token, "\n")
+            window.until("return document.getElementById('confirm') !== null && document.getElementById('dialog').open")
+            assert window.barriers() == []
+            window.click("#confirm")
+            window.until("return !document.getElementById('dialog').open")
+
+        order("a-wrong-token-of-24-letters-x")
+        window.until("return document.getElementById('answer').textContent.includes('token')")
+        assert asked.orders == []
+        order("the-right-token-of-24-letters")
+        window.until("return document.getElementById('answer').textContent.includes('holding')")
+        order()
+        assert asked.orders == ["hold", "hold"]
+
+
+def test_the_demonstration_is_watched_live_an_order_is_given_and_obeyed(tmp_path):
+    """The companion, the autopilot and the browser are processes of their own."""
+    port, token = free_port(), tmp_path / "token"
+    done = subprocess.Popen(
+        [sys.executable, "-m", "sitl.cli", "demo", "--seed", "3", "--speedup", "6", "--out", str(tmp_path / "v"),
+         "--http", str(port), "--http-token", str(token)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    try:
+        with Window() as window:
+            url = f"http://127.0.0.1:{port}/"
+            until_s = time.monotonic() + 90.0
+            while True:
+                try:
+                    window.open(url, 5.0)
+                    break
+                except Exception:
+                    assert time.monotonic() < until_s
+                    assert done.poll() is None, done.stderr.read()
+                    time.sleep(1.0)
+            window.complaints()   # of the time before it listened
+            window.until("return companion.view && companion.view.state.is_sailing && companion.view.plan", 60.0)
+            window.until("return companion.view.boat.sog_mps > 1")
+            keep(window, "live")
+            window.click("[data-verb=hold]")
+            window.until("return document.getElementById('token') !== null")
+            window.keys(token.read_text().strip(), "\n")
+            window.until("return document.getElementById('confirm') !== null")
+            window.click("#confirm")
+            window.until("return companion.view.orders.standing && companion.view.orders.standing.verb === 'hold'")
+            window.until("return companion.view.state.phase === 'holding'")
+            assert "done" in window.text("answer")
+            window.click("[data-verb=home]")   # its plan is seen before it is confirmed
+            window.until("return document.querySelector('#preview dl') !== null")
+            assert window.js("return document.querySelectorAll('#map .preview path').length") > 0
+            keep(window, "preview")
+            window.click("#dialog .buttons button:not(.primary)")
+            window.driver.refresh()
+            window.until("return document.body.dataset.ready === '1' && companion.view !== null")
+            window.until("return companion.past.t_s.length > 60")
+            window.click("[data-verb=go_on]")   # the token is kept for the window
+            window.until("return document.getElementById('confirm') !== null")
+            window.click("#confirm")
+            window.until("return companion.view.orders.standing === null")
+            window.until("return companion.view.state.phase !== 'holding'")
+            assert window.complaints() == []
+            assert is_own(window, url)
+    finally:
+        done.send_signal(signal.SIGINT)
+        try:
+            done.wait(30.0)
+        except subprocess.TimeoutExpired:
+            done.kill()
+            done.wait()
+        done.stderr.close()

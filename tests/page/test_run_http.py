@@ -1,0 +1,64 @@
+"""``companion run --http`` and ``sitl run --http``: what is refused, and that no page is worth a voyage."""
+
+import socket
+import stat
+
+import pytest
+
+from companion import cli
+from sitl import cli as sitl_cli
+from sitl.scene.ships import free_port
+from tests.view.conftest import write_mission
+
+
+def tried(tmp_path, *words):
+    """Run without an autopilot: what is wrong with the page is told before, or sailed without."""
+    return cli.main(["run", str(write_mission(tmp_path)), "--link", f"udpin:127.0.0.1:{free_port()}", "--wait", "0.3",
+                     "--out", str(tmp_path / "v"), "--state", str(tmp_path / "s.json"), *map(str, words)])
+
+
+@pytest.mark.parametrize("words", [
+    ("--http-token", "t"), ("--http-name", "boat.local"), ("--http", "x"), ("--http", "127.0.0.1:99999"),
+    ("--http", "80", "--http-token", "no/such/folder/t")])
+def test_a_page_that_cannot_be_is_one_line(words, tmp_path, capfd):
+    code = tried(tmp_path, *words)
+    err = capfd.readouterr().err
+    assert (code, err.count("\n")) in {(2, 1), (66, 1)}
+    assert not (tmp_path / "v").exists()
+
+
+def test_a_token_that_others_can_read_is_one_line(tmp_path, capsys):
+    token = tmp_path / "token"
+    token.write_text("a-token-of-enough-characters\n")
+    token.chmod(0o644)
+    assert tried(tmp_path, "--http", free_port(), "--http-token", token) == 2
+    assert "chmod 600" in capsys.readouterr().err
+
+
+def test_with_its_port_in_use_she_is_sailed_without_a_page(tmp_path, capfd):
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        assert tried(tmp_path, "--http", port) == 1   # for want of an autopilot, not of a page
+    out, err = capfd.readouterr()
+    assert out.count("she is sailed without a page") == 1
+    assert "in use" in out
+    assert "no autopilot" in err or "heard" in err
+    assert '"what":"live page"' in (tmp_path / "v" / "decisions.jsonl").read_text()
+
+
+def test_a_token_is_made_and_its_file_is_its_owners(tmp_path, capsys):
+    token = tmp_path / "token"
+    tried(tmp_path, "--http", free_port(), "--http-token", token)
+    capsys.readouterr()
+    assert stat.S_IMODE(token.stat().st_mode) == 0o600
+
+
+def test_under_the_virtual_clock_no_browser_can_be_waited_for(tmp_path, capsys):
+    write_mission(tmp_path)
+    (tmp_path / "s.toml").write_text('name = "s"\nmission = "mission.toml"\n')
+    assert sitl_cli.main(["run", str(tmp_path / "s.toml"), "--http", "8765", "--out", str(tmp_path / "v")]) == 2
+    err = capsys.readouterr().err
+    assert "--live" in err
+    assert err.count("\n") == 1

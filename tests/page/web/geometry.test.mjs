@@ -1,0 +1,92 @@
+// The page's pure functions: node --test.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import * as format from "../../../companion/page/web/format.js";
+import * as g from "../../../companion/page/web/geometry.js";
+
+const near = (a, b, by = 1e-6) => assert.ok(Math.abs(a - b) <= by, `${a} is not ${b}`);
+const cameras = [0, 37, 90, 180, 271.5].map((up) => ({ centre: [120, -40], scale: 1.7, up, width: 640, height: 480 }));
+
+test("what is up is up, and right of it is right", () => {
+  for (const camera of cameras) {
+    const [x, y] = g.project(camera, g.moved(camera.centre, camera.up, 10));
+    near(x, 320); near(y, 240 - 17);
+    const [a, b] = g.project(camera, g.moved(camera.centre, camera.up + 90, 10));
+    near(a, 320 + 17); near(b, 240);
+  }
+});
+
+test("a place on the screen is found again", () => {
+  for (const camera of cameras) {
+    for (const place of [[0, 0], [500, -800], [-3.5, 12]]) {
+      const back = g.unproject(camera, g.project(camera, place));
+      near(back[0], place[0]); near(back[1], place[1]);
+    }
+  }
+});
+
+test("the matrix does what project does", () => {
+  for (const camera of cameras) {
+    const [a, b, c, d, e, f] = g.matrix(camera).slice(7, -1).split(" ").map(Number);
+    const [x, y] = g.project(camera, [33, 44]);
+    near(a * 33 + c * 44 + e, x); near(b * 33 + d * 44 + f, y);
+  }
+});
+
+test("the track is parted by tack and by gaps, and joined at each tack", () => {
+  const pieces = g.byTack([0, 1, 2, 3, null, 5, 6], [0, 0, 0, 0, null, 0, 0], [true, true, false, false, false, false, false]);
+  assert.deepEqual(pieces.map((p) => p.starboard), [true, false, false]);
+  assert.deepEqual(pieces[1].points[0], [1, 0]);   // begins where the tack before ends
+  assert.deepEqual(pieces[2].points, [[5, 0], [6, 0]]);
+});
+
+test("directions go on over north", () => {
+  assert.deepEqual(g.unwrapped([350, null, 358, 5, 355]), [350, null, 358, 365, 355]);
+});
+
+test("a sector goes clockwise from its first to its last direction", () => {
+  assert.match(g.sector(0, 90, 0, 10), /^M0\.00 -10\.00A10 10 0 0 1 10\.00 -?0\.00/);
+  assert.match(g.sector(0, 200, 0, 10), / 0 1 1 /);
+});
+
+test("marks are round, within, and not too many", () => {
+  for (const [low, high] of [[0, 1], [-3, 17], [340, 385], [4.1, 4.9], [0, 1e-9]]) {
+    const marks = g.marks(low, high, 4);
+    assert.ok(marks.length <= 5 && marks.every((m) => m >= low - 1e-9 && m <= high + 1e-9), String(marks));
+  }
+});
+
+test("a leg's risk has three classes, and unknown is none of them", () => {
+  assert.deepEqual([0, 0.019, 0.02, 0.099, 0.1, null].map(g.riskClass), ["0", "0", "1", "1", "2", "unknown"]);
+});
+
+test("unknown is a dash and never nought", () => {
+  for (const show of [format.figure, format.speed, format.bearing, format.distance, format.percent, format.duration, format.atBow]) {
+    assert.equal(show(null), format.NONE);
+    assert.notEqual(show(0), format.NONE);
+  }
+});
+
+test("bearings have three digits and turn with the variation", () => {
+  Object.assign(format.units, { bearings: "true", variation: 10 });
+  assert.equal(format.bearing(359.6), "000°");
+  assert.equal(format.bearing(7), "007°");
+  format.units.bearings = "magnetic";
+  assert.equal(format.bearing(5), "355°");
+  format.units.bearings = "true";
+});
+
+test("speeds are knots or metres a second", () => {
+  format.units.speeds = "kn";
+  assert.equal(format.speed(1), "1.9");
+  format.units.speeds = "mps";
+  assert.equal(format.speed(1), "1.0");
+});
+
+test("a position is degrees and minutes, and 60 minutes are a degree", () => {
+  assert.equal(format.position(50.99999999, -1.5), "51°00.000′ N  001°30.000′ W");
+});
+
+test("the wind over starboard is S", () => {
+  assert.deepEqual([format.atBow(42), format.atBow(-42), format.atBow(180)], ["42° S", "42° P", "180°"]);
+});
