@@ -6,6 +6,7 @@ import asyncio
 import codecs
 import contextlib
 import os
+import re
 import signal
 import sys
 import termios
@@ -18,6 +19,10 @@ from companion.terminal.screen import Frame, changes
 
 # The alternate screen, no cursor, no line wrap; and back.
 ENTER, LEAVE = "\x1b[?1049h\x1b[?25l\x1b[?7l", "\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l"
+
+
+# Arrows and their like, as a terminal sends them: no key of ours.
+FUNCTION_KEYS = re.compile(r"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|O.)")
 
 
 def can_draw(out: TextIO, environment: Mapping[str, str]) -> bool:
@@ -99,10 +104,7 @@ class Terminal:
         if not data:
             self._hang_up()
             return
-        text = self._keys.decode(data)
-        if text.startswith("\x1b") and len(text) > 1:
-            return            # an arrow or a function key: no key of ours
-        for key in text:
+        for key in FUNCTION_KEYS.sub("", self._keys.decode(data)):
             self._on_key(key)
 
     def _hang_up(self) -> None:

@@ -5,39 +5,37 @@ import contextlib
 import json
 import socket
 import stat
+from dataclasses import replace
 
+import msgspec
 import pytest
 
 from companion.app.crew import Crew
 from companion.app.local import MAX_LINE, MOST, served
+from companion.app.showing import Showing
 from companion.clock import run
+from companion.compose import config_of, voyage_of
 from companion.errors import InputError
+from companion.geofence import load_mission
 from companion.mavlink.link import Link
 from companion.orders import Result, Verb
 from companion.skipper.step import Acknowledge
+from companion.view import Event, View
 from sitl.autopilot import MemoryLink
+from tests.terminal.test_dashboard import VIEW
 
 
-def showing():
-    from pathlib import Path
-
-    from companion.app.showing import Showing
-    from companion.compose import config_of, voyage_of
-    from companion.geofence import load_mission
-
-    mission = load_mission(Path("missions/archipelago.toml"))
-    return Showing(voyage_of(mission), config_of(mission), 0.0, print)
+def showing(on_fault=print):
+    mission = load_mission("missions/archipelago.toml")
+    return Showing(voyage_of(mission), config_of(mission), 0.0, on_fault)
 
 
-SHOWING = showing()
-
-
-def with_socket(path, talk):
+def with_socket(path, talk, shown=None):
     """Run ``talk(crew)`` with the socket served; what nobody takes is answered by nobody."""
     async def whole():
         crew = Crew(Link(MemoryLink().near), has_key=False)
         crew.begin()
-        async with served(path, crew, SHOWING):
+        async with served(path, crew, shown or showing()):
             return await talk(crew)
 
     return run(whole())
@@ -119,7 +117,7 @@ def test_a_place_that_is_taken_is_left_alone_and_what_a_kill_left_is_not(tmp_pat
 
     async def twice(crew):
         with pytest.raises(InputError, match="another program listens"):
-            async with served(tmp_path / "s", crew, SHOWING):
+            async with served(tmp_path / "s", crew, showing()):
                 pass
         return await said(tmp_path / "s", b"jump\n")
 
@@ -132,3 +130,78 @@ def test_a_place_that_is_taken_is_left_alone_and_what_a_kill_left_is_not(tmp_pat
         return (tmp_path / "s").is_socket()
 
     assert with_socket(tmp_path / "s", mode)
+
+
+# ------------------------------------------------------------------------------------------ views
+def tell(shown, number, text=""):
+    """Let a step be seen, as the voyage does."""
+    event = Event(number=number, t_s=float(number), kind="said", title=f"event {number}", text=text)
+    for watcher in tuple(shown.watchers):
+        watcher(replace(VIEW, t_s=float(number)), (event,), None)
+
+
+async def watching(path, shown):
+    reader, writer = await asyncio.open_unix_connection(path, limit=1 << 20)
+    writer.write(b"watch\n")
+    async with asyncio.timeout(5.0):
+        while not shown.watchers:  # noqa: ASYNC110 - nothing tells of it
+            await asyncio.sleep(0.01)
+    return reader, writer
+
+
+def test_who_watches_is_told_of_each_step_and_orders_go_on(tmp_path):
+    shown = showing()
+
+    async def talk(crew):
+        reader, writer = await watching(tmp_path / "s", shown)
+        tell(shown, 1)
+        first = msgspec.json.decode(await reader.readline())
+        tell(shown, 2)
+        tell(shown, 3)                       # before the one before it was fetched: the newest, and all that happened
+        second = msgspec.json.decode(await reader.readline())
+        assert (await said(tmp_path / "s", b"dance\n"))[0].startswith(b'{"result": "unknown"')
+        writer.close()
+        await asyncio.sleep(0.1)
+        tell(shown, 4)
+        await asyncio.sleep(0.1)
+        tell(shown, 5)
+        await asyncio.sleep(0.1)
+        return first, second, len(shown.watchers)
+
+    first, second, left = with_socket(tmp_path / "s", talk, shown)
+    assert msgspec.convert(first["view"], View) == replace(VIEW, t_s=1.0)
+    assert second["view"]["t_s"] == 3.0
+    assert [event["number"] for event in second["events"]] == [2, 3]
+    assert left == 0                         # who is gone is told no more
+
+
+def test_who_watches_and_never_reads_is_hung_up_on(tmp_path, monkeypatch):
+    monkeypatch.setattr("companion.app.local.STUCK_S", 0.3)
+    shown = showing()
+
+    async def talk(crew):
+        _, writer = await watching(tmp_path / "s", shown)
+        writer.transport.pause_reading()
+        for number in range(200):
+            tell(shown, number, "x" * 100_000)
+            await asyncio.sleep(0.005)
+            if not shown.watchers:
+                break
+        async with asyncio.timeout(5.0):
+            while shown.watchers:  # noqa: ASYNC110 - nothing tells of it
+                await asyncio.sleep(0.01)
+        writer.close()
+
+    with_socket(tmp_path / "s", talk, shown)
+
+
+def test_a_view_that_cannot_be_made_is_said_once_and_costs_nothing():
+    faults, seen = [], []
+    shown = showing(faults.append)
+    shown.take(None, None, None)             # nobody watches: nothing is made
+    assert faults == []
+    shown.watchers.append(lambda *told: seen.append(told))
+    shown.take(None, None, None)
+    shown.take(None, None, None)
+    assert len(faults) == 1
+    assert "could not be made" in faults[0]

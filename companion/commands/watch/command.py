@@ -156,7 +156,7 @@ async def _tell(args: argparse.Namespace, source: Source, over: asyncio.Event) -
     while not over.is_set():
         view, events = source.look()
         if view is None and now_s() - began_s >= args.timeout:
-            sys.stderr.write(f"companion watch: {source.trouble or f'{source.name}: nothing heard'}\n")
+            sys.stderr.write(f"companion watch: {source.name}: {source.trouble or 'nothing heard'}\n")
             return EXIT_NO_LINK
         for event in events:
             sys.stdout.write(f"{event_words(event)}\n")

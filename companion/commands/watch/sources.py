@@ -116,7 +116,7 @@ class Radio(Source):
             try:
                 await self._link.wait_autopilot(self._timeout_s)
             except LinkError as error:
-                self.trouble = str(error)
+                self.trouble = str(error).removeprefix(f"{self.name}: ")
                 if now_s() - began_s < 0.5 * self._timeout_s:   # it cannot be told which one is ours
                     return
             else:
@@ -160,10 +160,10 @@ class OnBoard(Source):
                     await self._hear(reader)
                 finally:
                     writer.close()
-                self.trouble = "the companion has hung up"
+                self.trouble = "the companion has hung up; trying again"
             except (OSError, ValueError) as error:
                 why = reason(error) if isinstance(error, OSError) else "that is no companion of this version"
-                self.trouble = f"{self._path}: {why}; is the companion running with --socket?"
+                self.trouble = f"nobody is there ({why}): companion run needs --socket"
             await asyncio.sleep(AGAIN_S)
 
     async def _hear(self, reader: asyncio.StreamReader) -> None:
