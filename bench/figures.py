@@ -5,9 +5,10 @@
 - wolsieffer-7: two channels; the wind just lets the right-hand one be sailed, noise closes it, down wind.
 - busser-5-1 .. busser-5-4: AVALON's costs added one by one: sailing time alone; turning; estimate and tunnel;
   other winds.
+- field-atoms, field-trees: Schmitt's figures 6.1 to 6.5, and her trees 4.2 and 4.3; wrsc2013-field: her task.
 - risk: the promise of a path against simulated winds, as its limit is tightened.
 
-The polygons are drawn after the papers' pictures, which give no coordinates.
+The problems are in ``bench.papers``.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
+from bench.papers import DELTA_6A, DELTA_6B, NOISY_DEG, STEADY_DEG, four_polygons, lake, two_channels
 from companion.planner.problem import evaluate
 
 mpl.use("Agg")
@@ -27,40 +29,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
-from companion.boat import MPS_PER_KNOT, Boat, avalon
 from companion.planner import Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.plan import Plan, PlanStatus
 from companion.planner.reference.astar import search as search_astar
 from companion.planner.risk import simulate_entries
 from companion.planner.settings import AstarSettings
+from companion.plots.field import atoms_figure, encounter_figure, trees_figure
 from companion.plots.plan import draw_plan
+from sitl.tasks.wrsc2013 import HALF_M
+from sitl.tasks.wrsc2013 import run as run_wrsc2013
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "figures"
-FOUR = [
-    "POLYGON((-110 95,-35 80,-20 130,-75 165,-110 95))", "POLYGON((25 60,95 75,80 130,30 120,25 60))",
-    "POLYGON((-60 210,0 190,25 240,-25 275,-60 210))", "POLYGON((60 190,130 175,140 250,85 260,60 190))",
-]
-CHANNELS = [  # an island between two shores: a channel on its left, one on its right
-    "POLYGON((-40 80,30 60,60 160,45 300,-20 320,-60 220,-40 80))",
-    "POLYGON((-400 -50,-210 -50,-150 120,-165 260,-130 380,-170 480,-400 480,-400 -50))",
-    "POLYGON((120 -50,400 -50,400 480,170 480,125 340,140 180,120 -50))",
-]
-WOLSIEFFER = {"no_go_half_deg": 45.0, "max_twa_deg": 180.0, "turn_rate_rad_s": 0.5,
-              "speed": {"model": "constant", "v_mps": 1.5}}
-
-
-def problem(**parts):
-    return Problem.from_json({"id": "", "title": "", "obstacles": [], "fence": None, "delta_s": 0.5, **parts})
-
-
-def end(x, y, **more):
-    return {"x": x, "y": y, **more}
-
-
-def kalman(from_deg, sigma0, growth):
-    return {"from_deg": from_deg, "speed_mps": 5.0,
-            "sigma": {"model": "kalman", "sigma0_deg": sigma0, "growth_deg_per_sqrt_s": growth}}
 
 
 def save(figure, name):
@@ -76,19 +56,14 @@ def save(figure, name):
 
 # ------------------------------------------------------------------------------------- Wolsieffer
 def wolsieffer_6():
-    low, high = end(0, 0, heading_deg=0), end(20, 330, heading_deg=180)
-    # With the half angle at 45 + c sqrt(t) degrees the boat gets 0.157 v / c^2 to windward (c in radians) before the
-    # zone is 180 degrees wide: at 66 % that is 311 m here, at 60 % 824 m.
-    wind = kalman(0.0, 0.0, 3.82)
     figure, axes = plt.subplots(2, 2, figsize=(11.0, 12.4), layout="constrained")
-    for ax, letter, start, goal, delta in (
-        (axes[0, 0], "a", low, high, 0.60), (axes[0, 1], "b", low, high, DELTA_6B),
-        (axes[1, 0], "c", high, low, 0.60), (axes[1, 1], "d", high, low, DELTA_6B),
+    for ax, letter, is_up, delta in (
+        (axes[0, 0], "a", True, DELTA_6A), (axes[0, 1], "b", True, DELTA_6B),
+        (axes[1, 0], "c", False, DELTA_6A), (axes[1, 1], "d", False, DELTA_6B),
     ):
-        p = problem(start=start, goal=end(goal["x"], goal["y"], radius=4), obstacles=FOUR, boat=WOLSIEFFER, wind=wind,
-                    delta_s=delta)
+        p = four_polygons(delta, is_up=is_up)
         answer = plan(p, algorithm="rrtstar", expansions=6000, seed=1)
-        way = "up" if start is low else "down"
+        way = "up" if is_up else "down"
         result = f"{answer.cost_s:.0f} s"
         if not answer.has_path:
             proved = plan(p, budget_s=1.0).status is PlanStatus.INFEASIBLE
@@ -100,18 +75,13 @@ def wolsieffer_6():
     save(figure, "wolsieffer-6")
 
 
-DELTA_6B = 0.66
-
-
 def wolsieffer_7():
     figure, axes = plt.subplots(1, 3, figsize=(13.0, 5.6), layout="constrained")
-    up = {"start": end(0, -20, heading_deg=0), "goal": end(10, 420, radius=4)}
-    down = {"start": end(10, 420, heading_deg=180), "goal": end(0, -20, radius=4)}
-    for ax, letter, ends, sigma0, text in (
-        (axes[0], "a", up, 0.5, "steady wind"), (axes[1], "b", up, 14.0, "noisy wind"),
-        (axes[2], "c", down, 14.0, "down wind"),
+    for ax, letter, is_up, sigma0_deg, text in (
+        (axes[0], "a", True, STEADY_DEG, "steady wind"), (axes[1], "b", True, NOISY_DEG, "noisy wind"),
+        (axes[2], "c", False, NOISY_DEG, "down wind"),
     ):
-        p = problem(**ends, obstacles=CHANNELS, boat=WOLSIEFFER, wind=kalman(WIND_7, sigma0, 0.05), delta_s=0.75)
+        p = two_channels(sigma0_deg, is_up=is_up)
         answer = plan(p, budget_s=2.0)
         result = f"{answer.cost_s:.0f} s" if answer.has_path else answer.reason
         draw_plan(ax, p, answer, title=f"({letter}) {text}: {result}")
@@ -119,23 +89,7 @@ def wolsieffer_7():
     save(figure, "wolsieffer-7")
 
 
-WIND_7 = -30.0
-
-
 # ----------------------------------------------------------------------------------------- Büsser
-def lake(wind_from, knots=10.0):
-    boat = Boat(polar=avalon(), max_twa_rad=np.radians(160.0)).problem_boat(knots * MPS_PER_KNOT)
-    angles = np.linspace(0.0, 2.0 * np.pi, 33)
-    island = ", ".join(f"{120 + 90 * np.cos(a):.2f} {560 + 90 * np.sin(a):.2f}" for a in angles[:-1])
-    first = f"{120 + 90:.2f} 560.00"
-    return problem(
-        start=end(0, 0, heading_deg=0), goal=end(40, 900, radius=10), boat=boat,
-        obstacles=["POLYGON((-120 250,-20 250,-20 350,-120 350,-120 250))", f"POLYGON(({island}, {first}))"],
-        wind={"from_deg": wind_from, "speed_mps": knots * MPS_PER_KNOT, "sigma": {"model": "none"}},
-        fence="POLYGON((-450 -100,550 -100,550 1000,-450 1000,-450 -100))",
-    )
-
-
 def sail(p, **settings):
     outcome = search_astar(p, Effort(60.0, None), 0, AstarSettings(grid_m=20.0, **settings))
     if outcome.waypoints_en is None:
@@ -209,9 +163,32 @@ def risk():
     save(figure, "risk")
 
 
+# ---------------------------------------------------------------------------------------- Schmitt
+def field_atoms():
+    save(atoms_figure(), "field-atoms")
+
+
+def field_trees():
+    save(trees_figure(), "field-trees")
+
+
+def wrsc2013():
+    sailed = run_wrsc2013(WRSC_SEED)
+    course, score = sailed.course, sailed.score
+    title = (f"WRSC 2013, seed {WRSC_SEED}, by field: nearest hulls {score.least_m:.0f} m, "
+             f"out after {score.left_after_s:.0f} s")
+    save(encounter_figure(
+        sailed.track, sailed.intruder, half_m=HALF_M, twd_from_rad=course.twd_from_rad, tws_mps=course.tws_mps,
+        title=title, entered_s=course.entry_s), "wrsc2013-field")
+
+
+WRSC_SEED = 9
+
+
 FIGURES = {
     "wolsieffer-6": wolsieffer_6, "wolsieffer-7": wolsieffer_7, "busser-5-1": busser_5_1, "busser-5-2": busser_5_2,
-    "busser-5-3": busser_5_3, "busser-5-4": busser_5_4, "risk": risk,
+    "busser-5-3": busser_5_3, "busser-5-4": busser_5_4, "risk": risk, "field-atoms": field_atoms,
+    "field-trees": field_trees, "wrsc2013-field": wrsc2013,
 }
 
 

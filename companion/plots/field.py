@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
 
 import matplotlib as mpl
 
@@ -188,15 +186,3 @@ def encounter_figure(
     ax.legend(loc="lower left", fontsize=8)
     ax.set_title(title, fontsize=11)
     return figure
-
-
-def save(figure: Figure, path: Path) -> Path:
-    """Write a figure; return where."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    return path
-
-
-def save_all(folder: Path) -> Sequence[Path]:
-    """Write the atoms and the trees into ``folder``."""
-    return [save(atoms_figure(), folder / "field-atoms.png"), save(trees_figure(), folder / "field-trees.png")]

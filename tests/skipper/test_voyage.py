@@ -110,6 +110,17 @@ def test_a_90_degree_shift_in_mid_leg():
     assert reasons & {act.ReplanReason.WIND_SHIFT, act.ReplanReason.NO_GO}
 
 
+def test_a_plan_is_made_anew_when_it_is_old():
+    """Büsser's 60 minutes, cut to one and a half: a leg of four minutes without a waypoint on it."""
+    world = make(Goal(en_m=(700.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0),
+                 config={"plan_age_s": 90.0})
+    assert world.skipper.config.plan_age_s == 90.0
+    assert world.run(600, is_done)
+    asked = [t for t, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.PLAN_AGE]
+    assert len(asked) >= 2
+    assert all(b - a >= 90.0 for a, b in pairwise(asked))
+
+
 def test_a_header_that_closes_the_leg_is_answered_within_seconds():
     world = make(Goal(en_m=(300.0, 330.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0 if t < 40 else 0.5, 5.0))
     assert world.run(40)
