@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from companion.arguments import number, place, system_id
 from companion.errors import CompanionError, InputError, JobError
+from companion.program.arguments import number, place, system_id
 
 FOLDER = Path("/etc/companion")
 
