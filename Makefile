@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test check docs slowest campaign bench figures deb clean
+.PHONY: env demo test check docs slowest campaign bench figures deb release clean
 env: $(ENV)
 
 # What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
@@ -83,6 +83,13 @@ figures: $(ENV)
 # The Debian package of this machine's release and architecture, into dist/ (about three minutes; see packaging/).
 deb:
 	python3 packaging/deb.py
+
+# What is handed out, into dist/: wheel, bill of materials, checksums of all that is there (packages of other releases and
+# machines are put there before: packaging/build_in_debian.sh).
+release: $(ENV)
+	$(BIN)/python -m hatchling build -t wheel -d dist
+	$(BIN)/python packaging/sbom.py requirements.lock > dist/sailboat-companion.cdx.json
+	cd dist && sha256sum *.whl *.deb *.cdx.json 2>/dev/null > SHA256SUMS; cat SHA256SUMS
 
 clean:
 	rm -rf $(VENV) build dist docs/api

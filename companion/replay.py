@@ -18,7 +18,7 @@ from companion.compose import config_of, estimator_of, target_limits_of, voyage_
 from companion.errors import InputError
 from companion.fold import Step, VoyageFold
 from companion.geofence import load_mission
-from companion.mavlink.tlog import read_tlog
+from companion.mavlink.tlog import TlogRecord, read_tlog
 from companion.mavlink.trust import OWN_COMPONENT
 from companion.mavlink.wire import Codec, Message
 from companion.messages import MissionItem
@@ -44,7 +44,9 @@ from companion.telemetry.folder import (
     action_record,
     ais_of,
     believed,
+    is_from_the_start,
     jsonable,
+    parts,
     read_decisions,
     read_description,
     read_rows,
@@ -113,6 +115,9 @@ class Recorded:
 
     def __init__(self, folder: Path, mission_path: Path | None = None) -> None:
         require_files(folder, VOYAGE, TLOG, DECISIONS, TRACK)
+        if not all(is_from_the_start(folder / name) for name in (TLOG, DECISIONS, TRACK)):
+            raise InputError(str(folder), "", "its first records were dropped for want of room",
+                             "it cannot be folded from its start; `companion report` draws what is there")
         description = read_description(folder)
         with believed(folder / VOYAGE, "[run], [mission] and [permissions]"):
             self.epoch_s = float(description["run"]["epoch_s"])
@@ -212,7 +217,7 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
         actions += len(folded.replayed)
         if not _same(folded.replayed, folded.recorded):
             differences.append(Difference(t_s=folded.t_s, recorded=folded.recorded, replayed=folded.replayed))
-    if lost and next(iter(read_tlog(folder / TLOG)), None) is None:
+    if lost and next(_frames(folder / TLOG), None) is None:
         raise InputError(
             str(folder / TLOG), "", f"is empty, and the steps heard {counted(messages, 'message')}",
             "nothing can be folded without them: copy the voyage's folder again")
@@ -246,12 +251,17 @@ def _rows(path: Path) -> list[tuple[float, int, int]]:
         return [(r["t_s"], int(r["frames"]), int(r["outcomes"])) for r in read_rows(path)]
 
 
+def _frames(path: Path) -> Iterator[TlogRecord]:
+    for part in parts(path):
+        yield from read_tlog(part)
+
+
 def _messages(
     path: Path, epoch_s: float, start_s: float, end_s: float, fold: VoyageFold, system: int, unheard: int,
 ) -> Iterator[tuple[float, Message]]:
     """Yield the messages of the autopilot's ``system`` that are not our own, behind those that nobody heard."""
     codec = Codec(system=1, component=OWN_COMPONENT)
-    for record in read_tlog(path):
+    for record in _frames(path):
         at_s = record.unix_us / 1e6 - epoch_s
         if not start_s <= at_s < end_s:
             continue

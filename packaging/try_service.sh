@@ -19,7 +19,8 @@ wait_for 90 'grep -qs "\"kind\":\"plan\"" /var/log/companion/lake/voyages/*/deci
 echo "first plan after $(($(date +%s) - began)) s"
 [ -z "$(find /var/cache/companion -type f 2>/dev/null)" ] || wrong "kernels were compiled"
 total=0
-pids=$(cat "/sys/fs/cgroup$(systemctl show -p ControlGroup --value companion@lake)/cgroup.procs")
+family() { echo "$1"; local child; for child in $(cat /proc/"$1"/task/*/children); do family "$child"; done; }
+pids=$(family "$(systemctl show -p MainPID --value companion@lake)")
 for pid in $pids; do
     kb=$(awk '/^Pss:/ {print $2}' "/proc/$pid/smaps_rollup"); total=$((total + kb))
 done

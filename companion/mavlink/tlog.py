@@ -7,6 +7,7 @@ tail, and finds its way again after damage in the middle.
 
 from __future__ import annotations
 
+import gzip
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -85,15 +86,17 @@ def parse_tlog(data: bytes) -> Iterator[TlogRecord]:
 
 
 def read_tlog(path: Path) -> list[TlogRecord]:
-    """Return the records of a file, a torn tail left out.
+    """Return the records of a file (of one that gzip compressed, too), a torn tail left out.
 
     Raises:
         InputError: it cannot be read, or holds bytes and not one record.
     """
     try:
         data = path.read_bytes()
-    except OSError as error:
-        raise InputError(str(path), "", f"cannot be read ({error.strerror})") from error
+        data = gzip.decompress(data) if path.suffix == ".gz" else data
+    except (OSError, EOFError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(str(path), "", f"cannot be read ({reason})") from error
     records = list(parse_tlog(data))
     if data and not records:
         raise InputError(str(path), "", "no MAVLink frame in it", "give a .tlog file")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.replay import Recorded
-from companion.telemetry.folder import TLOG, VoyageFigures, read_voyage
+from companion.telemetry.folder import TLOG, VoyageFigures, is_from_the_start, parts, read_voyage
 from companion.telemetry.status import companion_status
 from companion.view.area import Area
 from companion.view.events import Event
@@ -39,7 +39,8 @@ def recorded_views(folder: Path) -> RecordedViews:
     Raises:
         InputError: it is not a voyage folder, or a file in it is damaged; from ``moments`` too.
     """
-    if (folder / TLOG).is_file() and (folder / TLOG).stat().st_size > 0:
+    heard = [part for part in parts(folder / TLOG) if part.stat().st_size > 0]
+    if heard and is_from_the_start(folder / TLOG):
         recorded = Recorded(folder)
         fold = ViewFold(recorded.voyage, recorded.config, source="recorded", epoch_s=recorded.epoch_s)
         return RecordedViews(name=recorded.mission.name, area=fold.area, count=len(recorded.rows), is_whole=True,

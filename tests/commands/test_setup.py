@@ -1,5 +1,7 @@
 """``companion setup``: finds the autopilot on a serial port, writes two files, and says what is wrong."""
 
+import fcntl
+import grp
 import os
 import pty
 import socket
@@ -110,12 +112,12 @@ def test_no_port_a_busy_one_and_one_without_permission(tmp_path, monkeypatch, se
     (tmp_path / "autopilot").symlink_to("ttyACM0")
     assert [p.path.name for p in ports.ports(tmp_path)] == ["autopilot"]   # one port, its best name
     monkeypatch.setattr(os, "access", lambda *_: False)   # root may everything
-    assert "belongs to the group tty, and you are not in it; sudo adduser $USER tty" in refusal(ports.ports(tmp_path))
+    group = grp.getgrgid(serial.stat().st_gid).gr_name
+    assert f"belongs to the group {group}, and you are not in it; sudo adduser $USER {group}" in refusal(
+        ports.ports(tmp_path))
 
 
 def test_a_busy_port_says_who_to_end(serial):
-    import fcntl
-
     with serial.open("r+b", buffering=0) as taken:
         fcntl.flock(taken, fcntl.LOCK_EX)
         assert "another program has it; end that, or share the port" in refusal([ports.Port(path=serial)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import gzip
 import json
 import math
 import tomllib
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from companion.errors import InputError
 from companion.telemetry.folder.names import AREA, DECISIONS, SUMMARY, TRACK, VOYAGE
 from companion.telemetry.folder.recorder import TRACK_COLUMNS, read_jsonl
+from companion.telemetry.folder.segments import parts, read_part
 
 DAMAGED = "is the folder damaged, or another program's? take it from its copy"
 _WORDS = ("mode", "phase")
@@ -205,10 +207,17 @@ def read_decisions(folder: Path) -> list[dict[str, Any]]:
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of track.csv: numbers by column, NaN where a cell is empty; a torn last row is left out."""
+    """Return the rows of track.csv and its closed parts: numbers by column, NaN where a cell is empty.
+
+    A torn last row is left out.
+    """
+    return [row for part in parts(path) or [path] for row in _rows_of(part)]
+
+
+def _rows_of(path: Path) -> list[dict[str, Any]]:
     try:
-        lines = path.read_text(encoding="utf-8").split("\n")
-    except ValueError:
+        lines = read_part(path).decode().split("\n")
+    except (ValueError, EOFError, gzip.BadGzipFile):
         raise InputError(str(path), "", "is not text", DAMAGED) from None
     header = next(csv.reader(lines[:1]), [])
     missing = [name for name in TRACK_COLUMNS if name not in header]

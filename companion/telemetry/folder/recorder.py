@@ -28,6 +28,7 @@ from companion.disk import Disk, is_mistake, reason
 from companion.errors import JobError
 from companion.lock import FolderLock
 from companion.telemetry.folder.names import DECISIONS, SUMMARY, TLOG, TRACK, VOYAGE
+from companion.telemetry.folder.segments import Segments, closed, parts, read_part
 from companion.telemetry.folder.shelf import Shelf
 
 # The files of one voyage end here [bytes], restarts included: what comes later is dropped and counted. A day of the
@@ -86,6 +87,9 @@ class Recorder:
         self._disk, self._shelf, self._is_durable = disk or Disk(), shelf, is_durable
         share = 1.0 if shelf is None else min(1.0, shelf.budget_bytes / sum(MAX_BYTES.values()))
         self._caps = {name: int(share * most) for name, most in MAX_BYTES.items()}
+        self._segments = Segments(
+            folder, self._disk, sum(MAX_BYTES.values()) if shelf is None else shelf.budget_bytes)
+        self._retired: list[int] = []   # files that were closed but for a write that may be under way
         self._lock = FolderLock(folder)
         self._bytes: dict[str, int] = {}
         self._fds: dict[str, int] = {}
@@ -200,6 +204,8 @@ class Recorder:
             elif self._is_durable:
                 for fd in self._fds.values():
                     self._disk.sync(fd)
+            if not self.trouble:
+                self._rotate(float(stamps["t_s"]))
         except OSError as error:
             self._pause(reason(error))
         if self._gone and not self.trouble:
@@ -210,8 +216,37 @@ class Recorder:
             self.decision({**stamps, "kind": "gap", "since_s": self._ended[name], "why": f"{name} is full"})
 
     def _tidy(self) -> None:
+        """Drop what is over the budget: of other voyages, and the oldest parts of this one."""
         if self._shelf is not None:
-            self._gone += self._shelf.tidy()
+            budget_bytes = self._shelf.budget_bytes - self._segments.headroom_bytes
+            self._gone += self._shelf.tidy(self._segments.headroom_bytes)
+            over_bytes = self._shelf.used_bytes() - budget_bytes
+        else:
+            held = (part for name in MAX_BYTES for part in closed(self.folder / name))
+            over_bytes = sum(part.stat().st_size for part in held) - sum(MAX_BYTES.values())
+        with contextlib.suppress(OSError):
+            self._gone += self._segments.drop(over_bytes)
+
+    def _rotate(self, t_s: float) -> None:
+        """Close what is large or old, and compress it; a write of the voyage's own loop may be under way meanwhile."""
+        while self._retired:
+            os.close(self._retired.pop())
+        self._segments.compress()
+        for name in MAX_BYTES:
+            if self._segments.is_due(name, self._bytes[name], t_s):
+                self._disk.sync(self._fds[name])
+                self._segments.close(name, t_s)
+                self._retired.append(self._fds[name])
+                self._begin(name)
+
+    def _begin(self, name: str) -> None:
+        """Open a record's file, the track's with its header."""
+        fd = self._disk.open_to_append(self.folder / name)
+        size = os.fstat(fd).st_size
+        if name == TRACK and size == 0:
+            self._disk.append(fd, _HEADER)
+            size = len(_HEADER)
+        self._fds[name], self._bytes[name] = fd, size
 
     def _pause(self, why: str) -> None:
         """Record nothing any more, until ``tend`` finds that it can be."""
@@ -243,20 +278,17 @@ class Recorder:
             path = self.folder / name
             if name != TLOG:  # whose readers find the next frame by themselves
                 _cut_torn_line(path)
-            self._fds[name] = self._disk.open_to_append(path)
-            self._bytes[name] = os.fstat(self._fds[name]).st_size
-        if self._bytes[TRACK] == 0:
-            self._disk.append(self._fds[TRACK], _HEADER)
-            self._bytes[TRACK] = len(_HEADER)
+            self._begin(name)
         if self._is_durable:
             self._disk.sync_folder(self.folder)
             self._disk.sync_folder(self.folder.parent)
 
     def _close(self) -> None:
-        for fd in self._fds.values():
+        for fd in (*self._fds.values(), *self._retired):
             with contextlib.suppress(OSError):
                 os.close(fd)
         self._fds.clear()
+        self._retired.clear()
 
 
 def _cut_torn_line(path: Path) -> None:
@@ -283,15 +315,20 @@ def without_none(value: Any) -> Any:
 
 
 def read_jsonl(path: Path) -> list[dict[str, Any]]:
-    """Return the records of a JSON-lines file; a torn last line is left out."""
+    """Return the records of a JSON-lines file and its closed parts; a torn last line is left out.
+
+    Raises:
+        FileNotFoundError: it is not there.
+    """
     records: list[dict[str, Any]] = []
-    lines = path.read_bytes().split(b"\n")
-    for number, line in enumerate(lines):
-        if not line.strip():
-            continue
-        try:
-            records.append(json.loads(line))
-        except (ValueError, RecursionError):
-            if number < len(lines) - 2:
-                raise JobError(f"{path}: line {number + 1} is not JSON; only the last line may be torn") from None
+    for part in parts(path) or [path]:
+        lines = read_part(part).split(b"\n")
+        for number, line in enumerate(lines):
+            if not line.strip():
+                continue
+            try:
+                records.append(json.loads(line))
+            except (ValueError, RecursionError):
+                if number < len(lines) - 2:
+                    raise JobError(f"{part}: line {number + 1} is not JSON; only the last line may be torn") from None
     return records

@@ -26,6 +26,7 @@ from companion.telemetry.folder.names import (
     VERDICT,
     VOYAGE,
 )
+from companion.telemetry.folder.segments import closed
 
 # Enough for half a month under way: a day of the endurance scenario writes 0.3 GB [bytes].
 DEFAULT_BUDGET_BYTES = 5_000_000_000
@@ -44,9 +45,9 @@ class Shelf:
         """Return what all voyages take now."""
         return sum(_size(voyage) for voyage in self._voyages())
 
-    def tidy(self) -> tuple[str, ...]:
-        """Drop what is over the budget; return what was dropped, in words."""
-        return self._drop(self.used_bytes() - self.budget_bytes, stages=len(_STAGES))
+    def tidy(self, kept_free_bytes: int = 0) -> tuple[str, ...]:
+        """Drop what is over the budget, less what is to stay free of it; return what was dropped, in words."""
+        return self._drop(self.used_bytes() + kept_free_bytes - self.budget_bytes, stages=len(_STAGES))
 
     def make_room(self, wanted_bytes: int) -> tuple[str, ...]:
         """Drop telemetry logs, and nothing else, for a disk that something else has filled."""
@@ -107,7 +108,7 @@ def _remove(voyage: Path, names: tuple[str, ...]) -> int:
     """Remove these of a voyage's files, and its folder when nothing is left in it; return the bytes freed."""
     freed = 0
     for name in names:
-        for file in list(_files(voyage / name)):
+        for file in [*_files(voyage / name), *closed(voyage / name)]:
             with contextlib.suppress(OSError):
                 size = file.lstat().st_size
                 file.unlink()
