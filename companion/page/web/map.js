@@ -326,7 +326,8 @@ function places(view, at) {
     let line = y;
     while (taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - line) < 12)) line += 12;
     taken.push([x, line]);
-    children.push(svg("text", { x, y: line, class: `word ${kind}` }, text));
+    const isCut = x + 7 * text.length > camera.width;
+    children.push(svg("text", { x: isCut ? x - 18 : x, y: line, class: `word ${kind}`, "text-anchor": isCut ? "end" : "start" }, text));
   }
   fill("places", children);
 }
