@@ -3,7 +3,7 @@
 The word ``watch`` asks for the views of the voyage: a line of JSON for each step, until the connection is closed.
 
 It is a Unix socket of mode 0600: the user that runs the companion, and root. What it may order is the mission's
-``[operator] local_orders``. The live page and ``companion order --socket`` speak to it.
+``[operator] local_orders``. ``companion order --socket`` speaks to it; the live page gives its orders as it does.
 """
 
 from __future__ import annotations

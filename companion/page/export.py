@@ -28,6 +28,9 @@ def export(record: Record) -> bytes:
         "past": msgspec.Raw(record.past()), "log": msgspec.Raw(record.log()),
         "moments": [base64.b64encode(chunk).decode() for chunk in record.chunks],
     }
+    beside = record.compared()
+    if beside is not None:
+        data["beside"] = msgspec.Raw(beside)
     packed = _base64(gzip.compress(msgspec.json.encode(data), 9, mtime=0))
     page = re.sub(r'<link rel="stylesheet"[^>]*>', lambda _: f"<style>{style}</style>", page)
     page = re.sub(r'<link rel="icon"[^>]*>', '<link rel="icon" href="data:,">', page)

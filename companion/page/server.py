@@ -156,6 +156,9 @@ class Server:
             return JSON, source.past(), "", None
         if path == "/api/log":
             return JSON, source.hub.log() if isinstance(source, Live) else source.log(), "", None
+        other = source.compared() if path == "/api/beside" and isinstance(source, Record) else None
+        if other is not None:
+            return JSON, other, "", None
         if path == "/register_service":
             return JSON, msgspec.json.encode(self.service()), "", None
         chunk = re.fullmatch(r"/api/moments/([0-9]{1,6})", path)

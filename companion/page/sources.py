@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gzip
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import msgspec
@@ -59,24 +59,30 @@ class Record:
     def __init__(self, name: str, area: Area, *, is_whole: bool, count: int) -> None:
         self.name, self.area, self.is_whole = name, area, is_whole
         self._every = max(1, -(-count // MOST_MOMENTS))
-        self._trail = Trail(most=2 * MOST_MOMENTS)
+        self.trail = Trail(most=2 * MOST_MOMENTS)
         self._events: list[Event] = []
         self._waiting: list[bytes] = []
         self.chunks: list[bytes] = []
         self.times: list[float] = []
         self._seen = 0
-        self._unix_s: float | None = None
+        self.unix_s: float | None = None
+        self.sails_s: float | None = None
+        self.last: View | None = None
+        self.beside: Record | None = None   # another voyage, to compare with
 
     def take(self, view: View, events: Sequence[Event]) -> None:
         """Take the next moment; of a very long voyage those in which nothing happened are thinned out."""
         self._events += events
         self._seen += 1
+        self.last = view
+        if self.sails_s is None and view.state.is_sailing:
+            self.sails_s = view.t_s
         if view.unix_s is not None:
-            self._unix_s = view.unix_s - view.t_s
+            self.unix_s = view.unix_s - view.t_s
         if self._every > 1 and self._seen % self._every and not events:
             return
         self.times.append(view.t_s)
-        self._trail.add(sample_of(view))
+        self.trail.add(sample_of(view))
         self._waiting.append(msgspec.json.encode(view))
         if len(self._waiting) == CHUNK:
             self._pack()
@@ -93,12 +99,27 @@ class Record:
     def hello(self) -> dict[str, Any]:
         """Return what a page has to know first."""
         return {"schema": SCHEMA, "version": __version__, "kind": "recorded", "name": self.name, "orders": None,
-                "count": len(self.times), "chunk": CHUNK, "area": self.area.hash}
+                "count": len(self.times), "chunk": CHUNK, "area": self.area.hash, "sails_s": self.sails_s,
+                "beside": None if self.beside is None else self.beside.name}
 
     def log(self) -> bytes:
         """Return the log, as JSON."""
         return msgspec.json.encode(self._events)
 
+    def compared(self) -> bytes | None:
+        """Return the voyage beside this one in this one's metres, as JSON; None: there is none."""
+        other = self.beside
+        if other is None:
+            return None
+        east_m = (other.area.origin_lon_deg - self.area.origin_lon_deg) * self.area.lon_m
+        north_m = (other.area.origin_lat_deg - self.area.origin_lat_deg) * self.area.lat_m
+        moved = [replace(
+            s, east_m=None if s.east_m is None else round(s.east_m + east_m, 1),
+            north_m=None if s.north_m is None else round(s.north_m + north_m, 1)) for s in other.trail.samples]
+        return msgspec.json.encode({
+            "name": other.name, "sails_s": other.sails_s, "past": Past.of(moved, other.unix_s),
+            "figures": None if other.last is None else other.last.figures})
+
     def past(self) -> bytes:
         """Return the samples of the whole voyage, as JSON: a row for each moment."""
-        return msgspec.json.encode(Past.of(self._trail.samples, self._unix_s))
+        return msgspec.json.encode(Past.of(self.trail.samples, self.unix_s))

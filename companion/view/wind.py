@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
-from companion.boat import AutopilotLimits
+from companion.boat import AutopilotLimits, Boat
 from companion.fold import Step
 from companion.geo.angles import difference_rad, heading_of
 from companion.messages import VehicleState, WindForecast
@@ -25,6 +26,13 @@ def planned_no_go_rad(config: SkipperConfig, voyage: Voyage, limits: AutopilotLi
     """Return the half angle that plans keep out of, before it is widened."""
     of_autopilot = config.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
     return max(of_autopilot + config.no_go_pad_rad, voyage.boat.no_go_half_rad)
+
+
+@lru_cache(maxsize=64)   # asked for twice in every step, and the search takes longer than all else in a view
+def best_angles(boat: Boat, tws_mps: float, no_go_rad: float) -> tuple[float, float]:
+    """Return the best angles to windward and to leeward [rad]."""
+    beat = boat.polar.best_beat(tws_mps, no_go_half_rad=no_go_rad)
+    return beat.twa_rad, boat.polar.best_run(tws_mps, max_twa_rad=boat.max_twa_rad).twa_rad
 
 
 def wind_of(step: Step) -> air.Wind | None:
@@ -99,8 +107,7 @@ def laylines_of(
     if here is None or vehicle is None or twd_rad is None or tws_mps is None or math.dist(here, mark_en) < 1.0:
         return None
     no_go_rad = planned_no_go_rad(config, voyage, snapshot.limits)
-    beat = boat.polar.best_beat(tws_mps, no_go_half_rad=no_go_rad).twa_rad
-    run = boat.polar.best_run(tws_mps, max_twa_rad=boat.max_twa_rad).twa_rad
+    beat, run = best_angles(boat, round(tws_mps, 1), no_go_rad)
     off_rad = abs(difference_rad(twd_rad, heading_of(mark_en[0] - here[0], mark_en[1] - here[1])))
     if off_rad < beat:
         angle_rad, is_beat = max(beat, no_go_rad), True
@@ -147,12 +154,12 @@ def polar_of(step: Step, voyage: Voyage, config: SkipperConfig) -> air.Polar | N
     angles, speeds = polar.curve(tws_mps)
     no_go_rad = planned_no_go_rad(config, voyage, step.snapshot.limits)
     twd_rad = wind.present_twd_from_rad
+    beat, run = best_angles(voyage.boat, round(tws_mps, 1), no_go_rad)
     has_way = vehicle is not None and twd_rad is not None
     return air.Polar(
         name=polar.name, tws_mps=rounded(tws_mps), twa_deg=tuple(degrees(float(a)) for a in angles),
         speed_mps=tuple(rounded(float(v), 3) for v in speeds),
-        beat_deg=degrees(polar.best_beat(tws_mps, no_go_half_rad=no_go_rad).twa_rad),
-        run_deg=degrees(polar.best_run(tws_mps, max_twa_rad=voyage.boat.max_twa_rad).twa_rad),
+        beat_deg=degrees(beat), run_deg=degrees(run),
         live_twa_deg=signed(difference_rad(twd_rad, vehicle.heading_rad))
         if has_way and vehicle is not None and twd_rad is not None else None,
         live_mps=rounded(vehicle.speed_mps) if vehicle is not None else None)

@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 
 from companion.clock import run
+from companion.commands.view import read_record
 from companion.page import Address, Live, export, served
 from sitl.scene.ships import free_port
 from tests.page.asking import Asked
@@ -120,6 +121,24 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(record):
         assert window.js("return document.documentElement.scrollWidth") <= 390
         assert window.barriers() == []
         keep(window, "phone")
+        assert window.complaints() == []
+
+
+def test_two_voyages_are_seen_beside_each_other_from_setting_sail_on(record, sailed):
+    first, second = read_record(sailed.folder), record
+    first.beside = second
+    with serving(first) as (url, _), Window() as window:
+        window.open(url)
+        window.js("companion.timeline.go(companion.timeline.index(80))")
+        window.until("return companion.view.t_s > 79")
+        assert window.js("return document.querySelectorAll('#map .other path').length") > 0
+        assert "beside" in window.text("voyagetable")
+        assert window.js("return document.querySelectorAll('#stripchart .otherline').length") == 4
+        # of one voyage twice the boats lie on each other
+        assert window.js(
+            "const at = (q) => document.querySelector(q).getAttribute('transform').match(/translate\\(([^)]*)/)[1];"
+            "return at('#map .ghost path') === at('#map .boat .hull')")
+        keep(window, "beside")
         assert window.complaints() == []
 
 

@@ -5,6 +5,7 @@ import gzip
 import json
 import socket
 import tracemalloc
+from dataclasses import replace
 
 import pytest
 
@@ -199,6 +200,21 @@ def record_of(count, every=1):
         record.take(view_at(float(n)), (event(n + 1),) if n % 100 == every else ())
     record.finish()
     return record
+
+
+def test_a_voyage_beside_another_is_in_its_metres():
+    async def talk(browser, *_):
+        return json.loads((await browser.get("/api/beside"))[2]), json.loads((await browser.get("/api/hello"))[2])
+
+    record, other = record_of(5), record_of(5)
+    other.area = replace(other.area, origin_lat_deg=record.area.origin_lat_deg + 0.001)
+    other.trail.samples = [replace(s, east_m=1.0, north_m=2.0) for s in other.trail.samples]
+    record.beside = other
+    beside, hello = with_page(talk, record)
+    assert hello["beside"] == "test"
+    assert set(beside["past"]["north_m"]) == {113.0}   # 111 m to the degree's thousandth
+    assert set(beside["past"]["east_m"]) == {1.0}
+    assert with_page(lambda browser, *_: browser.get("/api/beside"), record_of(5))[0] == 404
 
 
 def test_a_record_is_read_by_chunks_and_a_day_is_thinned_but_for_what_happened():

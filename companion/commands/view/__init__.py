@@ -26,6 +26,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     )
     parser.add_argument("voyage", type=Path, nargs="?", metavar="VOYAGE_DIR",
                         help="the folder that `companion run` left")
+    parser.add_argument("--beside", type=Path, metavar="VOYAGE_DIR",
+                        help="another voyage, shown beside it from the moment on that both set sail")
     parser.add_argument("--link", metavar="LINK", help="the shore end of a telemetry radio: /dev/ttyUSB0:57600, "
                         "udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
     parser.add_argument("--system", type=system_id, metavar="N",
@@ -49,11 +51,16 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("companion view", "", "what to view is not said" if args.link is None else
                          "a folder and a link are two things", "name a voyage's folder, or --link LINK")
     if args.link is not None:
+        if args.beside is not None:
+            raise InputError("--beside", str(args.beside), "there is no recorded voyage to show it beside",
+                             "name two folders")
         if args.export is not None:
             raise InputError("--export", str(args.export), "what is heard by radio is no voyage yet",
                              "export the folder that the companion leaves")
         return run_loop(ashore(args))
     record = read_record(args.voyage)
+    if args.beside is not None:
+        record.beside = read_record(args.beside)
     if args.export is not None:
         data = export(record)
         write_files({str(args.export): data}, force=args.force)

@@ -15,22 +15,33 @@ import { Timeline } from "./timeline.js";
 
 const KEPT = 7200;
 const GAP_S = 8;        // after a hole in the views the past is asked for again
-/** @type {{view: View | null, area: Area | null, past: Past | null, hello: Hello | null, timeline: Timeline | null, heard: number, isUp: boolean, isOver: boolean}} */
-const page = { view: null, area: null, past: null, hello: null, timeline: null, heard: performance.now(), isUp: true, isOver: false };
+/** @type {{view: View | null, area: Area | null, past: Past | null, hello: Hello | null, beside: import("./feed.js").Beside | null, timeline: Timeline | null, heard: number, isUp: boolean, isOver: boolean}} */
+const page = { view: null, area: null, past: null, hello: null, beside: null, timeline: null, heard: performance.now(), isUp: true, isOver: false };
 // for tests, and for who is curious
 Object.assign(window, { companion: page });
 
 function show() {
   const { view, area, past } = page;
-  panel.show(view, page.isOver ? "over" : page.hello?.kind ?? "connecting");
-  map.show(view, area, past);
+  panel.show(view, page.isOver ? "over" : page.hello?.kind ?? "connecting", page.beside);
+  const other = beside();
+  map.show(view, area, past, other);
   dial.show(view, past);
-  strips.show(view, past, view?.plan?.margin_m ?? area?.margin_m ?? null);
+  strips.show(view, past, view?.plan?.margin_m ?? area?.margin_m ?? null, other);
   polar.show(view, past);
   orders.show(view);
   log.show(view?.t_s ?? -Infinity);
   if (view) page.timeline?.words(view);
   old();
+}
+
+/** The other voyage, its time moved so that both set sail at once. */
+function beside() {
+  const other = page.beside;
+  if (!other || !page.view) return null;
+  const off = (page.hello?.sails_s ?? page.past?.t_s[0] ?? 0) - (other.sails_s ?? other.past.t_s[0] ?? 0);
+  let count = other.past.t_s.length;
+  while (count > 0 && (other.past.t_s[count - 1] ?? 0) + off > page.view.t_s + 0.05) count -= 1;
+  return { name: other.name, past: other.past, off, count };
 }
 
 function old() {
@@ -93,6 +104,7 @@ async function recorded(hello, inside) {
   page.area = inside ? inside.area : await read("/api/area");
   page.past = inside ? inside.past : await read("/api/past");
   log.add(inside ? inside.log : await read("/api/log"));
+  page.beside = inside ? inside.beside ?? null : hello.beside ? await read("/api/beside") : null;
   const moments = new Moments(hello.count ?? 0, hello.chunk ?? 60, inside?.moments ?? null);
   const times = page.past?.t_s ?? [];
   let wanted = 0;

@@ -10,18 +10,19 @@ const LAY_M = 4000;
 
 /** @type {Camera} */
 const camera = { centre: [0, 0], scale: 1, up: 0, width: 600, height: 400 };
+/** @typedef {{name: string, past: Past, off: number, count: number}} Other  another voyage: seconds to add to its time, samples until now */
 /** @typedef {{way: Point[], risks: (number | null)[]}} Preview */
-/** @type {{up: string, follow: boolean, fitted: boolean, view: View | null, area: Area | null, past: Past | null, preview: Preview | null, picks: ((en: Point) => void) | null}} */
-const state = { up: "north", follow: true, fitted: false, view: null, area: null, past: null, preview: null, picks: null };
+/** @type {{up: string, follow: boolean, fitted: boolean, view: View | null, area: Area | null, past: Past | null, preview: Preview | null, picks: ((en: Point) => void) | null, other: Other | null}} */
+const state = { up: "north", follow: true, fitted: false, view: null, area: null, past: null, preview: null, picks: null, other: null };
 /** @type {Record<string, SVGElement>} */
 const layers = {};
 const root = picture("map");
 
 export function build() {
   const world = svg("g", { class: "world" });
-  for (const name of ["limits", "grown", "obstacles", "fan", "track"]) world.append(layers[name] = svg("g", { class: name }));
+  for (const name of ["limits", "grown", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
   root.append(svg("defs", {}, pattern()), layers.world = world);
-  for (const name of ["grid", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "boat", "furniture"]) {
+  for (const name of ["grid", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat", "furniture"]) {
     root.append(layers[name] = svg("g", { class: name }));
   }
   new ResizeObserver(() => { measure(); draw(); }).observe(root);
@@ -40,9 +41,10 @@ function measure() {
   camera.height = Math.max(50, box.height);
 }
 
-/** @param {View | null} view @param {Area | null} area @param {Past | null} past */
-export function show(view, area, past) {
+/** @param {View | null} view @param {Area | null} area @param {Past | null} past @param {Other | null} [other] */
+export function show(view, area, past, other = null) {
   state.view = view;
+  state.other = other;
   state.past = past;
   if (area !== state.area) { state.area = area; water(); }
   if (!state.fitted && view !== null && (view.goals.length > 0 || view.boat.at_en_m !== null)) { all(); state.fitted = true; }
@@ -144,6 +146,7 @@ function draw() {
   previewed(at);
   places(view, at);
   vessels(view, at);
+  beside(at);
   own(view, at);
   furniture(view, wind);
 }
@@ -326,7 +329,8 @@ function places(view, at) {
     let line = y;
     while (taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - line) < 12)) line += 12;
     taken.push([x, line]);
-    children.push(svg("text", { x, y: line, class: `word ${kind}` }, text));
+    const isCut = x + 7 * text.length > camera.width;
+    children.push(svg("text", { x: isCut ? x - 18 : x, y: line, class: `word ${kind}`, "text-anchor": isCut ? "end" : "start" }, text));
   }
   fill("places", children);
 }
@@ -354,6 +358,18 @@ function vessels(view, at) {
       svg("text", { x: x + beam / 2 + 6, y: y + 9, class: `word small vesselword ${alarm}` }, cpa));
   }
   fill("vessels", children);
+}
+
+/** The other voyage at this moment. @param {(en: Point) => Point} at */
+function beside(at) {
+  const other = state.other;
+  if (!other) { fill("other", []); return fill("ghost", []); }
+  const pieces = byTack(other.past.east_m.slice(0, other.count), other.past.north_m.slice(0, other.count), []);
+  fill("other", pieces.map((piece) => svg("path", { d: path(piece.points) })));
+  const n = other.count - 1, e = other.past.east_m[n], m = other.past.north_m[n];
+  if (e == null || m == null) return fill("ghost", []);
+  const [x, y] = at([e, m]);
+  fill("ghost", [svg("path", { d: "M0-13C5-6 5 3 3.5 9H-3.5C-5 3-5-6 0-13Z", transform: `translate(${x} ${y}) rotate(${(other.past.heading_deg[n] ?? 0) - camera.up})` }), svg("text", { x: x + (x > camera.width - 110 ? -9 : 9), y: y + 12, class: "word small", "text-anchor": x > camera.width - 110 ? "end" : "start" }, `beside: ${other.name}`)]);
 }
 
 /** @param {View | null} view @param {(en: Point) => Point} at */

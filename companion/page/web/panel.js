@@ -7,8 +7,8 @@ import { riskClass } from "./geometry.js";
 
 const OLD_S = 5;
 
-/** @param {View | null} view @param {string} kind */
-export function show(view, kind) {
+/** @param {View | null} view @param {string} kind @param {import("./feed.js").Beside | null} [beside] */
+export function show(view, kind, beside = null) {
   say("name", view?.name || "Companion");
   document.title = view ? `${view.name}: ${view.state.phase}` : "Companion";
   say("kind", { live: "live", radio: "by radio", recorded: "recorded" }[kind] ?? kind);
@@ -20,7 +20,7 @@ export function show(view, kind) {
   alarms(view);
   figures(view);
   plan(view);
-  tables(view);
+  tables(view, beside);
 }
 
 /** How old the data are, with what has passed since they came. @param {View | null} view @param {number} since_s @param {boolean} isLost */
@@ -104,8 +104,8 @@ function keep(id, content) {
   box.scrollLeft = left;
 }
 
-/** @param {View | null} view */
-function tables(view) {
+/** @param {View | null} view @param {import("./feed.js").Beside | null} beside */
+function tables(view, beside) {
   keep("vesseltable", table("Vessels", ["vessel", "range", "bearing", "CPA", "in", "alarm", "we must", "report"], (view?.vessels ?? []).map((v) => [
     v.name, distance(v.range_m), bearing(v.bearing_deg), distance(v.cpa_m), v.cpa_s === null ? "opening" : duration(v.cpa_s),
     el("span", { class: `grade ${v.alarm || "none"}` }, v.alarm || NONE), v.role ? `${v.role}${v.rule ? ` (${v.rule})` : ""}` : NONE, v.age_s === null ? NONE : `${duration(v.age_s)} old`])));
@@ -122,8 +122,12 @@ function tables(view) {
     ...(view && view.boat.lat_deg !== null && view.boat.lon_deg !== null ? [["boat", position(view.boat.lat_deg, view.boat.lon_deg), NONE, NONE]] : [])]));
   keep("healthtable", table("Health of every part", ["part", "is", "says", "age"], (view?.health ?? []).map((part) => [
     part.name, el("span", { class: `grade ${part.grade}` }, part.grade), part.text || NONE, part.age_s === null ? NONE : duration(part.age_s)])));
-  const f = view?.figures;
-  keep("voyagetable", table("The voyage so far", ["figure", "value"], !f ? [] : [
-    ["time under way", duration(f.time_s)], ["distance", distance(f.distance_m)], ["tacks, gybes", `${f.tacks ?? NONE}, ${f.gybes ?? NONE}`], ["plans, replans", `${f.plans ?? NONE}, ${f.replans ?? NONE}`],
-    ["least clearance", distance(f.min_clearance_m)], ["contacts", figure(f.contacts)], ["no-go entries", figure(f.no_go_entries)], ["goals reached", `${f.goals_reached ?? NONE} of ${f.goals ?? NONE}`]]));
+  const all = [view?.figures ?? null, ...(beside ? [beside.figures] : [])];
+  /** @type {[string, (f: import("../../view/view").Figures) => string][]} */
+  const rows = [
+    ["time under way", (f) => duration(f.time_s)], ["distance", (f) => distance(f.distance_m)], ["tacks, gybes", (f) => `${f.tacks ?? NONE}, ${f.gybes ?? NONE}`],
+    ["plans, replans", (f) => `${f.plans ?? NONE}, ${f.replans ?? NONE}`], ["least clearance", (f) => distance(f.min_clearance_m)], ["contacts", (f) => figure(f.contacts)],
+    ["no-go entries", (f) => figure(f.no_go_entries)], ["goals reached", (f) => `${f.goals_reached ?? NONE} of ${f.goals ?? NONE}`]];
+  keep("voyagetable", table("The voyage so far", ["figure", "value", ...(beside ? [`beside: ${beside.name}, at its end`] : [])],
+    view ? rows.map(([name, show]) => [name, ...all.map((f) => f === null ? NONE : show(f))]) : []));
 }

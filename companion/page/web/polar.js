@@ -50,7 +50,8 @@ export function show(view, past) {
   if (polar.live_twa_deg !== null && polar.live_mps !== null) {
     const [x, y] = onDial(polar.live_twa_deg, r(polar.live_mps));
     const target = at(polar.twa_deg, polar.speed_mps, Math.abs(polar.live_twa_deg));
-    if (target > 0.1) share = `${Math.round(100 * polar.live_mps / target)} %`;
+    // close to the wind's eye she carries her way, and the polar says nothing
+    if (target > 0.1 && Math.abs(polar.live_twa_deg) > (polar.beat_deg ?? 0) - 8) share = `${Math.round(100 * polar.live_mps / target)} %`;
     out.push(svg("path", { class: "towards", d: path([[0, 0], [x, y]]) }), svg("circle", { cx: x, cy: y, r: 5.5, class: `live ${polar.live_twa_deg > 0 ? "starboard" : "port"}` }));
   }
   root.replaceChildren(svg("g", { transform: "translate(170 120)" }, ...out),

@@ -4,7 +4,7 @@ import { bearing, clock, distance, scaled, speed, speedUnit } from "./format.js"
 import { marks, path, unwrapped, wrap } from "./geometry.js";
 
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Past} Past @typedef {import("./geometry.js").Point} Point */
-/** @typedef {{name: string, unit: string, values: (number | null)[], low: (number | null)[], high: (number | null)[], ahead: [number, number, number][], label: (v: number) => string, now: string, least: number, line: number | null, floor: number | null, steps: number[]}} Strip */
+/** @typedef {{name: string, unit: string, values: (number | null)[], low: (number | null)[], high: (number | null)[], ahead: [number, number, number][], other: [number, number][], label: (v: number) => string, now: string, least: number, line: number | null, floor: number | null, steps: number[]}} Strip */
 
 const LEFT = 58, RIGHT = 64, TALL = 92, GAP = 10, TOP = 6, FOOT = 20;
 const AHEAD_S = 60;
@@ -16,8 +16,8 @@ export function over(seconds) {
   windowS = seconds;
 }
 
-/** @param {View | null} view @param {Past | null} past @param {number | null} margin */
-export function show(view, past, margin) {
+/** @param {View | null} view @param {Past | null} past @param {number | null} margin @param {{past: Past, off: number, count: number} | null} [other] */
+export function show(view, past, margin, other = null) {
   const width = Math.max(280, root.clientWidth || 600);
   const height = TOP + 4 * (TALL + GAP) + FOOT;
   root.setAttribute("viewBox", `0 0 ${width} ${height}`);
@@ -41,6 +41,14 @@ export function show(view, past, margin) {
       svg("text", { x: x(at), y: bottom + 15, class: "axis middle" }, past.unix_s === null ? clock(null, at) : clock(past.unix_s + at).slice(0, 5)));
   }
   for (const [n, strip] of strips(view, past, cut, now, margin).entries()) {
+    if (other) {
+      const column = [other.past.twd_from_deg, other.past.tws_mps, other.past.sog_mps, other.past.clearance_m][n] ?? [];
+      const base = Number(strip.values.find((v) => v !== null) ?? 0);
+      for (let k = 0; k < other.count; k++) {
+        const at = (other.past.t_s[k] ?? 0) + other.off, value = column[k];
+        if (at >= begin && value != null) strip.other.push([at, n === 0 ? base + wrap(value - base) : value]);
+      }
+    }
     children.push(...draw(strip, TOP + n * (TALL + GAP), t, x, now, width, begin));
   }
   children.push(svg("path", { class: "present", d: path([[x(now), TOP], [x(now), bottom]]) }));
@@ -60,14 +68,14 @@ function strips(view, past, cut, now, margin) {
   const at80 = levels.indexOf(0.8);
   const bands = view.wind?.bands ?? [];
   return [
-    { name: "TWD", unit: "", values: twd, low: off(mean, half, -1), high: off(mean, half, 1), steps: [1, 2, 3, 4.5], line: null, floor: null, least: 20,
+    { name: "TWD", other: [], unit: "", values: twd, low: off(mean, half, -1), high: off(mean, half, 1), steps: [1, 2, 3, 4.5], line: null, floor: null, least: 20,
       ahead: bands.map((b) => { const m = near(b.twd_from_deg, base) ?? 0, h = b.half_deg[at80] ?? b.sigma_deg; return [now + b.horizon_s, m - h, m + h]; }),
       label: (v) => bearing(v), now: bearing(view.wind?.twd_from_deg) },
-    { name: "TWS", unit: speedUnit(), values: cut(past.tws_mps), low: off(tws, sigma, -1.28), high: off(tws, sigma, 1.28), steps: [1, 2, 5], line: null, floor: 0, least: 2,
+    { name: "TWS", other: [], unit: speedUnit(), values: cut(past.tws_mps), low: off(tws, sigma, -1.28), high: off(tws, sigma, 1.28), steps: [1, 2, 5], line: null, floor: 0, least: 2,
       ahead: bands.map((b) => [now + b.horizon_s, b.tws_mps - 1.28 * b.tws_sigma_mps, b.tws_mps + 1.28 * b.tws_sigma_mps]),
       label: (v) => speed(v, 0), now: speed(view.wind?.tws_mps) },
-    { name: "SOG", unit: speedUnit(), values: cut(past.sog_mps), low: [], high: [], ahead: [], steps: [1, 2, 5], line: null, floor: 0, least: 1, label: (v) => speed(v, 0), now: speed(view.boat.sog_mps) },
-    { name: "clear", unit: "m", values: cut(past.clearance_m), low: [], high: [], ahead: [], steps: [1, 2, 5], line: margin, floor: 0, least: 20, label: (v) => String(Math.round(v)), now: distance(view.boat.clearance_m) },
+    { name: "SOG", other: [], unit: speedUnit(), values: cut(past.sog_mps), low: [], high: [], ahead: [], steps: [1, 2, 5], line: null, floor: 0, least: 1, label: (v) => speed(v, 0), now: speed(view.boat.sog_mps) },
+    { name: "clear", other: [], unit: "m", values: cut(past.clearance_m), low: [], high: [], ahead: [], steps: [1, 2, 5], line: margin, floor: 0, least: 20, label: (v) => String(Math.round(v)), now: distance(view.boat.clearance_m) },
   ];
 }
 
@@ -112,6 +120,7 @@ function draw(strip, top, t, x, now, width, begin) {
     if (v === null || v === undefined || at < begin) pieces.push([]);
     else pieces[pieces.length - 1]?.push([x(at), y(v)]);
   });
+  if (strip.other.length > 1) out.push(svg("path", { class: "otherline", d: path(strip.other.map(([at, v]) => [x(at), y(v)])) }));
   out.push(svg("path", { class: `line ${strip.name}`, d: pieces.filter((p) => p.length > 1).map((p) => path(p)).join("") }));
   out.push(svg("text", { x: right + 8, y: top + 14, class: "stripname" }, strip.unit ? `${strip.name} ${strip.unit}` : strip.name), svg("text", { x: right + 8, y: top + 38, class: "stripvalue" }, strip.now.replace(" m", "")));
   return out;
