@@ -12,15 +12,14 @@ import numpy as np
 
 from companion.app.crew import Crew
 from companion.app.executor import Planner
+from companion.app.showing import Showing
 from companion.errors import JobError
 from companion.fold import Step, VoyageFold
-from companion.messages import CompanionStatus
 from companion.orders import LOCAL, Answer, Verb, Wanted, permitted
 from companion.page import Address, Live, served
 from companion.planner import Plan
 from companion.skipper import Skipper
-from companion.telemetry.folder import VoyageFigures
-from companion.view import ViewFold
+from companion.view import Area, Event, View
 
 # All browsers are one station: an order that is sent twice in haste is done once. No connection of the socket on
 # board has this number.
@@ -32,24 +31,15 @@ LAST_S = 5.0           # for one that is being made when the voyage ends
 class LivePage:
     """Shows the steps of a voyage on ``live``."""
 
-    def __init__(self, live: Live, fold: ViewFold, skipper: Skipper, planner: Planner, crew: Crew,
-                 on_fault: Callable[[str], None]) -> None:
-        self._live, self._fold, self._skipper, self._planner, self._crew = live, fold, skipper, planner, crew
-        self._on_fault = on_fault
+    def __init__(self, live: Live, area: Area, skipper: Skipper, planner: Planner, crew: Crew) -> None:
+        self._live, self._area, self._skipper, self._planner, self._crew = live, area, skipper, planner, crew
         self._step: Step | None = None
         self._plan: asyncio.Task[Plan] | None = None
-        self._has_failed = False
 
-    def show(self, status: CompanionStatus, step: Step, figures: VoyageFigures) -> None:
-        """Show a step; a fault of the page's is said once, and is not worth the voyage."""
+    def show(self, view: View, events: tuple[Event, ...], step: Step) -> None:
+        """Show a step."""
         self._step = step
-        try:
-            view, events = self._fold.take(step, status, figures)
-            self._live.show(view, events, self._fold.area)
-        except Exception as error:
-            if not self._has_failed:
-                self._has_failed = True
-                self._on_fault(f"the live page: {error!r}")
+        self._live.show(view, events, self._area)
 
     async def ask(self, wanted: Wanted) -> Answer:
         """Give an order."""
@@ -94,24 +84,24 @@ def _in_figures(plan: Plan) -> dict[str, Any]:
 
 
 async def opened(
-    stack: contextlib.AsyncExitStack, address: Address, fold: VoyageFold, planner: Planner, crew: Crew, *,
-    epoch_s: float, pace: float, on_fault: Callable[[str], None], refuse: Callable[[str, str], None],
-) -> LivePage | None:
-    """Serve the page of a voyage for as long as ``stack``; None where it cannot be: she is sailed without it.
+    stack: contextlib.AsyncExitStack, address: Address, fold: VoyageFold, planner: Planner, crew: Crew,
+    showing: Showing, *, pace: float, refuse: Callable[[str, str], None],
+) -> None:
+    """Serve the page of a voyage for as long as ``stack``; where it cannot be she is sailed without it.
 
     ``pace``: seconds of the loop for each second. ``refuse`` hears why it is not served.
     """
     skipper, verbs = fold.skipper, fold.permissions.local_orders
-    view = ViewFold(skipper.voyage, skipper.config, epoch_s=epoch_s)
-    live = Live(name=skipper.voyage.name, unix_s=epoch_s, area=view.area,
+    area = showing.area
+    live = Live(name=skipper.voyage.name, unix_s=showing.epoch_s, area=area,
                 permitted=tuple(verb.value for verb in Verb if permitted(verb, verbs)))
-    page = LivePage(live, view, skipper, planner, crew, on_fault)
+    page = LivePage(live, area, skipper, planner, crew)
     if address.token:
         live.ask, live.preview = page.ask, page.preview
     try:
         await stack.enter_async_context(served(address, live, pace=pace))
     except JobError as error:
         refuse("live page", f"{error}; she is sailed without a page")
-        return None
+        return
     stack.push_async_callback(page.end)
-    return page
+    showing.watchers.append(page.show)

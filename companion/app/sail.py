@@ -23,7 +23,7 @@ from companion.app.far import Mailbox
 from companion.app.keepers import keep_fence, keep_identity, keep_parameters
 from companion.app.local import served
 from companion.app.options import Far, SailOptions
-from companion.app.page import LivePage, opened
+from companion.app.page import opened
 from companion.app.showing import OnView, Showing
 from companion.clock import now_s
 from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
@@ -109,7 +109,6 @@ class _Shell:
         self._autopilot: Autopilot | None = None
         self._crew: Crew | None = None
         self._counted = LinkStats()
-        self._page: LivePage | None = None
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
@@ -127,9 +126,8 @@ class _Shell:
                 crew = self._crew = Crew(link, has_key=self.options.signing is not None)
                 link.subscribe(self._on_message)
                 if self.options.http is not None:
-                    self._page = await opened(
-                        stack, self.options.http, self.fold, self.planner, crew, epoch_s=self.options.epoch_s,
-                        pace=1.0 / self.options.budget_scale, on_fault=self._on_fault, refuse=self._refuse)
+                    await opened(stack, self.options.http, self.fold, self.planner, crew, self.showing,
+                                 pace=1.0 / self.options.budget_scale, refuse=self._refuse)
                 await self._wait_autopilot(link)
                 autopilot = self._autopilot = await stack.enter_async_context(Autopilot(link))
                 for text in await self.feeds.open(stack, feeds_of(self.mission), self.options.seed):
@@ -320,8 +318,6 @@ class _Shell:
         if trouble and not status.alert_code:
             status = replace(status, alert_code=DISK, alert_text=trouble)
         self.status, self._step = status, step
-        if self._page is not None:
-            self._page.show(status, step, self.log.figures)
         if self.on_status is not None:
             self.on_status(status, step)
         self.showing.take(step, status, self.log.figures)

@@ -9,7 +9,7 @@ from companion.messages import CompanionStatus
 from companion.skipper.step import SkipperConfig
 from companion.skipper.way import Voyage
 from companion.telemetry.folder import VoyageFigures
-from companion.view import Event, View, ViewFold
+from companion.view import Area, Event, View, ViewFold
 
 OnView = Callable[[View, tuple[Event, ...], Step], None]
 
@@ -23,21 +23,30 @@ class Showing:
     def __init__(
         self, voyage: Voyage, config: SkipperConfig, epoch_s: float, on_fault: Callable[[str], None],
     ) -> None:
-        self._parts = (voyage, config, epoch_s)
-        self._fold: ViewFold | None = None
+        self.epoch_s = epoch_s
+        self._voyage, self._config = voyage, config
+        self._made: ViewFold | None = None
         self._on_fault = on_fault
         self._faults: set[str] = set()
         self.watchers: list[OnView] = []
         self.is_kept = False   # made although nobody watches yet: who comes later wants to know of the plan in force
+
+    @property
+    def area(self) -> Area:
+        """The area of the voyage, as it is drawn."""
+        return self._fold.area
+
+    @property
+    def _fold(self) -> ViewFold:
+        if self._made is None:
+            self._made = ViewFold(self._voyage, self._config, epoch_s=self.epoch_s)
+        return self._made
 
     def take(self, step: Step, status: CompanionStatus, figures: VoyageFigures) -> None:
         """Show one step."""
         if not (self.watchers or self.is_kept):
             return
         try:
-            if self._fold is None:
-                voyage, config, epoch_s = self._parts
-                self._fold = ViewFold(voyage, config, epoch_s=epoch_s)
             view, events = self._fold.take(step, status, figures)
         except Exception as error:
             self._failed(f"the view of this step could not be made: {error!r}")

@@ -25,7 +25,7 @@ HELD_S = 30.0            # a connection that held for so long starts the pauses 
 SAY_AGAIN_S = 600.0      # the same words about a receiver are not said again sooner
 _WORDS = {
     errno.EADDRINUSE: "the port is in use", errno.ECONNREFUSED: "nobody listens there",
-    errno.EACCES: "not permitted", errno.EADDRNOTAVAIL: "no address of this computer",
+    errno.EACCES: "not permitted", errno.EPERM: "not permitted", errno.EADDRNOTAVAIL: "no address of this computer",
     errno.ENETUNREACH: "no network leads there", errno.EHOSTUNREACH: "no way leads there",
 }
 

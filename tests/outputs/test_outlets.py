@@ -2,9 +2,11 @@
 
 import asyncio
 import contextlib
+import errno
 import itertools
 import json
 import socket
+import sys
 import time
 from dataclasses import replace
 
@@ -251,6 +253,29 @@ def test_a_token_is_in_no_text(tmp_path):
     assert "sesame" not in repr(whom)
     with pytest.raises(InputError, match="no such file"):
         chosen((), ["ws://h"], tmp_path / "other")
+
+
+def test_without_its_library_a_websocket_is_refused_in_one_line(monkeypatch):
+    monkeypatch.setitem(sys.modules, "websockets", None)
+    with pytest.raises(InputError, match=r"pip install 'sailboat-companion\[signalk\]', or name the server's TCP port"):
+        chosen((), ["ws://h"])
+    assert chosen((), ["tcp:h:8375"]).displays.signalk
+
+
+def test_a_broadcast_that_is_not_permitted_is_told_of(frame, view, monkeypatch):
+    """As in the service's sandbox; the voyage goes on, and so do the other outputs."""
+    def refuse(self, data, addr=None):
+        self._protocol.error_received(PermissionError(errno.EPERM, "x"))
+
+    monkeypatch.setattr("asyncio.selector_events._SelectorDatagramTransport.sendto", refuse)
+
+    async def body(outputs, said):
+        await tell(outputs, view, 0.5)
+        return said
+
+    said = with_outputs(frame, ["udp:255.255.255.255:10110"], (), body)
+    assert said[:2] == ["NMEA 0183 udp:255.255.255.255:10110: sending",
+                        "NMEA 0183 udp:255.255.255.255:10110: not permitted; trying again"]
 
 
 def test_a_delta_is_small_and_plain_json(frame, view):
