@@ -32,6 +32,10 @@ def swinging(t):
     return 0.15 * math.sin(t / 60.0), 5.0
 
 
+def swinging_about(twd_deg):
+    return lambda t: (math.radians(twd_deg) + 0.15 * math.sin(t / 20.0), 5.0)
+
+
 def ar1(seed, sd_deg, rho=0.036):
     rng, a, x = np.random.default_rng(seed), math.exp(-rho), [0.0]
     for _ in range(4000):
@@ -101,6 +105,35 @@ def test_by_forecast_policy_a_steady_wind_means_no_new_plans():
     assert shifting.run(1500, is_done)
     reasons = [a.reason for _, a in shifting.actions if isinstance(a, act.RequestPlan)]
     assert act.ReplanReason.FORECAST in reasons
+
+
+def forecast_plans(world):
+    return [a for _, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.FORECAST]
+
+
+@pytest.mark.parametrize(("policy", "count"), [(ReplanPolicy.FORECAST, 1), (ReplanPolicy.WAYPOINT, 0)])
+def test_by_forecast_policy_a_wind_that_becomes_less_certain_means_a_plan_at_once(policy, count):
+    """Wolsieffer's discussion: planning again only when the uncertainty changes significantly."""
+    world = make(Goal(en_m=(600.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0),
+                 config={"replan_policy": policy}, sigma=math.radians(5.0))
+    assert world.run(60)
+    assert not forecast_plans(world)
+    world.sigma = math.radians(6.0)      # by a fifth: nothing
+    assert world.run(20)
+    assert not forecast_plans(world)
+    world.sigma = math.radians(12.0)
+    assert world.run(30)
+    assert len(forecast_plans(world)) == count   # one: the new plan, or the old one that was kept, knows of it
+    assert all(a.from_seq is None and "less certain" in a.text for a in forecast_plans(world))
+
+
+def test_by_forecast_policy_a_wind_that_becomes_more_certain_is_used_at_the_next_waypoint():
+    world = make(config={"replan_policy": ReplanPolicy.FORECAST}, wind=lambda t: (0.0, 5.0), sigma=math.radians(12.0))
+    assert world.run(40, is_sailing)
+    world.sigma = math.radians(3.0)
+    assert world.run(1500, is_done)
+    assert forecast_plans(world)
+    assert forecast_plans(world)[0].from_seq is not None
 
 
 def test_a_90_degree_shift_in_mid_leg():
@@ -764,6 +797,29 @@ def test_by_headings_it_rounds_buoys(side):
     assert world.run(3000, is_done)
     assert len(world.state.reached) == 6
     assert min(distance_m(places[0], p) for p in world.track) > 3.0
+
+
+@pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
+@pytest.mark.parametrize("twd_deg", [-20.0, 0.0, 20.0])
+def test_by_headings_nothing_is_steered_to_the_buoys_side_of_what_is_wanted(side, twd_deg):
+    """Büsser 3.2.4, on the way to a windward mark: 30 degrees off the buoy, and never 10 nearer."""
+    hand, buoy = 1.0 if side is Side.PORT else -1.0, (0.0, 150.0)
+    world = make(Goal(en_m=buoy, side=side), Goal(en_m=(0.0, 0.0)), obstacles=(), wind=swinging_about(twd_deg),
+                 config={"guidance": Guidance.HEADING}, expansions=600)
+    near, before = [], [(world.position, 0)]
+
+    def look(w):
+        place, seen = before[0]
+        if w.state.gate == 0 and 10.0 < distance_m(place, buoy) < 20.0:
+            near.extend(hand * difference_rad(a.heading_rad, bearing_rad(place, buoy))
+                        for _, a in w.actions[seen:] if isinstance(a, act.SteerHeading))
+        before[0] = (w.position, len(w.actions))
+        return is_done(w)
+
+    assert world.run(1500, look)
+    assert near
+    assert min(near) > math.radians(19.0), np.degrees(near)
+    assert world.state.missed == 0
 
 
 @pytest.mark.parametrize(("place", "words"), [

@@ -2,8 +2,9 @@
 
 Per leg the heading is that from the previous waypoint to the current one, not from the boat: the plan's angle to
 the wind is what makes it fast. Near the destination it is the course from the boat; near a buoy the course to the
-buoy plus 30 degrees. Drift is added as in equation 3 of chapter 2. Heading setpoints have no protection of
-ArduRover's against the no-go zone: ``sailable`` is ours.
+buoy plus 30 degrees, and no manoeuvre there leads to the buoy's side of what is wanted (section 3.2.4: "to the left of
+the desired heading", for a buoy to port). Drift is added as in equation 3 of chapter 2. Heading setpoints have no
+protection of ArduRover's against the no-go zone: ``sailable_rad`` is ours.
 
 [1] G.-A. Büsser, Design and Implementation of a Navigation Algorithm for an Autonomous Sailboat, ETH Zürich, 2009.
 """
@@ -38,23 +39,35 @@ def drift_correction_rad(velocity_en_mps: tuple[float, float], heading_rad: floa
 
 def buoy_heading_rad(boat_en: PointEn, buoy_en: PointEn, side: Side, angle_rad: float) -> float:
     """Return the course to the buoy turned away from it by ``angle_rad`` ([1] Figure 3.5), to leave it on ``side``."""
-    turn = angle_rad if side is Side.PORT else -angle_rad
-    return wrap_pi(bearing_rad(boat_en, buoy_en) + turn)
+    return wrap_pi(bearing_rad(boat_en, buoy_en) + _hand(side) * angle_rad)
 
 
-def sailable_rad(wanted_rad: float, heading_rad: float, twd_from_rad: float, no_go_half_rad: float) -> float:
+def sailable_rad(
+    wanted_rad: float, heading_rad: float, twd_from_rad: float, no_go_half_rad: float, buoy: Side = Side.NONE
+) -> float:
     """Return the wanted heading, or the edge of the no-go zone if it lies inside.
 
     The edge is that of the tack the boat is on; the other one only when the wanted heading is nearer to it by more
-    than 10 degrees, so that a course dead to windward does not make the boat tack to and fro.
+    than 10 degrees, so that a course dead to windward does not make the boat tack to and fro. With a ``buoy`` to be
+    left on that side nothing leads to its side of the wanted heading ([1] 3.2.4): the edge is the far one, unless the
+    boat is on the near one already and that within 10 degrees of what is wanted, for staying there is no manoeuvre.
     """
     to_wanted = difference_rad(wanted_rad, twd_from_rad)
     if abs(to_wanted) >= no_go_half_rad:
         return wanted_rad
     side = 1.0 if difference_rad(heading_rad, twd_from_rad) >= 0.0 else -1.0
-    if side * to_wanted < -TACK_HYSTERESIS_RAD / 2.0:
+    if buoy is not Side.NONE:
+        far = _hand(buoy)
+        if side != far and far * to_wanted + no_go_half_rad > TACK_HYSTERESIS_RAD:
+            side = far
+    elif side * to_wanted < -TACK_HYSTERESIS_RAD / 2.0:
         side = -side
     return wrap_pi(twd_from_rad + side * no_go_half_rad)
+
+
+def _hand(side: Side) -> float:
+    """Return which way leads away from a buoy that is left on ``side``: 1 to starboard, -1 to port."""
+    return 1.0 if side is Side.PORT else -1.0
 
 
 def desired_heading_rad(turn: Turn) -> float | None:
@@ -62,19 +75,18 @@ def desired_heading_rad(turn: Turn) -> float | None:
     boat, leg, vehicle, wind, gate = turn.boat_en, turn.leg(), turn.snapshot.vehicle, turn.wind_now, turn.gate
     if boat is None or leg is None or vehicle is None or wind is None or not turn.ahead():
         return None
-    wanted = bearing_rad(*leg)
+    wanted, buoy = bearing_rad(*leg), Side.NONE
     if _is_at_buoy(gate, boat) and gate is not None and gate.buoy_en_m is not None:
-        wanted = bearing_rad(boat, leg[1])
+        wanted, buoy = bearing_rad(boat, leg[1]), gate.side
         if gate.is_first and distance_m(boat, gate.buoy_en_m) > distance_m(gate.en_m, gate.buoy_en_m):
             # The scheme is for the approach: kept up all the way round it would spiral into the buoy.
             clear = buoy_heading_rad(boat, gate.buoy_en_m, gate.side, turn.config.buoy_angle_rad)
-            hand = 1.0 if gate.side is Side.PORT else -1.0
-            if hand * difference_rad(clear, wanted) > 0.0:
+            if _hand(gate.side) * difference_rad(clear, wanted) > 0.0:
                 wanted = clear
     elif turn.state.index == turn.last_waypoint() or distance_m(*leg) < 1.0:
         wanted = bearing_rad(boat, leg[1])
     wanted = wrap_pi(wanted + drift_correction_rad(vehicle.velocity_en_mps, vehicle.heading_rad))
-    return sailable_rad(wanted, vehicle.heading_rad, wind[0], turn.no_go_half_rad)
+    return sailable_rad(wanted, vehicle.heading_rad, wind[0], turn.no_go_half_rad, buoy)
 
 
 def _is_at_buoy(gate: Gate | None, boat: PointEn) -> bool:

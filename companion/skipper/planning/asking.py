@@ -23,6 +23,7 @@ from companion.skipper.way.judge import half_width_rad
 
 UPLOAD_LATENCY_S = 1.5   # item protocol, a few dozen items, and the read-back
 SLOW_MPS = 0.5           # slower than this the course over ground says nothing about the heading
+WIDTH_AHEAD_S = 60.0     # how far ahead the interval is taken that a plan remembers of its wind
 
 
 def request(
@@ -61,7 +62,7 @@ def request(
     facts = replace(
         turn.blank_facts(number, step.margin_m, shared.delta_s, name),
         plan_twd_from_rad=problem.wind.twd_from_rad,
-        plan_half_width_rad=half_width_rad(forecast, start.after_s + 60.0, turn.config.wind_change_level),
+        plan_half_width_rad=half_width_rad(forecast, start.after_s + WIDTH_AHEAD_S, turn.config.wind_change_level),
         vessels_part=shared.part or 0.0, bound_for=bound.name if bound is not None and not step.nearer_goal else "",
     )
     if turn.state.pending_plan is not None:

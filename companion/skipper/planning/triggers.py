@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from companion.geo.angles import difference_rad
+from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
 from companion.skipper.planning.errands import HOME, Errand, Kind, errand, homeward
 from companion.skipper.planning.vessels import meetings
@@ -18,7 +19,7 @@ from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m
-from companion.skipper.way.judge import predicted_beat
+from companion.skipper.way.judge import half_width_rad, predicted_beat
 from companion.traffic import Decision, decide
 from companion.traffic.plans import MIN_INTERVAL_S
 
@@ -28,6 +29,8 @@ BEND_PLAN_AGE_S = 60.0           # ... unless the last one is this old
 FORECAST_SHARE = 0.5         # of the interval that the plan used: a smaller change of the mean does not matter
 FORECAST_RAD = math.radians(5.0)
 FORECAST_SPEED = 0.3         # share of the wind speed
+FORECAST_WIDTH = 1.5         # times as wide, or as narrow, and ...
+FORECAST_WIDTH_RAD = math.radians(3.0)   # ... by this much
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +76,7 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
     if trigger is None and not turn.is_raised("wind untrusted"):
         trigger = _no_go(turn)
     trigger = trigger or _position(turn)
-    return trigger or _extension(turn, bound) or _wind(turn) or _waypoint(turn)
+    return trigger or _extension(turn, bound) or _wind(turn) or _unsure(turn) or _waypoint(turn)
 
 
 REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST,
@@ -187,6 +190,29 @@ def _wind(turn: Turn) -> Trigger | None:
     return None
 
 
+def _unsure(turn: Turn) -> Trigger | None:
+    """The wind has become less certain than the plan allowed for; that it became more so can wait for a waypoint."""
+    route, config = turn.state.route, turn.config
+    if route is None or config.replan_policy is not ReplanPolicy.FORECAST or turn.is_raised("wind untrusted"):
+        return None
+    width_rad = _width_rad(turn)
+    if not _is_wider(width_rad, route.plan_half_width_rad):
+        return None
+    text = (f"the wind has become less certain: ±{math.degrees(width_rad):.0f}°, the plan allowed for "
+            f"±{math.degrees(route.plan_half_width_rad):.0f}°")
+    return Trigger(reason=ReplanReason.FORECAST, text=text, interval_s=config.min_replan_interval_s)
+
+
+def _width_rad(turn: Turn) -> float:
+    """Return the half width now of the interval that a plan remembers."""
+    return half_width_rad(turn.snapshot.wind.forecast, WIDTH_AHEAD_S, turn.config.wind_change_level)
+
+
+def _is_wider(now_rad: float, then_rad: float) -> bool:
+    """Return whether an interval is that much wider that plans differ; none is remembered of a stay (0)."""
+    return then_rad > 0.0 and now_rad > max(FORECAST_WIDTH * then_rad, then_rad + FORECAST_WIDTH_RAD)
+
+
 def _extension(turn: Turn, bound: Errand | None) -> Trigger | None:
     """The mission ends soon and goals remain, or the rest of an errand's way: plan on from its last waypoint."""
     route, boat, last = turn.state.route, turn.boat_en, turn.last_waypoint()
@@ -244,12 +270,15 @@ def _is_bend(route: Route, index: int) -> bool:
 
 
 def forecast_matters(turn: Turn) -> bool:
-    """Return whether the wind has changed enough against the plan's to make another plan worth its upload."""
+    """Return whether the wind, or its uncertainty, has changed enough against the plan's to be worth an upload."""
     route, mean = turn.state.route, turn.wind_mean
     if route is None or mean is None:
         return False
     turned = abs(difference_rad(mean[0], route.plan_twd_from_rad))
     if turned > max(FORECAST_RAD, FORECAST_SHARE * route.plan_half_width_rad):
+        return True
+    width_rad, planned_rad = _width_rad(turn), route.plan_half_width_rad
+    if _is_wider(width_rad, planned_rad) or _is_wider(planned_rad, width_rad):
         return True
     return abs(mean[1] - route.plan_tws_mps) > FORECAST_SPEED * max(route.plan_tws_mps, 1.0)
 

@@ -19,7 +19,7 @@ class ReplanPolicy(enum.Enum):
     """When a new plan is made at a waypoint."""
 
     WAYPOINT = "waypoint"      # at every waypoint, from the next one (Wolsieffer 2020, section VI)
-    FORECAST = "forecast"      # only when the forecast has changed enough to matter
+    FORECAST = "forecast"      # only when the forecast, its spread included, has changed enough to matter
 
 
 class Guidance(enum.Enum):

@@ -51,6 +51,35 @@ def test_dead_to_windward_it_stays_on_its_tack():
     assert sailable_rad(0.5, -0.8, 0.0, 0.785) == pytest.approx(0.785)
 
 
+BUOYS = pytest.mark.parametrize(("side", "hand"), [(Side.PORT, 1.0), (Side.STARBOARD, -1.0)])
+
+
+@BUOYS
+@CHECK
+@given(ANGLE, ANGLE, ANGLE, st.floats(0.5, 1.2))
+def test_at_a_buoy_no_manoeuvre_leads_to_its_side_of_the_wanted_heading(side, hand, wanted, heading, twd, no_go):
+    """Büsser 3.2.4: "never to perform maneuvers that would result in a new direction to the left"."""
+    out = sailable_rad(wanted, heading, twd, no_go, side)
+    assert abs(difference_rad(out, twd)) >= no_go - 1e-9
+    if abs(difference_rad(wanted, twd)) >= no_go:
+        assert out == wanted
+    elif hand * difference_rad(out, wanted) < -1e-9:
+        # To the buoy's side only by going on as she goes, and not by more than ten degrees.
+        assert difference_rad(heading, twd) * difference_rad(out, twd) >= 0.0
+        assert abs(difference_rad(out, wanted)) <= math.radians(10.0) + 1e-9
+
+
+@BUOYS
+def test_at_a_buoy_she_goes_about_to_get_clear_and_not_to_get_nearer(side, hand):
+    wanted = hand * 0.1
+    assert sailable_rad(wanted, -hand * 0.8, 0.0, 0.785) == pytest.approx(hand * 0.785)   # nearer by 11 degrees
+    assert sailable_rad(-wanted, -hand * 0.8, 0.0, 0.785) == pytest.approx(-hand * 0.785)
+    assert sailable_rad(-wanted, -hand * 0.8, 0.0, 0.785, side) == pytest.approx(hand * 0.785)
+    assert sailable_rad(-hand * 0.5, hand * 0.8, 0.0, 0.785) == pytest.approx(-hand * 0.785)
+    assert sailable_rad(-hand * 0.5, hand * 0.8, 0.0, 0.785, side) == pytest.approx(hand * 0.785)
+    assert sailable_rad(-hand * 0.7, -hand * 0.8, 0.0, 0.785, side) == pytest.approx(-hand * 0.785)
+
+
 @pytest.mark.parametrize(("side", "sign"), [(Side.PORT, 1.0), (Side.STARBOARD, -1.0)])
 def test_the_buoy_is_left_on_its_side(side, sign):
     boat, buoy = (0.0, 0.0), (30.0, 40.0)
