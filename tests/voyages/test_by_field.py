@@ -70,6 +70,7 @@ def test_two_boats_that_do_not_look_meet(tmp_path):
     (tmp_path / "m.toml").write_text(text)
     blind = sail(tmp_path / "s.toml", 0, tmp_path / "out", msgspec.structs.replace(scenario, mission="m.toml"))
     seeing = sail(FOLDER / "two-boats.toml", 0, tmp_path / "seeing")
+    assert seeing.passed, failed(seeing)
     near = blind.figures["vessel_distances_m"]["211000001"]
     assert near < 60.0 < seeing.figures["vessel_distances_m"]["211000001"]
     assert near > 8.0      # the other boat looks
