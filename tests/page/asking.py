@@ -3,15 +3,22 @@
 import asyncio
 import contextlib
 import json
+import socket
 
 from companion.clock import run
 from companion.orders import Answer, Result
 from companion.page import Address, Live, served
 from companion.view import Event, View
 from companion.view.values import State
-from sitl.scene.ships import free_port
 
 TOKEN = "a-token-of-enough-characters"
+
+
+def free_port():
+    """Return a TCP port that nobody listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 def view_at(t_s, why=""):

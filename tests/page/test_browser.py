@@ -17,8 +17,7 @@ from pathlib import Path
 from companion.clock import run
 from companion.commands.view import read_record
 from companion.page import Address, Live, export, served
-from sitl.scene.ships import free_port
-from tests.page.asking import Asked
+from tests.page.asking import Asked, free_port
 from tests.page.browsing import Window, needs_browser
 
 pytestmark = needs_browser

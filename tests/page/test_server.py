@@ -14,8 +14,7 @@ from companion.errors import JobError
 from companion.page import Address, Live, Record, served, server
 from companion.page.hub import Hub, Watcher
 from companion.view import Area
-from sitl.scene.ships import free_port
-from tests.page.asking import event, hang_up, view_at, with_page
+from tests.page.asking import event, free_port, hang_up, view_at, with_page
 
 
 def parsed(stream):

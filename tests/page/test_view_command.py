@@ -14,7 +14,7 @@ import pytest
 from companion import cli
 from companion.page import export
 from companion.telemetry.folder import TLOG, TRACK
-from sitl.scene.ships import free_port
+from tests.page.asking import free_port
 
 
 def said(capsys, *words):
