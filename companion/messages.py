@@ -121,6 +121,7 @@ class AutopilotStatus:
     fence_breaches: int | None = None    # since the boot; outside the home circle one more every 20 m
     last_reached_seq: int | None = None
     rc_us: tuple[int, ...] = ()          # what the receiver hears, by channel from 1 [us]
+    servo_us: tuple[int, ...] = ()       # what its servo outputs are told, by number from 1 [us]; 0: nothing
     home: GeoPoint | None = None
     utc_at_boot_s: float | None = None   # Unix time of its start, once it knows the time
     leaks: bool | None = None            # a switch in the bilge, where a script of the autopilot's tells of one

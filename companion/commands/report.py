@@ -90,6 +90,10 @@ def in_words(record: VoyageRecord) -> list[str]:
         whole = f" and {100.0 * s.path_risk:.0f} % over a whole way" if s.path_risk is not None else ""
         lines.append(f"Chance that plans gave the wind to force her into the no-go zone: up to "
                      f"{100.0 * s.promised_risk:.0f} % at each instant{whole}; entered {_times(s.no_go_entries)}.")
+    if s.servos:
+        moved = "; ".join(f"output {number} {_times(servo.movements)}, {servo.travel_us} us in all"
+                          for number, servo in s.servos.items())
+        lines.append(f"Servos moved: {moved}. SERVOn_FUNCTION says what they are (26 rudder, 89 sheet).")
     if s.alerts:
         said = ", ".join(f"{code} {_times(number)}" for code, number in sorted(s.alerts.items()))
         lines.append(f"Announced: {said}.")

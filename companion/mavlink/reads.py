@@ -27,6 +27,7 @@ READS: Mapping[str, tuple[str, ...]] = {
     "SYSTEM_TIME": ("assembler",),
     "FENCE_STATUS": ("assembler",),
     "RC_CHANNELS": ("assembler",),
+    "SERVO_OUTPUT_RAW": ("assembler",),
     "STATUSTEXT": ("assembler", "machines", "shore", "asking"),
     "AIS_VESSEL": ("assembler",),
     "HOME_POSITION": ("assembler", "autopilot"),

@@ -2,7 +2,7 @@
 
 Direction and speed over time with the forecast made two minutes before; the last hour as a vertical strip, newest at
 the top, a left shift to the left, red on port tack and green on starboard; reliability; CRPS by horizon beside the
-references; histogram and autocorrelation of the direction (Wolsieffer 2020, Figures 4 and 5).
+references; histograms of direction and strength, autocorrelation of the direction (Wolsieffer 2020, Figures 4 and 5).
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from companion.plots.chart import save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from companion.wind.study import Record, Score
 
@@ -43,21 +44,26 @@ _LAG_S = 600.0
 
 
 def save_wind(record: Record, scores: Sequence[Score], path: str | Path) -> None:
-    """Draw a record with the scores of one or more estimators; the first is the one whose forecasts are shown.
+    """Write the picture of a record; see ``wind_figure``.
 
     Raises InputError when the file cannot be written or its kind is unknown.
     """
-    figure = plt.figure(figsize=(15.0, 9.4), layout="constrained")
+    save(wind_figure(record, scores), path)
+
+
+def wind_figure(record: Record, scores: Sequence[Score]) -> Figure:
+    """Return a record drawn with the scores of one or more estimators; the first one's forecasts are shown."""
+    figure = plt.figure(figsize=(16.5, 9.4), layout="constrained")
     whole = figure.add_gridspec(1, 2, width_ratios=(1.7, 4.0))
     left = whole[0].subgridspec(1, 2, width_ratios=(0.95, 0.75))
     right = whole[1].subgridspec(2, 1, height_ratios=(2.1, 1.1))
     upper = right[0].subgridspec(2, 1, height_ratios=(1.25, 0.85))
-    lower = right[1].subgridspec(1, 4)
+    lower = right[1].subgridspec(1, 5)
     strip = figure.add_subplot(left[0])
     strip_speed = figure.add_subplot(left[1], sharey=strip)
     direction = figure.add_subplot(upper[0])
     speed = figure.add_subplot(upper[1], sharex=direction)
-    below = [figure.add_subplot(lower[i]) for i in range(4)]
+    below = [figure.add_subplot(lower[i]) for i in range(5)]
     centre = _centre(record)
     draw_strips(strip, strip_speed, record, centre)
     draw_direction(direction, record, scores[0], centre)
@@ -65,13 +71,14 @@ def save_wind(record: Record, scores: Sequence[Score], path: str | Path) -> None
     draw_reliability(below[0], scores)
     draw_crps(below[1], scores)
     draw_histogram(below[2], record, centre)
-    draw_autocorrelation(below[3], record, centre)
+    draw_strength(below[3], record)
+    draw_autocorrelation(below[4], record, centre)
     figure.suptitle(
         f"{record.name}: true wind, mean {np.mean(record.tws_mps):.1f} m/s from "
         f"{math.degrees(centre) % 360.0:.0f}°, {record.duration_s / 60.0:.0f} min; forecasts by "
         f"“{scores[0].estimator}”", fontsize=12,
     )
-    save(figure, path)
+    return figure
 
 
 def _centre(record: Record) -> float:
@@ -241,6 +248,22 @@ def draw_histogram(axes: Axes, record: Record, centre_rad: float) -> None:
     axes.set_xlabel("direction about its mean [°]")
     axes.set_yticks([])
     axes.set_title("distribution of direction", fontsize=9)
+    axes.legend(fontsize=7)
+
+
+def draw_strength(axes: Axes, record: Record) -> None:
+    """Draw the distribution of the wind's speed with the normal of the same mean and spread (Figure 4)."""
+    speed = record.tws_mps
+    mean, spread = float(np.mean(speed)), max(0.05, float(np.std(speed)))
+    top = float(np.max(speed)) + 0.5
+    axes.hist(speed, bins=40, range=(0.0, top), density=True, color=TRUE, alpha=0.6)
+    x = np.linspace(0.0, top, 200)
+    axes.plot(x, np.exp(-0.5 * ((x - mean) / spread) ** 2) / (spread * math.sqrt(2.0 * math.pi)), color=MEDIAN, lw=1.4,
+              label=f"normal, sd {spread:.1f} m/s")
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])   # room for the legend over the curve
+    axes.set_xlabel("wind speed [m/s]")
+    axes.set_yticks([])
+    axes.set_title("distribution of strength", fontsize=9)
     axes.legend(fontsize=7)
 
 

@@ -116,6 +116,9 @@ FORGERIES: tuple[Forgery, ...] = (
             build=lambda _: wire.MAVLink_fence_status_message(1, 1, 3, 0)),
     Forgery(message="RC_CHANNELS", says="a person moves the sticks", build=lambda k: wire.MAVLink_rc_channels_message(
         k.boot_ms, 8, *(1900 if k.boot_ms % 2 else 1100 for _ in range(8)), *([0] * 10), 255)),
+    Forgery(message="SERVO_OUTPUT_RAW", says="the rudder hard over",
+            build=lambda k: wire.MAVLink_servo_output_raw_message(
+                k.boot_ms * 1000, 0, 2000, 0, 1500, 1000, *([0] * 12))),
     Forgery(message="STATUSTEXT", says='"EKF failsafe"',
             build=lambda _: wire.MAVLink_statustext_message(2, b"EKF failsafe", 0, 0)),
     Forgery(message="STATUSTEXT", says='"Flight plan received"',

@@ -239,6 +239,8 @@ class VehicleAssembler:
             }
         if kind == "RC_CHANNELS":
             return {"rc_us": codec.rc_us(message)}
+        if kind == "SERVO_OUTPUT_RAW":
+            return {"servo_us": codec.servo_us(message)} if message.port == 0 else None
         if kind == "HOME_POSITION":
             return {"home": codec.geo_point(message.latitude, message.longitude)}
         if kind == "SYSTEM_TIME":

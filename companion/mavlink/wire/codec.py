@@ -179,6 +179,13 @@ def rc_us(message: Message) -> tuple[int, ...]:
     return tuple(0 if value == 0xFFFF else value for value in raw)
 
 
+def servo_us(message: Message) -> tuple[int, ...]:
+    """Return the outputs of SERVO_OUTPUT_RAW from the first to the last that is driven [us]; one that is not is 0."""
+    raw = [int(getattr(message, f"servo{n + 1}_raw")) for n in range(16)]
+    driven = [n for n, value in enumerate(raw) if value not in {0, 0xFFFF}]
+    return tuple(0 if value == 0xFFFF else value for value in raw[:driven[-1] + 1]) if driven else ()
+
+
 def cross_track_m(message: Message) -> float:
     """Return the cross track of NAV_CONTROLLER_OUTPUT [m], positive when the boat is right of its leg."""
     return -number(message.xtrack_error, -1e6, 1e6, "xtrack_error")

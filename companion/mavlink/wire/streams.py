@@ -49,6 +49,7 @@ DEFAULT_STREAMS = (
     Stream("SYSTEM_TIME", 0.5, 10.0),
     Stream("FENCE_STATUS", 1.0, 10.0),
     Stream("RC_CHANNELS", 1.0, 10.0),
+    Stream("SERVO_OUTPUT_RAW", 1.0, 10.0),
     Stream("AIS_VESSEL", 5.0, 60.0),
     Stream("HOME_POSITION", 0.2, 60.0),
 )

@@ -87,6 +87,13 @@ class RecordedPlan(Struct, frozen=True, kw_only=True):
     widening: tuple[tuple[float, float], ...] | None = None
 
 
+class ServoFigures(Struct, frozen=True, kw_only=True):
+    """What one servo output did."""
+
+    movements: int = 0
+    travel_us: int = 0
+
+
 class Summary(Struct, frozen=True, kw_only=True):
     """summary.json, as far as it is put into words."""
 
@@ -107,6 +114,7 @@ class Summary(Struct, frozen=True, kw_only=True):
     promised_risk: float | None = None
     path_risk: float | None = None
     alerts: dict[str, int] = {}
+    servos: dict[str, ServoFigures] = {}
     records_dropped: int = 0
     disk_trouble: str = ""
 

@@ -10,6 +10,7 @@ from companion.fold import Step
 from companion.geo.angles import wrap_pi
 from companion.messages import Mode
 from companion.skipper.step import Announce, RequestPlan, UploadMission
+from companion.telemetry.folder.servos import Servos
 from companion.traffic import TrafficCounts
 
 # Inside the no-go zone for longer than a tack takes [s] is an entry, not a tack.
@@ -48,6 +49,7 @@ class VoyageFigures:
     longest_no_go_s: float = 0.0
     alerts: dict[str, int] = field(default_factory=dict)
     traffic: TrafficCounts | None = None
+    servos: Servos = field(default_factory=Servos)
     _anchor: tuple[float, float] | None = None
     _side: int = 0
     _pending: tuple[int, float, float] | None = None
@@ -88,6 +90,8 @@ class VoyageFigures:
         if step.state.over:
             return   # what follows is a loiter
         self.last_s = snapshot.t_s
+        if autopilot is not None:
+            self.servos.take(autopilot.servo_us)
         if snapshot.position_en_m is not None:
             self._move(snapshot.position_en_m)
         self._wind(step)
@@ -151,6 +155,7 @@ class VoyageFigures:
             "path_risk": self.path_risk,
             "path_risk_vessels": self.path_risk_vessels,
             "no_go_entries": self.no_go_entries,
+            "servos": self.servos.to_dict(),
             "alerts": dict(sorted(self.alerts.items())),
             "traffic": None if self.traffic is None else asdict(self.traffic),
         }

@@ -315,6 +315,10 @@ def test_what_tells_a_failsafe_from_a_person_reaches_the_status():
     sticks = last(assembler, wire.MAVLink_rc_channels_message(
         1000, 4, 1500, 1501, 0xFFFF, 1800, *([0] * 14), 255))
     assert sticks.rc_us == (1500, 1501, 0, 1800)
+    servos = last(assembler, wire.MAVLink_servo_output_raw_message(
+        1000, 0, 1480, 0, 1500, 1740, 0xFFFF, *([0] * 11)))
+    assert servos.servo_us == (1480, 0, 1500, 1740)
+    assert last(assembler, wire.MAVLink_servo_output_raw_message(1000, 0, *([0] * 16))).servo_us == ()
     home = last(assembler, wire.MAVLink_home_position_message(
         508170000, -13100000, 0, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0))
     assert home.home == GeoPoint(lat_deg=50.817, lon_deg=-1.31)
