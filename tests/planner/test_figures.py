@@ -2,10 +2,12 @@
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bench.figures import FIGURES
 from bench.papers import DELTA_6A, DELTA_6B, NOISY_DEG, STEADY_DEG, four_polygons, lake, two_channels
 from companion.planner import PlanStatus, plan
 from companion.planner.effort import Effort
@@ -14,6 +16,14 @@ from companion.planner.reference.astar import search
 from companion.planner.settings import AstarSettings
 
 SAMPLES = 6000   # as they are drawn
+PICTURES = Path(__file__).resolve().parents[2] / "docs" / "figures"
+PAPERS = ("wolsieffer-", "busser-", "field-", "wrsc2013-")
+
+
+def test_make_figures_draws_every_picture_of_the_papers():
+    pictures = {path.stem for path in PICTURES.glob("*.png") if path.stem.startswith(PAPERS)}
+    assert pictures == {name for name in FIGURES if name.startswith(PAPERS)}
+    assert len(pictures) == 9
 
 
 # ------------------------------------------------------------------------------------- Wolsieffer

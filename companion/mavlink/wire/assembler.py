@@ -39,7 +39,8 @@ KNOWS_TIME_S = 1_577_836_800.0    # 2020: an autopilot that has no time yet tell
 # What tells of the status; an autopilot sends as many kinds again that tell nothing here.
 _TELLING = frozenset({
     "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "NAV_CONTROLLER_OUTPUT", "EKF_STATUS_REPORT", "GPS_RAW_INT",
-    "SYS_STATUS", "RC_CHANNELS", "HOME_POSITION", "SYSTEM_TIME", "NAMED_VALUE_FLOAT", "FENCE_STATUS",
+    "SYS_STATUS", "RC_CHANNELS", "SERVO_OUTPUT_RAW", "HOME_POSITION", "SYSTEM_TIME", "NAMED_VALUE_FLOAT",
+    "FENCE_STATUS",
 })
 _APPARENT = ("AppWndSpd", "AppWndDir")
 # Heartbeats that say the same before a change is believed, of so many, none older than this [s].
