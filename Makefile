@@ -49,7 +49,7 @@ demo: $(ENV)
 	$(BIN)/sitl run sitl/scenarios/demo.toml --live
 
 test: $(ENV)
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 3 --dist worksteal
 
 check: $(ENV)
 	$(BIN)/ruff check .
