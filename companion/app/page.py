@@ -57,7 +57,8 @@ class LivePage:
             return {"error": "a plan is being made: again in a moment"}
         # A task of its own: who hangs up must not end the planner's work, which would end the planner.
         self._plan = asyncio.create_task(
-            self._planner.plan(asked.problem, budget_s=PREVIEW_S, seed=asked.seed), name="preview")
+            self._planner.plan(asked.problem, budget_s=PREVIEW_S, seed=asked.seed, algorithm=asked.planner.algorithm,
+                               settings=asked.planner.settings), name="preview")
         return {"order": wanted.words, **_in_figures(await asyncio.shield(self._plan))}
 
     async def end(self) -> None:
