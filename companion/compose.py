@@ -183,8 +183,9 @@ def _orders(mission: Mission, key: str, given: tuple[str, ...] | str) -> tuple[s
 
 def estimator_of(mission: Mission) -> Estimator:
     """Return the mission's wind estimator. Raises InputError for a name unknown."""
+    numbers = _kalman(mission)
     try:
-        return make(mission.wind.estimator, **_kalman(mission))
+        return make(mission.wind.estimator, **numbers)
     except InputError as error:
         name = mission.wind.estimator
         raise InputError(str(mission.path), "[wind] estimator", f"{name!r} {error.problem}", error.remedy) from error
