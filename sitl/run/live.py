@@ -83,6 +83,10 @@ class _Companion:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout_at(deadline_s):
                 await self._is_over.wait()
+        await self.stop()
+
+    async def stop(self) -> None:
+        """Have it end, if it runs."""
         if self._process is not None and self._process.returncode is None:
             self._process.send_signal(signal.SIGINT)
             await self._process.wait()
@@ -118,7 +122,10 @@ def run_live(
             f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}")
     pace = speedup or scenario.speedup
     track = Truth() if truth is None else truth
-    return run(_run(scenario, source, seed, folder, autopilot, program, pace, track, page), speedup=pace)
+    try:
+        return run(_run(scenario, source, seed, folder, autopilot, program, pace, track, page), speedup=pace)
+    except asyncio.CancelledError:   # SIGTERM
+        raise KeyboardInterrupt from None
 
 
 async def _run(
@@ -149,6 +156,10 @@ async def _run(
             "--limit", f"{scenario.limit_s:g}", *feeds, *(["--exit-on-arrival"] if scenario.exit_on_arrival else []),
             *(["--dry-run"] if scenario.dry_run else []), *page,
         ])
+        stack.push_async_callback(companion.stop)
+        here = asyncio.current_task()
+        assert here is not None
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, here.cancel)   # it must leave nobody behind
         await companion.start()
         # The scenario's clock starts when the companion does its first work, as it does on the embedded autopilot.
         await companion.opened(folder / DECISIONS)

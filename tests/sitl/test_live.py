@@ -2,6 +2,9 @@
 
 import asyncio
 import math
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -178,3 +181,42 @@ def test_the_real_autopilot_sails_among_ships(name, tmp_path):
     verdict = run_live(load_scenario(source), source, 1, tmp_path / "v", autopilot="ardurover", program=PROGRAM,
                        speedup=None)
     assert verdict.passed, [c for c in verdict.checks if not c.passed]
+
+
+def test_a_run_that_is_terminated_leaves_no_companion_behind(tmp_path):
+    with subprocess.Popen(
+        [sys.executable, "-m", "sitl.cli", "run", "rocks", "--live", "--out", str(tmp_path / "v")],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    ) as run:
+        try:
+            while "WAITING" not in run.stdout.readline():   # the companion's own progress
+                pass
+            left = children(run.pid)
+            assert any("companion.cli" in words for words in left.values())
+            run.terminate()
+            rest = run.stdout.read()
+            assert run.wait(60.0) == 130
+            assert "Traceback" not in rest
+            until_s = time.monotonic() + 20.0
+            while alive := [words for pid, words in left.items() if command_of(pid) == words]:
+                assert time.monotonic() < until_s, alive
+                time.sleep(0.1)
+        finally:
+            run.kill()
+
+
+def command_of(pid):
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text().replace("\0", " ")
+    except OSError:
+        return ""
+
+
+def children(pid):
+    """Return the processes below one, by their numbers."""
+    found, above = {}, {pid}
+    while above:
+        below = {int(n) for p in above for n in Path(f"/proc/{p}/task/{p}/children").read_text().split()}
+        found |= {n: command_of(n) for n in below}
+        above = below
+    return found
