@@ -18,6 +18,7 @@ from companion.geo.angles import difference_rad, heading_of
 from companion.messages import Mode
 from companion.skipper.deeds.helm import is_busy, run_motor, set_mode
 from companion.skipper.step.actions import Severity
+from companion.skipper.step.missions import ROOMIER_M
 from companion.skipper.step.state import Fix, Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.drift import DriftAhead, drift_ahead
@@ -221,11 +222,19 @@ def _stop(turn: Turn, ahead: DriftAhead) -> None:
         turn.say(Severity.WARNING, "drift", f"{ahead.sentence()}: {means.name}", every_s=CALL_S)
 
 
-def _lies_in_loiter(turn: Turn) -> bool:
-    """Return whether she is at the loiter that ends the mission: its place was chosen for its room."""
+def lies_in_loiter(turn: Turn) -> bool:
+    """Return whether she is at the loiter that ends the mission, or has a clear way to it near by.
+
+    Its place was chosen for its room; a loiter begun where she lies would have what room there is.
+    """
     route, boat = turn.state.route, turn.boat_en
-    return route is not None and boat is not None and not turn.ahead() and (
-        distance_m(boat, route.points_en_m[-1]) <= AWAY_M)
+    if route is None or boat is None or turn.ahead():
+        return False
+    place = route.points_en_m[-1]
+    away_m = distance_m(boat, place)
+    return away_m <= AWAY_M or (
+        away_m <= AWAY_M + ROOMIER_M
+        and water_at(turn.voyage.area, boat).path_clearance_m([boat, place]) >= turn.config.margin_floor_m)
 
 
 def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
@@ -240,7 +249,7 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
         turn.update(adrift=replace(memory, loitered=True, loiter_en_m=place))
         turn.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until she can sail")
         return True
-    if status.mode is not Mode.AUTO or memory.loitered or ahead is None or (ahead.is_clear and _lies_in_loiter(turn)):
+    if status.mode is not Mode.AUTO or memory.loitered or ahead is None or (ahead.is_clear and lies_in_loiter(turn)):
         return False
     if not is_busy(turn, Mode.LOITER.name) and set_mode(turn, Mode.LOITER, f"{what}, {how}"):
         turn.update(after_operator=True)

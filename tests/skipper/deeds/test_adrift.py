@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import pytest
 import shapely
+import shapely.affinity
 
 from companion.messages import Mode
-from companion.skipper.deeds.adrift import CALL, MEANS
+from companion.skipper.deeds.adrift import CALL, MEANS, lies_in_loiter
 from companion.skipper.step import actions as act
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
@@ -165,3 +166,22 @@ def test_loiter_that_does_not_hold_ends_in_the_call():
     assert w.mode is Mode.LOITER
     assert said(w, CALL)
     assert contact_s(w) - said_at(w, CALL)[0] >= 60.0
+
+
+@pytest.mark.parametrize(("place", "obstacles", "stays"), [
+    ((20.0, 0.0), (), True),                                            # in it
+    ((60.0, 0.0), (), True),                                            # on her clear way to it
+    ((60.0, 0.0), (shapely.box(20.0, -20.0, 30.0, 20.0),), False),      # a rock lies between
+    ((90.0, 0.0), (), False),                                           # too far to be left to it
+])
+def test_the_mission_s_own_loiter_is_kept_where_she_is_in_it_or_has_a_clear_way_to_it(place, obstacles, stays):
+    w = world(obstacles=obstacles)
+    w.run(CALM_S)
+    here = w.position
+    there = (here[0] + place[0], here[1] + place[1])
+    moved = tuple(shapely.affinity.translate(o, *here) for o in obstacles)
+    voyage = replace(w.skipper.voyage, area=world(obstacles=moved).skipper.voyage.area) if moved else w.skipper.voyage
+    route = w.state.route
+    end = replace(route, items=route.items[-1:], points_en_m=(there,), leg_from_en_m=(here,), gate_of=(-1,))
+    turn = Turn(voyage, w.skipper.config, replace(w.state, route=end, index=0), w.snapshot())
+    assert lies_in_loiter(turn) is stays
