@@ -33,25 +33,29 @@ _LIBRARY, _ANNOTATION = 0, 6   # of what numba writes of a compiled function
 class _Loaded(JITCodeLibrary):  # type: ignore[misc]
     """Loaded machine code without LLVM's form of it, which is read when another kernel is compiled that calls it.
 
-    That form of a planner's kernels takes 12 MB, and nobody asks for it where nothing is compiled.
+    That form of a planner's kernels takes 12 MB, and nobody asks for it where nothing is compiled. It is read from the
+    file that was loaded, which must be that file still: the name of a function in machine code has a number in it that
+    another process's compiling of the same kernel gives otherwise, and linking with that leaves a call to nowhere.
     """
 
     path: Path
+    digest: bytes
     parsed: Any
 
     @classmethod
-    def lighten(cls, library: Any, path: Path) -> None:
-        """Make a library that was loaded from the file at ``path`` one of these."""
+    def lighten(cls, library: Any, path: Path, payload: bytes) -> None:
+        """Make a library that was loaded from the file at ``path``, which held ``payload``, one of these."""
         library._shared_module.close()  # noqa: SLF001
         del library._shared_module  # noqa: SLF001
         library.__class__, library.path, library.parsed = cls, path, None
+        library.digest = hashlib.sha256(payload).digest()
 
     @property
     def _shared_module(self) -> Any:
         if self.parsed is None:
             payload = _read(self.path)
-            if payload is None:
-                raise JobError(f"{self.path} has gone while a kernel was compiled that needs it")
+            if payload is None or hashlib.sha256(payload).digest() != self.digest:
+                raise JobError(f"{self.path} has gone or changed while a kernel was compiled that needs it")
             _, _, (_, bitcode) = pickle.loads(payload)[_LIBRARY]  # noqa: S301 - our own
             self.parsed = llvm.parse_bitcode(bitcode)
         return self.parsed
@@ -85,7 +89,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
                 continue
             try:
                 result = CompileResult._rebuild(target_context, *pickle.loads(payload))  # noqa: S301, SLF001 - our own
-                _Loaded.lighten(result.library, place / name)
+                _Loaded.lighten(result.library, place / name, payload)
             except Exception:
                 _LOG.warning("%s cannot be loaded: compiled again", place / name, exc_info=True)
             else:
@@ -99,7 +103,9 @@ class KernelCache(_Cache):  # type: ignore[misc]
         try:
             parts = list(data._reduce())  # noqa: SLF001
             parts[_ANNOTATION] = ""   # the source with its types, for a person who asks; none does
-            _write(written_to() / self.file_name(sig, data.codegen), dumps(tuple(parts)))
+            path = written_to() / self.file_name(sig, data.codegen)
+            if _read(path) is None:   # who has loaded the file that another process made meanwhile links with that one
+                _write(path, dumps(tuple(parts)))
         except OSError as error:
             _LOG.warning("compiled kernels cannot be kept in %s (%s)", folder(), error.strerror)
 
@@ -130,7 +136,14 @@ def _write(path: Path, payload: bytes) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(hashlib.sha256(payload).digest() + payload)
-        Path(beside).replace(path)
+        try:
+            os.link(beside, path)        # the first stays, see _Loaded
+        except FileExistsError:
+            if _read(path) is None:
+                Path(beside).replace(path)   # it is damaged
+        except OSError:
+            Path(beside).replace(path)       # a file system without links
+        Path(beside).unlink(missing_ok=True)
     except BaseException:
         Path(beside).unlink(missing_ok=True)
         raise
