@@ -1,5 +1,8 @@
 """The files of compiled kernels: the first that is written stays, for somebody may have loaded it and links with it."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 from companion.kernels.cache import _read, _write
