@@ -9,7 +9,7 @@
 set -euo pipefail
 
 release=$1 architecture=${2:-amd64}
-mirror=${MIRROR:-http://deb.debian.org/debian}
+mirror=${MIRROR:-}   # empty: the one that debootstrap knows
 source=$(realpath "$(dirname "$0")/..")
 work=$(mktemp -d /var/tmp/companion-build.XXXXXX)
 root=$work/root
@@ -19,7 +19,7 @@ if [ -n "${BASE:-}" ]; then
     cp -a "$BASE" "$root"
 else
     debootstrap --arch="$architecture" --variant=minbase --include=python3,python3-venv,ca-certificates \
-        "$release" "$root" "$mirror" >"$work/log" || { tail -5 "$work/log"; exit 1; }
+        "$release" "$root" ${mirror:+"$mirror"} >"$work/log" || { tail -5 "$work/log"; exit 1; }
 fi
 cp /etc/resolv.conf "$root/etc/resolv.conf"
 cp -L /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/ca-certificates.crt"

@@ -9,7 +9,7 @@
 set -euo pipefail
 
 package=$(realpath "$1") release=$2 architecture=${3:-amd64}
-mirror=${MIRROR:-http://deb.debian.org/debian}
+mirror=${MIRROR:-}   # empty: the one that debootstrap knows
 work=$(mktemp -d /var/tmp/companion-clean.XXXXXX)
 root=$work/root
 trap 'umount -l "$root/proc" 2>/dev/null || true; rm -rf "$work"' EXIT
@@ -25,7 +25,7 @@ if [ -n "${CLEAN:-}" ]; then
     cp -a "$CLEAN" "$root"
 else
     debootstrap --arch="$architecture" --variant=minbase --include=systemd,systemd-sysv,dbus,udev,ca-certificates,adduser,libstdc++6 \
-        "$release" "$root" "$mirror" >"$work/debootstrap.log" || { tail -5 "$work/debootstrap.log"; exit 1; }
+        "$release" "$root" ${mirror:+"$mirror"} >"$work/debootstrap.log" || { tail -5 "$work/debootstrap.log"; exit 1; }
 fi
 cp /etc/resolv.conf "$root/etc/resolv.conf"
 inside apt-get -qq update
