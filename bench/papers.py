@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from companion.boat import MPS_PER_KNOT, Boat, avalon
+from companion.boat import Boat, avalon
+from companion.geo.units import MPS_PER_KNOT
 from companion.planner import Problem
 
 FOUR = [

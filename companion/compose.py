@@ -11,11 +11,12 @@ from companion.addresses import Displays, OutputName, parse_nmea, parse_signalk
 from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant, read_polar
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
+from companion.geo.units import MPS_PER_KNOT
 from companion.geofence import Mission
 from companion.geofence.mission import Gate, free_water
 from companion.geofence.shapes import polygon_en
 from companion.orders import ALL, Verb, unknown
-from companion.planner.settings import AUTO, KNOT_MPS, SETTINGS, Choice
+from companion.planner.settings import AUTO, SETTINGS, Choice
 from companion.skipper.step import (
     CHOICES,
     SHORE,
@@ -229,7 +230,7 @@ def planner_of(mission: Mission) -> Choice:
         if key in numbers:
             numbers[key] = math.radians(numbers[key])
     if "heuristic_mps" in numbers:
-        numbers["heuristic_mps"] = numbers["heuristic_mps"] * KNOT_MPS or None
+        numbers["heuristic_mps"] = numbers["heuristic_mps"] * MPS_PER_KNOT or None
     if "is_tunnel_abrupt" in numbers:
         numbers["is_tunnel_abrupt"] = numbers["is_tunnel_abrupt"] == "abrupt"
     return Choice(algorithm=algorithm, settings=SETTINGS[algorithm](**numbers), expansions=expansions)

@@ -11,7 +11,7 @@ set -euo pipefail
 release=$1 architecture=${2:-amd64}
 mirror=${MIRROR:-}   # empty: the one that debootstrap knows
 source=$(realpath "$(dirname "$0")/..")
-work=$(mktemp -d /var/tmp/companion-build.XXXXXX)
+work=$(mktemp -d)   # $TMPDIR says where: it takes 2 GB
 root=$work/root
 trap 'umount -l "$root/proc" 2>/dev/null || true; rm -rf "$work"' EXIT
 
@@ -30,6 +30,6 @@ mkdir "$root/source"
 settings=$(env | grep '^PIP_' || true)
 export SOURCE_DATE_EPOCH=$(git -C "$source" log -1 --format=%ct)
 mkdir -p "$source/dist"
-chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 SOURCE_DATE_EPOCH=$SOURCE_DATE_EPOCH \
+chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/source LC_ALL=C.UTF-8 SOURCE_DATE_EPOCH=$SOURCE_DATE_EPOCH \
     $settings python3 /source/packaging/deb.py --out /source/dist
 cp "$root"/source/dist/*.deb "$source/dist/"

@@ -10,13 +10,13 @@ set -euo pipefail
 
 package=$(realpath "$1") release=$2 architecture=${3:-amd64}
 mirror=${MIRROR:-}   # empty: the one that debootstrap knows
-work=$(mktemp -d /var/tmp/companion-clean.XXXXXX)
+work=$(mktemp -d)   # $TMPDIR says where: it takes 2 GB
 root=$work/root
 trap 'umount -l "$root/proc" 2>/dev/null || true; rm -rf "$work"' EXIT
 
 say() { echo "== $*"; }
 wrong() { echo "WRONG: $*" >&2; exit 1; }
-inside() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 "$@"; }
+inside() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/trial LC_ALL=C.UTF-8 "$@"; }
 files() { (cd "$root" && find etc opt usr var/lib/companion var/log/companion var/cache/companion lib/systemd lib/udev \
     -xdev \( -type f -o -type l \) 2>/dev/null || true) | grep -vE '__pycache__|^etc/(ld.so.cache|passwd-?|group-?|g?shadow-?|subuid|subgid)|^etc/mtab|^etc/apt' | sort; }
 
@@ -35,37 +35,37 @@ mount -t proc proc "$root/proc"
 files >"$work/before"   # (paths of this list are the package's or Debian's; voyages of the trial are removed)
 
 say "install"
-cp "$package" "$root/var/tmp/companion.deb"
-inside dpkg -i /var/tmp/companion.deb >"$work/install.log" 2>&1 || { cat "$work/install.log"; wrong "it does not install"; }
+mkdir "$root/trial"   # the home of who tries it, and nothing else
+cp "$package" "$root/trial/companion.deb"
+inside dpkg -i /trial/companion.deb >"$work/install.log" 2>&1 || { cat "$work/install.log"; wrong "it does not install"; }
 inside companion --version
 inside id companion | grep -q dialout || wrong "the user is not in the group dialout"
 if [ "$(inside find /opt/companion -user root -perm -o+w ! -type l | wc -l)" != 0 ]; then wrong "others may write to /opt/companion"; fi
 
 say "nothing is compiled, and a voyage sails from an empty folder"
-inside sh -c 'mkdir -p /tmp/voyage && cd /tmp/voyage && companion mission example mine >/dev/null &&
+inside sh -c 'mkdir ~/voyage && cd ~/voyage && companion mission example mine >/dev/null &&
     companion mission check mine/lake.toml >/dev/null && sitl run rocks --out v' >"$work/sail.log" 2>&1 ||
     { cat "$work/sail.log"; wrong "it does not sail"; }
 grep -q PASSED "$work/sail.log" || wrong "it does not sail"
-[ ! -d "$root/root/.cache/sailboat-companion" ] || [ -z "$(find "$root/root/.cache/sailboat-companion" -type f)" ] ||
-    wrong "kernels were compiled: $(find "$root/root/.cache/sailboat-companion" -type f | head -3)"
-rm -rf "$root/tmp/voyage" "$root/root/.cache"
+compiled=$(find "$root/trial/.cache/sailboat-companion" -type f 2>/dev/null || true)
+[ -z "$compiled" ] || wrong "kernels were compiled: $(head -3 <<<"$compiled")"
 
 say "a conffile that was changed is kept"
 echo 'OPTIONS=--keep-gb 1' >"$root/etc/companion/service.env"
-inside dpkg -i --force-confold /var/tmp/companion.deb >"$work/upgrade.log" 2>&1 || { cat "$work/upgrade.log"; wrong "no upgrade"; }
+inside dpkg -i --force-confold /trial/companion.deb >"$work/upgrade.log" 2>&1 || { cat "$work/upgrade.log"; wrong "no upgrade"; }
 grep -q 'keep-gb 1' "$root/etc/companion/service.env" || wrong "the conffile was not kept"
 
 if [ "$architecture" = "$(dpkg --print-architecture)" ] && command -v systemd-nspawn >/dev/null; then
     say "the service under a real systemd"
     install -D -m 755 "$(dirname "$0")/try_service.sh" "$root/usr/local/bin/try_service"
-    printf '[Unit]\nAfter=multi-user.target\n[Service]\nType=oneshot\nExecStart=/usr/local/bin/try_service\nExecStopPost=/bin/systemctl --no-block poweroff\nStandardOutput=file:/var/tmp/service.log\nStandardError=file:/var/tmp/service.log\n[Install]\nWantedBy=multi-user.target\n' \
+    printf '[Unit]\nAfter=multi-user.target\n[Service]\nType=oneshot\nExecStart=/usr/local/bin/try_service\nExecStopPost=/bin/systemctl --no-block poweroff\nStandardOutput=file:/trial/service.log\nStandardError=file:/trial/service.log\n[Install]\nWantedBy=multi-user.target\n' \
         >"$root/etc/systemd/system/try.service"
     inside systemctl enable try.service 2>/dev/null
     umount -l "$root/proc"
     timeout 600 systemd-nspawn -q -D "$root" --boot --register=no --keep-unit >"$work/boot.log" 2>&1 || true
     mount -t proc proc "$root/proc"
-    cat "$root/var/tmp/service.log"
-    tail -1 "$root/var/tmp/service.log" | grep -q '^ALL IS WELL' || wrong "the service"
+    cat "$root/trial/service.log"
+    tail -1 "$root/trial/service.log" | grep -q '^ALL IS WELL' || wrong "the service"
     inside systemctl disable try.service 2>/dev/null || true
     rm -f "$root/etc/systemd/system/try.service" "$root/usr/local/bin/try_service"
 fi

@@ -5,10 +5,10 @@ wrong() { echo "WRONG: $*"; journalctl -u 'companion@*' --no-pager 2>/dev/null |
 wait_for() { for _ in $(seq "$1"); do eval "$2" && return 0; sleep 1; done; return 1; }
 status() { systemctl show -p StatusText --value companion@lake; }
 
-cd /tmp
-companion mission example /tmp/missions >/dev/null
+trial=$(mktemp -d) && cd "$trial" || exit 1
+companion mission example missions >/dev/null
 systemd-run --quiet --unit=boat /usr/bin/sitl boat --port 0 --udp 0 --udp-out 127.0.0.1:14551 --warm --moored --home 50.817,-1.31
-cp /tmp/missions/lake.* /etc/companion/
+cp missions/lake.* /etc/companion/
 echo 'LINK=udpin:127.0.0.1:14551' >/etc/companion/lake.env
 
 began=$(date +%s%N)
@@ -41,7 +41,7 @@ systemctl stop companion@lake || wrong "it does not stop"
 [ "$(systemctl show -p Result --value companion@lake)" = success ] || wrong "it stopped with $(systemctl show -p Result --value companion@lake)"
 systemctl start companion@nothing 2>/dev/null && wrong "an instance without a mission started"
 systemctl stop boat
-rm -rf /tmp/missions /etc/companion/lake.*
+rm -rf "$trial" /etc/companion/lake.*
 systemd-analyze verify companion@lake.service 2>&1 | grep -i companion@ && wrong "verify"
 systemd-analyze security --no-pager companion@lake.service | tail -1
 echo "ALL IS WELL"

@@ -19,11 +19,10 @@ from companion.boat.margins import (
     widest_corridor_m,
 )
 from companion.boat.outline import outline_en_m
-from companion.boat.polar import MPS_PER_KNOT, Polar, SailingAngle
+from companion.boat.polar import Polar, SailingAngle
 from companion.boat.polar_files import PolarFile, parse_polar, read_polar
 
 __all__ = [
-    "MPS_PER_KNOT",
     "AutopilotLimits",
     "Boat",
     "Hull",

@@ -8,7 +8,8 @@ from importlib.resources import files
 
 import numpy as np
 
-from companion.boat.polar import MPS_PER_KNOT, Polar
+from companion.boat.polar import Polar
+from companion.geo.units import MPS_PER_KNOT
 
 # [1], eq. 4.1: boat speed per wind speed against the true wind angle in RADIANS; both speeds in knots.
 AVALON_COEFFICIENTS = (-0.0048, 0.0335, -0.2460, 0.7465, -0.01109)

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-MPS_PER_KNOT = 1852.0 / 3600.0
 _SEARCH_STEP_RAD = math.radians(0.05)  # of the best angles; VMG is flat there, finer changes nothing
 
 

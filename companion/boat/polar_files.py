@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat.polar import MPS_PER_KNOT, Polar
+from companion.boat.polar import Polar
 from companion.errors import InputError, unreadable
+from companion.geo.units import MPS_PER_KNOT
 
 MAX_TWS_KN = 200.0
 MAX_SPEED_KN = 100.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import stat
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,13 +10,14 @@ from types import TracebackType
 from typing import Any, Self
 
 from companion.addresses import Displays
-from companion.errors import InputError, unreadable
+from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.outputs.deltas import Values, values_of
 from companion.outputs.nmea import Lines, lines_of
 from companion.outputs.nmea_outlets import TcpOutlet, UdpOutlet
 from companion.outputs.outlet import Outlet, Say
 from companion.outputs.signalk_outlets import TcpSignalK, WebSocketSignalK, require_websockets
+from companion.secret import read_secret
 from companion.view.values import View
 
 MOST_TOKEN = 8192   # characters
@@ -44,16 +44,8 @@ def wanted(displays: Displays) -> Wanted:
 
 def read_token(path: Path) -> str:
     """Return the token of a file that only its owner may read. Raises InputError."""
-    try:
-        mode, text = path.stat().st_mode, path.read_text("ascii")[:MOST_TOKEN].strip()
-    except OSError as error:
-        raise unreadable(str(path), error, "the Signal K token", "write it there, with mode 0600") from error
-    except UnicodeDecodeError:
-        text = ""
-    else:
-        if mode & (stat.S_IRWXG | stat.S_IRWXO):
-            raise InputError(str(path), "", "the Signal K token can be read by others", f"chmod 600 {path}")
-    if not text or any(c.isspace() for c in text):
+    text = read_secret(path, "the Signal K token", "write it there, with mode 0600")
+    if not text or not text.isascii() or len(text) > MOST_TOKEN or any(c.isspace() for c in text):
         raise InputError(str(path), "", "holds no token", "write the token that the server gave, and nothing else")
     return text
 

@@ -14,13 +14,12 @@ from functools import reduce
 from operator import xor
 
 from companion.geo.angles import wrap_two_pi
+from companion.geo.units import M_PER_NM, MPS_PER_KNOT
 from companion.messages import GeoPoint
 
 TALKER = "II"          # integrated instrumentation
 MAX_CHARACTERS = 82    # from $ to the line end, both included
 NAME_CHARACTERS = 8    # of a waypoint: more than a few do not fit into the sentences of a route
-MPS_PER_KNOT = 1852.0 / 3600.0
-M_PER_NM = 1852.0
 _FRAME = len("$*00\r\n")
 _MOST_XTE_NM = 9.99    # what the field of a cross-track error holds
 

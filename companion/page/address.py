@@ -7,11 +7,11 @@ import os
 import re
 import secrets
 import socket
-import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from companion.errors import InputError, unreadable
+from companion.secret import read_secret
 
 LEAST_TOKEN = 22      # characters: 128 bits in base64
 
@@ -60,16 +60,14 @@ def read_token(path: Path) -> str:
     Raises:
         InputError: others can read it, or what is in it is too short to be one.
     """
+    remedy = "name a file in a folder that is there"
     try:
         if not path.exists():
             with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
                 file.write(secrets.token_urlsafe(24) + "\n")
-        mode, text = path.stat().st_mode, path.read_text("utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        problem = error if isinstance(error, OSError) else OSError(0, "it is not text")
-        raise unreadable(str(path), problem, "the token", "name a file in a folder that is there") from error
-    if mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise InputError(str(path), "", "the token can be read by others", f"chmod 600 {path}")
+    except OSError as error:
+        raise unreadable(str(path), error, "the token", remedy) from error
+    text = read_secret(path, "the token", remedy)
     if len(text) < LEAST_TOKEN or not text.isascii() or not text.isprintable() or " " in text:
         raise InputError(str(path), "", f"is no token: it needs {LEAST_TOKEN} characters or more, in one word",
                          "remove it, and a new one is made")

@@ -25,12 +25,12 @@ def export(record: Record) -> bytes:
                for path, text in modules.items()}
     data = {
         "hello": {**record.hello(), "takes_orders": False}, "area": msgspec.to_builtins(record.area),
-        "past": msgspec.Raw(record.past()), "log": msgspec.Raw(record.log()),
+        "past": msgspec.Raw(record.past()()), "log": msgspec.Raw(record.log()),
         "moments": [base64.b64encode(chunk).decode() for chunk in record.chunks],
     }
     beside = record.compared()
     if beside is not None:
-        data["beside"] = msgspec.Raw(beside)
+        data["beside"] = msgspec.Raw(beside())
     packed = _base64(gzip.compress(msgspec.json.encode(data), 9, mtime=0))
     page = re.sub(r'<link rel="stylesheet"[^>]*>', lambda _: f"<style>{style}</style>", page)
     page = re.sub(r'<link rel="icon"[^>]*>', '<link rel="icon" href="data:,">', page)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Self
 
 import msgspec
@@ -46,9 +46,10 @@ class Hub:
         for event in self._waiting:
             event.set()
 
-    def log(self) -> bytes:
-        """Return the kept log as a JSON array."""
-        return b"[" + b",".join(data for _, data in self._ring) + b"]"
+    def log(self) -> Callable[[], bytes]:
+        """Return what makes the JSON array of the log that is kept now; a thread may call it while more comes."""
+        kept = tuple(self._ring)
+        return lambda: b"[" + b",".join(data for _, data in kept) + b"]"
 
     @property
     def last_number(self) -> int:

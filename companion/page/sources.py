@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -48,9 +49,10 @@ class Live:
                 "orders": list(self.permitted) if self.ask is not None else None, "count": None, "chunk": None,
                 "area": None if self.area is None else self.area.hash}
 
-    def past(self) -> bytes:
-        """Return the samples so far, as JSON."""
-        return msgspec.json.encode(Past.of(self.trail.samples, self.unix_s))
+    def past(self) -> Callable[[], bytes]:
+        """Return what makes the JSON of the samples so far; a thread may call it while more come."""
+        samples, unix_s = tuple(self.trail.samples), self.unix_s
+        return lambda: msgspec.json.encode(Past.of(samples, unix_s))
 
 
 class Record:
@@ -106,11 +108,11 @@ class Record:
         """Return the log, as JSON."""
         return msgspec.json.encode(self._events)
 
-    def compared(self) -> bytes | None:
-        """Return the voyage beside this one in this one's metres, as JSON; None: there is none."""
-        other = self.beside
-        if other is None:
-            return None
+    def compared(self) -> Callable[[], bytes] | None:
+        """Return what makes the JSON of the voyage beside this one, in this one's metres; None: there is none."""
+        return None if self.beside is None else partial(self._compared, self.beside)
+
+    def _compared(self, other: Record) -> bytes:
         east_m = (other.area.origin_lon_deg - self.area.origin_lon_deg) * self.area.lon_m
         north_m = (other.area.origin_lat_deg - self.area.origin_lat_deg) * self.area.lat_m
         moved = [replace(
@@ -120,6 +122,6 @@ class Record:
             "name": other.name, "sails_s": other.sails_s, "past": Past.of(moved, other.unix_s),
             "figures": None if other.last is None else other.last.figures})
 
-    def past(self) -> bytes:
-        """Return the samples of the whole voyage, as JSON: a row for each moment."""
-        return msgspec.json.encode(Past.of(self.trail.samples, self.unix_s))
+    def past(self) -> Callable[[], bytes]:
+        """Return what makes the JSON of the whole voyage's samples: a row for each moment."""
+        return lambda: msgspec.json.encode(Past.of(self.trail.samples, self.unix_s))

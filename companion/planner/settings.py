@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-KNOT_MPS = 1852.0 / 3600.0
+from companion.geo.units import MPS_PER_KNOT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +37,7 @@ class AstarSettings:
     gybe_s: float = 0.0
     tunnel_width_m: float | None = None
     is_tunnel_abrupt: bool = False
-    heuristic_mps: float | None = 7.0 * KNOT_MPS
+    heuristic_mps: float | None = 7.0 * MPS_PER_KNOT
     min_twa_rad: float = math.radians(45.0)
     max_twa_rad: float = math.radians(160.0)
     max_turn_rad: float = 0.5 * math.pi

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-MPS_PER_KNOT = 1852.0 / 3600.0
+from companion.geo.units import MPS_PER_KNOT
+
 OLD_S = 10.0      # what was heard longer ago looks old
 
 

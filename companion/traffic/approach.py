@@ -12,10 +12,9 @@ import math
 from dataclasses import dataclass
 
 from companion.geo.angles import wrap_two_pi
+from companion.geo.units import M_PER_NM
 from companion.traffic.predict import predict
 from companion.traffic.vessel import Vessel
-
-_NM_M = 1852.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +53,7 @@ class AlarmLimits:
     act_tcpa_s: float
 
 
-SEA = AlarmLimits(warn_cpa_m=0.25 * _NM_M, warn_tcpa_s=720.0, act_cpa_m=0.1 * _NM_M, act_tcpa_s=360.0)
+SEA = AlarmLimits(warn_cpa_m=0.25 * M_PER_NM, warn_tcpa_s=720.0, act_cpa_m=0.1 * M_PER_NM, act_tcpa_s=360.0)
 """For a boat of 1 to 2 knots among ships."""
 LAKE = AlarmLimits(warn_cpa_m=50.0, warn_tcpa_s=90.0, act_cpa_m=20.0, act_tcpa_s=45.0)
 

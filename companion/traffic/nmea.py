@@ -17,9 +17,9 @@ from typing import Any
 import pyais
 from pyais.exceptions import AISBaseException
 
+from companion.geo.units import MPS_PER_KNOT
 from companion.messages import AisReport, GeoPoint
 
-MPS_PER_KNOT = 1852.0 / 3600.0
 MAX_LINE = 120           # NMEA 0183 says 82; tag blocks and careless multiplexers make more
 MAX_DATAGRAM = 8192
 FRAGMENT_S = 10.0        # fragments of one message come within this

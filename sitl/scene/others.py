@@ -17,6 +17,7 @@ from pyais import encode_dict
 
 from companion.clock import now_s
 from companion.geo.frame import LocalFrame
+from companion.geo.units import MPS_PER_KNOT
 from sitl.autopilot import Vessel
 from sitl.scene.encounter import Met
 from sitl.scene.mariner import Mariner, Receiver, met_by
@@ -41,7 +42,6 @@ from sitl.world import Wind
 
 TRAFFIC = frozenset({"vessel", "intruder", "second_boat", "meeting"})
 OUR_LENGTH_M = 2.0    # what the second boat takes ours for
-_MPS_PER_KNOT = 1852.0 / 3600.0
 
 
 def sentences(vessel: Vessel) -> bytes:
@@ -56,7 +56,7 @@ def sentences(vessel: Vessel) -> bytes:
     if vessel.cog_deg is not None:
         said["course"] = vessel.cog_deg
     if vessel.sog_mps is not None:
-        said["speed"] = vessel.sog_mps / _MPS_PER_KNOT
+        said["speed"] = vessel.sog_mps / MPS_PER_KNOT
     if vessel.heading_deg is not None:
         said["heading"] = round(vessel.heading_deg) % 360
     return "".join(f"{line}\r\n" for line in encode_dict(said, talker_id="AI", sentence_type="VDM")).encode()

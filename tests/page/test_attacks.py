@@ -8,8 +8,9 @@ import pytest
 
 from companion.errors import InputError
 from companion.orders import Answer, Result
-from companion.page import read_token
-from companion.page.server import MOST_BODY, MOST_HEAD, MOST_WATCHERS
+from companion.page import connections, read_token
+from companion.page.connections import MOST_HEAD
+from companion.page.server import MOST_BODY, MOST_WATCHERS
 from tests.page.asking import TOKEN, Asked, hang_up, taking_orders, view_at, with_page
 
 
@@ -243,9 +244,7 @@ def test_sixteen_watch_and_the_next_is_told_so():
 
 
 def test_a_request_that_never_ends_is_hung_up_on(monkeypatch):
-    from companion.page import server
-
-    monkeypatch.setattr(server, "REQUEST_S", 0.2)
+    monkeypatch.setattr(connections, "REQUEST_S", 0.2)
 
     async def talk(browser, *_):
         return await browser.raw(b"GET / HTTP/1.1\r\nHost: ", at_most_s=5.0), await browser.get("/api/hello")

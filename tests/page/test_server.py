@@ -4,6 +4,7 @@ import asyncio
 import gzip
 import json
 import socket
+import threading
 import tracemalloc
 from dataclasses import replace
 
@@ -11,9 +12,9 @@ import pytest
 
 from companion.clock import now_s, run
 from companion.errors import JobError
-from companion.page import Address, Live, Record, served, server
+from companion.page import Address, Live, Record, connections, served
 from companion.page.hub import Hub, Watcher
-from companion.view import Area
+from companion.view import Area, Past
 from tests.page.asking import event, free_port, hang_up, view_at, with_page
 
 
@@ -93,12 +94,42 @@ def test_a_slow_watcher_gets_the_newest_view_and_not_all():
     assert [data["t_s"] for _, _, data in run(look())] == [999.0]
 
 
+def test_what_takes_long_to_make_and_to_pack_is_not_made_on_the_voyages_loop(monkeypatch):
+    """An hour's samples and a page's worth of log, while more come in: the columns stay of one length."""
+    by = []
+
+    def noted(work):
+        return lambda *given, **more: by.append(threading.get_ident()) or work(*given, **more)
+
+    monkeypatch.setattr(Past, "of", noted(Past.of))
+    monkeypatch.setattr(gzip, "compress", noted(gzip.compress))
+
+    async def talk(browser, live, _):
+        for n in range(3000):
+            live.show(view_at(float(n)), (event(n + 1),), None)
+        asked = [asyncio.create_task(browser.get("/api/past", Accept_Encoding="gzip")) for _ in range(3)]
+        n = 3000
+        while not all(each.done() for each in asked):
+            live.show(view_at(float(n)), (event(n + 1),), None)
+            n += 1
+            await asyncio.sleep(0.0)
+        return [await each for each in asked], threading.get_ident()
+
+    answers, loop = with_page(talk)
+    for status, _, body in answers:
+        past = json.loads(gzip.decompress(body))
+        assert status == 200
+        assert {len(past[name]) for name in past if name != "unix_s"} == {len(past["t_s"])}
+    assert len(by) == 6
+    assert loop not in by
+
+
 def test_twelve_watch_and_one_never_reads_and_the_loop_is_not_held(monkeypatch):
     """Views of eight times the size, fifty a second; memory does not grow by the one who does not read: he is dropped.
 
     Lateness is held against what the machine, which others share, does to a loop that nobody watches.
     """
-    monkeypatch.setattr(server, "BLOCKED_S", 1.0)
+    monkeypatch.setattr(connections, "BLOCKED_S", 1.0)
 
     async def talk(browser, live, page):
         head = f"GET /api/stream HTTP/1.1\r\nHost: 127.0.0.1:{browser.port}\r\n\r\n".encode()

@@ -14,6 +14,7 @@ from companion.errors import CompanionError, InputError, JobError
 from companion.program.arguments import number, place, system_id
 
 FOLDER = Path("/etc/companion")
+NO_GO_DEG = number("deg", at_least=20.0, at_most=80.0)
 
 _EPILOG = """\
 examples:
@@ -50,7 +51,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--drawn", action="store_true",
                         help="the goals are drawn in a ground station and uploaded to the autopilot")
     parser.add_argument("--polar", type=Path, metavar="FILE", help="of the boat (default: the simulator's boat)")
-    parser.add_argument("--no-go", type=number("deg", at_least=20.0, at_most=80.0), metavar="DEG",
+    parser.add_argument("--no-go", type=NO_GO_DEG, metavar="DEG",
                         help="what the boat can sail to the wind (default: 47)")
     parser.add_argument("--dir", type=Path, default=FOLDER, metavar="DIR",
                         help=f"where the unit looks (default: {FOLDER})")
@@ -75,11 +76,11 @@ def run(args: argparse.Namespace) -> int:
     if not args.drawn:
         args.start = args.start or ask("where she starts, LAT,LON", None, place)
         args.goal = args.goal or [ask("where she is to sail, LAT,LON", None, place)]
-    args.no_go = args.no_go or ask("how near to the wind she sails [deg]", 47.0, float)
+    args.no_go = args.no_go or ask("how near to the wind she sails [deg]", 47.0, NO_GO_DEG)
     written = write(args.dir, args.name, mission_of(args, system), settings_of(link), args.polar)
     for path in written:
         print(f"{path}: written")
-    code = 0 if args.no_doctor or link is None else _examine(written[0], link, system)
+    code = 0 if args.no_doctor else _examine(written[0], link, system)
     print(f"[operator] of {written[0]} permits nothing yet. To start: "
           f"sudo systemctl enable --now companion@{args.name}")
     return code

@@ -12,12 +12,12 @@ import hashlib
 import os
 import re
 import secrets
-import stat
 from pathlib import Path
 
 from companion.disk import Disk, reason
-from companion.errors import InputError, unreadable
+from companion.errors import InputError
 from companion.mavlink.wire.frames import SigningState
+from companion.secret import read_secret
 
 # 2015-01-01T00:00:00Z in Unix seconds: the zero of MAVLink signing timestamps, which count 10 µs.
 EPOCH_S = 1_420_070_400.0
@@ -33,15 +33,7 @@ def read_key(path: Path) -> bytes:
     Raises:
         InputError: it is missing, readable by others, or empty.
     """
-    try:
-        mode = path.stat().st_mode
-        text = path.read_text("utf-8").strip()
-    except OSError as error:
-        raise unreadable(str(path), error, "the signing key", "make it with mode 0600") from error
-    except UnicodeDecodeError as error:
-        raise InputError(str(path), "", f"signing key cannot be read ({error})", "make it with mode 0600") from error
-    if mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise InputError(str(path), "", "the signing key can be read by others", f"chmod 600 {path}")
+    text = read_secret(path, "the signing key", "make it with mode 0600")
     if re.fullmatch(r"[0-9a-fA-F]{64}", text):
         return bytes.fromhex(text)
     if not text:

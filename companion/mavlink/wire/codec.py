@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.geo.angles import wrap_pi, wrap_two_pi
+from companion.geo.units import MPS_PER_KNOT
 from companion.mavlink.wire.frames import Message
 from companion.messages import (
     AisReport,
@@ -32,7 +33,6 @@ from companion.messages import (
 )
 
 AUTOPILOT_COMPONENT = 1
-KNOT_MPS = 1852.0 / 3600.0
 MAX_WIND_MPS = 100.0
 MAX_SPEED_MPS = 50.0
 # FLAGS of EKF_STATUS_REPORT that a position needs; the real one shows 0x33f when ready.
@@ -208,7 +208,7 @@ def ais_report(t_s: float, message: Message) -> AisReport:
     flags = message.flags
     speed_mps = course_rad = turn_radps = None
     if flags & wire.AIS_FLAGS_VALID_VELOCITY and not (ardupilot and message.velocity >= _AIS_SPEED_UNKNOWN):
-        speed_mps = message.velocity / 10.0 * KNOT_MPS if ardupilot else message.velocity / 100.0
+        speed_mps = message.velocity / 10.0 * MPS_PER_KNOT if ardupilot else message.velocity / 100.0
     if flags & wire.AIS_FLAGS_VALID_COG and message.COG < _AIS_COURSE_UNKNOWN_CDEG:
         course_rad = math.radians(message.COG / 100.0)
     signed = flags & wire.AIS_FLAGS_VALID_TURN_RATE and not flags & wire.AIS_FLAGS_TURN_RATE_SIGN_ONLY

@@ -9,7 +9,7 @@ import numpy as np
 from companion.kernels.jit import kernel
 from companion.kernels.xorshift import uniform
 from companion.planner.reference.kernels import HALF, TWD, TWO_PI, first_hit, meets_target, steer, straight, wrap
-from companion.planner.risk.wind_kernels import leg_risk, sigma_at
+from companion.planner.risk.wind_kernels import leg_risk, sigma_at, tail
 
 # Columns of ``node``: place, heading of arrival, time, accumulated risk, cost, the greatest risk of a state so far.
 X, Y, H, T, R, C, M = range(7)
@@ -51,7 +51,7 @@ def _state_risk(twa, t, number, risk_number, risk_table):  # type: ignore[no-unt
         t, int(risk_number[MODEL]), risk_number[S0], risk_number[S1], risk_number[RHO], risk_table[0], risk_table[1])
     if sigma <= 1e-12:
         return 0.0 if margin >= -1e-9 else 1.0
-    return 0.5 * math.erfc(margin / sigma / math.sqrt(2.0))
+    return tail(margin / sigma)
 
 
 @kernel

@@ -229,7 +229,8 @@ def first_passage(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _tail(z):  # type: ignore[no-untyped-def]
+def tail(z):  # type: ignore[no-untyped-def]
+    """Return the chance that a standard normal value is above ``z``."""
     return 0.5 * math.erfc(z / math.sqrt(2.0))
 
 
@@ -250,11 +251,11 @@ def leg_risk(  # type: ignore[no-untyped-def]
     s_start = sigma_at(t0, model, s0, s1, rho, table_t, table_s)
     if max(s_start, sigma_at(t1, model, s0, s1, rho, table_t, table_s)) <= 1e-9:
         return 0.0 if margin >= -1e-9 else 1.0
-    entry = _tail(margin / max(s_start, 1e-9))
+    entry = tail(margin / max(s_start, 1e-9))
     is_full = True
     if before_t >= 0.0 and before_twa * twa > 0.0:
         s_before = max(sigma_at(before_t, model, s0, s1, rho, table_t, table_s), 1e-9)
-        entry = max(0.0, entry - _tail((abs(before_twa) - half) / s_before))
+        entry = max(0.0, entry - tail((abs(before_twa) - half) / s_before))
         is_full = False
     total, press = 0.0, 0.0
     n = 16

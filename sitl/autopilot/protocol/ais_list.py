@@ -7,12 +7,12 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from companion.geo.units import MPS_PER_KNOT
 from companion.messages import GeoPoint
 
 LIST_MAX = 25
 TIMEOUT_S = 600.0
 RESEND_S = 30.0
-KNOT_MPS = 1852.0 / 3600.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +79,7 @@ class AisList:
             flags |= mav.AIS_FLAGS_VALID_VELOCITY
         # measured on the real one: speed in 0.1 knot though the field is in cm/s; turn rate in 0.1 deg/s and
         # without sign though it is in 0.01 deg/s; "not available" is 121 there, without the flag
-        speed = 1023 if v.sog_mps is None else round(v.sog_mps / KNOT_MPS * 10.0)
+        speed = 1023 if v.sog_mps is None else round(v.sog_mps / MPS_PER_KNOT * 10.0)
         if v.turn_rate_dps is None:
             turn = 121
         else:
