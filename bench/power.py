@@ -9,15 +9,12 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import signal
-import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-from bench.voyage import MISSION, SCENARIO
-from sitl.scene import free_port
+from bench.voyage import afloat
 
 ROOT = Path("/sys/fs/cgroup")
 PERIOD_US = 100_000
@@ -77,28 +74,13 @@ def main() -> int:
     parser.add_argument("--share", type=float, default=0.25, help="of one core (default: 0.25)")
     parser.add_argument("--megabytes", type=int, default=200)
     args = parser.parse_args()
-    groups, port = Groups(args.share, args.megabytes), free_port()
+    groups = Groups(args.share, args.megabytes)
     try:
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch) / "voyage"
-            boat = subprocess.Popen([
-                sys.executable, "-m", "sitl.run.live_boat", str(SCENARIO), "--endpoint", f"udpout:127.0.0.1:{port}"])
-            began = time.monotonic()
-            companion = subprocess.Popen(
-                [sys.executable, "-m", "companion.cli", "run", str(MISSION), "--link", f"udpin:127.0.0.1:{port}",
-                 "--out", str(folder), "--state", str(Path(scratch) / "state.json"), "--exit-on-arrival",
-                 "--wait", "120"],
-                preexec_fn=groups.enter)  # noqa: PLW1509 - no threads here
-            track = folder / "track.csv"
-            while companion.poll() is None and not (track.is_file() and track.read_bytes().count(b"\n") > 1):
-                time.sleep(0.1)
-            started_s = time.monotonic() - began
-            try:
+            options = "--exit-on-arrival", "--wait", "120"
+            with afloat(folder, *options, preexec_fn=groups.enter) as (companion, started_s):
                 companion.wait(1200)
-            finally:
-                companion.send_signal(signal.SIGINT)
-                boat.terminate()
-                boat.wait(30)
             summary = json.loads((folder / "summary.json").read_text())
             plans = [json.loads(line) for line in (folder / "decisions.jsonl").read_text().splitlines()]
             took = sorted(p["plan"]["elapsed_s"] for p in plans if p["kind"] == "plan" and p.get("plan"))

@@ -10,6 +10,7 @@ of a busy machine are too high: run it on a quiet one.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import signal
@@ -17,7 +18,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from sitl.scene import free_port
 
@@ -49,20 +52,35 @@ def memory_mb(pid: int) -> float:
     return 0.0
 
 
-def live(seconds: float) -> dict[str, float]:
+@contextlib.contextmanager
+def afloat(folder: Path, *options: str, **more: Any) -> Iterator[tuple[subprocess.Popen[bytes], float]]:
+    """Sail the demo in real time: the companion as a process of its own, and how long its first step took [s].
+
+    ``more`` goes to the companion's process. It is ended with the body, if it has not ended by itself.
+    """
     port = free_port()
+    boat = subprocess.Popen([
+        sys.executable, "-m", "sitl.run.live_boat", str(SCENARIO), "--endpoint", f"udpout:127.0.0.1:{port}"])
+    began = time.monotonic()
+    companion = subprocess.Popen(
+        [sys.executable, "-m", "companion.cli", "run", str(MISSION), "--link", f"udpin:127.0.0.1:{port}",
+         "--out", str(folder), "--state", str(folder.parent / "state.json"), *options], **more)
+    track = folder / "track.csv"
+    try:
+        while companion.poll() is None and not (track.is_file() and track.read_bytes().count(b"\n") > 1):
+            time.sleep(0.02)
+        yield companion, time.monotonic() - began
+    finally:
+        companion.send_signal(signal.SIGINT)
+        companion.wait(30)
+        boat.terminate()
+        boat.wait(30)
+
+
+def live(seconds: float) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "voyage"
-        boat = subprocess.Popen([
-            sys.executable, "-m", "sitl.run.live_boat", str(SCENARIO), "--endpoint", f"udpout:127.0.0.1:{port}"])
-        began = time.monotonic()
-        companion = subprocess.Popen(
-            [sys.executable, "-m", "companion.cli", "run", str(MISSION), "--link", f"udpin:127.0.0.1:{port}",
-             "--out", str(folder), "--state", str(Path(scratch) / "state.json")], stdout=subprocess.DEVNULL)
-        try:
-            while not (folder / "track.csv").is_file() or (folder / "track.csv").read_bytes().count(b"\n") < 2:
-                time.sleep(0.02)
-            start_s = time.monotonic() - began
+        with afloat(folder, stdout=subprocess.DEVNULL) as (companion, start_s):
             # The wind settles for half a minute; then plan and sail. Planning is left out of the idle figure.
             time.sleep(45.0)
             main, workers = companion.pid, children(companion.pid)
@@ -75,11 +93,6 @@ def live(seconds: float) -> dict[str, float]:
                 loads.append((cpu_s(main) - before) / (time.monotonic() - at))
                 worst = max(worst, sum(memory_mb(p) for p in (main, *workers) if Path(f"/proc/{p}").exists()))
             mean_load = (cpu_s(main) - cpu0) / (time.monotonic() - began)
-        finally:
-            companion.send_signal(signal.SIGINT)
-            companion.wait(30)
-            boat.terminate()
-            boat.wait(30)
         summary = json.loads((folder / "summary.json").read_text())
     return {
         "start_s": start_s, "cpu_core_mean": mean_load, "cpu_core_median": sorted(loads)[len(loads) // 2],

@@ -10,6 +10,7 @@ repeats bit for bit. No code asks which of them it runs on.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import selectors
 import time
 from collections.abc import Coroutine
@@ -97,6 +98,14 @@ class _JumpingSelector(selectors.DefaultSelector):
                 raise RuntimeError("virtual time stands still: nothing is ready and no timer is set")
             self._loop.jump(max(0.0, timeout))
         return ready
+
+
+async def ended(task: asyncio.Task[Any] | None) -> None:
+    """Cancel a task and wait until it has ended; what it raised by itself is raised."""
+    if task is not None:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
 
 
 def run(main: Coroutine[Any, Any, T], *, speedup: float = 1.0) -> T:

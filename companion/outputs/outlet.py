@@ -7,7 +7,6 @@ goes wrong with a receiver is said in words, once, and tried again with a jitter
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import errno
 import random
 from abc import ABC, abstractmethod
@@ -15,7 +14,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
-from companion.clock import now_s
+from companion.clock import ended, now_s
 
 T = TypeVar("T")
 Say = Callable[[str], None]
@@ -72,10 +71,7 @@ class Outlet(ABC, Generic[T]):
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
     ) -> None:
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
+        await ended(self._task)
 
     def tell(self, value: T) -> None:
         """Give it the newest value; returns at once."""

@@ -23,7 +23,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from companion.clock import effort_s
+from companion.clock import effort_s, ended
 from companion.errors import JobError
 from companion.kernels.build import prepare
 from companion.planner.child import Child, Forked, Started
@@ -229,9 +229,7 @@ class PlannerWorker:
             return task.result()
         finally:
             if not task.done():
-                task.cancel()
-                with contextlib.suppress(asyncio.CancelledError):
-                    await task
+                await ended(task)
 
 
 # ------------------------------------------------------------------------------------- in the child

@@ -20,7 +20,7 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from typing import Any
 
-from companion.clock import now_s
+from companion.clock import ended, now_s
 from companion.errors import InputError, LinkError
 from companion.messages import AisReport
 from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json
@@ -197,6 +197,4 @@ async def open_feed(name: str, on_report: OnReport, *, seed: int = 0) -> AsyncIt
     try:
         yield feed
     finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
+        await ended(task)

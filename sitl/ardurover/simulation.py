@@ -19,7 +19,7 @@ from typing import Any, Self
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from companion.clock import now_s
+from companion.clock import ended, now_s
 from companion.errors import JobError, LinkError
 from companion.geo.angles import wrap_two_pi
 from companion.geo.frame import LocalFrame
@@ -127,7 +127,7 @@ class ArduRover:
         await self._harness.open(self._received)
         self._stack.push_async_callback(self._harness.close)
         life = asyncio.create_task(self._live(), name="ardurover harness")
-        self._stack.push_async_callback(_cancelled, life)
+        self._stack.push_async_callback(ended, life)
         try:
             async with asyncio.timeout(_READY_SIM_S + 10.0 * self._speedup):
                 while not self._ready.is_set():
@@ -284,12 +284,6 @@ class ArduRover:
                     self.set_parameter("SIM_WIND_DIR", wind[0])
                     self.set_parameter("SIM_WIND_SPD", wind[1])
             await asyncio.sleep(1.0 / _WIND_HZ)
-
-
-async def _cancelled(task: asyncio.Task[None]) -> None:
-    task.cancel()
-    with contextlib.suppress(asyncio.CancelledError):
-        await task
 
 
 def _is_free(port: int) -> bool:

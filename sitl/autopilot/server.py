@@ -12,7 +12,7 @@ import contextlib
 from collections.abc import AsyncIterator, Sequence
 from typing import Any
 
-from companion.clock import now_s
+from companion.clock import ended, now_s
 from companion.errors import LinkError
 from companion.mavlink.transports import LinkName, Transport, open_link, parse_link
 from sitl.autopilot.autopilot import Autopilot
@@ -238,7 +238,4 @@ async def serve(autopilot: Autopilot, endpoints: Sequence[Transport | str | None
         try:
             yield server
         finally:
-            if not task.done():
-                task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await task
+            await ended(task)

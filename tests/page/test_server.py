@@ -101,10 +101,10 @@ def test_what_takes_long_to_make_and_to_pack_is_not_made_on_the_voyages_loop(mon
     def noted(work):
         return lambda *given, **more: by.append(threading.get_ident()) or work(*given, **more)
 
-    monkeypatch.setattr(Past, "of", noted(Past.of))
-    monkeypatch.setattr(gzip, "compress", noted(gzip.compress))
 
     async def talk(browser, live, _):
+        monkeypatch.setattr(Past, "of", noted(Past.of))   # the page's own files are packed by now, once for all
+        monkeypatch.setattr(gzip, "compress", noted(gzip.compress))
         for n in range(3000):
             live.show(view_at(float(n)), (event(n + 1),), None)
         asked = [asyncio.create_task(browser.get("/api/past", Accept_Encoding="gzip")) for _ in range(3)]

@@ -15,7 +15,7 @@ from companion import cli
 from companion.app import sail as app
 from companion.app.options import SailOptions, at_once
 from companion.clock import run_virtual
-from companion.commands.run import last_words
+from companion.commands.run.command import last_words
 from companion.geofence import load_mission
 from companion.mavlink.wire.frames import Codec
 from companion.planner.worker import InlinePlanner

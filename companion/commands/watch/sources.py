@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypedDict
 
-from companion.clock import now_s
+from companion.clock import ended, now_s
 from companion.disk import reason
 from companion.errors import LinkError
 from companion.messages import VehicleState
@@ -44,10 +44,7 @@ class Source(ABC):
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
     ) -> None:
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
+        await ended(self._task)
 
     @abstractmethod
     def look(self) -> Look:

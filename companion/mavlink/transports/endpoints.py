@@ -13,7 +13,7 @@ import errno
 import random
 from typing import Any, cast
 
-from companion.clock import now_s
+from companion.clock import ended, now_s
 from companion.errors import LinkError
 from companion.mavlink.transports.transport import (
     MAX_WRITE_BUFFER_BYTES,
@@ -122,11 +122,8 @@ class StreamEndpoint(_Endpoint):
     async def close(self) -> None:
         """Stop."""
         self._on_bytes = None
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
-            self._task = None
+        await ended(self._task)
+        self._task = None
         if self._server is not None:
             self._server.close()
             self._server = None

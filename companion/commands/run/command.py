@@ -1,4 +1,4 @@
-"""``companion run``: sail a mission."""
+"""The command: from the files that are named to the last words of the voyage."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from companion.errors import InputError
+from companion.commands.run.given import far_of, page_of, signing_of
 from companion.program import INTERRUPTED
-from companion.program.arguments import host_name, http_address, number, out_folder, system_id, whole
 from companion.program.extras import missing
 from companion.words import counted, file_name
 
@@ -32,78 +31,6 @@ if TYPE_CHECKING:
 
 
 NOT_THERE = 66   # exit code (EX_NOINPUT of sysexits.h): a card mounted a second late is no reason to give up
-
-
-def add_parser(subparsers: Any, summary: str) -> None:
-    """Add the command."""
-    parser = subparsers.add_parser(
-        "run", help=summary,
-        description="Sail a mission: estimate the wind, plan, upload, and plan again at each waypoint. Nothing is "
-        "sent to the boat that the mission's [operator] table does not allow.",
-        epilog="Exit codes: 0 arrived, 1 not, 2 an order that gets no better by trying again, 66 a file that is not "
-        "there or cannot be read, a drawing that is not there or cannot be sailed. Examples: companion run "
-        "missions/archipelago.toml --link udpin:127.0.0.1:14551; companion run --from-autopilot boat.toml --link "
-        "udpin:127.0.0.1:14551",
-    )
-    parser.add_argument("mission", type=Path, nargs="?", metavar="MISSION.toml",
-                        help="the mission file; beside a drawing its boat, margins, wind and permissions")
-    parser.add_argument("--from-autopilot", action="store_true",
-                        help="sail what was drawn in a ground station and uploaded: waypoints are goals, the fence is "
-                        "the area, rally points are refuges (in the file: from_autopilot = true)")
-    parser.add_argument("--link", required=True, metavar="LINK",
-                        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
-    parser.add_argument("--system", type=system_id, metavar="N",
-                        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)")
-    parser.add_argument("--out", type=Path, metavar="DIR",
-                        help="the voyage folder (default: voyages/<UTC time>-<mission>)")
-    parser.add_argument("--dry-run", action="store_true", help="look, plan and speak; touch nothing")
-    parser.add_argument("--seed", type=whole(), default=None, help="of the planner (default: the mission's)")
-    parser.add_argument("--state", type=Path, metavar="FILE",
-                        help="where the state for a restart is kept (default: voyages/<mission>.state.json); its "
-                        "folder is one boat's, and locked")
-    parser.add_argument("--socket", type=Path, metavar="PATH", help="take orders from on board at this Unix socket: "
-                        "companion order VERB --socket PATH, as [operator] local_orders permits")
-    parser.add_argument("--http", type=http_address, metavar="[HOST:]PORT",
-                        help="serve the live page here; without HOST to this machine alone (127.0.0.1). It shows; it "
-                        "takes orders only with --http-token")
-    parser.add_argument("--http-token", type=Path, metavar="FILE",
-                        help="let who has the token in this file (made, mode 0600, where there is none) give orders "
-                        "from the page, as [operator] local_orders permits")
-    parser.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
-                        help="a further name under which this machine's page may be asked for")
-    parser.add_argument("--far", type=out_folder, metavar="DIR", help="the folder shared with the program of a "
-                        "satellite modem: the newest status in DIR/out, orders in DIR/in, as [operator] far_orders "
-                        "permits; `companion far` is its end ashore")
-    parser.add_argument("--far-key", type=Path, metavar="FILE",
-                        help="the key of that link, made by `companion key new` (default: the signing key)")
-    parser.add_argument("--far-every", type=number("min", at_least=1.0, at_most=1440.0), default=10.0, metavar="MIN",
-                        help="a new status this often (default: 10), and after each order")
-    parser.add_argument("--again", action="store_true",
-                        help="sail the mission again when its state says that it has arrived (asked at a terminal)")
-    parser.add_argument("--keep-gb", type=number("GB", above=0.0), metavar="GB",
-                        help="what all voyages in the folder may take together; the oldest finished ones give way, "
-                        "telemetry logs first, decisions last (default: 5, and without end where --out is given)")
-    parser.add_argument("--wait", type=number("s", above=0.0), default=30.0, metavar="S",
-                        help="give up when no autopilot is heard for this long (default: 30)")
-    parser.add_argument("--limit", type=number("s", above=0.0), metavar="S", help="end after this many seconds")
-    parser.add_argument("--exit-on-arrival", action="store_true",
-                        help="end when the voyage is over; by default the boat is watched in its loiter until SIGINT "
-                        "or SIGTERM")
-    parser.add_argument("--feed", action="append", default=[], metavar="FEED",
-                        help="hear other vessels here too, besides the mission's [traffic] feeds: udpin:HOST:PORT, "
-                        "tcp:HOST:PORT, /dev/NAME:BAUD; may be given more than once")
-    parser.add_argument("--nmea", action="append", default=[], metavar="OUT",
-                        help="tell OpenCPN and its like in NMEA 0183, besides the mission's [output] nmea: "
-                        "udp:HOST:PORT, or tcp:[HOST:]PORT to be a server; may be given more than once")
-    parser.add_argument("--signalk", action="append", default=[], metavar="SERVER",
-                        help="tell a Signal K server, besides the mission's [output] signalk: ws://HOST:3000 or "
-                        "tcp:HOST:8375; may be given more than once")
-    parser.add_argument("--signalk-token", type=Path, metavar="FILE",
-                        help="the token that the Signal K server asks for (mode 0600)")
-    parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (32 bytes, mode 0600)")
-    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=1.0, metavar="N",
-                        help="the autopilot is a simulator that runs N times as fast as time (default: 1)")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -151,8 +78,8 @@ def _run(args: argparse.Namespace) -> int:
     for name in args.signalk:
         parse_signalk(name)
     parse_link(args.link)
-    _far(args)
-    _http(args)
+    far_of(args)
+    page_of(args)
     settings, sailed = settings_of(args.mission, is_drawn=args.from_autopilot, system=args.system), None
     if settings is None:
         named = require_sailable(load_mission(args.mission))
@@ -187,7 +114,7 @@ def _start(
         number = 1
         while True:
             if settings is not None:
-                sailed = read_drawn(args, settings, folder, state_path, _signing(args.signing_key), manager, err)
+                sailed = read_drawn(args, settings, folder, state_path, signing_of(args.signing_key), manager, err)
             if sailed is None:
                 return NOT_THERE
             code = _voyage(args, sailed, folder, state_path, manager, nursery, out, err)
@@ -217,7 +144,7 @@ def _voyage(
     from companion.outputs import wanted
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
 
-    signing = _signing(args.signing_key)
+    signing = signing_of(args.signing_key)
     shelf = None   # a folder that was named is not ours to tidy
     if args.out is None or args.keep_gb is not None:
         shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
@@ -240,8 +167,8 @@ def _voyage(
             expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
             wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
             exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
-            settings=sailed.settings, socket=args.socket, http=_http(args), far=_far(args), command=" ".join(sys.argv),
-            token=secrets.randbelow(0xFFFFFFFF) + 1,
+            settings=sailed.settings, socket=args.socket, http=page_of(args), far=far_of(args),
+            command=" ".join(sys.argv), token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
     summary = run_loop(_sail(mission, transport, folder, options, manager, nursery, out, told), speedup=args.speedup)
@@ -333,45 +260,6 @@ async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, m
     if isinstance(ready, TimeoutError | EOFError | OSError):
         raise JobError(f"the planner's process did not start: {ready!r}")
     return not stop.is_set()
-
-
-def _signing(path: Path | None) -> Any:
-    if path is None:
-        return None
-    from companion.mavlink.transports import SigningStore
-
-    return SigningStore(path, time.time())
-
-
-def _http(args: argparse.Namespace) -> Any:
-    """Return where the page is served. Raises InputError: the token cannot be used."""
-    if args.http is None:
-        named = "--http-token" if args.http_token is not None else "--http-name" if args.http_name else ""
-        if named:
-            raise InputError(named, "", "there is no page to use it on", "say where it is served: --http PORT")
-        return None
-    from companion.page import Address, read_token
-
-    host, port = args.http
-    return Address(host=host, port=port, names=tuple(args.http_name),
-                   token="" if args.http_token is None else read_token(args.http_token))
-
-
-def _far(args: argparse.Namespace) -> Any:
-    """Return the folder of the satellite link with its key. Raises InputError: it cannot be used."""
-    if args.far is None:
-        if args.far_key is not None:
-            raise InputError("--far-key", str(args.far_key), "there is no link to use it on",
-                             "name its folder: --far DIR")
-        return None
-    from companion.app.options import Far
-    from companion.mavlink.transports import read_key
-
-    key_file = args.far_key or args.signing_key
-    if key_file is None:
-        raise InputError("--far", str(args.far), "has no key", "make one with `companion key new far.key` and name it "
-                         "with --far-key")
-    return Far(folder=args.far, key=read_key(key_file), every_s=60.0 * args.far_every)
 
 
 def _report(folder: Path, err: Console) -> None:
