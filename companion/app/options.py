@@ -10,7 +10,7 @@ from pathlib import Path
 from companion.app.adoption import Settings
 from companion.disk import Disk
 from companion.mavlink.transports import SigningStore
-from companion.page import Address
+from companion.page import Address, Chart
 from companion.telemetry.folder import Shelf
 
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
@@ -57,6 +57,7 @@ class SailOptions:
         known: hashes of missions on the autopilot that ours may take the place of: the drawing that is sailed.
         socket: where orders from on board are taken; None: nowhere.
         http: where the live page is served; None: nowhere.
+        charts: the user's, under the page's own water.
         far: the folder that a satellite modem's program shares with us; None: there is none.
         signing: key and timestamp for a signed link.
         token: 32 bits that tell our heartbeat from a second companion's; on the boat they are drawn by lot.
@@ -80,6 +81,7 @@ class SailOptions:
     settings: Settings | None = None
     socket: Path | None = None
     http: Address | None = None
+    charts: tuple[Chart, ...] = ()
     far: Far | None = None
     known: tuple[str, ...] = ()
     signing: SigningStore | None = None

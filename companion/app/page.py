@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from companion.app.showing import Showing
 from companion.errors import JobError
 from companion.fold import Step, VoyageFold
 from companion.orders import LOCAL, Answer, Verb, Wanted, permitted
-from companion.page import Address, Live, served
+from companion.page import Address, Chart, Live, served
 from companion.planner import Plan
 from companion.skipper import Skipper
 from companion.view import Area, Event, View
@@ -86,7 +86,7 @@ def _in_figures(plan: Plan) -> dict[str, Any]:
 
 async def opened(
     stack: contextlib.AsyncExitStack, address: Address, fold: VoyageFold, planner: Planner, crew: Crew,
-    showing: Showing, *, pace: float, refuse: Callable[[str, str], None],
+    showing: Showing, *, pace: float, charts: Sequence[Chart], refuse: Callable[[str, str], None],
 ) -> None:
     """Serve the page of a voyage for as long as ``stack``; where it cannot be she is sailed without it.
 
@@ -100,7 +100,7 @@ async def opened(
     if address.token:
         live.ask, live.preview = page.ask, page.preview
     try:
-        await stack.enter_async_context(served(address, live, pace=pace))
+        await stack.enter_async_context(served(address, live, pace=pace, charts=charts))
     except JobError as error:
         refuse("live page", f"{error}; she is sailed without a page")
         return

@@ -127,7 +127,7 @@ class _Shell:
                 link.subscribe(self._on_message)
                 if self.options.http is not None:
                     await opened(stack, self.options.http, self.fold, self.planner, crew, self.showing,
-                                 pace=1.0 / self.options.budget_scale, refuse=self._refuse)
+                                 pace=1.0 / self.options.budget_scale, charts=self.options.charts, refuse=self._refuse)
                 await self._wait_autopilot(link)
                 autopilot = self._autopilot = await stack.enter_async_context(Autopilot(link))
                 for text in await self.feeds.open(stack, feeds_of(self.mission), self.options.seed):

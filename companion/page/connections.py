@@ -50,12 +50,16 @@ class Refused(Exception):  # noqa: N818
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
-    """An answer: content and its kind; ``tag`` if it may be kept, ``packed`` where it lies there gzipped already."""
+    """An answer: content and its kind; ``packed`` where it lies there gzipped already.
+
+    ``tag``: it may be kept, and is asked for again by this. ``is_fixed``: what is at this path is never another.
+    """
 
     kind: str = JSON
     data: bytes
     tag: str = ""
     packed: bytes | None = None
+    is_fixed: bool = False
 
 
 class Channel:
@@ -232,7 +236,8 @@ class _Connection:
 
     async def _send_reply(self, request: h11.Request, reply: Reply) -> None:
         kind, data, tag, packed = reply.kind, reply.data, reply.tag, reply.packed
-        headers = [("Cache-Control", "no-cache" if tag else "no-store")]
+        keeping = "private, max-age=86400, immutable" if reply.is_fixed else "no-cache" if tag else "no-store"
+        headers = [("Cache-Control", keeping)]
         if tag:
             headers.append(("ETag", tag))
             if tag in header(request, b"if-none-match"):
@@ -248,7 +253,7 @@ class _Connection:
             headers.append(("Content-Range", f"bytes {span[0]}-{span[1] - 1}/{len(data)}"))
             await self._send(206, kind, data[span[0]:span[1]], headers, has_body=not is_head)
             return
-        takes_packed = "gzip" in header(request, b"accept-encoding")
+        takes_packed = "gzip" in header(request, b"accept-encoding") and not kind.startswith("image/")
         if takes_packed and packed is None and len(data) > PACK_BYTES:
             packed = await asyncio.to_thread(gzip.compress, data, 1, mtime=0)   # milliseconds: not on the voyage's loop
         if takes_packed and packed is not None:

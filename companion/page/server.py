@@ -7,7 +7,7 @@ import contextlib
 import gzip
 import hmac
 import re
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any
 
 import h11
@@ -16,6 +16,7 @@ import msgspec
 from companion.errors import InputError
 from companion.orders import phrase
 from companion.page.address import Address
+from companion.page.charts import Chart
 from companion.page.connections import JSON, Channel, Refused, Reply, Server, Stream, header, listening
 from companion.page.hub import Watcher
 from companion.page.site import files
@@ -29,13 +30,15 @@ MARK = b"x-companion"     # no form and no picture can send it
 
 
 @contextlib.asynccontextmanager
-async def served(address: Address, source: Live | Record, *, pace: float = 1.0) -> AsyncIterator[Server]:
-    """Serve a page while the body runs. ``pace``: seconds of the loop for each second.
+async def served(
+    address: Address, source: Live | Record, *, pace: float = 1.0, charts: Sequence[Chart] = (),
+) -> AsyncIterator[Server]:
+    """Serve a page while the body runs. ``pace``: seconds of the loop for each second; ``charts``: the lowest first.
 
     Raises:
         JobError: the port is in use, or it cannot be listened there.
     """
-    async with listening(address, Page(address, source, pace), pace=pace) as server:
+    async with listening(address, Page(address, source, pace, charts), pace=pace) as server:
         try:
             yield server
         finally:
@@ -48,8 +51,9 @@ class Page:
 
     most_body = MOST_BODY
 
-    def __init__(self, address: Address, source: Live | Record, pace: float) -> None:
+    def __init__(self, address: Address, source: Live | Record, pace: float, charts: Sequence[Chart]) -> None:
         self._address, self._source, self._pace = address, source, pace
+        self._charts = {chart.tag: chart for chart in charts}
         self._files = files()
         self._ordering = asyncio.Lock()
 
@@ -68,6 +72,11 @@ class Page:
         if chunk is not None and isinstance(self._source, Record) and int(chunk[1]) < len(self._source.chunks):
             packed = self._source.chunks[int(chunk[1])]
             return Reply(data=await asyncio.to_thread(gzip.decompress, packed), packed=packed)
+        tile = re.fullmatch(r"/tiles/([0-9a-f]{12})/([0-9]{1,2})/([0-9]{1,8})/([0-9]{1,8})", path)
+        chart = self._charts.get(tile[1]) if tile is not None else None
+        if tile is not None and chart is not None:
+            kind, data = await asyncio.to_thread(chart.tile, int(tile[2]), int(tile[3]), int(tile[4]))
+            return Reply(kind=kind, data=data, is_fixed=True)
         make = self._made(path)
         if make is None:
             raise Refused(404, "there is nothing here")
@@ -78,7 +87,8 @@ class Page:
         """Return what makes the content of a path from what is known now; None: there is nothing."""
         source = self._source
         if path == "/api/hello":
-            return _json({**source.hello(), "takes_orders": self._takes_orders})
+            charts = [chart.facts() for chart in self._charts.values()]
+            return _json({**source.hello(), "takes_orders": self._takes_orders, "charts": charts})
         if path == "/api/area" and source.area is not None:
             return _json(source.area)
         if path == "/api/past":

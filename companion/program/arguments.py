@@ -10,7 +10,7 @@ import ipaddress
 import math
 import os
 import re
-from argparse import ArgumentTypeError
+from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 from pathlib import Path
 
@@ -96,6 +96,13 @@ def http_address(text: str) -> tuple[str, int]:
     if bare and not is_address and ("[" in host or not _HOST.fullmatch(bare)):
         raise ArgumentTypeError(f"{host[:60]!r} is no name or address to listen on; write PORT or HOST:PORT")
     return bare or "127.0.0.1", int(port)
+
+
+def chart_option(parser: ArgumentParser) -> None:
+    """Add the option of what a page shows under its own water."""
+    parser.add_argument("--chart", type=Path, action="append", default=[], metavar="FILE",
+                        help="a chart under the page's own water: raster tiles in MBTiles or PMTiles; may be given "
+                        "more than once, the lowest first")
 
 
 def host_name(text: str) -> str:

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from companion.program.arguments import http_address, number, out_folder, whole
+from companion.program.arguments import chart_option, http_address, number, out_folder, whole
 from companion.program.extras import missing
 from companion.words import counted, file_name
 
@@ -54,6 +54,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--http", type=http_address, metavar="[HOST:]PORT",
                         help="with --live or ardurover: the companion serves its live page here")
     parser.add_argument("--http-token", type=Path, metavar="FILE", help="orders from the page, as of companion run")
+    chart_option(parser)
     parser.add_argument("--seed", type=whole(), default=0)
     parser.add_argument("--out", type=out_folder, metavar="DIR", help="the voyage folder")
     parser.set_defaults(run=run)
@@ -79,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     scenario_wind(scenario, args.scenario, args.seed)
     if own_polar(mission) is not None and args.autopilot == "ardurover":
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
-    page = _page(args)
+    page = page_words(args)
     compile_ahead(mission.skipper.planner)
     if args.autopilot == "ardurover" or args.live:
         from sitl.run.live import run_live
@@ -98,19 +99,21 @@ def run(args: argparse.Namespace) -> int:
     return 0 if verdict.passed else 1
 
 
-def _page(args: argparse.Namespace) -> list[str]:
+def page_words(args: argparse.Namespace) -> list[str]:
     """Return what the companion is told of its live page. Raises InputError: it cannot be served."""
     from companion.errors import InputError
 
     if args.http is None:
-        if args.http_token is not None:
-            raise InputError("--http-token", str(args.http_token), "there is no page to use it on", "say --http PORT")
+        for name, value in (("--http-token", args.http_token), ("--chart", next(iter(args.chart), None))):
+            if value is not None:
+                raise InputError(name, str(value), "there is no page to use it on", "say --http PORT")
         return []
     if not (args.live or args.autopilot == "ardurover"):
         raise InputError("--http", "", "no browser can be waited for under the virtual clock", "say --live, too")
     host, port = args.http
     return ["--http", f"{f'[{host}]' if ':' in host else host}:{port}",
-            *([] if args.http_token is None else ["--http-token", str(args.http_token)])]
+            *([] if args.http_token is None else ["--http-token", str(args.http_token)]),
+            *(word for path in args.chart for word in ("--chart", str(path)))]
 
 
 def draw(folder: Path) -> None:

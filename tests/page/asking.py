@@ -88,12 +88,13 @@ class Browser:
         return status, json.loads(body) if body else None
 
 
-def with_page(talk, source=None, token="", names=()):
+def with_page(talk, source=None, token="", names=(), charts=()):
     """Return what ``talk(browser, source, server)`` returns while the page is served."""
     async def whole():
         port = free_port()
         mine = source if source is not None else Live(name="test")
-        async with served(Address(host="127.0.0.1", port=port, token=token, names=names), mine) as server:
+        address = Address(host="127.0.0.1", port=port, token=token, names=names)
+        async with served(address, mine, charts=charts) as server:
             return await talk(Browser(port), mine, server)
 
     return run(whole())

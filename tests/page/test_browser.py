@@ -14,17 +14,21 @@ import threading
 import time
 from pathlib import Path
 
+import pytest
+
 from companion.clock import run
 from companion.commands.view import read_record
 from companion.page import Address, Live, export, served
+from companion.page.charts import open_chart
 from tests.page.asking import Asked, free_port
 from tests.page.browsing import Window, needs_browser
+from tests.page.charting import mbtiles, share_in_tile, tile_of
 
 pytestmark = needs_browser
 
 
 @contextlib.contextmanager
-def serving(source, token="", port=None):
+def serving(source, token="", port=None, charts=()):
     """Serve a page from a thread; yields its address and a way to run something in its loop."""
     port = port or free_port()
     ready, over = threading.Event(), None
@@ -34,7 +38,7 @@ def serving(source, token="", port=None):
         nonlocal over
         over = asyncio.Event()
         loops.append(asyncio.get_running_loop())
-        async with served(Address(host="127.0.0.1", port=port, token=token), source):
+        async with served(Address(host="127.0.0.1", port=port, token=token), source, charts=charts):
             ready.set()
             await over.wait()
 
@@ -90,6 +94,50 @@ def test_a_recorded_voyage_is_scrubbed_played_and_read_by_everybody(record):
         assert window.complaints() == []
         assert is_own(window, url)
         assert took < 5.0
+
+
+def test_a_chart_lies_under_the_own_water_where_it_belongs(record, tmp_path):
+    """The tile that a goal lies in is where the goal is, at every zoom and with every side up."""
+    area = record.area
+    lat, lon = area.origin_lat_deg, area.origin_lon_deg
+    bounds = (lon - 0.02, lat - 0.02, lon + 0.02, lat + 0.02)
+    chart = open_chart(mbtiles(tmp_path / "a.mbtiles", bounds=bounds, zooms=range(12, 18)))
+    with serving(record, charts=[chart]) as (url, _), Window() as window:
+        window.open(url)
+        window.js("companion.timeline.go(companion.timeline.index(60))")
+        east_m, north_m = window.until("return companion.view && companion.view.boat.at_en_m")
+        place = lat + north_m / area.lat_m, lon + east_m / area.lon_m
+        for keys in ("a", "f", "w", "n", "+++", "------"):
+            window.keys(*keys)
+            window.until("return document.querySelectorAll('#map .chart image').length > 0")
+            shown = window.until("""
+                const all = [...document.querySelectorAll('#map .chart image')];
+                const zoom = Math.max(...all.map((i) => Number(i.getAttribute('href').split('/')[3])));
+                return all.every((i) => i.getAttribute('href').split('/')[3] == zoom) && zoom""")
+            x, y = tile_of(*place, shown)
+            inside = window.js("""
+                return import('/map.js').then(({onScreen}) => {
+                  const image = document.querySelector(`#map .chart image[href$="/${arguments[0]}"]`);
+                  if (image === null) return null;
+                  const at = onScreen([arguments[1], arguments[2]]), m = image.getScreenCTM().inverse();
+                  const map = document.getElementById('map').getBoundingClientRect();
+                  const p = new DOMPoint(at[0] + map.left, at[1] + map.top).matrixTransform(m);
+                  const b = image.getBBox();
+                  return [(p.x - b.x) / b.width, (p.y - b.y) / b.height]; })""", f"{shown}/{x}/{y}", east_m, north_m)
+            share = share_in_tile(*place, shown)
+            assert inside == [pytest.approx(share[0], abs=0.02), pytest.approx(share[1], abs=0.02)], (keys, shown)
+        window.keys("a")
+        for palette in ("day", "dusk", "night"):
+            window.js("const p = document.getElementById('palette'); p.value = arguments[0]; "
+                      "p.dispatchEvent(new Event('change'))", palette)
+            time.sleep(0.3)
+            assert window.barriers() == [], palette
+            keep(window, f"chart-{palette}")
+        assert "© nobody" in window.text("key")
+        window.keys("c")
+        assert window.js("return document.querySelectorAll('#map .chart image').length") == 0
+        assert window.complaints() == []
+        assert is_own(window, url)
 
 
 def test_units_and_bearings_are_as_one_likes_and_stay_so(record):

@@ -1,12 +1,15 @@
 """``companion run --http`` and ``sitl run --http``: what is refused, and that no page is worth a voyage."""
 
+import argparse
 import socket
 import stat
+from pathlib import Path
 
 import pytest
 
 from companion import cli
 from sitl import cli as sitl_cli
+from sitl.commands.run import page_words
 from sitl.scene.ships import free_port
 from tests.view.conftest import write_mission
 
@@ -18,8 +21,8 @@ def tried(tmp_path, *words):
 
 
 @pytest.mark.parametrize("words", [
-    ("--http-token", "t"), ("--http-name", "boat.local"), ("--http", "x"), ("--http", "127.0.0.1:99999"),
-    ("--http", "80", "--http-token", "no/such/folder/t")])
+    ("--http-token", "t"), ("--http-name", "boat.local"), ("--chart", "a.mbtiles"), ("--http", "x"),
+    ("--http", "127.0.0.1:99999"), ("--http", "80", "--http-token", "no/such/folder/t")])
 def test_a_page_that_cannot_be_is_one_line(words, tmp_path, capfd):
     code = tried(tmp_path, *words)
     err = capfd.readouterr().err
@@ -46,6 +49,24 @@ def test_with_its_port_in_use_she_is_sailed_without_a_page(tmp_path, capfd):
     assert "in use" in out
     assert "no autopilot" in err or "heard" in err
     assert '"what":"live page"' in (tmp_path / "v" / "decisions.jsonl").read_text()
+
+
+def test_without_a_chart_that_is_none_she_is_sailed_all_the_same(tmp_path, capfd):
+    """It is asked for again at every start of a service: a card that has lost it keeps no boat ashore."""
+    chart = tmp_path / "a.mbtiles"
+    chart.write_bytes(b"KAP")
+    assert tried(tmp_path, "--http", free_port(), "--chart", chart, "--chart", tmp_path / "none.pmtiles") == 1
+    err = capfd.readouterr().err
+    assert err.count("she is sailed without this chart") == 2
+    assert "gdal_translate" in err
+
+
+def test_a_simulated_voyage_is_told_of_its_charts(tmp_path, capsys):
+    assert sitl_cli.main(["run", "demo", "--live", "--chart", str(tmp_path / "a.mbtiles")]) == 2
+    assert "--http PORT" in capsys.readouterr().err
+    args = argparse.Namespace(http=("127.0.0.1", 8765), http_token=None, live=True, autopilot="embedded",
+                              chart=[Path("a.mbtiles"), Path("b.pmtiles")])
+    assert page_words(args)[-4:] == ["--chart", "a.mbtiles", "--chart", "b.pmtiles"]
 
 
 def test_a_token_is_made_and_its_file_is_its_owners(tmp_path, capsys):

@@ -25,7 +25,9 @@ def said(capsys, *words):
 @pytest.mark.parametrize("words", [
     (), ("nowhere",), ("nowhere", "--link", "udpin:127.0.0.1:1"), ("--link", "udpin:127.0.0.1:1", "--export", "x.html"),
     ("nowhere", "--http", "many"), ("nowhere", "--http", "0"), ("nowhere", "--http", "a b:80"), ("--link", "nothing"),
-    ("nowhere", "--http-name", "-x-"), ("--link", "udpin:127.0.0.1:1", "--beside", "nowhere")])
+    ("nowhere", "--http-name", "-x-"), ("nowhere", "--chart", "no.mbtiles"),
+    ("nowhere", "--chart", "README.md"), ("nowhere", "--chart", "README.md", "--export", "x.html"),
+    ("--link", "udpin:127.0.0.1:1", "--beside", "nowhere")])
 def test_what_cannot_be_viewed_is_one_line(words, capsys):
     code, err = said(capsys, *words)
     assert code == 2

@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from companion.commands.run.given import far_of, page_of, signing_of
+from companion.commands.run.given import charts_of, far_of, page_of, signing_of
 from companion.program import INTERRUPTED
 from companion.program.extras import missing
 from companion.words import counted, file_name
@@ -167,8 +167,9 @@ def _voyage(
             expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
             wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
             exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
-            settings=sailed.settings, socket=args.socket, http=page_of(args), far=far_of(args),
-            command=" ".join(sys.argv), token=secrets.randbelow(0xFFFFFFFF) + 1,
+            settings=sailed.settings, socket=args.socket, http=page_of(args),
+            charts=charts_of(args, err), far=far_of(args), command=" ".join(sys.argv),
+            token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
     summary = run_loop(_sail(mission, transport, folder, options, manager, nursery, out, told), speedup=args.speedup)

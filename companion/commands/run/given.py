@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from companion.errors import InputError
+
+if TYPE_CHECKING:
+    from companion.telemetry.console import Console
 
 
 def signing_of(path: Path | None) -> Any:
@@ -22,7 +25,8 @@ def signing_of(path: Path | None) -> Any:
 def page_of(args: argparse.Namespace) -> Any:
     """Return where the page is served. Raises InputError: the token cannot be used."""
     if args.http is None:
-        named = "--http-token" if args.http_token is not None else "--http-name" if args.http_name else ""
+        named = "--http-token" if args.http_token is not None else "--http-name" if args.http_name else (
+            "--chart" if args.chart else "")
         if named:
             raise InputError(named, "", "there is no page to use it on", "say where it is served: --http PORT")
         return None
@@ -31,6 +35,19 @@ def page_of(args: argparse.Namespace) -> Any:
     host, port = args.http
     return Address(host=host, port=port, names=tuple(args.http_name),
                    token="" if args.http_token is None else read_token(args.http_token))
+
+
+def charts_of(args: argparse.Namespace, err: Console) -> Any:
+    """Return the charts; without one that is none, or that a card no longer has, she is sailed all the same."""
+    from companion.page import open_charts
+
+    charts: list[Any] = []
+    for path in args.chart:
+        try:
+            charts += open_charts([path])
+        except InputError as error:
+            err.write(f"companion run: note: {error}; she is sailed without this chart\n")
+    return tuple(charts)
 
 
 def far_of(args: argparse.Namespace) -> Any:

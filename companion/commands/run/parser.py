@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.commands.run.command import run
-from companion.program.arguments import host_name, http_address, number, out_folder, system_id, whole
+from companion.program.arguments import chart_option, host_name, http_address, number, out_folder, system_id, whole
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -46,6 +46,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         "from the page, as [operator] local_orders permits")
     parser.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
                         help="a further name under which this machine's page may be asked for")
+    chart_option(parser)
     parser.add_argument("--far", type=out_folder, metavar="DIR", help="the folder shared with the program of a "
                         "satellite modem: the newest status in DIR/out, orders in DIR/in, as [operator] far_orders "
                         "permits; `companion far` is its end ashore")

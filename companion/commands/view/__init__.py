@@ -9,7 +9,7 @@ from typing import Any
 
 from companion.commands.output import force_option, write_files
 from companion.errors import InputError
-from companion.program.arguments import host_name, http_address, out_file, system_id
+from companion.program.arguments import chart_option, host_name, http_address, out_file, system_id
 
 PORT = 8765
 SAID_EVERY = 500      # recorded steps between two words on how far it is
@@ -36,6 +36,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         help=f"where to serve it (default: 127.0.0.1:{PORT})")
     parser.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
                         help="a further name under which this machine's page may be asked for")
+    chart_option(parser)
     parser.add_argument("--export", type=out_file, metavar="FILE.html", help="write one file and serve nothing")
     force_option(parser)
     parser.set_defaults(run=run)
@@ -45,11 +46,14 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
     from companion.commands.view.serving import ashore, serve
-    from companion.page import Address, export
+    from companion.page import Address, export, open_charts
 
     if (args.voyage is None) == (args.link is None):
         raise InputError("companion view", "", "what to view is not said" if args.link is None else
                          "a folder and a link are two things", "name a voyage's folder, or --link LINK")
+    if args.export is not None and args.chart:
+        raise InputError("--chart", str(args.chart[0]), "is not packed into a file to send", "leave it out")
+    charts = open_charts(args.chart)
     if args.link is not None:
         if args.beside is not None:
             raise InputError("--beside", str(args.beside), "there is no recorded voyage to show it beside",
@@ -57,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         if args.export is not None:
             raise InputError("--export", str(args.export), "what is heard by radio is no voyage yet",
                              "export the folder that the companion leaves")
-        return run_loop(ashore(args))
+        return run_loop(ashore(args, charts))
     record = read_record(args.voyage)
     if args.beside is not None:
         record.beside = read_record(args.beside)
@@ -67,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"{args.export}: {len(data) / 1e6:.1f} MB, {len(record.times)} moments")
         return 0
     host, port = args.http
-    return run_loop(serve(Address(host=host, port=port, names=tuple(args.http_name)), record))
+    return run_loop(serve(Address(host=host, port=port, names=tuple(args.http_name)), record, charts))
 
 
 def read_record(folder: Path) -> Any:

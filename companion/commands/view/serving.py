@@ -21,17 +21,17 @@ async def _stopped() -> None:
     await stop.wait()
 
 
-async def serve(address: Any, source: Any) -> int:
+async def serve(address: Any, source: Any, charts: Any) -> int:
     """Serve until stopped."""
     from companion.page import served
 
-    async with served(address, source):
+    async with served(address, source, charts=charts):
         print(f"{address.url}  (Ctrl-C ends it)", flush=True)
         await _stopped()
     return 0
 
 
-async def ashore(args: argparse.Namespace) -> int:
+async def ashore(args: argparse.Namespace, charts: Any) -> int:
     """Show what a radio brings."""
     from companion.clock import now_s
     from companion.mavlink.link import Link
@@ -67,7 +67,7 @@ async def ashore(args: argparse.Namespace) -> int:
 
         showing = asyncio.create_task(show(), name="what the radio brings")
         serving = asyncio.create_task(
-            serve(Address(host=host, port=port, names=tuple(args.http_name)), live), name="page")
+            serve(Address(host=host, port=port, names=tuple(args.http_name)), live, charts), name="page")
         try:
             await asyncio.wait({showing, serving}, return_when=asyncio.FIRST_COMPLETED)
             if showing.done():

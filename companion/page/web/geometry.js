@@ -80,6 +80,53 @@ export function byTack(east, north, starboard) {
   return out;
 }
 
+const MERCATOR_M = 40075016.686;   // a tile's width at zoom 0, on the equator
+
+/** @typedef {{origin_lat_deg: number, origin_lon_deg: number, lat_m: number, lon_m: number}} Origin  where the metres are on the globe */
+/** @typedef {{bounds_deg: [number, number, number, number], least_zoom: number, most_zoom: number}} Covers */
+/** @typedef {{z: number, x: number, y: number, west_m: number, south_m: number, wide_m: number, tall_m: number}} Tile */
+
+/** Where a latitude and a longitude are on the chart's metres. Meridians come together: a metre east is fewer of them here than there.
+ * @param {Origin} origin @param {number} lat @param {number} lon @returns {Point} */
+export function onWater(origin, lat, lon) {
+  const narrower = Math.cos(lat * RAD) / Math.cos(origin.origin_lat_deg * RAD);
+  return [wrap(lon - origin.origin_lon_deg) * origin.lon_m * narrower, (lat - origin.origin_lat_deg) * origin.lat_m];
+}
+
+/** The parallel at a share of Web Mercator's height, 0 in the north. @param {number} y */
+const parallel = (y) => Math.atan(Math.sinh(Math.PI * (1 - 2 * y))) / RAD;
+
+/** The tiles of a chart that a camera sees, at the zoom that is fine enough for its pixels; none where there would be too many.
+ * @param {Camera} camera @param {Origin} origin @param {Covers} chart @param {number} dense pixels of the screen in one of the page @param {number} most @returns {Tile[]} */
+export function tilesIn(camera, origin, chart, dense, most) {
+  const near = origin.origin_lat_deg + unproject(camera, [camera.width / 2, camera.height / 2])[1] / origin.lat_m;
+  const fine = Math.log2(MERCATOR_M * Math.cos(near * RAD) * camera.scale * dense / 256);
+  const corners = [[0, 0], [camera.width, 0], [0, camera.height], [camera.width, camera.height]].map((p) => unproject(camera, /** @type {Point} */ (p)));
+  const [west, south, east, north] = chart.bounds_deg;
+  const lats = corners.map((p) => origin.origin_lat_deg + p[1] / origin.lat_m), norths = lats.map((lat) => Math.max(-85, Math.min(85, lat)));
+  const lons = corners.map((p, n) => origin.origin_lon_deg + p[0] / (origin.lon_m * Math.cos((norths[n] ?? 0) * RAD) / Math.cos(origin.origin_lat_deg * RAD)));
+  const low = Math.max(south, Math.min(...norths)), high = Math.min(north, Math.max(...norths));
+  if (low >= high) return [];
+  for (let z = Math.min(chart.most_zoom, Math.max(chart.least_zoom, Math.round(fine))); z >= chart.least_zoom; z--) {
+    const all = 2 ** z, row = (/** @type {number} */ lat) => Math.floor(all * (1 - Math.asinh(Math.tan(Math.max(-85, Math.min(85, lat)) * RAD)) / Math.PI) / 2);
+    const column = (/** @type {number} */ lon) => Math.floor(all * (lon + 180) / 360);
+    const [top, bottom, left, right] = [row(high), row(low), column(Math.min(...lons)), column(Math.max(...lons))];
+    if ((bottom - top + 1) * (right - left + 1) > most) continue;
+    /** @type {Tile[]} */
+    const out = [];
+    for (let y = top; y <= bottom; y++) for (let x = left; x <= right; x++) {
+      const round = ((x % all) + all) % all, lon = 360 * round / all - 180;   // past the date line the world begins anew
+      if (lon >= east || lon + 360 / all <= west) continue;
+      const [up, down] = [parallel(y / all), parallel((y + 1) / all)], middle = (up + down) / 2;
+      const at = onWater(origin, middle, 360 * (x + 0.5) / all - 180);
+      const wide = 360 / all * origin.lon_m * Math.cos(middle * RAD) / Math.cos(origin.origin_lat_deg * RAD);
+      out.push({ z, x: round, y, west_m: at[0] - wide / 2, south_m: (down - origin.origin_lat_deg) * origin.lat_m, wide_m: wide, tall_m: (up - down) * origin.lat_m });
+    }
+    return out;
+  }
+  return [];
+}
+
 /** The class of a leg by its risk: 0 to 2, or "unknown". @param {number | null | undefined} risk */
 export function riskClass(risk) {
   if (risk === null || risk === undefined) return "unknown";

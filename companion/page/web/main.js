@@ -156,7 +156,7 @@ function settings() {
 /** @type {[string, string, () => void][]} */
 const KEYS = [
   ["n", "north up", () => map.orient("north")], ["h", "head up", () => map.orient("head")], ["w", "wind up", () => map.orient("wind")],
-  ["f", "follow the boat", () => map.follow(!map.isFollowing())], ["a", "show all", () => map.all()], ["+", "nearer", () => map.zoom(1.5)], ["-", "farther", () => map.zoom(1 / 1.5)],
+  ["c", "charts", () => get("charts").click()], ["f", "follow the boat", () => map.follow(!map.isFollowing())], ["a", "show all", () => map.all()], ["+", "nearer", () => map.zoom(1.5)], ["-", "farther", () => map.zoom(1 / 1.5)],
   ["d", "day, dusk, night", () => cycle("palette")], ["u", "knots or m/s", () => cycle("speeds")], ["m", "true or magnetic", () => cycle("bearings")],
   [" ", "play and pause", () => page.timeline?.play(!page.timeline.isPlaying)], ["ArrowLeft", "a moment back", () => page.timeline?.step(-1)], ["ArrowRight", "a moment on", () => page.timeline?.step(1)],
   ["[", "to the decision before", () => page.timeline?.jump(-1)], ["]", "to the next decision", () => page.timeline?.jump(1)], ["?", "these keys", () => help()],
@@ -209,6 +209,7 @@ async function begin() {
   page.isUp = true;
   page.hello = hello;
   if (hello.takes_orders) orders.build(hello.orders ?? []);
+  map.lay(hello.charts ?? []);
   setInterval(old, 1000);
   addEventListener("resize", () => show());
   if (hello.kind === "recorded") await recorded(hello, inside);

@@ -1,4 +1,5 @@
 // The chart: own water first. Metres on a local frame; symbols and words stay upright and of one size.
+import * as charts from "./charts.js";
 import { get, picture, set, svg } from "./dom.js";
 import { bearing, distance, duration, percent } from "./format.js";
 import { byTack, matrix, moved, path, project, riskClass, scaleBar, unproject } from "./geometry.js";
@@ -20,7 +21,7 @@ const root = picture("map");
 
 export function build() {
   const world = svg("g", { class: "world" });
-  for (const name of ["limits", "grown", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
+  for (const name of ["chart", "limits", "grown", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
   root.append(svg("defs", {}, pattern()), layers.world = world);
   for (const name of ["grid", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat", "furniture"]) {
     root.append(layers[name] = svg("g", { class: name }));
@@ -55,6 +56,11 @@ export function show(view, area, past, other = null) {
 export function showPreview(preview) {
   state.preview = preview;
   draw();
+}
+
+/** What lies under the own water. @param {import("./charts.js").Chart[]} given the lowest first */
+export function lay(given) {
+  charts.build(given, /** @type {SVGElement} */ (layers.chart), draw);
 }
 
 /** Let the next click choose a place. @param {((en: Point) => void) | null} picks */
@@ -136,6 +142,7 @@ function draw() {
   }
   set(/** @type {SVGElement} */ (layers.world), { transform: matrix(camera) });
   set(/** @type {Element} */ (root.querySelector("#hatch")), { patternTransform: `rotate(45) scale(${1 / camera.scale})` });
+  charts.draw(camera, state.area);
   const at = (/** @type {Point} */ en) => project(camera, en);
   grid(at);
   track();

@@ -90,3 +90,34 @@ test("a position is degrees and minutes, and 60 minutes are a degree", () => {
 test("the wind over starboard is S", () => {
   assert.deepEqual([format.atBow(42), format.atBow(-42), format.atBow(180)], ["42° S", "42° P", "180°"]);
 });
+
+const everywhere = { bounds_deg: [-180, -85, 180, 85], least_zoom: 0, most_zoom: 18 };
+const origins = [[50.8, -1.3], [-36.8, 174.7], [0, 0], [75, 20], [-17, 179.999]].map(([lat, lon]) => ({
+  origin_lat_deg: lat, origin_lon_deg: lon, lat_m: 111200, lon_m: 111300 * Math.cos(lat * Math.PI / 180) }));
+
+test("the tiles of a chart cover what is seen, and are few", () => {
+  for (const origin of origins) for (const camera of cameras) for (const scale of [0.01, 0.3, 1.7, 20]) {
+    const seen = { ...camera, scale };
+    const tiles = g.tilesIn(seen, origin, everywhere, 1, 48);
+    assert.ok(tiles.length > 0 && tiles.length <= 48);
+    for (const at of [[1, 1], [639, 1], [320, 240], [1, 479], [639, 479]]) {
+      const [e, n] = g.unproject(seen, at);
+      const lap = 0.005 * tiles[0].wide_m;
+      assert.ok(tiles.some((t) => e >= t.west_m - lap && e <= t.west_m + t.wide_m + lap && n >= t.south_m - lap && n <= t.south_m + t.tall_m + lap),
+        `nothing at ${at} of ${JSON.stringify(origin)}, scale ${scale}`);
+    }
+    for (const t of tiles) assert.ok(t.x >= 0 && t.x < 2 ** t.z && t.y >= 0 && t.y < 2 ** t.z);
+  }
+});
+
+test("a pixel of a tile is about one of the screen, and what a chart has not is not asked for", () => {
+  const [origin] = origins, [camera] = cameras;
+  for (const scale of [0.05, 0.4, 1.7]) {
+    const [tile] = g.tilesIn({ ...camera, scale }, origin, everywhere, 1, 48);
+    const pixels = tile.wide_m * scale / 256;
+    assert.ok(pixels > 0.69 && pixels < 1.45, `${pixels}`);
+  }
+  for (const t of g.tilesIn({ ...camera, scale: 60 }, origin, { ...everywhere, most_zoom: 14 }, 2, 48)) assert.equal(t.z, 14);
+  assert.deepEqual(g.tilesIn(camera, origin, { ...everywhere, bounds_deg: [10, 50, 11, 51] }, 1, 48), []);
+  assert.deepEqual(g.tilesIn({ ...camera, scale: 0.002 }, origin, { ...everywhere, least_zoom: 17 }, 1, 48), []);
+});
