@@ -77,10 +77,10 @@ def afloat(folder: Path, *options: str, **more: Any) -> Iterator[tuple[subproces
         boat.wait(30)
 
 
-def live(seconds: float) -> dict[str, float]:
+def live(seconds: float, *options: str) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "voyage"
-        with afloat(folder, stdout=subprocess.DEVNULL) as (companion, start_s):
+        with afloat(folder, *options, stdout=subprocess.DEVNULL) as (companion, start_s):
             # The wind settles for half a minute; then plan and sail. Planning is left out of the idle figure.
             time.sleep(45.0)
             main, workers = companion.pid, children(companion.pid)
