@@ -12,6 +12,7 @@ from companion.disk import Disk
 from companion.mavlink.transports import SigningStore
 from companion.page import Address, Chart
 from companion.telemetry.folder import Shelf
+from companion.wind import Estimator, WindRoom
 
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
 
@@ -24,6 +25,11 @@ async def in_thread(work: Callable[[], None]) -> None:
 async def at_once(work: Callable[[], None]) -> None:
     """Do disk work here: for the virtual clock, which has no threads."""
     work()
+
+
+def wind_room(estimator: Estimator) -> WindRoom:
+    """Return the wind room of an estimator."""
+    return WindRoom(estimator=estimator)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +66,7 @@ class SailOptions:
         charts: the user's, under the page's own water.
         far: the folder that a satellite modem's program shares with us; None: there is none.
         signing: key and timestamp for a signed link.
+        room: makes the wind room of the mission's estimator; a study may know more of the wind, or less.
         token: 32 bits that tell our heartbeat from a second companion's; on the boat they are drawn by lot.
         budget_scale: computing seconds for each second of the loop's time: 1 / speedup beside a hurried simulator.
         command: what was typed, for the record.
@@ -85,6 +92,7 @@ class SailOptions:
     far: Far | None = None
     known: tuple[str, ...] = ()
     signing: SigningStore | None = None
+    room: Callable[[Estimator], WindRoom] = field(default=wind_room, repr=False)
     token: int = 1
     budget_scale: float = 1.0
     command: str = ""

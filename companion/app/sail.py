@@ -43,7 +43,6 @@ from companion.telemetry.radio import Radio, speak_high_latency
 from companion.telemetry.state_file import StateFile
 from companion.telemetry.status import companion_status
 from companion.traffic.listening import Feeds
-from companion.wind import WindRoom
 
 STEP_S = 1.0
 TEND_EVERY_S = 5.0        # records are synced, and taken up again after trouble
@@ -196,7 +195,7 @@ class _Shell:
         if self._named is None and persisted is not None:
             self._named = persisted.system
         self.fold = VoyageFold(
-            skipper, WindRoom(estimator=estimator_of(self.mission)),
+            skipper, options.room(estimator_of(self.mission)),
             permissions_of(self.mission, dry_run=options.dry_run), persisted, known=known,
             traffic=target_limits_of(self.mission),
         )

@@ -10,8 +10,9 @@ import contextlib
 import json
 import math
 import traceback
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,9 @@ from companion.sailable import require_sailable
 from companion.skipper.deeds import CALL
 from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT
+from companion.wind import Estimator, WindRoom
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.run.variation import Variation
 from sitl.scene import Others, Scenario, Verdict, free_port, is_all_ordinary, judge, own_polar, scenario_wind, tasks_of
 from sitl.trouble import KEY, FragilePlanner, MortalPlanner, Observer, Satellite, World, channel, happen
 
@@ -114,14 +117,19 @@ def with_radio(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
 async def run_embedded(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, on_status: OnStatus | None = None,
     expansions: int | None = EXPANSIONS, observer: Observer | None = None, worker_pace: float | None = None,
+    variation: Variation | None = None,
 ) -> Verdict:
     """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json.
 
     With ``worker_pace`` (loop seconds per second, on a loop in real time that begins at 0) the planner is the real
-    worker process, and plans by its budget of time.
+    worker process, and plans by its budget of time. ``variation``: what is another in the mission than its file says.
     """
     mission, radio_port = with_radio(mission_of(scenario, source), scenario)
     wind = scenario_wind(scenario, source, seed)
+    room = None
+    if variation is not None:
+        mission = require_sailable(variation.mission(mission))
+        room = None if variation.room is None else partial(variation.room, wind)
     start = mission.start or mission.origin
     heading_deg = scenario.start_heading_deg
     if heading_deg is None:
@@ -150,7 +158,7 @@ async def run_embedded(
             *([asyncio.create_task(world.satellite.run(), name="satellite")] if world.satellite is not None else []),
             *(asyncio.create_task(happen(world, e), name=f"event {e.kind}") for e in scenario.events),
         ]
-        await _sail_and_restart(world, scenario, mission, seed, folder, on_status, expansions, worker_pace)
+        await _sail_and_restart(world, scenario, mission, seed, folder, on_status, expansions, worker_pace, room)
         for task in side_tasks:
             task.cancel()
         for task in side_tasks:
@@ -171,7 +179,7 @@ async def run_embedded(
 
 async def _sail_and_restart(
     world: World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_status: OnStatus | None,
-    expansions: int | None, worker_pace: float | None,
+    expansions: int | None, worker_pace: float | None, room: Callable[[Estimator], WindRoom] | None,
 ) -> None:
     """Run the companion; kill it where the scenario says, and start it again."""
     kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
@@ -184,6 +192,8 @@ async def _sail_and_restart(
         far=None if scenario.satellite is None else Far(
             folder=folder / FAR, key=KEY, every_s=scenario.satellite.status_every_s),
     )
+    if room is not None:
+        options = replace(options, room=room)
 
     def look(status: CompanionStatus, step: Step) -> None:
         world.status_s.append(step.snapshot.t_s)

@@ -1,0 +1,164 @@
+"""What each part is worth: the same weather, seed for seed, sailed with one thing taken away or another in its place.
+
+Asks what Wolsieffer 2020 leaves to future work: is a boat safer that plans with the wind's uncertainty?
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from companion.errors import InputError
+from companion.geofence import Mission
+from sitl.campaigns.pool import in_processes
+from sitl.run.variation import Variation, foreknown, unspread
+
+HERE = Path(__file__).parents[1] / "scenarios"
+SCENARIOS = (HERE / "two-channels.toml", HERE / "figures" / "two-channels-rough.toml", HERE / "narrow-channel.toml")
+AS_IT_IS = "as it is"
+PLANNED = {"skipper": {"autopilot_beats": False}}
+
+VARIATIONS: Mapping[str, Variation] = {
+    AS_IT_IS: Variation(),
+    "no spread": Variation(room=unspread),
+    "wind foreknown": Variation(room=foreknown),
+    "kalman": Variation(tables={"wind": {"estimator": "kalman"}}),
+    "by forecast": Variation(tables={"skipper": {"replan": "forecast"}}),
+    "beats planned": Variation(tables=PLANNED),
+    "planned, no spread": Variation(tables=PLANNED, room=unspread),
+    "planned, foreknown": Variation(tables=PLANNED, room=foreknown),
+    "planned, kalman": Variation(tables={**PLANNED, "wind": {"estimator": "kalman"}}),
+    "planned, delta_s 0.6": Variation(tables={**PLANNED, "risk": {"delta_s": 0.6}}),
+    "planned, delta_s 0.8": Variation(tables={**PLANNED, "risk": {"delta_s": 0.8}}),
+    "planned, delta_s 0.98": Variation(tables={**PLANNED, "risk": {"delta_s": 0.98}}),
+    "rrtstar": Variation(tables={"skipper": {"autopilot_beats": False, "planner": "rrtstar"}}),
+    "astar": Variation(tables={"skipper": {"autopilot_beats": False, "planner": "astar"}}),
+}
+BOOTSTRAPS = 2000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One voyage."""
+
+    scenario: Path
+    variation: str
+    seed: int
+
+
+def sail_one(job: Job) -> dict[str, Any]:
+    """Sail a job; return its figures. What was not foreseen is in ``error``."""
+    from companion.clock import run_virtual
+    from sitl.run.embedded import run_embedded
+    from sitl.scene import load_scenario
+
+    scenario = load_scenario(job.scenario)
+    said = {"scenario": scenario.name, "variation": job.variation, "seed": job.seed}
+    with tempfile.TemporaryDirectory(prefix="ablation-") as scratch:
+        try:
+            verdict = run_virtual(run_embedded(
+                scenario, job.scenario, job.seed, Path(scratch) / "voyage", variation=VARIATIONS[job.variation]))
+        except Exception as error:
+            return {**said, "error": repr(error)}
+    names = ("arrived", "contacts", "time_s", "tacks", "min_clearance_m", "no_go_entries", "replans", "promised_risk")
+    return {**said, "error": "", **{name: verdict.figures[name] for name in names}, "floor_m": _floor_m(job.scenario)}
+
+
+def _floor_m(path: Path) -> float:
+    return _mission(path).margin_floor_m
+
+
+def _mission(path: Path) -> Mission:
+    from sitl.run.embedded import mission_of
+    from sitl.scene import load_scenario
+
+    return mission_of(load_scenario(path), path)
+
+
+def run_ablation(
+    scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int, workers: int | None,
+    out: Path | None,
+) -> int:
+    """Sail everything, print the tables; return the exit code."""
+    from sitl.run.compiled import compile_ahead
+
+    unknown = next((name for name in names if name not in VARIATIONS), None)
+    if unknown is not None:
+        raise InputError("--only", unknown, "is no variation", "choose of: " + ", ".join(VARIATIONS))
+    wanted = [AS_IT_IS, *(name for name in VARIATIONS if name in names and name != AS_IT_IS)]
+    for path in scenarios:
+        _mission(path)
+    for planner in ("auto", *(name for name in ("rrtstar", "astar") if name in wanted)):
+        compile_ahead(planner)
+    jobs = [Job(scenario=path, variation=name, seed=first_seed + n)
+            for n in range(runs) for path in scenarios for name in wanted]
+    records, began = [], time.perf_counter()
+    for record in in_processes(sail_one, jobs, workers):
+        records.append(record)
+        left_s = (time.perf_counter() - began) / len(records) * (len(jobs) - len(records))
+        sys.stderr.write(f"\r{len(records)}/{len(jobs)} sailed, {left_s:.0f} s left   ")
+        sys.stderr.flush()
+    sys.stderr.write("\n")
+    for scenario in dict.fromkeys(record["scenario"] for record in sorted(records, key=_order)):
+        print(f"{scenario}, {runs} seeds from {first_seed}")
+        print(table([record for record in records if record["scenario"] == scenario], wanted))
+    for record in (r for r in records if r["error"]):
+        print(f"ERROR {record['scenario']}, {record['variation']}, seed {record['seed']}: {record['error'][:300]}")
+    if out is not None:
+        out.write_text("".join(json.dumps(r) + "\n" for r in sorted(records, key=_order)), encoding="utf-8")
+    return 1 if any(r["error"] for r in records) else 0
+
+
+def _order(record: Mapping[str, Any]) -> tuple[str, int, int]:
+    return record["scenario"], list(VARIATIONS).index(record["variation"]), record["seed"]
+
+
+def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
+    """Return one scenario's table, a line for each variation; times are paired with those of ``AS_IT_IS``."""
+    reference = {r["seed"]: r for r in records if r["variation"] == AS_IT_IS and not r["error"]}
+    heads = ("", "arrived", "touched", "below floor", "in no-go, per voyage", "least clearance m", "median m", "tacks",
+             "time, share of as it is")
+    rows = [heads]
+    for name in names:
+        mine = [r for r in records if r["variation"] == name and not r["error"]]
+        if not mine:
+            continue
+        clear = [r["min_clearance_m"] for r in mine if r["min_clearance_m"] is not None]
+        shares = [r["time_s"] / reference[r["seed"]]["time_s"] for r in mine
+                  if r["arrived"] and r["seed"] in reference and reference[r["seed"]]["arrived"]]
+        middle, low, high = interval(shares)
+        rows.append((
+            name, f"{sum(bool(r['arrived']) for r in mine)}/{len(mine)}", str(sum(r["contacts"] > 0 for r in mine)),
+            str(sum(r["min_clearance_m"] is not None and r["min_clearance_m"] < r["floor_m"] for r in mine)),
+            f"{np.mean([r['no_go_entries'] or 0 for r in mine]):.2f}",
+            f"{min(clear):.1f}" if clear else "-", f"{np.median(clear):.1f}" if clear else "-",
+            f"{np.median([r['tacks'] for r in mine]):.0f}",
+            "1" if name == AS_IT_IS else f"{middle:.3f} ({low:.3f} to {high:.3f})" if shares else "-"))
+    widths = [max(len(row[n]) for row in rows) for n in range(len(heads))]
+    return "\n".join("  ".join(cell.rjust(w) if n else cell.ljust(w)
+                               for n, (cell, w) in enumerate(zip(row, widths, strict=True))).rstrip()
+                     for row in rows) + "\n"
+
+
+def interval(shares: Sequence[float]) -> tuple[float, float, float]:
+    """Return the geometric mean of paired shares and the bootstrap's 95 % interval of it; nan without any.
+
+    >>> interval([1.1, 1.1, 1.1])
+    (1.1, 1.1, 1.1)
+    """
+    if not shares:
+        return math.nan, math.nan, math.nan
+    logs = np.log(np.asarray(shares, dtype=np.float64))
+    rng = np.random.default_rng(0)
+    means = logs[rng.integers(0, logs.size, (BOOTSTRAPS, logs.size))].mean(axis=1)
+    low, high = np.quantile(means, (0.025, 0.975))
+    return tuple(round(math.exp(float(x)), 12) for x in (logs.mean(), low, high))   # type: ignore[return-value]

@@ -1,0 +1,96 @@
+"""What another boat would do in the same weather: a mission with other numbers, or one that knows the wind better."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from companion.geofence import Mission
+from companion.messages import WindForecast
+from companion.wind import Estimator, WindRoom
+from sitl.world.wind import Wind
+
+MEAN_S = 30.0       # [s] over which what will blow is averaged: a plan is of legs, not of puffs
+_MEAN_STEP_S = 2.0
+AHEAD_S = 300.0
+NO_SPREAD_RAD = 1e-4
+
+
+class Unspread(WindRoom):
+    """The wind room whose forecasts are believed to be certain: what a planner without wind uncertainty is told."""
+
+    def forecast_table(
+        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None,
+    ) -> WindForecast | None:
+        """Return the forecast's mean over ``AHEAD_S``, for every horizon, without any spread."""
+        table = super().forecast_table(t_s, horizons_s, levels)
+        if table is None:
+            return None
+        # A mean that moves with the horizon would be a spread again: the skipper adds what its one mean leaves out.
+        near = table.mean_twd_from_rad[table.horizon_s <= AHEAD_S]
+        mean = math.atan2(float(np.sin(near).mean()), float(np.cos(near).mean()))
+        return _certain(replace(table, mean_twd_from_rad=np.full_like(table.mean_twd_from_rad, mean)))
+
+
+class Foreknown(WindRoom):
+    """The wind room that knows what will blow: the mean of the ``MEAN_S`` from each horizon on, and no spread.
+
+    A plan is still made for one mean direction, and what the wind will depart from it is added to the zone.
+    ``wind`` is counted from the zero of the clock that its readings are stamped with.
+    """
+
+    def __init__(self, wind: Wind, estimator: Estimator) -> None:
+        super().__init__(estimator=estimator)
+        self._wind = wind
+
+    def forecast_table(
+        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None,
+    ) -> WindForecast | None:
+        """Return what will blow."""
+        table = super().forecast_table(t_s, horizons_s, levels)
+        if table is None:
+            return None
+        means = np.array([self._mean(t_s + float(h)) for h in table.horizon_s])
+        return _certain(replace(table, mean_twd_from_rad=means[:, 0], mean_tws_mps=means[:, 1]))
+
+    def _mean(self, t_s: float) -> tuple[float, float]:
+        blown = [self._wind.at(max(0.0, t)) for t in np.arange(t_s, t_s + MEAN_S, _MEAN_STEP_S).tolist()]
+        east = sum(math.sin(twd) for twd, _ in blown)
+        north = sum(math.cos(twd) for twd, _ in blown)
+        return math.atan2(east, north), sum(tws for _, tws in blown) / len(blown)
+
+
+def _certain(table: WindForecast) -> WindForecast:
+    return replace(
+        table, sigma_twd_rad=np.full_like(table.sigma_twd_rad, NO_SPREAD_RAD),
+        sigma_tws_mps=np.full_like(table.sigma_tws_mps, NO_SPREAD_RAD),
+        half_width_rad=np.zeros_like(table.half_width_rad))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variation:
+    """Keys of the mission's tables that are other ones, and the wind room: of the wind and the mission's estimator."""
+
+    tables: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    room: Callable[[Wind, Estimator], WindRoom] | None = None
+
+    def mission(self, mission: Mission) -> Mission:
+        """Return the mission so changed."""
+        changes = {name: msgspec.structs.replace(getattr(mission.options, name), **keys)
+                   for name, keys in self.tables.items()}
+        return replace(mission, options=msgspec.structs.replace(mission.options, **changes))
+
+
+def unspread(_: Wind, estimator: Estimator) -> WindRoom:
+    """Return the room without spread."""
+    return Unspread(estimator=estimator)
+
+
+def foreknown(wind: Wind, estimator: Estimator) -> WindRoom:
+    """Return the room that knows what will blow."""
+    return Foreknown(wind, estimator)
