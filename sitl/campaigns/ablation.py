@@ -5,6 +5,7 @@ Asks what Wolsieffer 2020 leaves to future work: is a boat safer that plans with
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import sys
@@ -19,6 +20,7 @@ import numpy as np
 
 from companion.errors import InputError
 from companion.geofence import Mission
+from sitl.campaigns.figures import read
 from sitl.campaigns.pool import in_processes
 from sitl.run.variation import Variation, foreknown, unspread
 
@@ -88,8 +90,9 @@ def run_ablation(
     scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int, workers: int | None,
     out: Path | None,
 ) -> int:
-    """Sail everything, print the tables; return the exit code."""
+    """Sail what ``out`` does not hold yet, append each voyage as it ends, print the tables; return the exit code."""
     from sitl.run.compiled import compile_ahead
+    from sitl.scene import load_scenario
 
     unknown = next((name for name in names if name not in VARIATIONS), None)
     if unknown is not None:
@@ -101,21 +104,33 @@ def run_ablation(
         compile_ahead(planner)
     jobs = [Job(scenario=path, variation=name, seed=first_seed + n)
             for n in range(runs) for path in scenarios for name in wanted]
-    records, began = [], time.perf_counter()
-    for record in in_processes(sail_one, jobs, workers):
-        records.append(record)
-        left_s = (time.perf_counter() - began) / len(records) * (len(jobs) - len(records))
-        sys.stderr.write(f"\r{len(records)}/{len(jobs)} sailed, {left_s:.0f} s left   ")
-        sys.stderr.flush()
-    sys.stderr.write("\n")
+    named = {path: load_scenario(path).name for path in scenarios}
+    keys = {(named[job.scenario], job.variation, job.seed) for job in jobs}
+    records = [r for r in (read(out) if out is not None and out.exists() else []) if _key(r) in keys]
+    sailed = {_key(r) for r in records}
+    jobs = [job for job in jobs if (named[job.scenario], job.variation, job.seed) not in sailed]
+    began = time.perf_counter()
+    with contextlib.ExitStack() as stack:
+        file = None if out is None else stack.enter_context(out.open("a", encoding="utf-8"))
+        for n, record in enumerate(in_processes(sail_one, jobs, workers), 1):
+            records.append(record)
+            if file is not None:
+                file.write(json.dumps(record, separators=(",", ":")) + "\n")
+                file.flush()
+            left_s = (time.perf_counter() - began) / n * (len(jobs) - n)
+            sys.stderr.write(f"\r{n}/{len(jobs)} sailed, {left_s:.0f} s left   ")
+            sys.stderr.flush()
+    sys.stderr.write("\n" if jobs else "")
     for scenario in dict.fromkeys(record["scenario"] for record in sorted(records, key=_order)):
         print(f"{scenario}, {runs} seeds from {first_seed}")
         print(table([record for record in records if record["scenario"] == scenario], wanted))
     for record in (r for r in records if r["error"]):
         print(f"ERROR {record['scenario']}, {record['variation']}, seed {record['seed']}: {record['error'][:300]}")
-    if out is not None:
-        out.write_text("".join(json.dumps(r) + "\n" for r in sorted(records, key=_order)), encoding="utf-8")
     return 1 if any(r["error"] for r in records) else 0
+
+
+def _key(record: Mapping[str, Any]) -> tuple[str, str, int]:
+    return record["scenario"], record["variation"], record["seed"]
 
 
 def _order(record: Mapping[str, Any]) -> tuple[str, int, int]:

@@ -27,7 +27,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S")
     parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
                         help="processes (default: one per core)")
-    parser.add_argument("--json", type=out_file, metavar="FILE", help="write a line for each voyage")
+    parser.add_argument("--out", type=out_file, metavar="FILE",
+                        help="append a line for each voyage as it ends; what it holds already is not sailed again")
     parser.set_defaults(run=run)
 
 
@@ -37,4 +38,4 @@ def run(args: argparse.Namespace) -> int:
 
     return run_ablation(
         args.scenarios or SCENARIOS, names=args.only or tuple(VARIATIONS), runs=args.runs, first_seed=args.first_seed,
-        workers=args.workers, out=args.json)
+        workers=args.workers, out=args.out)

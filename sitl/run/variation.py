@@ -13,7 +13,7 @@ import numpy as np
 from companion.geofence import Mission
 from companion.messages import WindForecast
 from companion.wind import Estimator, WindRoom
-from sitl.world.wind import Wind
+from sitl.world import Wind
 
 MEAN_S = 30.0       # [s] over which what will blow is averaged: a plan is of legs, not of puffs
 _MEAN_STEP_S = 2.0

@@ -106,8 +106,13 @@ def test_what_is_no_variation_is_one_line_that_names_them(capsys):
 
 def test_a_voyage_of_each_is_sailed_and_written(tmp_path, capsys):
     out = tmp_path / "a.jsonl"
-    code = cli.main(["ablate", str(UPWIND), "--only", "no spread", "--runs", "1", "--workers", "1", "--json", str(out)])
+    words = ["ablate", str(UPWIND), "--only", "no spread", "--runs", "1", "--workers", "1", "--out", str(out)]
+    assert cli.main(words) == 0
     printed = capsys.readouterr().out
-    assert code == 0
-    assert [json.loads(line)["variation"] for line in out.read_text().splitlines()] == [AS_IT_IS, "no spread"]
+    first = out.read_text()
+    assert [json.loads(line)["variation"] for line in first.splitlines()] == [AS_IT_IS, "no spread"]
     assert "1/1" in printed
+    out.write_text(first.splitlines()[0] + "\n")   # interrupted: what was sailed is not sailed again
+    assert cli.main(words) == 0
+    assert out.read_text() == first
+    assert capsys.readouterr().out == printed
