@@ -20,7 +20,6 @@ import numpy as np
 
 from companion.errors import InputError
 from companion.geofence import Mission
-from sitl.campaigns.figures import read
 from sitl.campaigns.pool import in_processes
 from sitl.run.variation import Variation, foreknown, unspread
 
@@ -106,7 +105,7 @@ def run_ablation(
             for n in range(runs) for path in scenarios for name in wanted]
     named = {path: load_scenario(path).name for path in scenarios}
     keys = {(named[job.scenario], job.variation, job.seed) for job in jobs}
-    records = [r for r in (read(out) if out is not None and out.exists() else []) if _key(r) in keys]
+    records = [r for r in _held(out) if _key(r) in keys]
     sailed = {_key(r) for r in records}
     jobs = [job for job in jobs if (named[job.scenario], job.variation, job.seed) not in sailed]
     began = time.perf_counter()
@@ -127,6 +126,19 @@ def run_ablation(
     for record in (r for r in records if r["error"]):
         print(f"ERROR {record['scenario']}, {record['variation']}, seed {record['seed']}: {record['error'][:300]}")
     return 1 if any(r["error"] for r in records) else 0
+
+
+def _held(out: Path | None) -> list[dict[str, Any]]:
+    """Return the voyages that a file holds; a last line that was cut short is taken out."""
+    if out is None or not out.exists():
+        return []
+    text = out.read_text(encoding="utf-8")
+    if text and not text.endswith("\n"):
+        out.write_text(text[:text.rfind("\n") + 1], encoding="utf-8")
+    try:
+        return [json.loads(line) for line in text.splitlines(keepends=True) if line.endswith("\n")]
+    except ValueError as error:
+        raise InputError(str(out), "", f"holds a line that is no voyage ({error})", "name another file") from error
 
 
 def _key(record: Mapping[str, Any]) -> tuple[str, str, int]:
