@@ -9,35 +9,19 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
+from companion.commands.shore.wording import NAMES, from_mavsdk, home_item, mavsdk_url, to_mavsdk, words
 from companion.errors import LinkError, TransferError
-from companion.messages import Command, GeoPoint, MissionItem, MissionType
+from companion.messages import GeoPoint, MissionItem, MissionType
 
 OnProgress = Callable[[float], None]  # 0..1
 
 CONNECT_TIMEOUT_S = 10.0
 SILENCE_S = 8.0        # nothing of a transfer for this long: it is dead (ArduRover itself gives up after 8 s)
 PARAM_TIMEOUT_S = 10.0
-_NAMES = {MissionType.MISSION: "mission", MissionType.FENCE: "fence", MissionType.RALLY: "rally"}
-
-
-def mavsdk_url(link: str) -> str:
-    """Return MAVSDK's words for a LINK. Raises InputError.
-
-    >>> mavsdk_url("tcp:127.0.0.1:5760")
-    'tcpout://127.0.0.1:5760'
-    """
-    from companion.mavlink.transports import parse_link
-
-    name = parse_link(link)
-    if name.kind == "serial":
-        return f"serial://{name.device}:{name.baud}"
-    kind = {"tcp": "tcpout"}.get(name.kind, name.kind)
-    return f"{kind}://{name.host}:{name.port}"
 
 
 def find_system(link: str, timeout_s: float, system: int | None) -> int:
@@ -95,7 +79,7 @@ class Shore:
         result = self._mavsdk.add_any_connection(url)
         if result is not None and int(result) != 0:
             self._close()
-            raise LinkError(f"{self._link} cannot be opened ({_words(result)})")
+            raise LinkError(f"{self._link} cannot be opened ({words(result)})")
         self._system = self._connected(wanted)
         if self._system is None:
             self._close()
@@ -192,7 +176,7 @@ class Shore:
                 raise TransferError(f"{what}: the autopilot fell silent for {SILENCE_S:g} s{self._said()}")
         if failure:
             time.sleep(0.2)  # the reason, a STATUSTEXT, may follow the refusal
-            raise TransferError(f"{what}: {_words(failure[0])}{self._said()}")
+            raise TransferError(f"{what}: {words(failure[0])}{self._said()}")
         return answer[0]
 
     def upload(
@@ -202,13 +186,13 @@ class Shore:
         """Write a list. A mission gets ``home`` (or its first place) as item 0. Raises TransferError."""
         wire = list(items)
         if kind is MissionType.MISSION:
-            wire.insert(0, _home_item(items, home))
+            wire.insert(0, home_item(items, home))
         if not wire:
             self.clear(kind)
             return
-        listed = [_to_mavsdk(i, item, kind) for i, item in enumerate(wire)]
+        listed = [to_mavsdk(i, item, kind) for i, item in enumerate(wire)]
         self._begin(len(wire), on_progress)
-        what = f"{_NAMES[kind]} upload"
+        what = f"{NAMES[kind]} upload"
         if kind is MissionType.MISSION:
             self._wait(what, lambda: self._raw.upload_mission(listed), self._raw.cancel_mission_upload)
         elif kind is MissionType.FENCE:
@@ -219,7 +203,7 @@ class Shore:
     def download(self, kind: MissionType, *, on_progress: OnProgress | None = None) -> tuple[MissionItem, ...]:
         """Read a list; a mission without its home. Raises TransferError, also when no autopilot took part."""
         self._begin(0, on_progress)
-        what = f"{_NAMES[kind]} download"
+        what = f"{NAMES[kind]} download"
         calls = {
             MissionType.MISSION: self._raw.download_mission, MissionType.FENCE: self._raw.download_geofence,
             MissionType.RALLY: self._raw.download_rallypoints,
@@ -232,7 +216,7 @@ class Shore:
         if count is None or count != len(listed):
             told = "never said how many items it holds" if count is None else f"announced {count} items"
             raise TransferError(f"{what}: the autopilot {told} and {len(listed)} arrived: is the link dead?")
-        items = tuple(_from_mavsdk(item) for item in listed)
+        items = tuple(from_mavsdk(item) for item in listed)
         if kind is not MissionType.MISSION:
             return items
         self.home = items[0].point if items and (items[0].lat_e7 or items[0].lon_e7) else None
@@ -249,7 +233,7 @@ class Shore:
         fields = {"target_system": self._system.get_system_id(), "target_component": 1, "mission_type": int(kind)}
         message = MavlinkMessage(message_name="MISSION_CLEAR_ALL", system_id=0, component_id=0, target_system_id=0,
                                  target_component_id=0, fields_json=json.dumps(fields))
-        self._wait(f"{_NAMES[kind]} clear", lambda: self._direct.send_message(message))
+        self._wait(f"{NAMES[kind]} clear", lambda: self._direct.send_message(message))
 
     def get_param(self, name: str) -> float:
         """Return a parameter. Raises TransferError."""
@@ -303,75 +287,5 @@ class Shore:
         if thread.is_alive():
             raise TransferError(f"{what}: no answer within {PARAM_TIMEOUT_S:g} s")
         if failure:
-            raise TransferError(f"{what}: {_words(failure[0])}")
+            raise TransferError(f"{what}: {words(failure[0])}")
         return answer[0]
-
-
-def _home_item(items: Sequence[MissionItem], home: GeoPoint | None) -> MissionItem:
-    point = home or next((i.point for i in items if i.lat_e7 or i.lon_e7), GeoPoint(lat_deg=0.0, lon_deg=0.0))
-    return MissionItem(command=Command.NAV_WAYPOINT, lat_e7=round(point.lat_deg * 1e7),
-                       lon_e7=round(point.lon_deg * 1e7), frame=0)
-
-
-def _to_mavsdk(number: int, item: MissionItem, kind: MissionType) -> Any:
-    from mavsdk.plugins.mission_raw import MissionItem as RawItem
-
-    p1, p2, p3, p4 = item.params
-    return RawItem(number, item.frame, int(item.command), int(number == 0), int(item.autocontinue), p1, p2, p3, p4,
-                   item.lat_e7, item.lon_e7, item.alt_m, int(kind))
-
-
-def _from_mavsdk(item: Any) -> MissionItem:
-    params = tuple(float(p) if p == p else 0.0 for p in (item.param1, item.param2, item.param3, item.param4))  # noqa: PLR0124
-    return MissionItem(
-        command=int(item.command), lat_e7=int(item.x), lon_e7=int(item.y), alt_m=float(item.z), frame=int(item.frame),
-        params=(params[0], params[1], params[2], params[3]), autocontinue=bool(item.autocontinue),
-    )
-
-
-def _words(result: object) -> str:
-    """Return a result of MAVSDK in plain words."""
-    inner = getattr(result, "result", getattr(result, "_result", result))
-    name = getattr(inner, "name", None)
-    return str(name).lower().replace("_", " ") if name else str(result).split("\n", maxsplit=1)[0]
-
-
-@contextmanager
-def progress_bar(title: str) -> Iterator[OnProgress]:
-    """Show a bar on a terminal's stderr; elsewhere nothing."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description:>18}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"),
-               TimeElapsedColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-        task = progress.add_task(title, total=1.0)
-        yield lambda done: progress.update(task, completed=done)
-        progress.update(task, completed=1.0)
-
-
-def upload_and_compare(
-    shore: Shore, kind: MissionType, items: Sequence[MissionItem], *, home: GeoPoint | None = None,
-) -> str:
-    """Write a list, read it back, compare, and return its hash. Raises TransferError where they differ."""
-    from companion.mavlink.wire import first_difference, mission_hash
-
-    name = _NAMES[kind]
-    with progress_bar(f"{name} upload") as on_progress:
-        shore.upload(kind, items, home=home, on_progress=on_progress)
-    with progress_bar("read back") as on_progress:
-        found = shore.download(kind, on_progress=on_progress)
-    difference = first_difference(items, found)
-    if difference:
-        raise TransferError(f"{name} read back differs: {difference}")
-    sent, back = mission_hash(items), mission_hash(found)
-    if sent != back:
-        raise TransferError(f"{name} read back differs: hash {back}, sent {sent}")
-    return sent
-
-
-def download_list(shore: Shore, kind: MissionType) -> tuple[MissionItem, ...]:
-    """Read a list with a progress bar."""
-    with progress_bar(f"{_NAMES[kind]} download") as on_progress:
-        return shore.download(kind, on_progress=on_progress)
