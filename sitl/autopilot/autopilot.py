@@ -43,7 +43,7 @@ class Autopilot:
     @property
     def t_s(self) -> float:
         """Simulated time since the start [s]."""
-        return self.core.t_s
+        return self.core.vehicle.t_s
 
     def step(self, dt_s: float = LOOP_S) -> None:
         """Let simulated time pass: as many whole loops as fit, the rest is kept for the next call."""
