@@ -53,7 +53,8 @@ class Autopilot:
         vehicle = self.core.vehicle
         end = vehicle.tick + loops
         while vehicle.tick < end:
-            chunk = max(1, min(end - vehicle.tick, self._due_tick() - vehicle.tick, _CHUNK))
+            left = end - vehicle.tick
+            chunk = 1 if left == 1 else max(1, min(left, self._due_tick() - vehicle.tick, _CHUNK))
             _, events = vehicle.advance(chunk)
             self._loop(events)
 
