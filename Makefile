@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV ?= .venv
 EXTRAS ?=
 BIN := $(VENV)/bin
+# Compiled modules are kept even where the surroundings forbid it: half of what collecting the tests and starting a command costs.
+export PYTHONDONTWRITEBYTECODE :=
 STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check

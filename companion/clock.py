@@ -84,11 +84,12 @@ class _JumpingSelector(selectors.DefaultSelector):
         super().__init__()
         self._loop = loop
         self._unasked = 0
+        self._files = self.get_map()
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         """Return what is ready now and let ``timeout`` virtual seconds pass if nothing is."""
         # Where there is nothing but the loop's own pipe, which wakes it from a wait, the system is hardly ever asked.
-        self._unasked = self._unasked + 1 if len(self.get_map()) <= 1 else ASK_EVERY
+        self._unasked = self._unasked + 1 if len(self._files) <= 1 else ASK_EVERY
         ready = []
         if self._unasked >= ASK_EVERY or timeout is None:
             self._unasked = 0
@@ -96,7 +97,8 @@ class _JumpingSelector(selectors.DefaultSelector):
         if not ready:
             if timeout is None:
                 raise RuntimeError("virtual time stands still: nothing is ready and no timer is set")
-            self._loop.jump(max(0.0, timeout))
+            if timeout > 0.0:
+                self._loop.jump(timeout)
         return ready
 
 

@@ -1,13 +1,28 @@
-"""What every test shares: which tests wait to be asked for, and why they were left out."""
+"""What every test shares: their order, which of them wait to be asked for, and why they were left out."""
+
+import os
 
 import pytest
 
+# A minute of each worker's time in tests of seconds: begun first, or one worker would end with them while others wait.
+LONG = "tests/voyages/test_scenarios_sail.py"
 
+
+@pytest.hookimpl(trylast=True)   # of what is left when the marks have been looked at
 def pytest_collection_modifyitems(config, items):
-    """Leave out, with the reason in the summary, what needs a program that a clone does not bring."""
+    """Order what several workers share; leave out, with a reason, what needs a program that a clone does not bring."""
+    items[:] = long_first(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
     if "ardurover" in (config.option.markexpr or ""):
         return
     skip = pytest.mark.skip(reason="sails the real ArduRover: asked for by `pytest -m ardurover` (see `sitl fetch`)")
     for item in items:
         if "ardurover" in item.keywords and item.get_closest_marker("ardurover"):
             item.add_marker(skip)
+
+
+def long_first(items, workers):
+    """Return ``items`` so that each of equal parts, which is what a worker begins with, begins with its long ones."""
+    long = [item for item in items if item.nodeid.startswith(LONG)]
+    rest = [item for item in items if not item.nodeid.startswith(LONG)]
+    ends = [len(rest) * n // workers for n in range(workers + 1)]
+    return [item for n in range(workers) for item in (*long[n::workers], *rest[ends[n]:ends[n + 1]])]

@@ -45,7 +45,7 @@ async def keep_parameters(fold: VoyageFold, autopilot: Autopilot) -> None:
         unread = fold.unread
         for name in RANGES:
             again_s = PARAMETER_AGAIN_S if name in unread else PARAMETERS_EVERY_S
-            if autopilot.link.is_alive and now_s() - asked_s.get(name, -math.inf) >= again_s:
+            if now_s() - asked_s.get(name, -math.inf) >= again_s and autopilot.link.is_alive:
                 asked_s[name] = now_s()
                 await autopilot.get_parameter(name)
                 unread = fold.unread

@@ -128,7 +128,8 @@ class _Shell:
                     await opened(stack, self.options.http, self.fold, self.planner, crew, self.showing,
                                  pace=1.0 / self.options.budget_scale, charts=self.options.charts, refuse=self._refuse)
                 await self._wait_autopilot(link)
-                autopilot = self._autopilot = await stack.enter_async_context(Autopilot(link))
+                autopilot = self._autopilot = await stack.enter_async_context(
+                    Autopilot(link, assembler=self.fold.assembler))
                 for text in await self.feeds.open(stack, feeds_of(self.mission), self.options.seed):
                     self._refuse("AIS feed", text)
                 for text in self._refusals:

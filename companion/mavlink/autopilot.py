@@ -50,11 +50,19 @@ class Autopilot:
 
     ``async with Autopilot(link) as autopilot`` also waits for the heartbeat (LinkError when none comes within
     ``timeout_s``) and asks for the version; without that, the first upload asks.
+
+    Args:
+        link: open.
+        timeout_s: of the wait for a heartbeat [s].
+        assembler: one that has taken every message of the link before we hear it, as a voyage's fold has, so that
+            nothing is decoded twice; whoever feeds it hears the values. None: our own.
     """
 
-    def __init__(self, link: Link, *, timeout_s: float = 10.0) -> None:
+    def __init__(self, link: Link, *, timeout_s: float = 10.0, assembler: VehicleAssembler | None = None) -> None:
         self.link = link
-        self.assembler = VehicleAssembler()
+        self._is_fed = assembler is not None
+        self.assembler = assembler or VehicleAssembler()
+        self._bad = self.assembler.dropped_by_type.copy()
         self._lists = Lists(link, lambda: self.assembler.status)
         self._timeout_s = timeout_s
         self._listeners: list[OnValue] = []
@@ -86,7 +94,8 @@ class Autopilot:
         return self.assembler.status
 
     def on_value(self, callback: OnValue) -> Callable[[], None]:
-        """Hand every decoded value to ``callback``; call the result to stop."""
+        """Hand every value that our own assembler decodes to ``callback``; call the result to stop."""
+        assert not self._is_fed, "who feeds the assembler hears the values"
         self._listeners.append(callback)
 
         def stop() -> None:
@@ -104,10 +113,10 @@ class Autopilot:
             self._lists.version = codec.autopilot_version(message)
         if message.get_srcSystem() != self.link.target_system:
             return
-        dropped = self.assembler.dropped_by_type
-        bad_before = dropped.get(kind, 0)
-        values = self.assembler.take(t_s, message)
-        if dropped.get(kind, 0) > bad_before:
+        values = () if self._is_fed else self.assembler.take(t_s, message)
+        bad = self.assembler.dropped_by_type.get(kind, 0)
+        if bad > self._bad.get(kind, 0):
+            self._bad[kind] = bad
             self.link.monitor.bad_value(t_s, kind)
         for value in values if self._listeners else ():
             for callback in tuple(self._listeners):

@@ -316,18 +316,24 @@ class Link:
         try:
             return call(*args)
         except Exception as error:
-            self.stats.faults[whose] += 1
-            if self.stats.faults[whose] == 1 and self._on_fault is not None:
-                # nobody is left to tell about the teller's own fault
-                with contextlib.suppress(Exception):
-                    self._on_fault(f"{whose} failed on what was heard, and goes on without it: {error!r}")
+            self._fault(whose, error)
             return None
+
+    def _fault(self, whose: str, error: Exception) -> None:
+        self.stats.faults[whose] += 1
+        if self.stats.faults[whose] == 1 and self._on_fault is not None:
+            # nobody is left to tell about the teller's own fault
+            with contextlib.suppress(Exception):
+                self._on_fault(f"{whose} failed on what was heard, and goes on without it: {error!r}")
 
     def _take_bytes(self, data: bytes) -> None:
         now = self._now()
         self._throughput.note(now, received=len(data))
         for message in self._codec.feed(data):
-            self.guard("the link", self._take, now, message)
+            try:   # as ``guard`` does; fifty messages a second, each to several listeners, are worth the lines
+                self._take(now, message)
+            except Exception as error:
+                self._fault("the link", error)
 
     def _take(self, now: float, message: Message) -> None:
         if self._reception.is_repeat(message):
@@ -349,7 +355,10 @@ class Link:
         if kind in {"COMMAND_LONG", "COMMAND_INT"}:
             self._take_command(message)
         for name, callback in self._subscribers:
-            self.guard(name, callback, now, message)
+            try:
+                callback(now, message)
+            except Exception as error:
+                self._fault(name, error)
 
     def _decide(self, now: float) -> None:
         """Begin, once our autopilot is known; or give up, when it cannot be."""

@@ -43,7 +43,7 @@ class Autopilot:
     @property
     def t_s(self) -> float:
         """Simulated time since the start [s]."""
-        return self.core.t_s
+        return self.core.vehicle.t_s
 
     def step(self, dt_s: float = LOOP_S) -> None:
         """Let simulated time pass: as many whole loops as fit, the rest is kept for the next call."""
@@ -53,7 +53,8 @@ class Autopilot:
         vehicle = self.core.vehicle
         end = vehicle.tick + loops
         while vehicle.tick < end:
-            chunk = max(1, min(end - vehicle.tick, self._due_tick() - vehicle.tick, _CHUNK))
+            left = end - vehicle.tick
+            chunk = 1 if left == 1 else max(1, min(left, self._due_tick() - vehicle.tick, _CHUNK))
             _, events = vehicle.advance(chunk)
             self._loop(events)
 

@@ -85,8 +85,9 @@ class Server:
         self._flush()
 
     def _flush(self) -> None:
+        links = self.autopilot.links
         for number, write in list(self._ports.items()):
-            link = self.autopilot.links.get(number)
+            link = links.get(number)
             if link is not None and link.has_output:
                 write(link.take())
 

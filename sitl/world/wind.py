@@ -67,7 +67,7 @@ class _Process:
         first = 0.0 if from_mean else float(np.random.default_rng((*self._seed, 2**31)).standard_normal())
         self._first = [first]
         self._cached = -1
-        self._values: NDArray[np.float64] = np.empty(0)
+        self._values: list[float] = []
 
     def at(self, t_s: float) -> float:
         place = max(0.0, t_s) / self._step_s
@@ -80,7 +80,7 @@ class _Process:
         block, offset = divmod(index, _BLOCK)
         if block != self._cached:
             self._load(block)
-        return float(self._values[offset])
+        return self._values[offset]
 
     def _load(self, block: int) -> None:
         for b in range(min(block, len(self._first) - 1), block + 1):
@@ -91,7 +91,7 @@ class _Process:
                 values.append(self._phi * values[-1] + each)
             if b + 1 == len(self._first):
                 self._first.append(values[-1])
-        self._values = np.array(values[:-1])
+        self._values = values[:-1]
         self._cached = block
 
 

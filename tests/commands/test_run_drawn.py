@@ -9,7 +9,7 @@ import textwrap
 
 import pytest
 
-from companion import clock
+from companion import cli, clock
 from companion.geofence import read
 from sitl.ardurover.program import find
 from sitl.ardurover.simulation import ArduRover
@@ -136,10 +136,9 @@ def test_a_dry_run_keeps_the_drawing_in_its_own_folder_only(said):
     assert (folder / text.split()[-1] / "drawn.plan").is_file()
 
 
-def test_neither_a_mission_nor_a_drawing_is_asked_for():
-    done = subprocess.run([*COMPANION, "--link", "tcp:127.0.0.1:1"], capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "there is no mission; name a mission file, or sail what is drawn on the autopilot" in done.stderr
+def test_neither_a_mission_nor_a_drawing_is_asked_for(capsys):
+    assert cli.main(["run", "--link", "tcp:127.0.0.1:1"]) == 2
+    assert "there is no mission; name a mission file, or sail what is drawn on the autopilot" in capsys.readouterr().err
 
 
 @pytest.mark.ardurover

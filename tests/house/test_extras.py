@@ -28,6 +28,13 @@ def without_extras(program, folder, *words):
                           capture_output=True, check=False, env={**os.environ, "PYTHONPATH": str(Path.cwd())})
 
 
+@pytest.fixture(scope="module")
+def sailed(tmp_path_factory):
+    """A voyage of an installation without extras: what came of it, and the folder that ``v`` is in."""
+    folder = tmp_path_factory.mktemp("alone")
+    return without_extras("sitl", folder, "run", "rocks", "--out", "v"), folder
+
+
 def names(requirements):
     return {re.match(r"[A-Za-z0-9-]+", text)[0].lower() for text in requirements}
 
@@ -54,11 +61,11 @@ def test_no_module_needs_an_extra_to_be_loaded_but_those_that_are_loaded_late():
     assert found == {"companion/plots", "companion/wind/study"}
 
 
-def test_the_demo_sails_without_any(tmp_path):
-    sailed = without_extras("sitl", tmp_path, "run", "rocks", "--out", "v")
-    assert sailed.returncode == 0, sailed.stdout + sailed.stderr
-    assert "PASSED" in sailed.stdout
-    assert sailed.stderr.endswith(
+def test_the_demo_sails_without_any(sailed):
+    done, _ = sailed
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "PASSED" in done.stdout
+    assert done.stderr.endswith(
         f"the picture could not be drawn: matplotlib is not installed, which this needs; pip install '{NAME}[plots]'\n")
 
 
@@ -67,10 +74,9 @@ def test_the_demo_sails_without_any(tmp_path):
     (["mission", "check", str(Path("missions/by-rrtstar.toml").absolute())], "filterpy"),
     (["mission", "download", "m.plan", "--link", "udpin:127.0.0.1:14599"], "mavsdk"),
 ])
-def test_a_missing_extra_is_one_line(tmp_path, words, library):
-    if words[0] == "report":
-        without_extras("sitl", tmp_path, "run", "rocks", "--out", "v")
-    done = without_extras("companion", tmp_path, *words)
+def test_a_missing_extra_is_one_line(request, tmp_path, words, library):
+    folder = request.getfixturevalue("sailed")[1] if words[0] == "report" else tmp_path
+    done = without_extras("companion", folder, *words)
     assert done.returncode == 1
     assert done.stderr == (f"companion {words[0]}: {library} is not installed, which this needs; "
                            f"pip install '{NAME}[{EXTRAS[library]}]'\n")

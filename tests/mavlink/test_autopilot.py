@@ -128,9 +128,13 @@ def test_behind_a_stopgap_no_mixture_is_ever_on_board(old):
         memory.near.write = until_cut
         task = asyncio.create_task(autopilot.upload_mission(
             new, method="guarded", keep_first=2, set_current=None, stopgap=GUARD_GAP))
+        judged = None
         while not task.done():
             await asyncio.sleep(0.02)
             stored = boat.pilot.helm.mission.items[1:]
+            if stored == judged:
+                continue
+            judged = stored
             on_board = tuple(canonical(MissionItem(
                 command=i.command, lat_e7=i.x, lon_e7=i.y, frame=i.frame, params=(i.p1, i.p2, i.p3, i.p4)))
                 for i in stored)

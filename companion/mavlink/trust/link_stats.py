@@ -31,7 +31,8 @@ class LinkStats:
                 # an overtaken frame: it was counted as lost when its follower came
                 self.frames_lost = max(0, self.frames_lost - 1)
                 return
-            self.frames_lost += max(0, gap - 1)
+            if gap > 1:
+                self.frames_lost += gap - 1
         self.last_seq[system, component] = seq
 
     def loss(self) -> float:

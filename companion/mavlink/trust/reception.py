@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -66,7 +66,7 @@ class Reception:
         self._objection = objection or _of_the_autopilot(Witness())
         self.expects_burst = False   # more frames were asked for at once than a stream has: their numbers prove nothing
         self._unheard: Counter[int] = Counter()
-        self._recent: deque[tuple[int, int, int, int, int]] = deque(maxlen=_DUPLICATE_WINDOW)
+        self._recent: dict[tuple[int, int, int, int, int], None] = {}   # the last frames, oldest first
 
     @property
     def is_decided(self) -> bool:
@@ -80,11 +80,13 @@ class Reception:
     def is_repeat(self, message: Message) -> bool:
         """Return whether the very frame was here just now."""
         header = message.get_header()
-        key = (message.get_srcSystem(), message.get_srcComponent(), header.seq, header.msgId, message.get_crc() or 0)
+        key = (header.srcSystem, header.srcComponent, header.seq, header.msgId, message.get_crc() or 0)
         if key in self._recent:
             self._stats.dropped[Drop.DUPLICATE] += 1
             return True
-        self._recent.append(key)
+        self._recent[key] = None
+        if len(self._recent) > _DUPLICATE_WINDOW:
+            del self._recent[next(iter(self._recent))]
         return False
 
     def choose(self, t_s: float) -> None:
@@ -101,8 +103,10 @@ class Reception:
     def hear(self, t_s: float, message: Message) -> Heard:
         """Return what ``message``, heard at ``t_s`` [s], is to us."""
         system, component, kind = message.get_srcSystem(), message.get_srcComponent(), message.get_type()
-        self.census.take(t_s, message)
-        self.choose(t_s)
+        if kind == "HEARTBEAT":
+            self.census.take(t_s, message)
+        if self.target is None:
+            self.choose(t_s)
         if component == self._identity.component:
             self._notice_companion(t_s, message, kind)
             if system in {self.target, self.own_system}:

@@ -96,7 +96,7 @@ class VehicleAssembler:
 
         Texts that lost a chunk and have waited too long for it come first, with [...] for what is missing.
         """
-        late = self._texts.expired(t_s)
+        late = self._texts.expired(t_s) if self._texts.is_waiting else None
         values = self._completed(t_s, message)
         return [*late, *values] if late else values
 
@@ -131,7 +131,8 @@ class VehicleAssembler:
             self._forget()
             self._status = None
             self._boot_s = boot_s
-        self._boot_s = boot_s if self._boot_s is None else max(boot_s, self._boot_s)
+        if self._boot_s is None or boot_s > self._boot_s:
+            self._boot_s = boot_s
 
     def _take(self, t_s: float, kind: str, message: Message) -> list[Value]:
         if kind == "ATTITUDE":

@@ -368,6 +368,11 @@ class TextAssembler:
             texts.append(_text(t_s, severity, "".join(chunks[i] for i in range(last + 1)), component))
         return texts
 
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a text waits for a chunk."""
+        return bool(self._open)
+
     def expired(self, t_s: float) -> list[StatusText]:
         """Return texts that waited too long for a chunk, with [...] for what is missing."""
         texts: list[StatusText] = []

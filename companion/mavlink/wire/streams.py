@@ -108,12 +108,22 @@ class StreamMonitor:
         times = self._times[stream.name]
         # rates below 0.5 Hz need a longer window to hold a few messages
         window_s = max(RATE_WINDOW_S, 4.0 / stream.rate_hz) if stream.rate_hz > 0.0 else RATE_WINDOW_S
-        recent = sum(1 for t in times if t_s - t <= window_s)
+        recent = _since(times, t_s, window_s)
         rate_hz = recent / window_s
         age_s = t_s - times[-1] if times else None
         is_fresh = age_s is not None and age_s <= stream.stale_s
-        bad = sum(1 for t in self._bad[stream.name] if t_s - t <= window_s)
+        bad = _since(self._bad[stream.name], t_s, window_s)
         return StreamHealth(
             stream=stream, age_s=age_s, rate_hz=rate_hz, is_fresh=is_fresh,
             is_on_rate=rate_hz >= 0.5 * stream.rate_hz and is_fresh, is_trusted=is_fresh and bad * 4 <= recent,
         )
+
+
+def _since(times: deque[float], t_s: float, window_s: float) -> int:
+    """Return how many of ``times``, oldest first, are of the last ``window_s`` [s]."""
+    count = 0
+    for t in reversed(times):
+        if t_s - t > window_s:
+            break
+        count += 1
+    return count

@@ -28,6 +28,7 @@ class Logbook:
         self.recorder, self.figures = recorder, VoyageFigures()
         self._config, self._epoch_s = config, epoch_s
         self._frames = 0
+        self._framed_s, self._framed_us = float("nan"), 0
         self._phase = ""
 
     # ---------------------------------------------------------------------------------------------- time
@@ -56,7 +57,9 @@ class Logbook:
 
     def frame(self, t_s: float, frame: bytes) -> None:
         """Write a frame of the link down."""
-        self.recorder.frame(stamp(self.quantised(t_s)[0], frame))
+        if t_s != self._framed_s:   # the frames of one piece of bytes are of one moment
+            self._framed_s, self._framed_us = t_s, self.quantised(t_s)[0]
+        self.recorder.frame(stamp(self._framed_us, frame))
 
     def message(self) -> None:
         """Count a message that the fold has heard: a replay gives it as many before the next step."""

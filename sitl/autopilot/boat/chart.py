@@ -5,7 +5,7 @@ from __future__ import annotations
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 
-_CACHE = 4096
+_CACHE, _TOLD = 4096, 64
 
 
 class Chart:
@@ -14,6 +14,7 @@ class Chart:
     def __init__(self, home: GeoPoint) -> None:
         self._frame = LocalFrame(home)
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
+        self._told: dict[tuple[float, float], tuple[int, int]] = {}
 
     def point(self, en: tuple[float, float]) -> GeoPoint:
         """Return a position in metres as a GeoPoint."""
@@ -21,8 +22,13 @@ class Chart:
 
     def to_e7(self, en: tuple[float, float]) -> tuple[int, int]:
         """Return (lat, lon) x 1e7 of a position in metres."""
-        point = self._frame.geo_from_en(*en)
-        return round(point.lat_deg * 1e7), round(point.lon_deg * 1e7)
+        found = self._told.get(en)
+        if found is None:   # several messages of one loop tell one place, and home or a destination is told for long
+            if len(self._told) >= _TOLD:
+                self._told.clear()
+            point = self._frame.geo_from_en(*en)
+            found = self._told[en] = round(point.lat_deg * 1e7), round(point.lon_deg * 1e7)
+        return found
 
     def to_en(self, lat_e7: int, lon_e7: int) -> tuple[float, float]:
         """Return (east, north) [m]; what is not on the globe is brought to its edge."""

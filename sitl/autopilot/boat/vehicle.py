@@ -28,6 +28,7 @@ class Vehicle:
     ) -> None:
         self.state = np.zeros(k.S_SIZE)
         self.tick = 0   # loops since the start: the state's own count
+        self.t_s = 0.0  # simulated time [s], of that count
         self.wind = wind
         self._parameters = parameters
         self._settings = np.zeros(k.P_SIZE)
@@ -72,11 +73,6 @@ class Vehicle:
         s[k.S_TWD_SIN], s[k.S_TWD_COS] = math.sin(twd), math.cos(twd)
         s[k.S_VANE_SET] = 1.0
 
-    @property
-    def t_s(self) -> float:
-        """Simulated time [s]."""
-        return self.tick * LOOP_S
-
     def advance(self, loops: int) -> tuple[int, int]:
         """Run up to ``loops`` loops; return (loops done, events)."""
         first = self.tick + 1
@@ -93,6 +89,7 @@ class Vehicle:
             noise = np.array([_hash01(self._seed, self.tick + 1 + i) for i in range(loops)])
         done, events = k.advance(self.state, self._settings, wind, first, noise, loops, self._polar)
         self.tick = int(self.state[k.S_TICK])
+        self.t_s = self.tick * LOOP_S
         return int(done), int(events)
 
     # ----------------------------------------------------------------------------------------- orders

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
@@ -22,12 +23,20 @@ class Voice:
     @property
     def has_work(self) -> bool:
         """Whether bytes wait to be read or texts to be sent."""
-        return bool(self._late_texts) or True in [bool(link.inbox) for link in self.links.values()]
+        if self._late_texts:
+            return True
+        for link in self.links.values():  # noqa: SIM110 - asked at every loop, as the next one is: no generators
+            if link.inbox:
+                return True
+        return False
 
     @property
     def due_s(self) -> float:
         """When the next stream of any port is due."""
-        return min([link.due_s for link in self.links.values()], default=float("inf"))
+        due_s = math.inf
+        for link in self.links.values():
+            due_s = min(due_s, link.due_s)
+        return due_s
 
     def open(self, number: int, t_s: float) -> Link:
         """Return a port; a new one sends the default streams from now on."""
@@ -68,6 +77,8 @@ class Voice:
 
     def after_ack(self) -> None:
         """A command was acknowledged: say what belongs behind it."""
+        if not self._late_texts:
+            return
         late, self._late_texts = self._late_texts, []
         for severity, text in late:
             self.announce(severity, text)

@@ -51,6 +51,9 @@ class Failsafe:
         self.battery_level = 0                 # that was said: 1 low, 2 critical; it never falls
         self._battery_action: int | None = None
         self._due_s = 0.0
+        self._revision = -1        # of the parameters that these two are taken from
+        self._watches_station = False
+        self._low_v = 0.0
         self._recovery_until_s = -math.inf
         self._acting = ""
         self.stopped_by = ""    # "crash" or "action": that changed the mode or disarmed, and nobody has since
@@ -63,12 +66,15 @@ class Failsafe:
     @property
     def due_s(self) -> float:
         """When to look again."""
-        core = self._core
-        get = core.parameters.get
+        core, parameters = self._core, self._core.parameters
+        if parameters.revision != self._revision:   # they are asked for at every loop and change once in a voyage
+            self._revision = parameters.revision
+            self._watches_station = bool(parameters.flag("FS_GCS_ENABLE"))
+            self._low_v = max(parameters.get("BATT_LOW_VOLT"), parameters.get("BATT_CRT_VOLT"))
         watching = (
-            (self._gcs_heard_s is not None and core.parameters.flag("FS_GCS_ENABLE"))
+            (self._gcs_heard_s is not None and self._watches_station)
             or self._radio.is_switched_off or self._lost
-            or 0.0 < core.battery_v < max(get("BATT_LOW_VOLT"), get("BATT_CRT_VOLT"))
+            or 0.0 < core.battery_v < self._low_v
             or core.roll_rad != 0.0 or self._ekf.is_watching
         )
         return self._due_s if watching else math.inf

@@ -27,14 +27,20 @@ class Polygon:
     def __init__(self, sign: float, vertices_en: NDArray[np.float64]) -> None:
         self.sign, self.vertices_en = sign, vertices_en
         edges = np.roll(vertices_en, -1, axis=0) - vertices_en
-        self._edges = tuple(zip(*(column.tolist() for column in (*vertices_en.T, *edges.T)), strict=True))
+        lengths2 = np.maximum((edges**2).sum(axis=1), 1e-12)
+        self._edges = tuple(
+            zip(*(column.tolist() for column in (*vertices_en.T, *edges.T, lengths2)), strict=True))
 
     def clearance_m(self, east: float, north: float) -> float:
         """Return the distance [m] to the edge, negative on the forbidden side."""
         least2, is_inside = math.inf, False
-        for x, y, dx, dy in self._edges:
+        for x, y, dx, dy, length2 in self._edges:
             px, py = east - x, north - y
-            u = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
+            u = (px * dx + py * dy) / length2
+            if u < 0.0:
+                u = 0.0
+            elif u > 1.0:
+                u = 1.0
             least2 = min(least2, (px - u * dx) ** 2 + (py - u * dy) ** 2)
             # even-odd rule: count the edges that a ray to the east crosses
             if (y > north) != (y + dy > north) and x + py / dy * dx > east:
@@ -123,8 +129,9 @@ class Fence:
         self._types = types = core.parameters.flag("FENCE_TYPE") & self._switched_on
         found = self._circle_clear_m = math.inf
         if types & TYPE_POLYGON:
+            here = core.vehicle.position
             for zone in self._zones:
-                found = min(found, zone.clearance_m(*core.vehicle.position))
+                found = min(found, zone.clearance_m(*here))
         if types & TYPE_CIRCLE and core.home_en is not None:
             self._circle_clear_m = core.parameters.get("FENCE_RADIUS") - math.dist(core.vehicle.position, core.home_en)
             found = min(found, self._circle_clear_m)
@@ -138,7 +145,7 @@ class Fence:
     def update(self) -> float | None:
         """Look at the fence: avoidance near it. Return how far outside [m] the boat is when a breach begins."""
         core = self._core
-        if core.t_s < self.due_s - 1e-9:
+        if not self.is_enabled or core.t_s < self._due_s - 1e-9:
             return None
         self._due_s = core.t_s + CHECK_S
         if not core.has_origin:

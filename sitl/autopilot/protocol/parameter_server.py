@@ -54,6 +54,8 @@ class ParameterServer:
 
     def update(self) -> None:
         """One loop: the next values of each list."""
+        if not self._lists:
+            return
         for sending in self._lists:
             for _ in range(_PER_LOOP):
                 entry = self._parameters.entry(sending.index)

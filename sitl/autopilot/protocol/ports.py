@@ -96,13 +96,13 @@ class Ports:
     def send_due(self) -> None:
         """Send the parameters and streams that are due, and texts that waited."""
         self._parameters.update()
+        t_s = self._core.t_s
         for link in self._voice.links.values():
-            self._send_streams(link, self._core.t_s)
+            if link.due_s <= t_s + 1e-9:
+                self._send_streams(link, t_s)
         self._voice.after_ack()
 
     def _send_streams(self, link: Link, t_s: float) -> None:
-        if link.due_s > t_s + 1e-9:
-            return
         due = link.take_due(t_s)
         if self._core.boot_s < FIRST_STREAMS_S:
             due = [i for i in due if i == mav.MAVLINK_MSG_ID_HEARTBEAT]

@@ -238,11 +238,16 @@ def _rc_channels(p: Pilot) -> Any:
     )
 
 
+# What is said once a second and never changes is made once.
+_AHRS = mav.MAVLink_ahrs_message(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_POWER = mav.MAVLink_power_status_message(5000, 0, 0)
+_MEMORY = mav.MAVLink_meminfo_message(0, 65535, 524288)
+
 BUILDERS: dict[int, Callable[[Pilot], Any]] = {
     # These only fill their place: no instrument of the simulated boat is behind them.
-    mav.MAVLINK_MSG_ID_AHRS: lambda _: mav.MAVLink_ahrs_message(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    mav.MAVLINK_MSG_ID_POWER_STATUS: lambda _: mav.MAVLink_power_status_message(5000, 0, 0),
-    mav.MAVLINK_MSG_ID_MEMINFO: lambda _: mav.MAVLink_meminfo_message(0, 65535, 524288),
+    mav.MAVLINK_MSG_ID_AHRS: lambda _: _AHRS,
+    mav.MAVLINK_MSG_ID_POWER_STATUS: lambda _: _POWER,
+    mav.MAVLINK_MSG_ID_MEMINFO: lambda _: _MEMORY,
     mav.MAVLINK_MSG_ID_RAW_IMU: lambda p: mav.MAVLink_raw_imu_message(
         p.core.boot_us, 0, 0, -1001, 0, 0, 0, 198, 0, 445, 0, 2762
     ),
