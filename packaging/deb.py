@@ -9,6 +9,7 @@ interrupted, it goes on where it was.
 import argparse
 import contextlib
 import gzip
+import hashlib
 import os
 import re
 import shutil
@@ -150,9 +151,14 @@ def control(stage: Path) -> None:
     (folder / "conffiles").write_text("/etc/companion/service.env\n")
     for name in ("postinst", "prerm", "postrm"):
         put(ROOT / "packaging/debian" / name, folder / name, 0o755)
-    sums = [f"{run('md5sum', path).split()[0]}  {path.relative_to(stage)}" for path in sorted(stage.rglob("*"))
+    sums = [f"{digest(path)}  {path.relative_to(stage)}" for path in sorted(stage.rglob("*"))
             if path.is_file() and not path.is_symlink() and folder not in path.parents]
     (folder / "md5sums").write_text("\n".join(sums) + "\n")
+
+
+def digest(path: Path) -> str:
+    """Return what dpkg compares an installed file with."""
+    return hashlib.md5(path.read_bytes(), usedforsecurity=False).hexdigest()
 
 
 def main() -> None:
