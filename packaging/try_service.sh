@@ -62,6 +62,6 @@ systemctl stop companion@lake || wrong "it does not stop"
 systemctl start companion@nothing 2>/dev/null && wrong "an instance without a mission started"
 systemctl stop boat
 rm -rf "$trial" /etc/companion/lake.*
-systemd-analyze verify companion@lake.service 2>&1 | grep -i companion@ && wrong "verify"
+systemd-analyze verify /lib/systemd/system/companion@.service 2>&1 | grep -i companion@ && wrong "verify"
 systemd-analyze security --no-pager companion@lake.service | tail -1
 echo "ALL IS WELL"
