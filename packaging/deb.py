@@ -82,6 +82,7 @@ def environment(stage: Path, work: Path) -> None:
                 path.unlink()
             else:
                 path.write_text(path.read_text().replace(str(home), HOME))
+    (home / ".gitignore").unlink(missing_ok=True)   # of venv, from Python 3.13 on
     config = home / "pyvenv.cfg"
     config.write_text(config.read_text().replace(str(home), HOME))
     for name in ("python", "python3"):

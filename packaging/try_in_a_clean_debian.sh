@@ -18,7 +18,7 @@ say() { echo "== $*"; }
 wrong() { echo "WRONG: $*" >&2; exit 1; }
 inside() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/trial LC_ALL=C.UTF-8 "$@"; }
 files() { (cd "$root" && find etc opt usr var/lib/companion var/log/companion var/cache/companion lib/systemd lib/udev \
-    -xdev \( -type f -o -type l \) 2>/dev/null || true) | grep -vE '__pycache__|^etc/(ld.so.cache|passwd-?|group-?|g?shadow-?|subuid|subgid)|^etc/mtab|^etc/apt' | sort; }
+    -xdev \( -type f -o -type l \) 2>/dev/null || true) | grep -vE '__pycache__|^etc/(ld.so.cache|passwd-?|group-?|g?shadow-?|subuid|subgid)|^etc/mtab|^etc/apt|^etc/.updated' | sort; }
 
 say "a clean $release, $architecture"
 if [ -n "${CLEAN:-}" ]; then
