@@ -58,6 +58,7 @@ from companion.words import counted
 TOLERANCE = 1e-6
 # Fields of a record that say when it was written, not what was decided.
 _STAMPS = frozenset({"t_s", "utc"})
+_AFTER_S = 3600.0   # messages may have come for so long behind the last row of the track
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,8 +134,9 @@ class Recorded:
         with believed(folder / DECISIONS, "a start"):
             self._starts = [
                 (float(d["t_s"]), None if d["persisted"] is None else Persisted.from_dict(d["persisted"]),
-                 tuple(d.get("known", ()))) for d in self._decisions if d["kind"] == "start"
-            ] or [(-1e18, None, ())]
+                 tuple(d.get("known", ())), float(d.get("epoch_s", self.epoch_s)))
+                for d in self._decisions if d["kind"] == "start"
+            ] or [(-1e18, None, (), self.epoch_s)]
 
     @property
     def restarts(self) -> int:
@@ -144,26 +146,30 @@ class Recorded:
     def steps(self) -> Iterator[Folded]:
         """Yield the steps in their order."""
         skipper = Skipper(voyage=self.voyage, config=self.config)
-        ends = [*(start[0] for start in self._starts[1:]), 1e18]
+        # Frames of another life, stamped by a clock that was set since, are years off: not of the last one either.
+        last_s = max((t_s for t_s, *_ in self.rows), default=0.0) + _AFTER_S
+        ends = [*(start[0] for start in self._starts[1:]), last_s]
         fed: dict[float, list[dict[str, Any]]] = {}
         for record in self._decisions:
             if record["kind"] in {"ais", "others", "order"}:
                 fed.setdefault(float(record["t_s"]), []).append(record)
-        for (start_s, persisted, known), end_s, gap_s in zip(self._starts, ends, _gaps(self._decisions), strict=True):
+        for (start_s, persisted, known, epoch_s), end_s, gap_s in zip(
+                self._starts, ends, _gaps(self._decisions), strict=True):
             fold = VoyageFold(
                 skipper, WindRoom(estimator=estimator_of(self.mission)), self._permissions, persisted, known=known,
                 traffic=target_limits_of(self.mission),
             )
-            yield from self._life(fold, start_s, end_s, gap_s, fed)
+            yield from self._life(fold, start_s, end_s, gap_s, fed, epoch_s)
 
     def _life(
         self, fold: VoyageFold, start_s: float, end_s: float, gap_s: float, fed: dict[float, list[dict[str, Any]]],
+        epoch_s: float,
     ) -> Iterator[Folded]:
-        """Yield the steps between a start of the companion and the next."""
+        """Yield the steps between a start of the companion and the next; the clock may have been set between them."""
         folder, mine = self.folder, [d for d in self._decisions if start_s <= d["t_s"] < end_s]
         found = next((d for d in mine if d["kind"] == "autopilot"), None)
         system, unheard = (0, 0) if found is None else (int(found["system"]), int(found["unheard"]))
-        heard = _messages(folder / TLOG, self.epoch_s, start_s, end_s, fold, system, unheard)
+        heard = _messages(folder / TLOG, epoch_s, start_s, end_s, fold, system, unheard)
         outcomes = iter([d for d in mine if d["kind"] in {"plan", "outcome"}])
         recorded = _actions_by_time(mine)
         for t_s, n_messages, n_outcomes in self.rows:

@@ -1,12 +1,15 @@
-"""The Debian package: ``python3 packaging/deb.py [--out DIR]`` (make deb), with the Debian whose package it is.
+"""The Debian package: ``python3 packaging/deb.py [--out DIR] [--work DIR]`` (make deb), with the Debian that it is for.
 
 An environment of its own under /opt/companion for this release's Python, with what requirements.lock names and the
-compiled kernels; commands, units, udev rule, manual pages and completion. Needs python3-venv, dpkg-deb and the network
-(or pip's own settings: PIP_FIND_LINKS, PIP_NO_INDEX).
+compiled kernels; commands, units, udev rule, manual pages and completion. Needs python3-venv, binutils, dpkg-deb and
+the network (or pip's own settings: PIP_FIND_LINKS, PIP_NO_INDEX). With --work what is made is kept there:
+interrupted, it goes on where it was.
 """
 
 import argparse
+import contextlib
 import gzip
+import hashlib
 import os
 import re
 import shutil
@@ -46,15 +49,24 @@ def release() -> str:
 def environment(stage: Path, work: Path) -> None:
     """Fill /opt/companion."""
     home = stage / HOME.lstrip("/")
-    run(f"/usr/bin/{PYTHON}", "-m", "venv", work / "pip")
-    run(f"/usr/bin/{PYTHON}", "-m", "venv", "--without-pip", "--symlinks", home)
+    done = work / "installed"   # the libraries
+    if not done.exists():
+        run(f"/usr/bin/{PYTHON}", "-m", "venv", "--clear", work / "pip")
+        run(f"/usr/bin/{PYTHON}", "-m", "venv", "--clear", "--without-pip", "--symlinks", home)
     pip = (work / "pip/bin/python", "-m", "pip", "--python", home / "bin/python", "install", "--quiet", "--no-compile",
            "--disable-pip-version-check")
-    run(work / "pip/bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "hatchling")
+    if not done.exists():
+        print("deb: installing libraries", flush=True)
+        run(work / "pip/bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "hatchling")
+        run(*pip, "--require-hashes", "-r", ROOT / "requirements.lock")
+        done.touch()
+    shutil.rmtree(work / "wheel", ignore_errors=True)
     run(work / "pip/bin/python", "-m", "hatchling", "build", "-t", "wheel", "-d", work / "wheel")
-    run(*pip, "--require-hashes", "-r", ROOT / "requirements.lock")
-    run(*pip, "--no-deps", *(work / "wheel").glob("*.whl"))
+    run(*pip, "--no-deps", "--force-reinstall", *(work / "wheel").glob("*.whl"))
     libraries = next(home.glob("lib/python3.*/site-packages"))
+    for name in ("companion", "sitl"):   # of what was there before
+        for path in (libraries / name).rglob("__pycache__"):
+            shutil.rmtree(path)
     for pattern in LEFT_OUT:
         for path in libraries.glob(pattern):
             if path.is_dir():
@@ -70,11 +82,11 @@ def environment(stage: Path, work: Path) -> None:
                 path.unlink()
             else:
                 path.write_text(path.read_text().replace(str(home), HOME))
+    (home / ".gitignore").unlink(missing_ok=True)   # of venv, from Python 3.13 on
     config = home / "pyvenv.cfg"
     config.write_text(config.read_text().replace(str(home), HOME))
     for name in ("python", "python3"):
-        (home / "bin" / name).unlink(missing_ok=True)
-        (home / "bin" / name).symlink_to(f"/usr/bin/{PYTHON}")
+        link(home / "bin" / name, f"/usr/bin/{PYTHON}")
     # by content, not by time: packed files keep neither this folder's name nor its clock
     run(f"/usr/bin/{PYTHON}", "-m", "compileall", "-q", "-s", stage, "-p", "/", "--invalidation-mode", "unchecked-hash",
         libraries)
@@ -85,6 +97,13 @@ def put(source: Path, target: Path, mode: int = 0o644) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(source, target)
     target.chmod(mode)
+
+
+def link(path: Path, target: str) -> None:
+    """Make a symbolic link, in place of another."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.unlink(missing_ok=True)
+    path.symlink_to(target)
 
 
 def zipped(target: Path, text: bytes) -> None:
@@ -100,8 +119,7 @@ def around(stage: Path, work: Path) -> None:
     put(ROOT / "deploy/service.env", stage / "etc/companion/service.env")
     put(ROOT / "packaging/debian/lintian-overrides", stage / f"usr/share/lintian/overrides/{NAME}")
     for name in ("companion", "sitl"):
-        (stage / "usr/bin").mkdir(parents=True, exist_ok=True)
-        (stage / "usr/bin" / name).symlink_to(f"{HOME}/bin/{name}")
+        link(stage / "usr/bin" / name, f"{HOME}/bin/{name}")
         put(work / "pages/completions" / name, stage / "usr/share/bash-completion/completions" / name)
     for page in (work / "pages/man1").iterdir():
         zipped(stage / f"usr/share/man/man1/{page.name}.gz", page.read_bytes())
@@ -123,7 +141,7 @@ def changelog() -> str:
 def control(stage: Path) -> None:
     """Write what dpkg is told."""
     folder = stage / "DEBIAN"
-    folder.mkdir()
+    folder.mkdir(exist_ok=True)
     architecture = run("dpkg", "--print-architecture")
     size = sum(p.lstat().st_size for p in stage.rglob("*") if p.is_file() and not p.is_symlink())
     text = (ROOT / "packaging/debian/control.in").read_text()
@@ -134,21 +152,28 @@ def control(stage: Path) -> None:
     (folder / "conffiles").write_text("/etc/companion/service.env\n")
     for name in ("postinst", "prerm", "postrm"):
         put(ROOT / "packaging/debian" / name, folder / name, 0o755)
-    sums = [f"{run('md5sum', path).split()[0]}  {path.relative_to(stage)}" for path in sorted(stage.rglob("*"))
+    sums = [f"{digest(path)}  {path.relative_to(stage)}" for path in sorted(stage.rglob("*"))
             if path.is_file() and not path.is_symlink() and folder not in path.parents]
     (folder / "md5sums").write_text("\n".join(sums) + "\n")
+
+
+def digest(path: Path) -> str:
+    """Return what dpkg compares an installed file with."""
+    return hashlib.md5(path.read_bytes(), usedforsecurity=False).hexdigest()
 
 
 def main() -> None:
     """Build it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / "dist")
-    out = parser.parse_args().out.resolve()
+    parser.add_argument("--work", type=Path, help="a folder to work in, and to go on in (default: a temporary one)")
+    args = parser.parse_args()
+    out = args.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        work = Path(folder)
+    with contextlib.ExitStack() as stack:
+        work = (args.work or Path(stack.enter_context(tempfile.TemporaryDirectory()))).resolve()
         stage = work / "stage"
-        stage.mkdir(mode=0o755)
+        stage.mkdir(mode=0o755, parents=True, exist_ok=True)
         environment(stage, work)
         around(stage, work)
         for path in stage.rglob("*"):

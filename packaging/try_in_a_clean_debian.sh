@@ -5,7 +5,7 @@
 #
 # RELEASE is bookworm or trixie, ARCHITECTURE amd64 (default) or arm64 (by emulation: qemu-user-static, binfmt_misc).
 # Needs debootstrap; with systemd-nspawn, and on this machine's own architecture, the service runs under a real systemd,
-# beside a simulated autopilot. CLEAN=DIR: a tree that was bootstrapped before. MIRROR: of Debian.
+# beside a simulated autopilot; else the companion is started by hand. CLEAN=DIR: a tree that was bootstrapped before. MIRROR: of Debian.
 set -euo pipefail
 
 package=$(realpath "$1") release=$2 architecture=${3:-amd64}
@@ -18,7 +18,7 @@ say() { echo "== $*"; }
 wrong() { echo "WRONG: $*" >&2; exit 1; }
 inside() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/trial LC_ALL=C.UTF-8 "$@"; }
 files() { (cd "$root" && find etc opt usr var/lib/companion var/log/companion var/cache/companion lib/systemd lib/udev \
-    -xdev \( -type f -o -type l \) 2>/dev/null || true) | grep -vE '__pycache__|^etc/(ld.so.cache|passwd-?|group-?|g?shadow-?|subuid|subgid)|^etc/mtab|^etc/apt' | sort; }
+    -xdev \( -type f -o -type l \) 2>/dev/null || true) | grep -vE '__pycache__|^etc/(ld.so.cache|passwd-?|group-?|g?shadow-?|subuid|subgid)|^etc/mtab|^etc/apt|^etc/.updated' | sort; }
 
 say "a clean $release, $architecture"
 if [ -n "${CLEAN:-}" ]; then
@@ -68,6 +68,19 @@ if [ "$architecture" = "$(dpkg --print-architecture)" ] && command -v systemd-ns
     tail -1 "$root/trial/service.log" | grep -q '^ALL IS WELL' || wrong "the service"
     inside systemctl disable try.service 2>/dev/null || true
     rm -f "$root/etc/systemd/system/try.service" "$root/usr/local/bin/try_service"
+else
+    say "the companion beside a simulated boat, by hand"
+    inside sh -c 'cd ~/voyage && sitl boat --port 0 --udp 0 --udp-out 127.0.0.1:14559 --warm --home 50.817,-1.31 >boat.log 2>&1 &
+        boat=$!
+        companion run mine/lake.toml --link udpin:127.0.0.1:14559 --out w --wait 300 --limit 300 >run.log 2>&1 &
+        companion=$! began=$(date +%s)
+        until grep -qs "\"kind\":\"plan\"" w/decisions.jsonl; do
+            kill -0 $companion 2>/dev/null && [ $(($(date +%s) - began)) -lt 600 ] || break
+            sleep 1
+        done
+        echo "first plan after $(($(date +%s) - began)) s"
+        kill -INT $companion; wait $companion; kill $boat
+        grep -qs "\"kind\":\"plan\"" w/decisions.jsonl' || { tail "$root"/trial/voyage/*.log; wrong "it does not plan"; }
 fi
 
 say "remove, and what is the user's stays; purge, and nothing does"

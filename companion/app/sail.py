@@ -12,6 +12,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,8 @@ from companion.mavlink.trust import LinkIdentity, LinkStats
 from companion.mavlink.wire import Drop
 from companion.messages import CompanionStatus
 from companion.skipper import Skipper
-from companion.skipper.step import Phase, Severity
+from companion.skipper.step import Phase, Severity, Snapshot
+from companion.telemetry.far import unix_of_boat
 from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, order_record, outcome_record
 from companion.telemetry.progress import DISK, left_behind
 from companion.telemetry.radio import Radio, speak_high_latency
@@ -47,6 +49,7 @@ from companion.traffic.listening import Feeds
 STEP_S = 1.0
 TEND_EVERY_S = 5.0        # records are synced, and taken up again after trouble
 LOOP_WATCH_S = 0.1
+CLOCK_OFF_S = 10.0        # from here on it is recorded
 # With ``exit_on_arrival`` the loiter is watched for a moment before the program ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
@@ -108,6 +111,7 @@ class _Shell:
         self._autopilot: Autopilot | None = None
         self._crew: Crew | None = None
         self._counted = LinkStats()
+        self._are_clocks_compared = False
 
     async def run(self, transport: Transport) -> dict[str, Any]:
         """Sail and leave the folder complete, whatever happens."""
@@ -312,6 +316,7 @@ class _Shell:
         self.log.step(step, clearance_m)
         if not self.options.dry_run:   # which must not take the place of a voyage that is interrupted
             await self.state_file.save(self.fold.skipper.persisted(step.state))
+        self._compare_clocks(snapshot)
         status = companion_status(step, self.voyage, self.log.figures, clearance_m, link.bytes_per_s()[1],
                                   self.feeds.open_feeds, self.feeds.dropped)
         trouble = self._trouble()
@@ -321,6 +326,23 @@ class _Shell:
         if self.on_status is not None:
             self.on_status(status, step)
         self.showing.take(step, status, self.log.figures)
+
+    def _compare_clocks(self, snapshot: Snapshot) -> None:
+        """Record once by how much this computer's clock, which stamps the records, is off the autopilot's by GPS.
+
+        A board without a battery begins in the past, and the network, which would say so, is far away. Nothing that is
+        decided hangs on this clock.
+        """
+        boat_s = None if self._are_clocks_compared else unix_of_boat(snapshot, snapshot.t_s)
+        if boat_s is None:
+            return
+        self._are_clocks_compared = True
+        behind_s = boat_s - self.options.epoch_s - snapshot.t_s
+        if abs(behind_s) >= CLOCK_OFF_S:
+            when = datetime.fromtimestamp(boat_s, UTC).isoformat(timespec="seconds")
+            self._record({"kind": "clock", "behind_s": round(behind_s, 1), "text": (
+                f"it is {when} by the autopilot's clock; this computer's, which stamps these records, is "
+                f"{abs(behind_s):.0f} s {'behind' if behind_s > 0.0 else 'ahead'}")})
 
     def _trouble(self) -> str:
         """Return what cannot be written now and why, empty when all is well."""

@@ -53,7 +53,7 @@ class _Loaded(JITCodeLibrary):  # type: ignore[misc]
     @property
     def _shared_module(self) -> Any:
         if self.parsed is None:
-            payload = _read(self.path)
+            payload = read(self.path)
             if payload is None or hashlib.sha256(payload).digest() != self.digest:
                 raise JobError(f"{self.path} has gone or changed while a kernel was compiled that needs it")
             _, _, (_, bitcode) = pickle.loads(payload)[_LIBRARY]  # noqa: S301 - our own
@@ -84,7 +84,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
         target_context.refresh()
         name = self.file_name(sig, target_context.codegen())
         for place in looked_in():
-            payload = _read(place / name)
+            payload = read(place / name)
             if payload is None:
                 continue
             try:
@@ -104,7 +104,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
             parts = list(data._reduce())  # noqa: SLF001
             parts[_ANNOTATION] = ""   # the source with its types, for a person who asks; none does
             path = written_to() / self.file_name(sig, data.codegen)
-            if _read(path) is None:   # who has loaded the file that another process made meanwhile links with that one
+            if read(path) is None:   # who has loaded the file that another process made meanwhile links with that one
                 _write(path, dumps(tuple(parts)))
         except OSError as error:
             _LOG.warning("compiled kernels cannot be kept in %s (%s)", folder(), error.strerror)
@@ -119,7 +119,8 @@ class KernelCache(_Cache):  # type: ignore[misc]
         """Nothing is kept in memory."""
 
 
-def _read(path: Path) -> bytes | None:
+def read(path: Path) -> bytes | None:
+    """Return what a file holds behind its digest; None: it is not there, or damaged."""
     try:
         data = path.read_bytes()
     except OSError:
@@ -139,7 +140,7 @@ def _write(path: Path, payload: bytes) -> None:
         try:
             os.link(beside, path)        # the first stays, see _Loaded
         except FileExistsError:
-            if _read(path) is None:
+            if read(path) is None:
                 Path(beside).replace(path)   # it is damaged
         except OSError:
             Path(beside).replace(path)       # a file system without links

@@ -1,15 +1,14 @@
 """A nursery of planners: a process forked from this one when all is loaded, which forks a planner when it is asked.
 
-Numba, the libraries and the machine code of all kernels are then in the memory once, for the companion and its planner
-together: 140 MB in place of 250. A fork of a process with threads, or with an event loop that turns, is not safe; so
-the nursery is made before either and has none itself. It is never needed: where there is none, or it dies, a planner is
-started as a program of its own.
+The libraries and the machine code of all kernels are then in the memory once, for the companion and its planner
+together. A fork of a process with threads, or with an event loop that turns, is not safe; so the nursery is made before
+either and has none itself. It is never needed: where there is none, or it dies, a planner is started as a program of
+its own.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import gc
 import os
 import signal
@@ -22,6 +21,7 @@ from typing import Any, NoReturn
 
 from companion.errors import JobError
 from companion.kernels.build import is_ready
+from companion.kernels.memory import let_go, trim
 
 _PID = struct.Struct("<q")
 _PATIENCE_S = 1.0   # a fork takes milliseconds, and the voyage's loop waits for it
@@ -48,8 +48,8 @@ class Nursery:
         warm()
         gc.collect()
         gc.freeze()   # what is there now is never looked at again, so its pages stay shared
-        with contextlib.suppress(OSError, AttributeError):   # of glibc: gives back what loading has freed
-            ctypes.CDLL(None).malloc_trim(0)
+        trim()
+        let_go("libllvmlite")   # if it was loaded at all: nobody calls it any more
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(AttributeError, OSError, ValueError):
                 stream.flush()

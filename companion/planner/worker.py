@@ -26,6 +26,7 @@ import numpy as np
 from companion.clock import effort_s, ended
 from companion.errors import JobError
 from companion.kernels.build import prepare
+from companion.kernels.memory import trim
 from companion.planner.child import Child, Forked, Started
 from companion.planner.nursery import Nursery
 from companion.planner.plan import Plan, PlanStatus, Why
@@ -264,6 +265,8 @@ def answer_requests(source: Any, sink: Any) -> None:
         except Exception as error:
             answer = f"{type(error).__name__}: {error}"
         _write(sink, pickle.dumps(answer))
+        del request, answer
+        trim()   # the next plan may be an hour away
 
 
 class _Pulse:

@@ -5,14 +5,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-from companion.kernels.cache import _read, _write
+from companion.kernels.cache import _write, read
 
 
 def test_of_two_processes_that_compile_one_kernel_the_first_one_s_file_stays(tmp_path):
     path = tmp_path / "kernel"
     _write(path, b"the first")
     _write(path, b"the second")
-    assert _read(path) == b"the first"
+    assert read(path) == b"the first"
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -20,7 +20,7 @@ def test_a_damaged_file_is_replaced(tmp_path):
     path = tmp_path / "kernel"
     path.write_bytes(b"x" * 100)
     _write(path, b"whole")
-    assert _read(path) == b"whole"
+    assert read(path) == b"whole"
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -30,7 +30,7 @@ def test_without_links_it_is_replaced(tmp_path, monkeypatch):
 
     monkeypatch.setattr("companion.kernels.cache.os.link", refused)
     _write(tmp_path / "kernel", b"whole")
-    assert _read(tmp_path / "kernel") == b"whole"
+    assert read(tmp_path / "kernel") == b"whole"
     assert list(tmp_path.iterdir()) == [Path(tmp_path, "kernel")]
 
 

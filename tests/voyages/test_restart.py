@@ -217,6 +217,36 @@ def test_a_state_that_does_not_fit_is_reported_and_the_boat_is_sailed_on_by_the_
     assert not replay(tmp_path).differences
 
 
+# What 0.1.0 wrote of a voyage and of a list on the autopilot.
+OF_0_1_0 = {"format", "voyage", "gate", "sailing", "route", "pending", "own_mode"}
+ROUTE_OF_0_1_0 = {"items", "points", "from", "gates", "plan_id", "plan_t_s", "plan_twd_from_rad", "plan_tws_mps",
+                  "plan_half_width_rad", "margin_m", "delta_s", "risk", "cost_s", "rung", "why"}
+
+
+def older(folder):
+    """The companion is upgraded while it is away: the state is of 0.1.0."""
+    state = json.loads((folder / "state.json").read_bytes())
+    assert set(state) > OF_0_1_0
+    state = {name: value for name, value in state.items() if name in OF_0_1_0}
+    for name in ("route", "pending"):
+        if state[name] is not None:
+            assert set(state[name]) > ROUTE_OF_0_1_0
+            state[name] = {key: value for key, value in state[name].items() if key in ROUTE_OF_0_1_0}
+    (folder / "state.json").write_text(json.dumps(state))
+
+
+def test_the_state_of_an_older_version_is_read_and_its_mission_sailed_on(tmp_path):
+    """Not by the mark alone: the plan that is on board is known, and nothing is planned anew for want of it."""
+    verdict, _ = sail(tmp_path, kill_at_s=70.0, change=older)
+    assert verdict.passed, verdict.checks
+    records = decisions(tmp_path)
+    after = records[[n for n, r in enumerate(records) if r["kind"] == "start"][1]:]
+    assert not [r["text"] for r in after if r["kind"] == "refusal"]
+    assert "adopted" in [r.get("code") for r in after if r.get("action") == "Announce"]
+    assert "mismatch" not in [r["reason"] for r in after if r.get("action") == "RequestPlan"]
+    assert not replay(tmp_path).differences
+
+
 @dataclass
 class Stranger(PowerCut):
     """Changes the list on the autopilot, while the companion is away, into one that is nobody's."""

@@ -76,7 +76,8 @@ class Logbook:
         self.recorder.voyage(voyage_record(
             mission, permissions, {**run, "epoch_s": self._epoch_s, "started_utc": started}, copy))
         self.note(t_s, {
-            "kind": "start", "persisted": None if persisted is None else persisted.to_dict(), "known": list(known)})
+            "kind": "start", "persisted": None if persisted is None else persisted.to_dict(), "known": list(known),
+            "epoch_s": self._epoch_s})
 
     def step(self, step: Step, clearance_m: float | None) -> None:
         """Write a step down: where the boat is, what was decided, and by which numbers."""
