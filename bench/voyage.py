@@ -52,6 +52,11 @@ def memory_mb(pid: int) -> float:
     return 0.0
 
 
+def written_bytes(pid: int) -> int:
+    """Return what one process has sent to the disk, in whole pages, as the kernel counts it."""
+    return int(Path(f"/proc/{pid}/io").read_text().partition("\nwrite_bytes:")[2].split()[0])
+
+
 @contextlib.contextmanager
 def afloat(folder: Path, *options: str, **more: Any) -> Iterator[tuple[subprocess.Popen[bytes], float]]:
     """Sail the demo in real time: the companion as a process of its own, and how long its first step took [s].
@@ -84,7 +89,7 @@ def live(seconds: float, *options: str) -> dict[str, float]:
             # The wind settles for half a minute; then plan and sail. Planning is left out of the idle figure.
             time.sleep(45.0)
             main, workers = companion.pid, children(companion.pid)
-            cpu0 = cpu_s(main)
+            cpu0, written0 = cpu_s(main), written_bytes(main)
             loads, worst = [], 0.0
             began = time.monotonic()
             while time.monotonic() - began < seconds:
@@ -92,11 +97,13 @@ def live(seconds: float, *options: str) -> dict[str, float]:
                 time.sleep(5.0)
                 loads.append((cpu_s(main) - before) / (time.monotonic() - at))
                 worst = max(worst, sum(memory_mb(p) for p in (main, *workers) if Path(f"/proc/{p}").exists()))
-            mean_load = (cpu_s(main) - cpu0) / (time.monotonic() - began)
+            took_s = time.monotonic() - began
+            mean_load, card_bytes_per_s = (cpu_s(main) - cpu0) / took_s, (written_bytes(main) - written0) / took_s
         summary = json.loads((folder / "summary.json").read_text())
     return {
         "start_s": start_s, "cpu_core_mean": mean_load, "cpu_core_median": sorted(loads)[len(loads) // 2],
-        "memory_mb": worst, "loop_held_max_s": summary["loop_held_max_s"],
+        "memory_mb": worst, "card_mb_per_day": card_bytes_per_s * 86_400.0 / 1e6,
+        "loop_held_max_s": summary["loop_held_max_s"],
     }
 
 
@@ -126,6 +133,7 @@ def main() -> int:
     print(f"companion while sailing          {100 * figures['cpu_core_median']:.1f} % of a core "
           f"(mean {100 * figures['cpu_core_mean']:.1f} %)")
     print(f"memory with the planner's worker {figures['memory_mb']:.0f} MB")
+    print(f"what reaches a card              {figures['card_mb_per_day']:.0f} MB a day")
     print(f"event loop held at most          {1000 * figures['loop_held_max_s']:.0f} ms")
     print(f"demo under the virtual clock     {figures['times_real_time']:.0f} times real time")
     if args.json:

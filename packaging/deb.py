@@ -167,7 +167,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / "dist")
     parser.add_argument("--work", type=Path, help="a folder to work in, and to go on in (default: a temporary one)")
+    parser.add_argument("--tree", action="store_true",
+                        help="stop when the package's tree is whole (--work DIR/stage), and write its name to DIR/name")
     args = parser.parse_args()
+    if args.tree and args.work is None:
+        parser.error("--tree needs --work")
     out = args.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
     with contextlib.ExitStack() as stack:
@@ -180,7 +184,11 @@ def main() -> None:
             if not path.is_symlink():
                 path.chmod(0o755 if path.is_dir() or path.parent.name == "bin" else 0o644)
         control(stage)
-        target = out / f"{NAME}_{version()}~{release()}_{run('dpkg', '--print-architecture')}.deb"
+        name = f"{NAME}_{version()}~{release()}_{run('dpkg', '--print-architecture')}.deb"
+        if args.tree:
+            (work / "name").write_text(f"{name}\n")
+            return
+        target = out / name
         run("dpkg-deb", "--build", "--root-owner-group", "-Zxz", stage, target)
     print(f"{target}: {target.stat().st_size / 1e6:.1f} MB")
 

@@ -99,6 +99,27 @@ def test_bad_words_are_one_line_and_write_nothing(words, said, tmp_path, capfd):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_full_card_is_one_line_with_what_makes_room(tmp_path, monkeypatch, capfd):
+    here = os.statvfs(tmp_path)
+    monkeypatch.setattr(os, "statvfs", lambda _: os.statvfs_result((*here[:3], 0, 0, *here[5:10])))
+    assert cli.main(["setup", "lake", "--yes", "--dir", str(tmp_path), "--link", "udpin:127.0.0.1:1", "--no-doctor",
+                     *HERE]) == 1
+    err = capfd.readouterr().err
+    assert "the card is full (0.0 MB left); make room: sudo apt clean" in err
+    assert err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", ["setup", "run"])
+def test_a_system_of_32_bits_is_one_line_with_what_to_install(command, monkeypatch, capfd):
+    monkeypatch.setattr(sys, "maxsize", 2**31 - 1)
+    assert cli.main([command]) == 1
+    err = capfd.readouterr().err
+    assert "32-bit system" in err
+    assert "install a 64-bit one" in err
+    assert err.count("\n") == 1
+
+
 def refusal(found):
     with pytest.raises(LinkError) as error:
         ports.find(found, lambda _: None)
