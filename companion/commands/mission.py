@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -106,23 +105,18 @@ def _example(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> int:
-    from companion.geofence.check import Conditions, check_area
-    from companion.geofence.mission import load_mission
-
     if Path(args.file).suffix.lower() != ".toml":
         document = read_mission_file(args.file)
         print_findings(document.findings, args.file)
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
-    from companion.sailable import require_sailable
+    from companion.sailable import judge
 
-    mission = require_sailable(load_mission(args.file))
-    bad = print_findings(mission.findings, args.file)
-    wind_deg = args.wind[1] if args.wind else mission.wind.preview_from_deg
-    bad |= print_findings(check_area(mission.area, Conditions(
-        start=mission.start, goals=tuple(g.point for g in mission.goals), margin_m=mission.margin_m,
-        twd_from_rad=math.radians(wind_deg), no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
-    )), args.file)
+    judged = judge(Path(args.file), from_deg=args.wind[1] if args.wind else None)
+    if judged.mission is None or judged.refusals:
+        raise judged.refusals[0]
+    mission = judged.mission
+    bad = print_findings(judged.findings, args.file)
     if args.plot:
         preview(mission, args)
     print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "

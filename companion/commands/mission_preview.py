@@ -12,7 +12,7 @@ from companion.program.arguments import picture, wind
 
 if TYPE_CHECKING:
     from companion.geofence import Document, Mission
-    from companion.planner import Plan, Problem
+    from companion.planner import Plan
 
 
 def preview_options(parser: argparse.ArgumentParser) -> None:
@@ -45,57 +45,16 @@ def preview(mission: Mission, args: argparse.Namespace) -> None:
 
 
 def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
-    """Return the planner's way from goal to goal, first lap, in a steady wind; and home, where the mission ends there.
-
-    Home is taken to be the start: the autopilot's is where it was armed.
-    """
+    """Return the planner's way from goal to goal, first lap, in a steady wind; and home, if the mission ends there."""
     from companion.compose import planner_of
     from companion.planner import plan
-    from companion.skipper.planning import HOME_RADIUS_M
+    from companion.previews import Wind, legs, walked
 
     by = planner_of(mission)
-
-    if mission.start is None:
-        return []
-    frame = mission.frame()
-    here = frame.en_from_geo(mission.start)
-    heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
-    plans = []
-    targets = [(goal.point, goal.radius_m) for goal in mission.goals]
-    if mission.skipper.end == "home":
-        targets.append((mission.start, HOME_RADIUS_M))
-    for point, radius_m in targets:
-        east_m, north_m = frame.en_from_geo(point)
-        problem = leg_problem(mission, here, heading_deg, (east_m, north_m), radius_m, tws_mps=tws_mps,
-                              from_deg=math.degrees(twd_from_rad))
-        answer = plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0, algorithm=by.algorithm,
-                      settings=by.settings)
-        plans.append(answer)
-        if not answer.has_path:
-            break
-        here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
-        heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
-    return plans
-
-
-def leg_problem(
-    mission: Mission, here_en: tuple[float, float], heading_deg: float, goal_en: tuple[float, float], radius_m: float,
-    *, tws_mps: float, from_deg: float, title: str = "",
-) -> Problem:
-    """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady."""
-    from companion.compose import boat_of
-    from companion.planner import Problem
-
-    local = mission.area.local(mission.frame())
-    return Problem.from_json({
-        "id": mission.name, "title": title,
-        "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
-        "goal": {"x": goal_en[0], "y": goal_en[1], "radius": radius_m},
-        "obstacles": local.obstacles_wkt(mission.margin_m),
-        "obstacle_names": local.obstacle_names(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here_en),
-        "wind": {"from_deg": from_deg, "speed_mps": tws_mps, "sigma": {"model": "none"}},
-        "boat": boat_of(mission).problem_boat(tws_mps), "delta_s": mission.risk.delta_s,
-    })
+    return walked(
+        legs(mission, Wind(from_deg=math.degrees(twd_from_rad), speed_mps=tws_mps)),
+        lambda problem: plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0, algorithm=by.algorithm,
+                             settings=by.settings))
 
 
 def read_mission_file(path: str) -> Document:
