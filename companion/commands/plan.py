@@ -125,7 +125,7 @@ def _mission(args: argparse.Namespace) -> Mission:
 
 def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
     """Return the problems and plans of a mission from goal to goal, to the first that has no path."""
-    from companion.previews import Wind, legs, walked
+    from companion.sailable.previews import Wind, legs, walked
 
     tws_mps, from_deg = args.wind or (mission.wind.preview_speed_mps, mission.wind.preview_from_deg)
     answers: list[tuple[Problem, Plan]] = []

@@ -23,7 +23,7 @@ def rewritten(
 ) -> str:
     """Return the mission file ``text``, which says ``before``, so that it says ``after``.
 
-    ``keys``: for ``goal`` and ``refuge``, of each entry of ``after`` its number in ``before`` (from 0), None: it is new.
+    ``keys``: for ``goal`` and ``refuge``, of each entry of ``after`` its number in ``before`` (from 0), None: new.
 
     A table of one kind keeps what it says of keys that did not change, and its comments.
 
@@ -169,8 +169,8 @@ def _listed(
                 block, _edited(block.text, name, changes, is_one_of_many=True)) if changes else block)
     if list(keys) == list(range(len(before))):
         out = list(blocks)
-        for n, entry in zip(places, entries, strict=True):
-            out[n] = entry
+        for n, block in zip(places, entries, strict=True):
+            out[n] = block
         return out
     rest = [b for b in blocks if b.name != name]
     if not entries:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gzip
-import hmac
 import re
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any
@@ -17,7 +16,7 @@ from companion.errors import InputError
 from companion.orders import phrase
 from companion.page.address import Address
 from companion.page.charts import Chart
-from companion.page.connections import JSON, Channel, Refused, Reply, Server, Stream, header, listening
+from companion.page.connections import Channel, Refused, Reply, Server, Stream, header, listening, require_token
 from companion.page.hub import Watcher
 from companion.page.site import files
 from companion.page.sources import Live, Record
@@ -26,7 +25,6 @@ MOST_WATCHERS = 16
 MOST_BODY = 1_000
 STILL_S = 15.0            # a word now and then, where nothing happens
 ANSWER_S = 8.0            # for the answer to an order
-MARK = b"x-companion"     # no form and no picture can send it
 
 
 @contextlib.asynccontextmanager
@@ -118,11 +116,7 @@ class Page:
         """Take an order, or show what it would lead to; return the answer."""
         if not self._takes_orders or not isinstance(self._source, Live) or self._source.ask is None:
             raise Refused(403, "orders are not taken here: begin with --http-token FILE")
-        if header(request, b"content-type").partition(";")[0].strip() != JSON or header(request, MARK) != "1":
-            raise Refused(403, "an order is JSON, with X-Companion: 1")
-        given = header(request, b"authorization")
-        if not hmac.compare_digest(given.encode(), f"Bearer {self._address.token}".encode()):
-            raise Refused(401, "the token is missing or wrong")
+        require_token(request, self._address.token)
         try:
             words = msgspec.json.decode(body, type=dict[str, str])["order"]
             wanted = phrase(words.split())

@@ -12,7 +12,7 @@ from companion.geofence import load_mission
 from companion.planner import Problem
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.json_write import to_dict
-from companion.previews import Wind, leg_problem
+from companion.sailable.previews import Wind, leg_problem
 
 GOOD = {
     "id": "pond", "title": "Across the pond", "start": {"x": 0, "y": 0, "heading_deg": 0},

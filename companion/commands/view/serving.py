@@ -12,7 +12,7 @@ from typing import Any
 STEP_S = 1.0
 
 
-async def _stopped() -> None:
+async def stopped() -> None:
     """Wait for SIGINT or SIGTERM."""
     stop = asyncio.Event()
     for end in (signal.SIGINT, signal.SIGTERM):
@@ -27,7 +27,7 @@ async def serve(address: Any, source: Any, charts: Any) -> int:
 
     async with served(address, source, charts=charts):
         print(f"{address.url}  (Ctrl-C ends it)", flush=True)
-        await _stopped()
+        await stopped()
     return 0
 
 

@@ -30,7 +30,7 @@ Coordinates = list[tuple[float, float]]
 _LEXEME = re.compile(r"\s*(?:([A-Za-z]+)|([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|([(),;]))")
 _SRID = re.compile(r"\s*SRID\s*=\s*(\d+)\s*;", re.IGNORECASE)
 _PREFIX = re.compile(r"([^|()]*)\|(?:([^|()]*)\|)?")
-_KINDS = {
+KINDS: dict[str, ZoneKind | None] = {   # what may stand between the bars
     "": None, "inclusion": ZoneKind.INCLUSION, "keep-in": ZoneKind.INCLUSION, "fence": ZoneKind.INCLUSION,
     "exclusion": ZoneKind.EXCLUSION, "keep-out": ZoneKind.EXCLUSION, "obstacle": ZoneKind.EXCLUSION,
 }
@@ -158,11 +158,11 @@ def _statement(text: str, line: int, last: int, source: str) -> _Statement:
     if prefix:
         name = prefix.group(1).strip()
         word = (prefix.group(2) or "").strip().lower()
-        if prefix.group(2) is None and name.lower() in _KINDS:
+        if prefix.group(2) is None and name.lower() in KINDS:
             name, word = "", name.lower()
-        if word not in _KINDS:
+        if word not in KINDS:
             raise InputError(source, f"line {line}", f"{word!r} is not a kind", "write inclusion or exclusion")
-        kind = _KINDS[word]
+        kind = KINDS[word]
         text = text[prefix.end():]
     return _Statement(line, last, name, kind, text)
 

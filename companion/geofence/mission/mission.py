@@ -196,8 +196,8 @@ def assembled(
 ) -> Mission:
     """Return the mission of ``options`` with the files that they name, which lie relative to ``path``.
 
-    The zones of ``drawn`` belong to its area; ``given`` is as for ``load_mission``, of its area's files. Whether its places lie in
-    free water is not looked at. Raises InputError.
+    The zones of ``drawn`` belong to its area; ``given`` is as for ``load_mission``, of its area's files. Whether its
+    places lie in free water is not looked at. Raises InputError.
     """
     reader = GoalReader(path=path, axis=options.area.axis)
     origin = reader.origin_of(options)

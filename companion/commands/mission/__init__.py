@@ -1,4 +1,4 @@
-"""``companion mission``: check, make, convert, upload and download missions."""
+"""``companion mission``: check, make, draw, convert, upload and download missions."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from companion.commands import mission_new
-from companion.commands.mission_preview import preview, preview_options, read_mission_file
+from companion.commands.mission.edit import add_parser as add_edit
+from companion.commands.mission.new import add_parser as add_new
+from companion.commands.mission.new import point_radius_option, write_mission
+from companion.commands.mission.picture import preview, preview_options, read_mission_file
 from companion.commands.output import (
     force_option,
     print_findings,
@@ -28,6 +30,7 @@ examples:
   companion mission check missions/archipelago.toml --plot archipelago.png
   companion mission new bay.toml --start 50.817,-1.31 --goal 50.8203,-1.31 --land islands.wkt --margin 12 --plot bay.png
   companion mission new bay.toml --from drawn-in-qgroundcontrol.plan
+  companion mission edit bay.toml                      (draw it in a browser, checked and planned as you draw)
   companion mission convert bay.toml bay.plan          (also .gpx, .kml, .geojson)
   companion mission convert bay.toml bay.waypoints --part mission
   companion mission convert route.gpx route.waypoints
@@ -41,20 +44,21 @@ Exit codes: 0 in order, 1 faults found or a failed transfer, 2 a file or option 
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
-    """Add the command with its six verbs."""
+    """Add the command with its verbs."""
     from companion.commands.fence import link_options
 
     parser = subparsers.add_parser(
         "mission", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    verbs = parser.add_subparsers(dest="verb", metavar="check|new|example|convert|upload|download", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="check|new|edit|example|convert|upload|download", required=True)
     check = verbs.add_parser("check", help="read a mission as the boat would and name what is wrong")
     check.add_argument("file", metavar="FILE")
     preview_options(check)
     check.set_defaults(run=_check)
 
-    mission_new.add_parser(verbs)
+    add_new(verbs)
+    add_edit(verbs)
 
     example = verbs.add_parser("example", help="write the missions that come with the program, to begin from")
     example.add_argument("folder", type=Path, metavar="DIR")
@@ -66,7 +70,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     convert.add_argument("--part", choices=("mission", "fence", "rally"),
                          help="write this alone (a .waypoints file holds no more than one of them)")
     convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
-    mission_new.point_radius_option(convert)
+    point_radius_option(convert)
     force_option(convert)
     convert.set_defaults(run=_convert)
 
@@ -122,6 +126,8 @@ def _check(args: argparse.Namespace) -> int:
     print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
           f"{counted(len(mission.area.solids), 'obstacle')}: "
           f"{'NOT in order' if bad else 'in order'}")
+    if bad:
+        print(f"to see it on a chart and mend it: companion mission edit {args.file}")
     return int(bad)
 
 
@@ -162,7 +168,7 @@ def _convert(args: argparse.Namespace) -> int:
             made = mission_files(document, out.stem)
         except ValueError as error:
             raise InputError(args.file, "", str(error)) from None
-        mission_new.write_mission(made, out, force=args.force)
+        write_mission(made, out, force=args.force)
         return 0
     if args.part is not None:
         document = _only(document, args.part)

@@ -48,7 +48,7 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
     """Return the planner's way from goal to goal, first lap, in a steady wind; and home, if the mission ends there."""
     from companion.compose import planner_of
     from companion.planner import plan
-    from companion.previews import Wind, legs, walked
+    from companion.sailable.previews import Wind, legs, walked
 
     by = planner_of(mission)
     return walked(
