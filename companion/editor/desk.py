@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Annotated, Any
 
 import h11
@@ -21,7 +21,7 @@ from companion.editor.saving import changed_meanwhile, save
 from companion.editor.sketch import Sketch
 from companion.editor.state import state_of
 from companion.errors import CompanionError, InputError
-from companion.page import Refused, Reply, Stream, files, require_token
+from companion.page import Chart, Refused, Reply, Stream, files, require_token, tile_at
 from companion.sailable.previews import Wind
 from companion.words import counted, listed
 
@@ -50,9 +50,12 @@ class Desk:
 
     most_body = MOST_BODY
 
-    def __init__(self, base: Base, token: str, previews: Previews, disk: Disk | None = None) -> None:
+    def __init__(
+        self, base: Base, token: str, previews: Previews, charts: Sequence[Chart] = (), disk: Disk | None = None,
+    ) -> None:
         self._path, self._token, self._previews, self._disk = base.path, token, previews, disk or Disk()
         self._files = {**files(), **files("companion.editor")}
+        self._charts = {chart.tag: chart for chart in charts}
         self._bases: dict[str, Base] = {}
         self._own: dict[Any, bytes] = {}      # files that were made here, as they were written
         self._turn, self._newest = asyncio.Lock(), 0
@@ -61,7 +64,9 @@ class Desk:
     async def reply(self, request: h11.Request, path: str, body: bytes) -> Reply | Stream:
         """Answer a request. Raises Refused."""
         if request.method != b"POST":
-            file = self._files.get(path)
+            file, tile = self._files.get(path), await tile_at(self._charts, path)
+            if tile is not None:
+                return tile
             if file is None:
                 raise Refused(404, "there is nothing here")
             return Reply(kind=file.kind, data=file.data, tag=file.tag, packed=file.packed)
@@ -110,7 +115,11 @@ class Desk:
     async def _load(self) -> dict[str, Any]:
         base = await asyncio.to_thread(read_base, self._path)
         self._keep(base)
-        return await asyncio.to_thread(state_of, base)
+        return await self._state(base)
+
+    async def _state(self, base: Base) -> dict[str, Any]:
+        charts = [chart.facts() for chart in self._charts.values()]
+        return {**await asyncio.to_thread(state_of, base), "charts": charts}
 
     async def _check(self, asked: _Asked) -> dict[str, Any]:
         self._newest += 1
@@ -152,7 +161,7 @@ class Desk:
         bad = [row for row in found["findings"] if row["severity"] == "error"]
         words = f"{listed(names)} saved" if names else "nothing had changed"
         words += f": NOT in order, {counted(len(bad), 'error')}" if bad else ": in order"
-        return {**await asyncio.to_thread(state_of, base), "said": words}
+        return {**await self._state(base), "said": words}
 
     async def _export(self, asked: _Asked) -> dict[str, Any]:
         return await asyncio.to_thread(self._exported, asked)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import secrets
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 
 from companion.editor.base import Base
 from companion.editor.desk import Desk
 from companion.editor.plans import Previews
-from companion.page import Address, listening
+from companion.page import Address, Chart, listening
 from companion.planner.worker import PlannerWorker
 
 
@@ -23,8 +23,10 @@ class Place:
 
 
 @contextlib.asynccontextmanager
-async def editing(base: Base, address: Address, say: Callable[[str], None] = lambda _: None) -> AsyncIterator[Place]:
-    """Serve the editor of a mission while the body runs. ``say`` hears where. An address without a token gets one.
+async def editing(base: Base, address: Address, charts: Sequence[Chart] = ()) -> AsyncIterator[Place]:
+    """Serve the editor of a mission while the body runs. An address without a token gets one.
+
+    ``charts`` lie under the drawing, the lowest first.
 
     Raises:
         JobError: the port is in use, or it cannot be listened there.
@@ -32,8 +34,6 @@ async def editing(base: Base, address: Address, say: Callable[[str], None] = lam
     token = address.token or secrets.token_urlsafe(24)
     async with (
         PlannerWorker(algorithm=base.options.skipper.planner) as worker,
-        listening(address, Desk(base, token, Previews(worker))) as server,
+        listening(address, Desk(base, token, Previews(worker), charts)) as server,
     ):
-        place = Place(url=f"{server.address.url}#{token}", token=token)
-        say(place.url)
-        yield place
+        yield Place(url=f"{server.address.url}#{token}", token=token)

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import gzip
 import re
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
 
 import h11
@@ -70,11 +70,9 @@ class Page:
         if chunk is not None and isinstance(self._source, Record) and int(chunk[1]) < len(self._source.chunks):
             packed = self._source.chunks[int(chunk[1])]
             return Reply(data=await asyncio.to_thread(gzip.decompress, packed), packed=packed)
-        tile = re.fullmatch(r"/tiles/([0-9a-f]{12})/([0-9]{1,2})/([0-9]{1,8})/([0-9]{1,8})", path)
-        chart = self._charts.get(tile[1]) if tile is not None else None
-        if tile is not None and chart is not None:
-            kind, data = await asyncio.to_thread(chart.tile, int(tile[2]), int(tile[3]), int(tile[4]))
-            return Reply(kind=kind, data=data, is_fixed=True)
+        tile = await tile_at(self._charts, path)
+        if tile is not None:
+            return tile
         make = self._made(path)
         if make is None:
             raise Refused(404, "there is nothing here")
@@ -154,6 +152,16 @@ class Page:
                         return
 
         return watch
+
+
+async def tile_at(charts: Mapping[str, Chart], path: str) -> Reply | None:
+    """Return the tile of one of the charts, by their tags, that a path names; None: it names none."""
+    tile = re.fullmatch(r"/tiles/([0-9a-f]{12})/([0-9]{1,2})/([0-9]{1,8})/([0-9]{1,8})", path)
+    chart = charts.get(tile[1]) if tile is not None else None
+    if tile is None or chart is None:
+        return None
+    kind, data = await asyncio.to_thread(chart.tile, int(tile[2]), int(tile[3]), int(tile[4]))
+    return Reply(kind=kind, data=data, is_fixed=True)
 
 
 def _json(value: Any) -> Callable[[], bytes]:

@@ -6,12 +6,12 @@ import argparse
 from pathlib import Path
 
 from companion.errors import InputError
-from companion.program.arguments import host_name, http_address
+from companion.program.arguments import chart_option, host_name, http_address
 
 _EPILOG = """\
 examples:
   companion mission edit missions/bay.toml
-  companion mission edit new.toml --http 8765
+  companion mission edit new.toml --http 8765 --chart solent.mbtiles
   companion mission edit new.toml --http 0.0.0.0:8765       (for who is on the network and has the whole address)
 
 The address that is printed ends in a token of this run: who has it may edit this file, nobody else. Nothing is written
@@ -33,6 +33,7 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
                       help="where to serve it (default: a free port of this machine, for this machine only)")
     edit.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
                       help="a further name under which this machine's page may be asked for")
+    chart_option(edit)
     edit.set_defaults(run=run)
 
 
@@ -40,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     """Serve the editor until it is ended; return the exit code."""
     from companion.clock import run as run_loop
     from companion.editor import Base, editing, read_base
-    from companion.page import Address
+    from companion.page import Address, open_charts
 
     path = Path(args.file)
     if path.suffix.lower() != ".toml":
@@ -50,11 +51,12 @@ def run(args: argparse.Namespace) -> int:
 
     base: Base = read_base(path)
     host, port = args.http
+    charts = open_charts(args.chart)
 
     async def whole() -> None:
         from companion.commands.view.serving import stopped
 
-        async with editing(base, Address(host=host, port=port, names=tuple(args.http_name))) as place:
+        async with editing(base, Address(host=host, port=port, names=tuple(args.http_name)), charts) as place:
             print(f"{place.url}  (Ctrl-C ends it)", flush=True)
             await stopped()
 

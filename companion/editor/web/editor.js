@@ -11,7 +11,7 @@ import * as tables from "./tables.js";
 /** @typedef {{findings: Finding[], is_in_order: boolean, grown: Place[][][], water: Place[][][]}} Found */
 /** @typedef {{to: string, why: string, way: Place[], time_s: number, length_m: number, risk: number | null, risks: (number | null)[], tacks: number, gybes: number, clearance_m: number | null}} Leg */
 /** @typedef {{error: string, legs: Leg[], time_s: number, length_m: number, tacks: number, gybes: number, clearance_m: number | null}} Plan */
-/** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, name: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string}} State */
+/** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, name: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string, charts: import("./charts.js").Chart[]}} State */
 
 const KNOT_MPS = 1852 / 3600, CHECK_MS = 180, PLAN_MS = 350, SIDES = 48;
 let token = "";
@@ -254,12 +254,25 @@ async function load() {
   history = new History(told.sketch);
   draft = null;
   selected = null;
-  if (isFirst) { windMps = told.wind.speed_mps; input("windfrom").value = String(told.wind.from_deg); shownWind(); tables.build(editor); chart.build(editor); }
+  if (isFirst) { windMps = told.wind.speed_mps; input("windfrom").value = String(told.wind.from_deg); shownWind(); tables.build(editor); chart.build(editor); map.lay(told.charts); }
   take(told, true);
   changed();
   whole();
-  if (isFirst && !told.is_placed) where();
+  if (isFirst && !told.is_placed) { if (told.charts[0]) begin(onChart(told.charts[0])); else where(); }
   return true;
+}
+
+/** The middle of a chart. @param {import("./charts.js").Chart} given @returns {Place} */
+function onChart(given) {
+  const [west, south, east, north] = given.bounds_deg;
+  return [(south + north) / 2, (west + east) / 2];
+}
+
+/** An empty mission begins there. @param {Place} place */
+function begin(place) {
+  state.frame = { lat: place[0], lon: place[1], lat_m: 111195, lon_m: 111320 * Math.max(0.01, Math.cos(place[0] * Math.PI / 180)) };
+  whole();
+  show();
 }
 
 /** An empty mission: where on the globe? */
@@ -275,11 +288,8 @@ function where() {
     void import("./sketch.js").then(({ degrees }) => {
       const place = [degrees(lat.value, "lat"), degrees(lon.value, "lon")];
       if (!place.every(Number.isFinite)) { get("wherewrong").textContent = "These are no degrees."; return; }
-      const cosine = Math.max(0.01, Math.cos((place[0] ?? 0) * Math.PI / 180));
-      state.frame = { lat: place[0] ?? 0, lon: place[1] ?? 0, lat_m: 111195, lon_m: 111320 * cosine };
       dialog.close();
-      whole();
-      show();
+      begin([place[0] ?? 0, place[1] ?? 0]);
     });
   });
 }
