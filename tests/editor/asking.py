@@ -16,6 +16,10 @@ TOKEN = "a-token-of-enough-characters"
 class Asker(Browser):
     """Asks as the editor's page does."""
 
+    async def raw(self, data, at_most_s=90.0):
+        """The first plan waits for the planner's kernels."""
+        return await super().raw(data, at_most_s)
+
     async def post(self, path, value=None, token=TOKEN, body=None, **headers):
         """Return status and answer."""
         data = json.dumps(value or {}).encode() if body is None else body
@@ -35,14 +39,14 @@ def with_editor(path, talk):
 
 
 @contextlib.contextmanager
-def edited(path, port=0):
+def edited(path, port=0, charts=()):
     """Serve the editor of a file from a thread; yields its address with its token."""
     ready, found = threading.Event(), []
 
     async def whole():
         over = asyncio.Event()
         found.extend([asyncio.get_running_loop(), over])
-        async with editing(read_base(path), Address(host="127.0.0.1", port=port, token=TOKEN)) as place:
+        async with editing(read_base(path), Address(host="127.0.0.1", port=port, token=TOKEN), charts) as place:
             found.append(place.url)
             ready.set()
             await over.wait()

@@ -54,11 +54,12 @@ def run(args: argparse.Namespace) -> int:
     charts = open_charts(args.chart)
 
     async def whole() -> None:
-        from companion.commands.view.serving import stopped
+        from companion.commands.view.serving import stopping
 
+        stop = stopping()
         async with editing(base, Address(host=host, port=port, names=tuple(args.http_name)), charts) as place:
             print(f"{place.url}  (Ctrl-C ends it)", flush=True)
-            await stopped()
+            await stop.wait()
 
     run_loop(whole())
     return 0

@@ -47,7 +47,7 @@ export function build(owner) {
 }
 
 /** A small sign of a tool. @param {string} name */
-function sign(name) {
+export function sign(name) {
   const icon = svg("svg", { viewBox: "-9 -9 18 18", class: `sign ${name}`, "aria-hidden": "true" });
   const draw = (/** @type {string} */ d, extra = {}) => icon.append(svg("path", { d, ...extra }));
   if (name === "select") draw("M-5-7V5L-2 2L1 8L3 7L0 1H5Z", { class: "full" });

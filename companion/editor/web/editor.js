@@ -166,9 +166,9 @@ async function planned(signal) {
 function planWords() {
   const words = get("planwords"), legs = plan?.legs ?? [];
   if (!input("plans").checked) plan = null;
-  words.textContent = plan === null ? "" : plan.error ? `No plan: ${plan.error}.` : legs.length === 0 ? "Nothing to plan yet." : "";
+  words.textContent = plan === null ? "" : history.now.goals.length === 0 ? "Nothing to plan yet." : plan.error ? `No plan: ${plan.error}.` : legs.length === 0 ? "Nothing to plan yet." : "";
   words.classList.toggle("warn", Boolean(plan?.error) && history.now.goals.length > 0);
-  const facts = plan === null || legs.length === 0 ? [] : [["time", duration(plan.time_s)], ["way", distance(plan.length_m)], ["tacks, gybes", `${plan.tacks}, ${plan.gybes}`], ["nearest, beyond the margin", distance(plan.clearance_m)]];
+  const facts = plan === null || legs.length === 0 ? [] : [["time", duration(plan.time_s)], ["way", distance(plan.length_m)], ["tacks, gybes", `${plan.tacks}, ${plan.gybes}`], ["room beyond margin", distance(plan.clearance_m)]];
   get("planfacts").replaceChildren(...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
   get("plantable").replaceChildren(...(plan && legs.length > 1 ? [table("Legs", ["to", "time", "way", "tacks", "risk"], legs.map((leg) => [leg.to, duration(leg.time_s), distance(leg.length_m), String(leg.tacks), percent(leg.risk)]))] : []));
   const first = legs[0]?.why;
@@ -357,7 +357,9 @@ function keys(event) {
   if (event.key === "Escape") return chart.cancel();
   if ((event.key === "Delete" || event.key === "Backspace") && selected && onChart) {
     event.preventDefault();
-    return editor.commit(removed(history.now, selected), null);
+    const rest = removed(history.now, selected), list = selected.of === "goal" ? "goals" : "shapes";
+    const isLess = selected.v !== undefined && rest[list].length === history.now[list].length;   // a corner only
+    return editor.commit(rest, isLess ? { of: selected.of, n: selected.n } : null);
   }
   const tool = chart.TOOLS.find((row) => row[1] === event.key);
   if (tool) return chart.choose(tool[0]);

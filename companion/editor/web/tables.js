@@ -1,4 +1,5 @@
 // The tables beside the chart: every thing with its numbers, to be read, typed and put in order.
+import { sign } from "./chart.js";
 import { el, get } from "./dom.js";
 import { called, changed, degrees, moved, placeOf, removed, reordered, toEn } from "./sketch.js";
 
@@ -47,7 +48,7 @@ function thing(ref, kind) {
   const isChosen = selected?.of === ref.of && selected.n === ref.n;
   const place = placeOf(sketch, ref);
   const head = el("button", { type: "button", class: "pick", id: `pick-${id(ref)}`, "aria-expanded": isChosen ? "true" : "false" },
-    el("span", { class: "number" }, ref.of === "goal" ? String(ref.n + 1) : ref.of === "start" ? "0" : ref.of === "refuge" ? "□" : ""),
+    el("span", { class: "number" }, ref.of === "goal" ? String(ref.n + 1) : sign(ref.of === "shape" ? (kind === "fence" ? "fence" : kind === "polygon" ? "obstacle" : "rock") : ref.of)),
     el("span", { class: "what" }, called(sketch, ref)), el("span", { class: "kind" }, summary(ref, kind)));
   head.addEventListener("click", () => editor.select(isChosen ? null : ref));
   const row = el("li", { class: isChosen ? "thing chosen" : "thing", "data-thing": id(ref) }, head);
@@ -160,6 +161,13 @@ function label(text, input, unit = "") {
   return el("label", {}, text, ...(unit ? [" ", el("span", { class: "unit" }, unit)] : []), input);
 }
 
+/** A field that is twice as wide. @param {string} text @param {HTMLElement} input */
+function doubled(text, input) {
+  const field = label(text, input);
+  field.className = "double";
+  return field;
+}
+
 /** @param {Ref} ref @param {string} prefix @param {boolean} [isBare] @returns {HTMLElement[]} */
 function position(ref, prefix = "", isBare = false) {
   const place = placeOf(editor.sketch(), ref) ?? [0, 0];
@@ -216,7 +224,7 @@ function mission(sketch) {
   named.className = "wide";
   const end = /** @type {HTMLSelectElement} */ (el("select", { id: "mission-end" }, el("option", { value: "loiter", selected: sketch.end === "loiter" }, "loiter at the last goal"), el("option", { value: "home", selected: sketch.end === "home" }, "sail home, loiter there")));
   end.addEventListener("change", () => editor.commit({ ...editor.sketch(), end: end.value === "home" ? "home" : "loiter" }, editor.selected()));
-  get("mission").replaceChildren(el("div", { class: "fields" }, named, label("after the last goal", end), field("laps", "laps", "", 1, 10000, sketch.laps),
+  get("mission").replaceChildren(el("div", { class: "fields" }, named, doubled("after the last goal", end), field("laps", "laps", "", 1, 10000, sketch.laps),
     field("margin_m", "margin to everything", "m", 0, 1000, sketch.margin_m), field("margin_floor_m", "at the least", "m", 0, 1000, sketch.margin_floor_m), field("point_radius_m", "radius of rocks", "m", 0.1, 5000, sketch.point_radius_m)),
     ...files.map((file) => el("p", { class: "none" }, el("b", {}, file.name), file.why ? ` ${file.why}` : "", file.shared_by.length ? ` Other missions use it too: ${file.shared_by.join(", ")}.` : "")),
     ...(others.length ? [el("p", { class: "none" }, `Kept in the file as they stand: ${others.map((name) => (name === "description" ? name : `[${name}]`)).join(", ")}.`)] : []));
