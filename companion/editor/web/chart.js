@@ -188,7 +188,9 @@ function between(ref) {
 function taken(at, event) {
   const reach = event.pointerType === "touch" ? NEAR_TOUCH : NEAR;
   let best = null, least = reach;
+  const on = (/** @type {Place} */ place) => map.onScreen(toEn(editor.frame(), place));
   for (const handle of handles()) {
+    if (handle.kind !== "point" && isCrowded(editor.sketch(), handle.ref, handle.kind, on)) continue;
     const place = handle.kind === "between" ? between(handle.ref) : placeOf(editor.sketch(), handle.ref);
     if (place === null) continue;
     const [x, y] = map.onScreen(toEn(editor.frame(), place));
@@ -319,7 +321,7 @@ function over(at, camera) {
   if (sketch.start) { const [x, y] = on(sketch.start.at); out.push(svg("text", { x: x + 10, y: y + 14, class: "word" }, "start")); }
   const last = sketch.goals.length - 1, home = sketch.end === "home" ? sketch.start?.at : last >= 0 ? placeOf(sketch, { of: "goal", n: last }) : null;
   if (home) { const [x, y] = on(home); out.push(svg("circle", { cx: x, cy: y, r: 15, class: "safeend" }), svg("text", { x: x + 18, y: y + 18, class: "word small safe" }, "safe end")); }
-  for (const shape of sketch.shapes) name(shape, on, camera, out);
+  sketch.shapes.forEach((shape, n) => { if (selected?.of !== "shape" || selected.n !== n) name(shape, on, camera, out); });
   chosen(sketch, selected, on, out);
   if (pending.length > 0) {
     const points = pending.map(on);
@@ -365,6 +367,16 @@ function name(shape, on, camera, out) {
   out.push(svg("text", { x, y: shape.type === "polygon" ? y + 4 : y - 10, class: "word small landword", "text-anchor": "middle" }, shape.name));
 }
 
+/** Has a handle no room of its own? @param {Sketch} sketch @param {Ref} ref @param {string} kind @param {(place: Place) => Point} on */
+function isCrowded(sketch, ref, kind, on) {
+  const ring = (ref.of === "shape" ? sketch.shapes[ref.n]?.rings[ref.ring ?? 0] : sketch.goals[ref.n]?.ring) ?? [];
+  if (kind === "whole") { const points = ring.map(on); return Math.max(...points.map((p) => p[0])) - Math.min(...points.map((p) => p[0])) < 44; }
+  const a = ring[ref.v ?? 0], b = ring[((ref.v ?? 0) + 1) % ring.length];
+  if (!a || !b) return true;
+  const [p, q] = [on(a), on(b)];
+  return Math.hypot(p[0] - q[0], p[1] - q[1]) < 30;
+}
+
 /** What is selected, with its handles. @param {Sketch} sketch @param {Ref | null} selected @param {(place: Place) => Point} on @param {Element[]} out */
 function chosen(sketch, selected, on, out) {
   if (!selected) return;
@@ -375,6 +387,7 @@ function chosen(sketch, selected, on, out) {
     if (ref.of !== selected.of || ref.n !== selected.n) continue;
     const place = kind === "between" ? between(ref) : placeOf(sketch, ref);
     if (place === null) continue;
+    if (kind !== "point" && isCrowded(sketch, ref, kind, on)) continue;
     const [x, y] = on(place), isIt = kind === "point" && (ref.v ?? -1) === (selected.v ?? -1) && (ref.ring ?? 0) === (selected.ring ?? 0) && (!selected.part || ref.part === selected.part || ref.part === undefined);
     if (kind === "whole") out.push(svg("path", { d: `M${x - 8} ${y}h16M${x} ${y - 8}v16M${x - 8} ${y}l3-3m-3 3l3 3M${x + 8} ${y}l-3-3m3 3l-3 3M${x} ${y - 8}l-3 3m3-3l3 3M${x} ${y + 8}l-3-3m3 3l3-3`, class: "whole" }));
     else out.push(svg("circle", { cx: x, cy: y, r: kind === "between" ? 3.5 : ref.part === "ring" ? 5.5 : 9, class: `handle ${kind}${isIt ? " it" : ""}` }));

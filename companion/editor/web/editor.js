@@ -308,7 +308,7 @@ function ask(title, words, ways) {
 
 function exporting() {
   const said = (/** @type {{said: string, part: string}} */ f) => (f.part ? `${f.said}: ${f.part}` : f.said);
-  const select = /** @type {HTMLSelectElement} */ (el("select", { id: "format" }, ...state.formats.map((f, n) => el("option", { value: n }, `${said(f)} (.${f.ending})`))));
+  const select = /** @type {HTMLSelectElement} */ (el("select", { id: "format" }, ...state.formats.map((f, n) => el("option", { value: n }, f.said.startsWith(".") ? said(f) : `${said(f)} (.${f.ending})`))));
   const make = el("button", { type: "button", class: "primary", id: "make" }, "Make it"), close = el("button", { type: "button" }, "Close"), told = el("div", { id: "exported", role: "status" });
   close.addEventListener("click", () => dialog.close());
   make.addEventListener("click", async () => {

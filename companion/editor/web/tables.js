@@ -115,7 +115,7 @@ function ofGoal(ref, fields, box) {
       number(ref, "mark_radius_m", "keep clear of marks", "m", goal.mark_radius_m ?? 5, 0, 500), number(ref, "after_s", "start: not before", "s", goal.after_s ?? null, 1, 1e6));
     box.append(swap);
   } else {
-    if (goal.kind === "box") fields.append(number(ref, "for_s", "stay for (empty: until told)", "s", goal.for_s ?? null, 1, 1e7));
+    if (goal.kind === "box") fields.append(number(ref, "for_s", "stay for", "s", goal.for_s ?? null, 1, 1e7, undefined, "until told"));
     else fields.append(number(ref, "swath_m", "seen from the track, across", "m", goal.swath_m ?? 20, 4, 5000), number(ref, "coverage", "share to be seen", "", goal.coverage ?? 0.95, 0.01, 0.99));
     if (goal.polygon) box.append(el("p", { class: "none" }, `Its water is in ${goal.polygon}: shown by the check, not drawn here.`));
     else box.append(corners({ ...ref, part: "ring" }, goal.ring ?? []));
@@ -127,9 +127,9 @@ function ofShape(ref, kind, fields, box) {
   const shape = editor.sketch().shapes[ref.n];
   if (!shape) return;
   if (kind === "point" || kind === "circle") {
-    fields.append(...position({ ...ref, ring: 0, v: 0 }), number(ref, "radius_m", `radius (empty: ${editor.sketch().point_radius_m})`, "m", shape.radius_m ?? null, 0.1, 5000, (value) => ({ radius_m: value, type: value === null ? "point" : "circle" })));
+    fields.append(...position({ ...ref, ring: 0, v: 0 }), number(ref, "radius_m", "radius", "m", shape.radius_m ?? null, 0.1, 5000, (value) => ({ radius_m: value, type: value === null ? "point" : "circle" }), String(editor.sketch().point_radius_m)));
   }
-  if (kind !== "fence") fields.append(number(ref, "margin_m", "own margin (empty: the mission's)", "m", shape.margin_m ?? null, 0, 1000));
+  if (kind !== "fence") fields.append(number(ref, "margin_m", "own margin", "m", shape.margin_m ?? null, 0, 1000, undefined, String(editor.sketch().margin_m)));
   if (kind === "polygon" || kind === "fence" || kind === "line") shape.rings.forEach((ring, r) => box.append(corners({ ...ref, ring: r }, ring, r > 0 ? `hole ${r}` : "")));
   if (shape.of) box.append(el("p", { class: "none" }, `In ${shape.of}.`));
 }
@@ -184,9 +184,9 @@ function position(ref, prefix = "", isBare = false) {
   });
 }
 
-/** @param {Ref} ref @param {string} key @param {string} text @param {string} unit @param {number | null} value @param {number} low @param {number} high @param {(value: number | null) => Record<string, any>} [values] */
-function number(ref, key, text, unit, value, low, high, values) {
-  const input = /** @type {HTMLInputElement} */ (el("input", { type: "number", id: `${key}-${id(ref)}`, value: value ?? "", min: low, max: high, step: "any" }));
+/** @param {Ref} ref @param {string} key @param {string} text @param {string} unit @param {number | null} value @param {number} low @param {number} high @param {(value: number | null) => Record<string, any>} [values] @param {string} [otherwise] what holds where nothing is typed */
+function number(ref, key, text, unit, value, low, high, values, otherwise = "") {
+  const input = /** @type {HTMLInputElement} */ (el("input", { type: "number", id: `${key}-${id(ref)}`, value: value ?? "", min: low, max: high, step: "any", placeholder: otherwise || null }));
   input.addEventListener("change", () => {
     const typed = input.value === "" ? null : Number(input.value);
     if (typed !== null && !(typed >= low && typed <= high)) return void input.reportValidity();
