@@ -125,24 +125,16 @@ def _mission(args: argparse.Namespace) -> Mission:
 
 def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
     """Return the problems and plans of a mission from goal to goal, to the first that has no path."""
-    from companion.commands.mission_preview import leg_problem
+    from companion.sailable.previews import Wind, legs, walked
 
-    assert mission.start is not None
     tws_mps, from_deg = args.wind or (mission.wind.preview_speed_mps, mission.wind.preview_from_deg)
-    frame = mission.frame()
-    here = frame.en_from_geo(mission.start)
-    heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
-    answers = []
-    for goal in mission.goals:
-        problem = leg_problem(
-            mission, here, heading_deg, frame.en_from_geo(goal.point), goal.radius_m, tws_mps=tws_mps,
-            from_deg=from_deg, title=goal.name)
+    answers: list[tuple[Problem, Plan]] = []
+
+    def answer(problem: Problem) -> Plan:
         answers.append(_answer(problem, args))
-        answer = answers[-1][1]
-        if not answer.has_path:
-            break
-        here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
-        heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
+        return answers[-1][1]
+
+    walked(legs(mission, Wind(from_deg=from_deg, speed_mps=tws_mps), goes_home=False), answer)
     return answers
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gzip
+import hmac
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import h11
@@ -38,6 +39,7 @@ HEADERS = (
     ("Permissions-Policy", "geolocation=(), camera=(), microphone=()"),
 )
 JSON = "application/json"
+MARK = b"x-companion"     # no form and no picture can send it
 
 
 class Refused(Exception):  # noqa: N818
@@ -106,6 +108,8 @@ async def listening(address: Address, app: App, *, pace: float = 1.0) -> AsyncIt
         in_use = getattr(error, "errno", None) in {98, 48, 10048}
         raise JobError(f"--http {address.host}:{address.port}: " + (
             "the port is in use; name another one" if in_use else f"cannot listen there ({words})")) from error
+    if address.port == 0:   # any that is free
+        server.address = replace(address, port=listener.sockets[0].getsockname()[1])
     try:
         yield server
     finally:
@@ -303,6 +307,15 @@ class _Connection:
             while await self._reader.read(1024):
                 pass
         self._writer.transport.abort()
+
+
+def require_token(request: h11.Request, token: str) -> None:
+    """Raise Refused for a POST that is not JSON of a page of ours, or does not know the token."""
+    if header(request, b"content-type").partition(";")[0].strip() != JSON or header(request, MARK) != "1":
+        raise Refused(403, "what is posted is JSON, with X-Companion: 1")
+    given = header(request, b"authorization")
+    if not (token and hmac.compare_digest(given.encode(), f"Bearer {token}".encode())):
+        raise Refused(401, "the token is missing or wrong")
 
 
 def header(request: h11.Request, name: bytes) -> str:

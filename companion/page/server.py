@@ -5,9 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gzip
-import hmac
 import re
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
 
 import h11
@@ -17,7 +16,7 @@ from companion.errors import InputError
 from companion.orders import phrase
 from companion.page.address import Address
 from companion.page.charts import Chart
-from companion.page.connections import JSON, Channel, Refused, Reply, Server, Stream, header, listening
+from companion.page.connections import Channel, Refused, Reply, Server, Stream, header, listening, require_token
 from companion.page.hub import Watcher
 from companion.page.site import files
 from companion.page.sources import Live, Record
@@ -26,7 +25,6 @@ MOST_WATCHERS = 16
 MOST_BODY = 1_000
 STILL_S = 15.0            # a word now and then, where nothing happens
 ANSWER_S = 8.0            # for the answer to an order
-MARK = b"x-companion"     # no form and no picture can send it
 
 
 @contextlib.asynccontextmanager
@@ -72,11 +70,9 @@ class Page:
         if chunk is not None and isinstance(self._source, Record) and int(chunk[1]) < len(self._source.chunks):
             packed = self._source.chunks[int(chunk[1])]
             return Reply(data=await asyncio.to_thread(gzip.decompress, packed), packed=packed)
-        tile = re.fullmatch(r"/tiles/([0-9a-f]{12})/([0-9]{1,2})/([0-9]{1,8})/([0-9]{1,8})", path)
-        chart = self._charts.get(tile[1]) if tile is not None else None
-        if tile is not None and chart is not None:
-            kind, data = await asyncio.to_thread(chart.tile, int(tile[2]), int(tile[3]), int(tile[4]))
-            return Reply(kind=kind, data=data, is_fixed=True)
+        tile = await tile_at(self._charts, path)
+        if tile is not None:
+            return tile
         make = self._made(path)
         if make is None:
             raise Refused(404, "there is nothing here")
@@ -118,11 +114,7 @@ class Page:
         """Take an order, or show what it would lead to; return the answer."""
         if not self._takes_orders or not isinstance(self._source, Live) or self._source.ask is None:
             raise Refused(403, "orders are not taken here: begin with --http-token FILE")
-        if header(request, b"content-type").partition(";")[0].strip() != JSON or header(request, MARK) != "1":
-            raise Refused(403, "an order is JSON, with X-Companion: 1")
-        given = header(request, b"authorization")
-        if not hmac.compare_digest(given.encode(), f"Bearer {self._address.token}".encode()):
-            raise Refused(401, "the token is missing or wrong")
+        require_token(request, self._address.token)
         try:
             words = msgspec.json.decode(body, type=dict[str, str])["order"]
             wanted = phrase(words.split())
@@ -160,6 +152,16 @@ class Page:
                         return
 
         return watch
+
+
+async def tile_at(charts: Mapping[str, Chart], path: str) -> Reply | None:
+    """Return the tile of one of the charts, by their tags, that a path names; None: it names none."""
+    tile = re.fullmatch(r"/tiles/([0-9a-f]{12})/([0-9]{1,2})/([0-9]{1,8})/([0-9]{1,8})", path)
+    chart = charts.get(tile[1]) if tile is not None else None
+    if tile is None or chart is None:
+        return None
+    kind, data = await asyncio.to_thread(chart.tile, int(tile[2]), int(tile[3]), int(tile[4]))
+    return Reply(kind=kind, data=data, is_fixed=True)
 
 
 def _json(value: Any) -> Callable[[], bytes]:

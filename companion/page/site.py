@@ -21,13 +21,13 @@ class File:
     tag: str
 
 
-def files() -> dict[str, File]:
-    """Return the page's files by their path from /."""
+def files(package: str = "companion.page") -> dict[str, File]:
+    """Return the files in a package's ``web`` by their path from /; ``index.html`` is / itself, too."""
     out = {}
-    for entry in sorted(resources.files("companion.page").joinpath("web").iterdir(), key=lambda e: e.name):
+    for entry in sorted(resources.files(package).joinpath("web").iterdir(), key=lambda e: e.name):
         suffix = entry.name[entry.name.rfind("."):]
         if suffix in TYPES and entry.name != "tsconfig.json" and not entry.name.startswith("package"):
             data = entry.read_bytes()
             out[f"/{entry.name}"] = File(kind=TYPES[suffix], data=data, packed=gzip.compress(data, 9, mtime=0),
                                          tag=f'"{hashlib.sha256(data).hexdigest()[:20]}"')
-    return {**out, "/": out["/index.html"]}
+    return {**out, "/": out["/index.html"]} if "/index.html" in out else out

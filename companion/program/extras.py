@@ -11,6 +11,7 @@ EXTRAS = {
     "mavsdk": "shore",
     "rich": "shore",
     "scipy": "shore",
+    "tomlkit": "shore",
     "websockets": "signalk",
     "filterpy": "papers",
 }

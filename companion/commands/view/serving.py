@@ -12,22 +12,23 @@ from typing import Any
 STEP_S = 1.0
 
 
-async def _stopped() -> None:
-    """Wait for SIGINT or SIGTERM."""
+def stopping() -> asyncio.Event:
+    """Return what is set by SIGINT or SIGTERM from now on."""
     stop = asyncio.Event()
     for end in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError):
             asyncio.get_running_loop().add_signal_handler(end, stop.set)
-    await stop.wait()
+    return stop
 
 
 async def serve(address: Any, source: Any, charts: Any) -> int:
     """Serve until stopped."""
     from companion.page import served
 
+    stop = stopping()
     async with served(address, source, charts=charts):
         print(f"{address.url}  (Ctrl-C ends it)", flush=True)
-        await _stopped()
+        await stop.wait()
     return 0
 
 

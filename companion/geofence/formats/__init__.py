@@ -8,12 +8,14 @@ from companion.geofence.formats.fence_items import (
     zones_to_items,
 )
 from companion.geofence.formats.losses import Written
-from companion.geofence.formats.raw.text import MAX_BYTES, MAX_POSITIONS
-from companion.geofence.formats.registry import format_of, write
+from companion.geofence.formats.raw.text import MAX_BYTES, MAX_POSITIONS, decode, read_bytes
+from companion.geofence.formats.registry import FORMATS, format_of, parse, write
 from companion.geofence.formats.rings import Findings
 from companion.geofence.formats.routes import lines_as_route
+from companion.geofence.formats.wkt import KINDS, drawings_of
 
 __all__ = [
-    "MAX_BYTES", "MAX_FENCE_ITEMS", "MAX_POSITIONS", "STORAGE_BYTES", "Findings", "Written", "format_of",
-    "items_to_zones", "lines_as_route", "storage_bytes", "write", "zones_to_items",
+    "FORMATS", "KINDS", "MAX_BYTES", "MAX_FENCE_ITEMS", "MAX_POSITIONS", "STORAGE_BYTES", "Findings", "Written",
+    "decode", "drawings_of", "format_of", "items_to_zones", "lines_as_route", "parse", "read_bytes", "storage_bytes",
+    "write", "zones_to_items",
 ]

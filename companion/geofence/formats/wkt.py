@@ -30,7 +30,7 @@ Coordinates = list[tuple[float, float]]
 _LEXEME = re.compile(r"\s*(?:([A-Za-z]+)|([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|([(),;]))")
 _SRID = re.compile(r"\s*SRID\s*=\s*(\d+)\s*;", re.IGNORECASE)
 _PREFIX = re.compile(r"([^|()]*)\|(?:([^|()]*)\|)?")
-_KINDS = {
+KINDS: dict[str, ZoneKind | None] = {   # what may stand between the bars
     "": None, "inclusion": ZoneKind.INCLUSION, "keep-in": ZoneKind.INCLUSION, "fence": ZoneKind.INCLUSION,
     "exclusion": ZoneKind.EXCLUSION, "keep-out": ZoneKind.EXCLUSION, "obstacle": ZoneKind.EXCLUSION,
 }
@@ -43,9 +43,34 @@ _NAMES = {
 @dataclass(frozen=True, slots=True)
 class _Statement:
     line: int
+    last: int
     name: str
     kind: ZoneKind | None
     text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """One statement of a WKT file as it was drawn, right or wrong, from ``line`` to ``last`` (from 1).
+
+    ``geometries``: POLYGON with its rings, LINESTRING and POINT with their positions (x, y), any other None: empty.
+    """
+
+    line: int
+    last: int
+    name: str
+    kind: ZoneKind | None
+    geometries: tuple[tuple[str, object], ...]
+
+
+def drawings_of(text: str, source: str) -> list[Drawing]:
+    """Return the statements of a WKT text, each with what was drawn. Raises InputError where it is no WKT."""
+    findings = Findings()
+    return [
+        Drawing(s.line, s.last, s.name, s.kind,
+                tuple(_Scanner(s.text, source, s.line, findings, latlon=False).geometries()))
+        for s in _statements(text, source)
+    ]
 
 
 def read_wkt(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, latlon: bool = False) -> Document:
@@ -118,7 +143,7 @@ def _statements(text: str, source: str) -> Iterator[_Statement]:
         depth += line.count("(") - line.count(")")
         is_whole = is_whole or "(" in line or "EMPTY" in line.upper()
         if depth <= 0 and is_whole:
-            yield _statement("\n".join(pending), start, source)
+            yield _statement("\n".join(pending), start, number, source)
             pending, depth, is_whole = [], 0, False
     if pending:
         text = "\n".join(pending)
@@ -127,19 +152,19 @@ def _statements(text: str, source: str) -> Iterator[_Statement]:
         raise InputError(source, f"line {start}", f"{text.strip()[:40]!r} is not WKT", _hint(text))
 
 
-def _statement(text: str, line: int, source: str) -> _Statement:
+def _statement(text: str, line: int, last: int, source: str) -> _Statement:
     name, kind = "", None
     prefix = _PREFIX.match(text)
     if prefix:
         name = prefix.group(1).strip()
         word = (prefix.group(2) or "").strip().lower()
-        if prefix.group(2) is None and name.lower() in _KINDS:
+        if prefix.group(2) is None and name.lower() in KINDS:
             name, word = "", name.lower()
-        if word not in _KINDS:
+        if word not in KINDS:
             raise InputError(source, f"line {line}", f"{word!r} is not a kind", "write inclusion or exclusion")
-        kind = _KINDS[word]
+        kind = KINDS[word]
         text = text[prefix.end():]
-    return _Statement(line, name, kind, text)
+    return _Statement(line, last, name, kind, text)
 
 
 def _hint(text: str) -> str:

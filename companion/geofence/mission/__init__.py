@@ -11,14 +11,32 @@ from companion.geofence.mission.drawn import (
     read_kept,
 )
 from companion.geofence.mission.files import MissionFiles, document_of, goal_losses, mission_files, zones_only
-from companion.geofence.mission.goal_options import kind_of
+from companion.geofence.mission.goal_options import (
+    BoxOptions,
+    GateOptions,
+    GoalOptions,
+    Latitude,
+    Longitude,
+    MarkOptions,
+    PointOptions,
+    SearchOptions,
+    kind_of,
+)
 from companion.geofence.mission.goals import Box, Gate, free_water, is_file
-from companion.geofence.mission.mission import load_mission, load_settings
-from companion.geofence.mission.options import AreaOptions, MissionOptions, WindOptions
-from companion.geofence.mission.text import read_options
+from companion.geofence.mission.mission import load_area, load_mission, load_settings, place_troubles, read_mission
+from companion.geofence.mission.options import (
+    AreaOptions,
+    MissionOptions,
+    RefugeOptions,
+    StartOptions,
+    WindOptions,
+)
+from companion.geofence.mission.text import parse_options, read_options, without_defaults
 
 __all__ = [
-    "NO_NAME", "AreaOptions", "Box", "Drawn", "Gate", "MissionFiles", "MissionOptions", "WindOptions", "document_of",
-    "drawing_of", "drawn_mission", "free_water", "goal_losses", "hindrance", "is_file", "kept", "kind_of",
-    "load_mission", "load_settings", "mission_files", "offer", "read_kept", "read_options", "zones_only",
+    "NO_NAME", "AreaOptions", "Box", "BoxOptions", "Drawn", "Gate", "GateOptions", "GoalOptions", "Latitude",
+    "Longitude", "MarkOptions", "MissionFiles", "MissionOptions", "PointOptions", "RefugeOptions", "SearchOptions",
+    "StartOptions", "WindOptions", "document_of", "drawing_of", "drawn_mission", "free_water", "goal_losses",
+    "hindrance", "is_file", "kept", "kind_of", "load_area", "load_mission", "load_settings", "mission_files", "offer",
+    "parse_options", "place_troubles", "read_kept", "read_mission", "read_options", "without_defaults", "zones_only",
 ]

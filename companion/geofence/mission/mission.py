@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +15,8 @@ from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Document
 from companion.geofence.findings import Finding, Severity
-from companion.geofence.formats.registry import read
+from companion.geofence.formats.raw.text import decode
+from companion.geofence.formats.registry import check_place, parse, read
 from companion.geofence.mission.goals import Gate, Goal, GoalReader, RefugePoint, refuges_of
 from companion.geofence.mission.names import called, name_findings
 from companion.geofence.mission.options import (
@@ -31,10 +32,11 @@ from companion.geofence.mission.options import (
     TrafficOptions,
     WindOptions,
 )
-from companion.geofence.mission.text import read_options
+from companion.geofence.mission.text import parse_options, read_options
 from companion.geofence.shapes import Obstacle, Zone, ZoneKind
 from companion.messages import GeoPoint
 
+AS_IT_IS: Mapping[Path, bytes] = {}   # nothing is given: every file is read from the disk
 RANGE_M = 50_000.0  # the frame is below 1 m wrong to here; what lies farther off is a mistake
 
 
@@ -156,23 +158,27 @@ class Mission:
         return None
 
 
-def load_mission(path: str | Path) -> Mission:
-    """Read and check a mission TOML with the files that it names.
+def load_mission(path: str | Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
+    """Read and check a mission TOML with the files that it names; what is ``given`` of a file stands for its content.
 
     Raises InputError (one line: file, place, problem, remedy) for anything that the boat must not sail with:
     unknown keys, values out of range, missing, broken or empty geometry, swapped axes, a start or goal outside
     free water.
     """
-    path = Path(path)
-    options = read_options(path)
+    mission = read_mission(Path(path), given)
+    check_places(mission)
+    return mission
+
+
+def read_mission(path: Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
+    """Read a mission as ``load_mission`` does, without a look at whether its places lie in free water."""
+    options = parse_options(decode(given[path], str(path)), str(path)) if path in given else read_options(path)
     if options.from_autopilot and not options.goal:
         raise InputError(str(path), "from_autopilot", "the goals of this mission are drawn on the autopilot, not here",
                          "companion run reads them there and sails them")
     if not options.goal:
         raise InputError(str(path), "goal", "is missing", "add [[goal]] with lat and lon")
-    mission = assembled(options, path)
-    check_places(mission)
-    return mission
+    return assembled(options, path, given=given)
 
 
 def load_settings(path: str | Path) -> MissionOptions:
@@ -185,14 +191,17 @@ def load_settings(path: str | Path) -> MissionOptions:
     return msgspec.structs.replace(options, name=called(options.name, path), from_autopilot=True)
 
 
-def assembled(options: MissionOptions, path: Path, drawn: Document | None = None) -> Mission:
+def assembled(
+    options: MissionOptions, path: Path, drawn: Document | None = None, given: Mapping[Path, bytes] = AS_IT_IS,
+) -> Mission:
     """Return the mission of ``options`` with the files that they name, which lie relative to ``path``.
 
-    The zones of ``drawn`` belong to its area. Whether its places lie in free water is not looked at. Raises InputError.
+    The zones of ``drawn`` belong to its area; ``given`` is as for ``load_mission``, of its area's files. Whether its
+    places lie in free water is not looked at. Raises InputError.
     """
     reader = GoalReader(path=path, axis=options.area.axis)
     origin = reader.origin_of(options)
-    area, findings = load_area(options.area, path, origin)
+    area, findings = load_area(options.area, path, origin, given)
     if drawn is not None:
         limits = tuple(z for z in drawn.zones if z.kind is ZoneKind.INCLUSION)
         area = Area(obstacles=(*area.obstacles, *drawn.as_obstacles(options.area.point_radius_m)),
@@ -218,7 +227,9 @@ def _require(path: Path, source: str, place: str, remedy: str) -> None:
         raise unreadable(source, error, f"{place} {path}", remedy) from None
 
 
-def load_area(options: AreaOptions, mission_path: Path, origin: GeoPoint) -> tuple[Area, tuple[Finding, ...]]:
+def load_area(
+    options: AreaOptions, mission_path: Path, origin: GeoPoint, given: Mapping[Path, bytes] = AS_IT_IS,
+) -> tuple[Area, tuple[Finding, ...]]:
     """Return the area that ``[area]`` names and what its files gave rise to. Raises InputError."""
     folder = mission_path.parent
     obstacles: list[Obstacle] = []
@@ -227,8 +238,12 @@ def load_area(options: AreaOptions, mission_path: Path, origin: GeoPoint) -> tup
 
     def load(name: str, key: str, kind: ZoneKind) -> Document:
         path = folder / name
-        _require(path, str(mission_path), f"[area] {key}", "paths are relative to the mission file")
-        document = read(path, kind=kind, axis=options.axis, near=origin, areas=True).require_clean()
+        if path in given:
+            document = check_place(parse(given[path], str(path), kind=kind, axis=options.axis, areas=True,
+                                         extension=path.suffix.lower()), origin).require_clean()
+        else:
+            _require(path, str(mission_path), f"[area] {key}", "paths are relative to the mission file")
+            document = read(path, kind=kind, axis=options.axis, near=origin, areas=True).require_clean()
         findings.extend(f for f in document.findings if f.severity is not Severity.NOTE)
         return document
 

@@ -52,14 +52,15 @@ def parse_options(text: str, source: str) -> MissionOptions:
 
 def dump_options(options: MissionOptions) -> str:
     """Return the options as TOML, leaving out what has its default."""
-    data = _without_defaults(options)
+    data = without_defaults(options)
     order = [
         "name", "description", "from_autopilot", "start", "goal", "refuge", "area", "wind", "risk", "boat", "autopilot",
         "operator", "skipper", "planner", "safety", "traffic", "output"]
     return tomli_w.dumps({k: data[k] for k in order if k in data})
 
 
-def _without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
+def without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
+    """Return what a table of a mission file says where all that has its default is left out."""
     tag = struct.__struct_config__.tag
     out: dict[str, Any] = {"kind": tag} if tag not in {None, "point"} else {}
     for field in msgspec.structs.fields(struct):
@@ -67,9 +68,9 @@ def _without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
         if value is None or (field.default is not msgspec.NODEFAULT and value == field.default):
             continue
         if isinstance(value, msgspec.Struct):
-            out[field.name] = _without_defaults(value)
+            out[field.name] = without_defaults(value)
         elif isinstance(value, tuple):
-            out[field.name] = [_without_defaults(v) if isinstance(v, msgspec.Struct) else v for v in value]
+            out[field.name] = [without_defaults(v) if isinstance(v, msgspec.Struct) else v for v in value]
         else:
             out[field.name] = value
     return out

@@ -15,6 +15,9 @@ const camera = { centre: [0, 0], scale: 1, up: 0, width: 600, height: 400 };
 /** @typedef {{way: Point[], risks: (number | null)[]}} Preview */
 /** @type {{up: string, follow: boolean, fitted: boolean, view: View | null, area: Area | null, past: Past | null, preview: Preview | null, picks: ((en: Point) => void) | null, other: Other | null}} */
 const state = { up: "north", follow: true, fitted: false, view: null, area: null, past: null, preview: null, picks: null, other: null };
+/** @typedef {{down: (at: Point, en: Point, event: PointerEvent) => boolean, move: (at: Point, en: Point, event: PointerEvent) => void, up: (at: Point, en: Point, event: PointerEvent) => void, tap: (at: Point, en: Point, event: PointerEvent) => void, hover: (at: Point, en: Point, event: PointerEvent) => void}} Hand  who draws on the chart: what ``down`` takes is not panned */
+/** @type {{hand: Hand | null, held: number | null, over: ((at: (en: Point) => Point, camera: Camera) => Element[]) | null}} */
+const drawing = { hand: null, held: null, over: null };
 /** @type {Record<string, SVGElement>} */
 const layers = {};
 const root = picture("map");
@@ -23,7 +26,7 @@ export function build() {
   const world = svg("g", { class: "world" });
   for (const name of ["chart", "limits", "grown", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
   root.append(svg("defs", {}, pattern()), layers.world = world);
-  for (const name of ["grid", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat", "furniture"]) {
+  for (const name of ["grid", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat", "furniture", "drawing"]) {
     root.append(layers[name] = svg("g", { class: name }));
   }
   new ResizeObserver(() => { measure(); draw(); }).observe(root);
@@ -81,7 +84,8 @@ export function orient(up) {
 /** @param {boolean} follow */
 export function follow(follow) {
   state.follow = follow;
-  set(get("follow"), { "aria-pressed": follow ? "true" : "false" });
+  const button = document.getElementById("follow");
+  if (button) set(button, { "aria-pressed": follow ? "true" : "false" });
   draw();
 }
 
@@ -111,13 +115,42 @@ export function all() {
     if (e !== null && e !== undefined && m !== null && m !== undefined) points.push([e, m]);
   }
   if (points.length < 2 && area) for (const shape of [...area.limits, ...area.obstacles]) points.push(...(shape[0] ?? []));
+  fit(points);
+}
+
+/** Show places. @param {Point[]} points */
+export function fit(points) {
   if (points.length === 0) return;
+  state.fitted = true;
   const low = [Math.min(...points.map((p) => p[0])), Math.min(...points.map((p) => p[1]))];
   const high = [Math.max(...points.map((p) => p[0])), Math.max(...points.map((p) => p[1]))];
   const wide = Math.max(40, (high[0] ?? 0) - (low[0] ?? 0)), tall = Math.max(40, (high[1] ?? 0) - (low[1] ?? 0));
   camera.centre = [((low[0] ?? 0) + (high[0] ?? 0)) / 2, ((low[1] ?? 0) + (high[1] ?? 0)) / 2];
   camera.scale = Math.min(camera.width / wide, camera.height / tall) / ROOM;
   follow(false);
+}
+
+/** Bring a place to the middle. @param {Point} en */
+export function centre(en) {
+  camera.centre = [en[0], en[1]];
+  follow(false);
+}
+
+/** The place in the middle, and how many pixels a metre has. */
+export function middle() {
+  return { en: /** @type {Point} */ ([camera.centre[0], camera.centre[1]]), scale: camera.scale };
+}
+
+/** Let somebody draw on the chart: ``over`` gives what lies above everything, ``hand`` hears the pointer first.
+ * @param {Hand} hand @param {(at: (en: Point) => Point, camera: Camera) => Element[]} over */
+export function drawOn(hand, over) {
+  drawing.hand = hand;
+  drawing.over = over;
+}
+
+/** Draw again. */
+export function again() {
+  draw();
 }
 
 /** What does not move. */
@@ -156,6 +189,7 @@ function draw() {
   beside(at);
   own(view, at);
   furniture(view, wind);
+  if (drawing.over) layers.drawing?.replaceChildren(...drawing.over(at, camera));
 }
 
 /** @param {string} name @param {SVGElement[]} children */
@@ -420,11 +454,17 @@ function listen() {
     const box = root.getBoundingClientRect();
     return /** @type {Point} */ ([event.clientX - box.left, event.clientY - box.top]);
   };
-  root.addEventListener("pointerdown", (event) => { root.setPointerCapture(event.pointerId); down.set(event.pointerId, here(event)); wasMoved = false; });
+  root.addEventListener("pointerdown", (event) => {
+    root.setPointerCapture(event.pointerId);
+    const at = here(event);
+    if (down.size === 0 && drawing.held === null && drawing.hand?.down(at, unproject(camera, at), event)) { drawing.held = event.pointerId; return; }
+    down.set(event.pointerId, at);
+    wasMoved = down.size > 1;   // two fingers choose no place
+  });
   root.addEventListener("pointermove", (event) => {
-    const from = down.get(event.pointerId);
-    if (from === undefined) return;
-    const to = here(event);
+    const from = down.get(event.pointerId), to = here(event);
+    if (drawing.held === event.pointerId) return drawing.hand?.move(to, unproject(camera, to), event);
+    if (from === undefined) return drawing.hand?.hover(to, unproject(camera, to), event);
     if (!wasMoved && Math.hypot(to[0] - from[0], to[1] - from[1]) < 4) return;
     wasMoved = true;
     if (down.size === 2) {
@@ -439,6 +479,8 @@ function listen() {
   });
   const up = (/** @type {PointerEvent} */ event) => {
     const at = here(event);
+    if (drawing.held === event.pointerId) { drawing.held = null; return drawing.hand?.up(at, unproject(camera, at), event); }
+    if (down.size === 1 && down.has(event.pointerId) && !wasMoved && state.picks === null && event.type === "pointerup") drawing.hand?.tap(at, unproject(camera, at), event);
     if (down.delete(event.pointerId) && !wasMoved && state.picks !== null && event.type === "pointerup") {
       const picks = state.picks;
       pick(null);

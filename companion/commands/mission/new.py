@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from companion.commands.mission_preview import preview, preview_options, read_mission_file
+from companion.commands.mission.picture import preview, preview_options, read_mission_file
 from companion.commands.output import force_option, print_findings, print_losses, refuse_existing, write_files
 from companion.errors import InputError
 from companion.program.arguments import number, place, system_id
@@ -99,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(args.source or "companion mission new", "", str(error)) from None
     mission = write_mission(made, out, force=args.force)
     print(f"{args.out}: note: [operator] permits nothing yet: with set_auto = true the companion uploads and sets AUTO")
+    print(f"{args.out}: note: to see and change it on a chart: companion mission edit {args.out}")
     if args.plot:
         preview(mission, args)
     return 0

@@ -1,15 +1,16 @@
-"""``companion mission``: check, make, convert, upload and download missions."""
+"""``companion mission``: check, make, draw, convert, upload and download missions."""
 
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from companion.commands import mission_new
-from companion.commands.mission_preview import preview, preview_options, read_mission_file
+from companion.commands.mission.edit import add_parser as add_edit
+from companion.commands.mission.new import add_parser as add_new
+from companion.commands.mission.new import point_radius_option, write_mission
+from companion.commands.mission.picture import preview, preview_options, read_mission_file
 from companion.commands.output import (
     force_option,
     print_findings,
@@ -29,6 +30,7 @@ examples:
   companion mission check missions/archipelago.toml --plot archipelago.png
   companion mission new bay.toml --start 50.817,-1.31 --goal 50.8203,-1.31 --land islands.wkt --margin 12 --plot bay.png
   companion mission new bay.toml --from drawn-in-qgroundcontrol.plan
+  companion mission edit bay.toml                      (draw it in a browser, checked and planned as you draw)
   companion mission convert bay.toml bay.plan          (also .gpx, .kml, .geojson)
   companion mission convert bay.toml bay.waypoints --part mission
   companion mission convert route.gpx route.waypoints
@@ -42,20 +44,21 @@ Exit codes: 0 in order, 1 faults found or a failed transfer, 2 a file or option 
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
-    """Add the command with its six verbs."""
+    """Add the command with its verbs."""
     from companion.commands.fence import link_options
 
     parser = subparsers.add_parser(
         "mission", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    verbs = parser.add_subparsers(dest="verb", metavar="check|new|example|convert|upload|download", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="check|new|edit|example|convert|upload|download", required=True)
     check = verbs.add_parser("check", help="read a mission as the boat would and name what is wrong")
     check.add_argument("file", metavar="FILE")
     preview_options(check)
     check.set_defaults(run=_check)
 
-    mission_new.add_parser(verbs)
+    add_new(verbs)
+    add_edit(verbs)
 
     example = verbs.add_parser("example", help="write the missions that come with the program, to begin from")
     example.add_argument("folder", type=Path, metavar="DIR")
@@ -67,7 +70,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     convert.add_argument("--part", choices=("mission", "fence", "rally"),
                          help="write this alone (a .waypoints file holds no more than one of them)")
     convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
-    mission_new.point_radius_option(convert)
+    point_radius_option(convert)
     force_option(convert)
     convert.set_defaults(run=_convert)
 
@@ -106,28 +109,25 @@ def _example(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> int:
-    from companion.geofence.check import Conditions, check_area
-    from companion.geofence.mission import load_mission
-
     if Path(args.file).suffix.lower() != ".toml":
         document = read_mission_file(args.file)
         print_findings(document.findings, args.file)
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
-    from companion.sailable import require_sailable
+    from companion.sailable import judge
 
-    mission = require_sailable(load_mission(args.file))
-    bad = print_findings(mission.findings, args.file)
-    wind_deg = args.wind[1] if args.wind else mission.wind.preview_from_deg
-    bad |= print_findings(check_area(mission.area, Conditions(
-        start=mission.start, goals=tuple(g.point for g in mission.goals), margin_m=mission.margin_m,
-        twd_from_rad=math.radians(wind_deg), no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
-    )), args.file)
+    judged = judge(Path(args.file), from_deg=args.wind[1] if args.wind else None)
+    if judged.mission is None or judged.refusals:
+        raise judged.refusals[0]
+    mission = judged.mission
+    bad = print_findings(judged.findings, args.file)
     if args.plot:
         preview(mission, args)
     print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
           f"{counted(len(mission.area.solids), 'obstacle')}: "
           f"{'NOT in order' if bad else 'in order'}")
+    if bad:
+        print(f"to see it on a chart and mend it: companion mission edit {args.file}")
     return int(bad)
 
 
@@ -168,7 +168,7 @@ def _convert(args: argparse.Namespace) -> int:
             made = mission_files(document, out.stem)
         except ValueError as error:
             raise InputError(args.file, "", str(error)) from None
-        mission_new.write_mission(made, out, force=args.force)
+        write_mission(made, out, force=args.force)
         return 0
     if args.part is not None:
         document = _only(document, args.part)

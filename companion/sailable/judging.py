@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
 from companion.compose import (
     config_of,
     displays_of,
@@ -12,8 +17,46 @@ from companion.compose import (
     voyage_of,
 )
 from companion.errors import InputError
-from companion.geofence import Mission
-from companion.geofence.mission import AreaOptions, kind_of
+from companion.geofence import Code, Finding, Mission, Severity
+from companion.geofence.check import Conditions, check_area
+from companion.geofence.mission import AreaOptions, kind_of, place_troubles, read_mission
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """A mission file as the boat would read it.
+
+    Attributes:
+        mission: None when it cannot be read at all.
+        refusals: why it must not be sailed; the first is what ``load_mission`` or ``require_sailable`` raises.
+        findings: what else is wrong or worth knowing, worst first.
+    """
+
+    mission: Mission | None
+    refusals: tuple[InputError, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+
+def judge(path: Path, *, from_deg: float | None = None, given: Mapping[Path, bytes] | None = None) -> Judged:
+    """Read a mission and its area as the boat will, and look for what is wrong with it: never raises InputError.
+
+    ``from_deg``: where the wind comes from, in which gaps are looked at (else the mission's). ``given``: see
+    ``load_mission``.
+    """
+    try:
+        mission = read_mission(path, given or {})
+        troubles = tuple(InputError(str(path), *trouble) for trouble in place_troubles(mission))
+        if not troubles:
+            require_sailable(mission)
+    except InputError as error:
+        return Judged(mission=None, refusals=(error,))
+    found = check_area(mission.area, Conditions(
+        start=mission.start, goals=tuple(g.point for g in mission.goals), margin_m=mission.margin_m,
+        twd_from_rad=math.radians(mission.wind.preview_from_deg if from_deg is None else from_deg),
+        no_go_half_rad=math.radians(mission.boat.no_go_half_deg)))
+    told = {Code.START_OUTSIDE, Code.GOAL_OUTSIDE} if troubles else set()
+    return Judged(mission=mission, refusals=troubles, findings=(
+        *mission.findings, *(f for f in found if f.severity is not Severity.ERROR or f.code not in told)))
 
 
 def require_sailable(mission: Mission) -> Mission:

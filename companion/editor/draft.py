@@ -1,0 +1,128 @@
+"""A draft: the files that a sketch makes of its base, not written yet, and the mission that they would be."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from companion.editor.base import Base
+from companion.editor.ground import Ground, can_hold, new_ground, written
+from companion.editor.sketch import Shape, Sketch, options_of
+from companion.editor.toml import rewritten
+from companion.errors import InputError, JobError
+from companion.geofence.mission import MissionOptions
+
+HEAD = """name = {name}
+
+[operator]            # what the companion may do uninvited
+set_auto = false      # upload missions, set AUTO and the modes of the watchdogs
+arm = false           # arm
+guided = false        # steer under GUIDED: out of irons, round a vessel
+upload_fence = false  # put the fence on the autopilot and switch it on
+# orders = ["hold", "go_on", "refuge", "home"]   # what the crew may order over the radio; "all"
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Draft:
+    """What would be written: ``files`` are the mission file and all files of its area that are drawn in."""
+
+    path: Path
+    options: MissionOptions
+    files: Mapping[Path, bytes]
+
+
+def draft_of(base: Base, sketch: Sketch, own: AbstractSet[Path] = frozenset()) -> Draft:
+    """Return the files that a sketch makes of its base. ``own``: files that were made here before, and may be again.
+
+    Raises:
+        InputError: a value is out of its range; JobError: the mission file cannot be changed in place.
+    """
+    source = str(base.path)
+    for name, count, keys in (("goal", len(base.options.goal), [g.key for g in sketch.goals]),
+                              ("refuge", len(base.options.refuge), [r.key for r in sketch.refuges])):
+        known = [key for key in keys if key is not None]
+        if len(set(known)) != len(known) or any(key >= count for key in known):
+            raise JobError(f"{source}: the sketch names a {name} that is not in the file; load it again")
+    try:
+        options = options_of(sketch, base.options)
+    except ValueError as error:
+        raise InputError(source, "", str(error)) from None
+    texts, options = _area(base, sketch, options, own)
+    before, text = base.options, base.toml.text
+    if base.is_new:
+        named = msgspec.structs.replace(MissionOptions(), name=options.name or base.path.stem)
+        options = msgspec.structs.replace(options, name=named.name)
+        before, text = named, HEAD.format(name=_toml(named.name or ""))
+    toml = rewritten(text, before, options, {
+        "goal": [g.key for g in sketch.goals], "refuge": [r.key for r in sketch.refuges]}, source)
+    files = {base.path: base.toml.data(toml)}
+    for name, text in texts.items():
+        was = base.texts.get(name)
+        files[base.path.parent / name] = was.data(text) if was is not None else text.encode()
+    return Draft(path=base.path, options=options, files=files)
+
+
+def _toml(text: str) -> str:
+    import tomlkit
+
+    return tomlkit.item(text).as_string()
+
+
+def _area(
+    base: Base, sketch: Sketch, options: MissionOptions, own: AbstractSet[Path],
+) -> tuple[dict[str, str], MissionOptions]:
+    """Return the texts of the area's files with the sketch's shapes in them, and the options that name them."""
+    grounds = dict(base.grounds)
+    at_home: dict[str, list[Shape]] = {name: [] for name in grounds}
+    homeless: list[Shape] = []
+    for shape in sketch.shapes:
+        ground = grounds.get(shape.of)
+        if ground is None or shape.key is None:
+            homeless.append(msgspec.structs.replace(shape, of="", key=None))
+        elif shape.key >= len(ground.shapes) or any(shape.key == other.key for other in at_home[shape.of]):
+            raise JobError(f"{base.path}: the sketch names a shape that is not in {shape.of}; load it again")
+        elif can_hold(ground.kind, shape):
+            at_home[shape.of].append(shape)
+        else:
+            homeless.append(msgspec.structs.replace(shape, of="", key=None))
+    for shape in homeless:
+        name = _place_for(shape, base, options, grounds, own)
+        grounds.setdefault(name, new_ground(name, shape.zone))
+        at_home.setdefault(name, []).append(shape)
+    empty = {name for name, ground in grounds.items() if not at_home[name] and ground.shapes}
+    names = [n for n in options.area.obstacles if n not in empty]
+    names += [n for n, g in grounds.items() if g.stands_for == "exclusion" and n not in names and n not in empty]
+    fence = options.area.fence if options.area.fence not in empty else None
+    fence = next((n for n, g in grounds.items() if g.stands_for == "inclusion" and n not in empty), fence)
+    area = msgspec.structs.replace(options.area, obstacles=tuple(names), fence=fence)
+    texts = {name: written(ground, at_home[name]) for name, ground in grounds.items() if name not in empty}
+    return texts, msgspec.structs.replace(options, area=area)
+
+
+def _place_for(
+    shape: Shape, base: Base, options: MissionOptions, grounds: Mapping[str, Ground], own: AbstractSet[Path],
+) -> str:
+    """Return the file that a new shape goes into: one of its zone that has words for it, else a new one."""
+    for name, ground in grounds.items():
+        if ground.stands_for == shape.zone and can_hold(ground.kind, shape):
+            return name
+    if shape.zone == "inclusion" and options.area.fence is not None:
+        raise InputError(str(base.path), "[area] fence", f"is {options.area.fence}, which cannot be drawn in here",
+                         "convert it: companion fence convert, or take it out of the mission")
+    stem = re.sub(r"[^\w-]+", "-", base.path.stem).strip("-").lower() or "mission"
+    ending = "wkt" if can_hold("wkt", shape) else "geojson"
+    noun = "fence" if shape.zone == "inclusion" else "obstacles"
+    number = 1
+    while True:
+        name = f"{stem}-{noun}{'' if number == 1 else f'-{number}'}.{ending}"
+        path = base.path.parent / name
+        if name not in base.texts and (not path.exists() or path in own):
+            return name
+        number += 1
+

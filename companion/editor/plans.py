@@ -1,0 +1,92 @@
+"""What a plan of a draft would be in a wind that somebody assumes: made by a worker, the newest request alone."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any
+
+import numpy as np
+
+from companion.compose import planner_of
+from companion.errors import InputError
+from companion.geofence import Mission
+from companion.planner import Plan, Problem
+from companion.planner.worker import PlannerWorker
+from companion.sailable.previews import Wind, bound_for, legs, onwards
+
+BUDGET_S = 0.5       # for a leg: near the best, and while one looks
+MOST_LEGS = 60
+
+
+class Superseded(Exception):  # noqa: N818
+    """A newer request has come."""
+
+
+class Previews:
+    """Plans with one worker; of requests that come meanwhile the newest is answered, the others are given up."""
+
+    def __init__(self, worker: PlannerWorker) -> None:
+        self._worker, self._newest = worker, 0
+        self._turn = asyncio.Lock()
+
+    async def make(self, mission: Mission, wind: Wind) -> dict[str, Any]:
+        """Return the plans of all legs in words and figures; ``error`` says why there is none.
+
+        Raises:
+            Superseded: a newer request has come before this was done.
+        """
+        self._newest += 1
+        mine = self._newest
+        if mission.start is None:
+            return {"error": "a plan begins somewhere: put the start on the chart", "legs": []}
+        async with self._turn:
+            by = planner_of(mission)
+            words, walk = bound_for(mission), legs(mission, wind)
+            made: list[dict[str, Any]] = []
+            error = ""
+            try:
+                problem: Problem | None = next(walk, None)
+                while problem is not None and len(made) < MOST_LEGS:
+                    if mine != self._newest:
+                        raise Superseded
+                    budget_s = min(BUDGET_S, mission.skipper.planning_budget_s)
+                    # Whoever hangs up must not end the worker's work, which would end the worker.
+                    plan = await asyncio.shield(self._worker.plan(
+                        problem, budget_s=budget_s, seed=0, algorithm=by.algorithm, settings=by.settings))
+                    to = words[len(made)]
+                    if not plan.has_path:
+                        error = f"no way to {to} was found: {plan.reason}"
+                        break
+                    made.append(_in_figures(plan, to, mission))
+                    problem = onwards(walk, plan)
+            except (InputError, ValueError) as trouble:
+                error = str(trouble)
+            if len(made) == MOST_LEGS < len(words):
+                error = f"only the first {MOST_LEGS} legs are planned here"
+            return {"error": error, "legs": made, **_together(made)}
+
+
+def _in_figures(plan: Plan, to: str, mission: Mission) -> dict[str, Any]:
+    frame = mission.frame()
+    clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
+    return {
+        "to": to, "why": plan.why.text,
+        "way": np.round(frame.array_lonlat_from_en(plan.waypoints_en)[:, ::-1], 7).tolist(),
+        "time_s": round(plan.cost_s, 1), "length_m": round(sum(leg.length_m for leg in plan.legs), 1),
+        "risk": None if plan.risk is None or not math.isfinite(plan.risk) else round(plan.risk, 4),
+        "risks": [None if leg.risk is None else round(leg.risk, 4) for leg in plan.legs],
+        "tacks": sum(leg.manoeuvre == "tack" for leg in plan.legs),
+        "gybes": sum(leg.manoeuvre == "gybe" for leg in plan.legs),
+        "clearance_m": round(min(clear), 1) if clear else None,
+    }
+
+
+def _together(made: list[dict[str, Any]]) -> dict[str, Any]:
+    clear = [leg["clearance_m"] for leg in made if leg["clearance_m"] is not None]
+    return {
+        "time_s": round(sum(leg["time_s"] for leg in made), 1),
+        "length_m": round(sum(leg["length_m"] for leg in made), 1),
+        "tacks": sum(leg["tacks"] for leg in made), "gybes": sum(leg["gybes"] for leg in made),
+        "clearance_m": min(clear) if clear else None,
+    }
