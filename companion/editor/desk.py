@@ -130,6 +130,7 @@ class Desk:
             return await asyncio.to_thread(lambda: looked_at(self._draft(asked.sketch), asked.from_deg)[1])
 
     async def _plan(self, asked: _Asked) -> dict[str, Any]:
+        mine = self._previews.arrived()
         judged, _ = await asyncio.to_thread(lambda: looked_at(self._draft(asked.sketch), asked.from_deg))
         if judged.mission is None or judged.refusals:
             first = judged.refusals[0]
@@ -137,7 +138,7 @@ class Desk:
         wind = judged.mission.wind
         from_deg = wind.preview_from_deg if asked.from_deg is None else asked.from_deg
         return await self._previews.make(judged.mission, Wind(
-            from_deg=from_deg % 360.0, speed_mps=asked.speed_mps, spread_deg=asked.spread_deg))
+            from_deg=from_deg % 360.0, speed_mps=asked.speed_mps, spread_deg=asked.spread_deg), mine)
 
     async def _save(self, asked: _Asked) -> dict[str, Any]:
         on_disk = self._base(asked.disk)

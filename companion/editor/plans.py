@@ -30,14 +30,19 @@ class Previews:
         self._worker, self._newest = worker, 0
         self._turn = asyncio.Lock()
 
-    async def make(self, mission: Mission, wind: Wind) -> dict[str, Any]:
+    def arrived(self) -> int:
+        """Return the number of a request that has just come: those before it are given up."""
+        self._newest += 1
+        return self._newest
+
+    async def make(self, mission: Mission, wind: Wind, mine: int) -> dict[str, Any]:
         """Return the plans of all legs in words and figures; ``error`` says why there is none.
+
+        ``mine``: the request's number.
 
         Raises:
             Superseded: a newer request has come before this was done.
         """
-        self._newest += 1
-        mine = self._newest
         if mission.start is None:
             return {"error": "a plan begins somewhere: put the start on the chart", "legs": []}
         async with self._turn:

@@ -75,9 +75,12 @@ def test_a_plan_is_made_in_the_wind_that_is_asked_and_a_newer_request_replaces_i
         await asker.post("/api/plan", {"sketch": sketch, "from_deg": 0.0, "speed_mps": 5.0})   # the worker is warm
         steady = await asker.post("/api/plan", {"sketch": sketch, "from_deg": 0.0, "speed_mps": 5.0})
         spread = await asker.post("/api/plan", {"sketch": sketch, "from_deg": 0.0, "speed_mps": 5.0, "spread_deg": 12})
-        many = await asyncio.gather(*(
-            asker.post("/api/plan", {"sketch": sketch, "from_deg": float(n), "speed_mps": 5.0}) for n in range(6)))
-        return steady[1], spread[1], many
+        many = []
+        for n in range(6):
+            many.append(asyncio.create_task(
+                asker.post("/api/plan", {"sketch": sketch, "from_deg": float(n), "speed_mps": 5.0})))
+            await asyncio.sleep(0.05)
+        return steady[1], spread[1], [await each for each in many]
 
     steady, spread, many = with_editor(bay, talk)
     assert steady["error"] == ""
