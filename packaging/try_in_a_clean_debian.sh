@@ -70,7 +70,8 @@ if [ "$architecture" = "$(dpkg --print-architecture)" ] && command -v systemd-ns
     rm -f "$root/etc/systemd/system/try.service" "$root/usr/local/bin/try_service"
 else
     say "the companion beside a simulated boat, by hand"
-    inside sh -c 'cd ~/voyage && sitl boat --port 0 --udp 0 --udp-out 127.0.0.1:14559 --warm --home 50.817,-1.31 >boat.log 2>&1 &
+    inside sh -c 'cd ~/voyage || exit 1
+        sitl boat --port 0 --udp 0 --udp-out 127.0.0.1:14559 --warm --home 50.817,-1.31 >boat.log 2>&1 &
         boat=$!
         companion run mine/lake.toml --link udpin:127.0.0.1:14559 --out w --wait 300 --limit 300 >run.log 2>&1 &
         companion=$! began=$(date +%s)
