@@ -50,7 +50,11 @@ $(STAMP)-%: requirements-%.lock $(STAMP)
 demo: $(ENV)
 	$(BIN)/sitl run sitl/scenarios/demo.toml --live
 
+# The tests' workers would each compile what a cold cache lacks: it is filled once, before them.
+KERNELS := $(BIN)/python -c 'from sitl.run.compiled import compile_ahead; compile_ahead()'
+
 test: $(ENV)
+	@$(KERNELS)
 	$(BIN)/python -m pytest -n 3 --dist worksteal
 
 check: $(ENV)
@@ -67,6 +71,7 @@ docs: $(ENV)
 
 # The ten slowest tests, and what their fixtures take.
 slowest: $(ENV)
+	@$(KERNELS)
 	$(BIN)/python -m pytest -n 2 --durations=10
 
 campaign: $(ENV)

@@ -78,13 +78,18 @@ def _code(code: types.CodeType, doc: str | None = "") -> Iterator[str]:
 
 def _globals_of(function: Any) -> list[tuple[str, Any]]:
     """Return the module's names that the function uses, and what they are."""
-    names: set[str] = set()
-    left = [function.__code__]
-    while left:
-        code = left.pop()
-        names.update(i.argval for i in dis.get_instructions(code) if i.opname in {"LOAD_GLOBAL", "LOAD_NAME"})
-        left.extend(c for c in code.co_consts if isinstance(c, types.CodeType))
-    return [(name, function.__globals__[name]) for name in sorted(names) if name in function.__globals__]
+    known = function.__globals__
+    return [(name, known[name]) for name in _names_of(function.__code__) if name in known]
+
+
+@functools.cache
+def _names_of(code: types.CodeType) -> tuple[str, ...]:
+    """Return the global names that code reads, in order; asked for twice of each kernel, and slow to find."""
+    names = {i.argval for i in dis.get_instructions(code) if i.opname in {"LOAD_GLOBAL", "LOAD_NAME"}}
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            names.update(_names_of(constant))
+    return tuple(sorted(names))
 
 
 def _constant(value: Any, where: str) -> str:

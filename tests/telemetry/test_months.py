@@ -55,21 +55,22 @@ def test_in_ninety_days_the_budget_is_never_exceeded(tmp_path, restarts_every_da
 
 
 def test_parts_are_read_as_one_record(tmp_path):
-    with Recorder(tmp_path, shelf=Shelf(folder=tmp_path.parent, budget_bytes=320_000), is_durable=False) as recorder:
+    folder = tmp_path / "voyage"   # the shelf drops what else is on it, and above lie other tests' voyages
+    with Recorder(folder, shelf=Shelf(folder=tmp_path, budget_bytes=320_000), is_durable=False) as recorder:
         recorder.voyage({})
         for t_s in range(400):
             recorder.frame(stamp(int(1.7e15 + t_s * 1e6), FRAME))
             recorder.track(row(t_s))
             recorder.decision({"t_s": t_s, "kind": "test", "text": "x" * 60})
             recorder.tend({"t_s": float(t_s), "utc": ""})
-    assert all(p.suffix == ".gz" for name in (TLOG, TRACK, DECISIONS) for p in closed(tmp_path / name))
-    assert len(closed(tmp_path / DECISIONS)) > 2
-    assert [d["t_s"] for d in read_decisions(tmp_path)] == list(range(400))
-    assert [r["t_s"] for r in read_rows(tmp_path / TRACK)] == [float(t) for t in range(400)]
-    assert sum(len(read_tlog(part)) for part in parts(tmp_path / TLOG)) == 400
-    assert is_from_the_start(tmp_path / TLOG)
-    closed(tmp_path / TLOG)[0].unlink()
-    assert not is_from_the_start(tmp_path / TLOG)
+    assert all(p.suffix == ".gz" for name in (TLOG, TRACK, DECISIONS) for p in closed(folder / name))
+    assert len(closed(folder / DECISIONS)) > 2
+    assert [d["t_s"] for d in read_decisions(folder)] == list(range(400))
+    assert [r["t_s"] for r in read_rows(folder / TRACK)] == [float(t) for t in range(400)]
+    assert sum(len(read_tlog(part)) for part in parts(folder / TLOG)) == 400
+    assert is_from_the_start(folder / TLOG)
+    closed(folder / TLOG)[0].unlink()
+    assert not is_from_the_start(folder / TLOG)
 
 
 def test_a_quiet_voyage_closes_its_parts_once_a_day_and_a_restart_goes_on_numbering(tmp_path):
