@@ -3,6 +3,11 @@
 import os
 
 import pytest
+from hypothesis import settings
+
+# How long an example takes is the machine's business, which others share.
+settings.register_profile("no deadline", deadline=None)
+settings.load_profile("no deadline")
 
 # A minute of each worker's time in tests of seconds: begun first, or one worker would end with them while others wait.
 LONG = "tests/voyages/test_scenarios_sail.py"

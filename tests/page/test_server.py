@@ -5,6 +5,7 @@ import gzip
 import json
 import socket
 import threading
+import time
 import tracemalloc
 from dataclasses import replace
 
@@ -127,7 +128,8 @@ def test_what_takes_long_to_make_and_to_pack_is_not_made_on_the_voyages_loop(mon
 def test_twelve_watch_and_one_never_reads_and_the_loop_is_not_held(monkeypatch):
     """Views of eight times the size, fifty a second; memory does not grow by the one who does not read: he is dropped.
 
-    Lateness is held against what the machine, which others share, does to a loop that nobody watches.
+    What a step of the loop takes is processor time of its thread, the clients' part included: a machine that others share
+    makes it late, and not dearer.
     """
     monkeypatch.setattr(connections, "BLOCKED_S", 1.0)
 
@@ -153,10 +155,10 @@ def test_twelve_watch_and_one_never_reads_and_the_loop_is_not_held(monkeypatch):
         big, peak, held = "w" * 60_000, 0, []
         tracemalloc.start()
         for n in range(400):
-            due = now_s() + 0.02
+            began = time.thread_time()
             live.show(view_at(float(n), why=big), (), None)
             await asyncio.sleep(0.02)
-            held.append(now_s() - due)
+            held.append(time.thread_time() - began)
             peak = max(peak, tracemalloc.get_traced_memory()[0])
             if page.dropped and n > 100:
                 break
@@ -165,17 +167,11 @@ def test_twelve_watch_and_one_never_reads_and_the_loop_is_not_held(monkeypatch):
             task.cancel()
         await asyncio.gather(*readers, return_exceptions=True)
         deaf.close()
-        alone = []
-        for _ in range(len(held)):
-            due = now_s() + 0.02
-            await asyncio.sleep(0.02)
-            alone.append(now_s() - due)
-        return counts, sorted(held), sorted(alone), page.dropped, peak
+        return counts, sorted(held), page.dropped, peak
 
-    counts, held, alone, dropped, peak = with_page(talk)
+    counts, held, dropped, peak = with_page(talk)
     assert min(counts) > 30
-    nearly_all = int(0.9 * len(held))
-    assert held[nearly_all] < 0.01 + 3.0 * alone[nearly_all]
+    assert held[int(0.9 * len(held))] < 0.01
     assert dropped == 1
     assert peak < 8_000_000
 
