@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import pytest
 
-from companion.clock import now_s, run
+from companion.clock import run
 from companion.errors import JobError
 from companion.page import Address, Live, Record, connections, served
 from companion.page.hub import Hub, Watcher
@@ -128,8 +128,8 @@ def test_what_takes_long_to_make_and_to_pack_is_not_made_on_the_voyages_loop(mon
 def test_twelve_watch_and_one_never_reads_and_the_loop_is_not_held(monkeypatch):
     """Views of eight times the size, fifty a second; memory does not grow by the one who does not read: he is dropped.
 
-    What a step of the loop takes is processor time of its thread, the clients' part included: a machine that others share
-    makes it late, and not dearer.
+    What a step of the loop takes is processor time of its thread, the clients' part included: a machine that others
+    share makes it late, and not dearer.
     """
     monkeypatch.setattr(connections, "BLOCKED_S", 1.0)
 
