@@ -15,17 +15,9 @@ from companion.editor.ground import Ground, can_hold, new_ground, written
 from companion.editor.sketch import Shape, Sketch, options_of
 from companion.editor.toml import rewritten
 from companion.errors import InputError, JobError
-from companion.geofence.mission import MissionOptions
+from companion.geofence.mission import PERMITS, MissionOptions
 
-HEAD = """name = {name}
-
-[operator]            # what the companion may do uninvited
-set_auto = false      # upload missions, set AUTO and the modes of the watchdogs
-arm = false           # arm
-guided = false        # steer under GUIDED: out of irons, round a vessel
-upload_fence = false  # put the fence on the autopilot and switch it on
-# orders = ["hold", "go_on", "refuge", "home"]   # what the crew may order over the radio; "all"
-"""
+HEAD = "name = {name}\n" + PERMITS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

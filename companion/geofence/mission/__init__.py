@@ -10,7 +10,7 @@ from companion.geofence.mission.drawn import (
     offer,
     read_kept,
 )
-from companion.geofence.mission.files import MissionFiles, document_of, goal_losses, mission_files, zones_only
+from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
 from companion.geofence.mission.goal_options import (
     BoxOptions,
     GateOptions,
@@ -34,7 +34,7 @@ from companion.geofence.mission.options import (
 from companion.geofence.mission.text import parse_options, read_options, without_defaults
 
 __all__ = [
-    "NO_NAME", "AreaOptions", "Box", "BoxOptions", "Drawn", "Gate", "GateOptions", "GoalOptions", "Latitude",
+    "NO_NAME", "PERMITS", "AreaOptions", "Box", "BoxOptions", "Drawn", "Gate", "GateOptions", "GoalOptions", "Latitude",
     "Longitude", "MarkOptions", "MissionFiles", "MissionOptions", "PointOptions", "RefugeOptions", "SearchOptions",
     "StartOptions", "WindOptions", "document_of", "drawing_of", "drawn_mission", "free_water", "goal_losses",
     "hindrance", "is_file", "kept", "kind_of", "load_area", "load_mission", "load_settings", "mission_files", "offer",
