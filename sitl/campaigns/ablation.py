@@ -95,7 +95,7 @@ def run_ablation(
 
     unknown = next((name for name in names if name not in VARIATIONS), None)
     if unknown is not None:
-        raise InputError("--only", unknown, "is no variation", "choose of: " + ", ".join(VARIATIONS))
+        raise InputError("--only", unknown, "is no variation", "choose of: " + "; ".join(VARIATIONS))
     wanted = [AS_IT_IS, *(name for name in VARIATIONS if name in names and name != AS_IT_IS)]
     for path in scenarios:
         _mission(path)
