@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from companion.commands.shore.session import OnProgress, Shore
+from companion.commands.shore.shore import OnProgress, Shore
 from companion.commands.shore.wording import NAMES
 from companion.errors import TransferError
 from companion.messages import GeoPoint, MissionItem, MissionType

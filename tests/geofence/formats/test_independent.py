@@ -229,7 +229,7 @@ def test_a_link_that_dies_in_a_transfer_is_an_error(tmp_path):
     """The autopilot stops answering after the connection: an error, no empty fence."""
     script = textwrap.dedent("""
         import os, signal, sys
-        from companion.commands.shore import session as shore
+        from companion.commands.shore import shore
         from companion.errors import TransferError
         from companion.messages import MissionType
 
