@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,24 +71,40 @@ class Disk:
         A new file beside it is written, synced and renamed, and then the folder is synced: only that makes the new
         name outlive a power cut.
         """
-        beside = path.with_name(path.name + NEW)
+        self.replace_all({path: data}, is_durable=is_durable)
+
+    def replace_all(self, files: Mapping[Path, bytes], *, is_durable: bool = True) -> None:
+        """Put each of ``files`` in its place, all or none: they are renamed when all are written. Modes are kept.
+
+        Raises:
+            OSError: one cannot be written, which its ``filename`` says; what was there is there.
+        """
+        beside = {path: path.with_name(path.name + NEW) for path in files}
+        path = Path()
         try:
-            fd = self.create(beside)
-            try:
-                done = 0
-                while done < len(data):
-                    done += self.write(fd, data[done:])
-                if is_durable:
-                    self.sync(fd)
-            finally:
-                os.close(fd)
-            self.rename(beside, path)
-        except OSError:
-            with contextlib.suppress(OSError):
-                beside.unlink()   # a full disk needs the room
+            for path, data in files.items():
+                fd = self.create(beside[path])
+                try:
+                    done = 0
+                    while done < len(data):
+                        done += self.write(fd, data[done:])
+                    with contextlib.suppress(OSError):
+                        os.fchmod(fd, path.stat().st_mode & 0o777)
+                    if is_durable:
+                        self.sync(fd)
+                finally:
+                    os.close(fd)
+            for path, new in beside.items():
+                self.rename(new, path)
+        except OSError as error:
+            for new in beside.values():
+                with contextlib.suppress(OSError):
+                    new.unlink()   # a full disk needs the room
+            error.filename = str(path)
             raise
         if is_durable:
-            self.sync_folder(path.parent)
+            for folder in {path.parent for path in files}:
+                self.sync_folder(folder)
 
     # ---------------------------------------------------------------------------------- what the above is made of
     def create(self, path: Path) -> int:

@@ -43,7 +43,7 @@ settings=$(env | grep '^PIP_' || true)
 export SOURCE_DATE_EPOCH=$(git -C "$source" log -1 --format=%ct)
 mkdir -p "$source/dist"
 chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/source LC_ALL=C.UTF-8 SOURCE_DATE_EPOCH=$SOURCE_DATE_EPOCH \
-    $settings python3 /source/packaging/deb.py --tree --work /work
-name=$(cat "$root/work/name")   # packed here: by emulation that alone takes a quarter of an hour
-dpkg-deb --build --root-owner-group -Zxz "$root/work/stage" "$source/dist/$name" >/dev/null
+    $settings python3 /source/packaging/deb.py --tree --work /building
+name=$(cat "$root/building/name")   # packed here: by emulation that alone takes a quarter of an hour
+dpkg-deb --build --root-owner-group -Zxz "$root/building/stage" "$source/dist/$name" >/dev/null
 ls -l "$source/dist/$name"

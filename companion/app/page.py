@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -16,7 +15,7 @@ from companion.app.showing import Showing
 from companion.errors import JobError
 from companion.fold import Step, VoyageFold
 from companion.orders import LOCAL, Answer, Verb, Wanted, permitted
-from companion.page import Address, Chart, Live, served
+from companion.page import Address, Chart, Live, plan_figures, served
 from companion.planner import Plan
 from companion.skipper import Skipper
 from companion.view import Area, Event, View
@@ -72,16 +71,7 @@ class LivePage:
 def _in_figures(plan: Plan) -> dict[str, Any]:
     if not plan.has_path:
         return {"error": f"no way there was found: {plan.reason}"}
-    clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
-    return {
-        "error": None, "way_en_m": np.round(plan.waypoints_en, 1).tolist(), "time_s": round(plan.cost_s, 1),
-        "length_m": round(sum(leg.length_m for leg in plan.legs), 1),
-        "risk": None if plan.risk is None or not math.isfinite(plan.risk) else round(plan.risk, 4),
-        "risks": [None if leg.risk is None else round(leg.risk, 4) for leg in plan.legs],
-        "tacks": sum(leg.manoeuvre == "tack" for leg in plan.legs),
-        "gybes": sum(leg.manoeuvre == "gybe" for leg in plan.legs),
-        "clearance_m": round(min(clear), 1) if clear else None,
-    }
+    return {"error": None, "way_en_m": np.round(plan.waypoints_en, 1).tolist(), **plan_figures(plan)}
 
 
 async def opened(

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from companion.disk import NEW, reason
+from companion.disk import Disk, reason
 from companion.errors import InputError, JobError
 from companion.words import counted
 
@@ -69,19 +69,10 @@ def write_out(
 def write_files(files: dict[str, bytes], *, force: bool) -> None:
     """Write all files or none: what exists is not overwritten without ``force``. Raises InputError."""
     refuse_existing(list(files), force=force)
-    beside: list[tuple[Path, Path]] = []
     try:
-        for name, data in files.items():
-            path = Path(name)
-            beside.append((path.with_name(path.name + NEW), path))
-            beside[-1][0].write_bytes(data)
-        for new, path in beside:
-            new.replace(path)
+        Disk().replace_all({Path(name): data for name, data in files.items()})
     except OSError as error:
-        for new, _ in beside:
-            with contextlib.suppress(OSError):
-                new.unlink(missing_ok=True)
-        raise InputError(str(beside[-1][1]), "", f"cannot be written ({reason(error)})", "name another place") from None
+        raise InputError(error.filename, "", f"cannot be written ({reason(error)})", "name another place") from None
 
 
 def refuse_existing(names: Sequence[str], *, force: bool) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,10 @@ import numpy as np
 from companion.compose import planner_of
 from companion.errors import InputError
 from companion.geofence import Mission
+from companion.page import plan_figures
 from companion.planner import Plan, Problem
 from companion.planner.worker import PlannerWorker
-from companion.sailable.previews import Wind, bound_for, legs, onwards
+from companion.sailable.previews import Wind, leg_names, legs, onwards
 
 BUDGET_S = 0.5       # for a leg: near the best, and while one looks
 MOST_LEGS = 60
@@ -47,7 +47,7 @@ class Previews:
             return {"error": "a plan begins somewhere: put the start on the chart", "legs": []}
         async with self._turn:
             by = planner_of(mission)
-            words, walk = bound_for(mission), legs(mission, wind)
+            words, walk = leg_names(mission), legs(mission, wind)
             made: list[dict[str, Any]] = []
             error = ""
             try:
@@ -73,18 +73,8 @@ class Previews:
 
 
 def _in_figures(plan: Plan, to: str, mission: Mission) -> dict[str, Any]:
-    frame = mission.frame()
-    clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
-    return {
-        "to": to, "why": plan.why.text,
-        "way": np.round(frame.array_lonlat_from_en(plan.waypoints_en)[:, ::-1], 7).tolist(),
-        "time_s": round(plan.cost_s, 1), "length_m": round(sum(leg.length_m for leg in plan.legs), 1),
-        "risk": None if plan.risk is None or not math.isfinite(plan.risk) else round(plan.risk, 4),
-        "risks": [None if leg.risk is None else round(leg.risk, 4) for leg in plan.legs],
-        "tacks": sum(leg.manoeuvre == "tack" for leg in plan.legs),
-        "gybes": sum(leg.manoeuvre == "gybe" for leg in plan.legs),
-        "clearance_m": round(min(clear), 1) if clear else None,
-    }
+    way = mission.frame().array_lonlat_from_en(plan.waypoints_en)[:, ::-1]
+    return {"to": to, "why": plan.why.text, "way": np.round(way, 7).tolist(), **plan_figures(plan)}
 
 
 def _together(made: list[dict[str, Any]]) -> dict[str, Any]:

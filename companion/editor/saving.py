@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from companion.disk import NEW, Disk, reason
+from companion.disk import Disk, reason
 from companion.errors import JobError
 
 
@@ -30,33 +28,12 @@ def changed_meanwhile(expected: Mapping[Path, bytes], files: Mapping[Path, bytes
 
 
 def save(files: Mapping[Path, bytes], disk: Disk) -> None:
-    """Write all files or none: each beside its place first, synced, then all renamed.
+    """Write all files or none.
 
     Raises:
         JobError: one cannot be written; what was there is there.
     """
-    beside: list[tuple[Path, Path]] = []
-    path = Path()
     try:
-        for path, data in files.items():
-            new = path.with_name(path.name + NEW)
-            fd = disk.create(new)
-            beside.append((new, path))
-            try:
-                done = 0
-                while done < len(data):
-                    done += disk.write(fd, data[done:])
-                with contextlib.suppress(OSError):
-                    os.fchmod(fd, path.stat().st_mode & 0o777)
-                disk.sync(fd)
-            finally:
-                os.close(fd)
-        for new, path in beside:
-            disk.rename(new, path)
-        for folder in {path.parent for path in files}:
-            disk.sync_folder(folder)
+        disk.replace_all(files)
     except OSError as error:
-        for new, _ in beside:
-            with contextlib.suppress(OSError):
-                new.unlink(missing_ok=True)
-        raise JobError(f"{path}: cannot be written ({reason(error)}); what was there is there") from None
+        raise JobError(f"{error.filename}: cannot be written ({reason(error)}); what was there is there") from None

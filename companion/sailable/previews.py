@@ -44,7 +44,7 @@ def leg_problem(
     })
 
 
-def bound_for(mission: Mission) -> list[str]:
+def leg_names(mission: Mission) -> list[str]:
     """Return in words where each of the legs of ``legs`` leads."""
     words = [f"goal {n}" + (f", {goal.name}" if goal.name else "") for n, goal in enumerate(mission.goals, start=1)]
     return [*words, "home"] if mission.skipper.end == "home" else words

@@ -188,4 +188,5 @@ def interval(shares: Sequence[float]) -> tuple[float, float, float]:
     rng = np.random.default_rng(0)
     means = logs[rng.integers(0, logs.size, (BOOTSTRAPS, logs.size))].mean(axis=1)
     low, high = np.quantile(means, (0.025, 0.975))
-    return tuple(round(math.exp(float(x)), 12) for x in (logs.mean(), low, high))   # type: ignore[return-value]
+    middle, low, high = (round(math.exp(float(x)), 12) for x in (logs.mean(), low, high))
+    return middle, low, high
