@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test check docs slowest campaign bench figures deb release clean
+.PHONY: env demo test test-long check docs slowest campaign bench figures deb release clean
 env: $(ENV)
 
 # What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
@@ -55,7 +55,12 @@ KERNELS := $(BIN)/python -c 'from sitl.run.compiled import compile_ahead; compil
 
 test: $(ENV)
 	@$(KERNELS)
-	$(BIN)/python -m pytest -n 3 --dist worksteal
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not campaign and not long"
+
+# What takes seconds of a core each (tests/long.txt): whole voyages, browsers, months.
+test-long: $(ENV)
+	@$(KERNELS)
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m long
 
 check: $(ENV)
 	$(BIN)/ruff check .

@@ -1,6 +1,7 @@
 """What every test shares: their order, which of them wait to be asked for, and why they were left out."""
 
 import os
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -11,6 +12,19 @@ settings.load_profile("no deadline")
 
 # A minute of each worker's time in tests of seconds: begun first, or one worker would end with them while others wait.
 LONG = "tests/voyages/test_scenarios_sail.py"
+
+# What takes seconds of a core is marked here, in one place, by name: `make test` leaves it to `make test-long`.
+ASIDE = Path(__file__).with_name("long.txt")
+NAMED = pytest.StashKey[set[str]]()
+
+
+def pytest_configure(config):
+    config.stash[NAMED] = {line for line in ASIDE.read_text().splitlines() if not line.startswith("#")}
+
+
+def pytest_itemcollected(item):
+    if item.nodeid in item.config.stash[NAMED]:
+        item.add_marker("long")
 
 
 @pytest.hookimpl(trylast=True)   # of what is left when the marks have been looked at
