@@ -279,6 +279,11 @@ class Vehicle:
         return float(self.state[k.S_DE]), float(self.state[k.S_DN])
 
     @property
+    def leg(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Where the present leg begins and ends [m]."""
+        return (float(self.state[k.S_OE]), float(self.state[k.S_ON])), self.destination
+
+    @property
     def current_en_mps(self) -> tuple[float, float]:
         """Of the water, towards east and north [m/s]."""
         return float(self.state[k.S_CURRENT_E]), float(self.state[k.S_CURRENT_N])
