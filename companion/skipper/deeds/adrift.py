@@ -237,8 +237,8 @@ def lies_in_loiter(turn: Turn) -> bool:
         and water_at(turn.voyage.area, boat).path_clearance_m([boat, place]) >= turn.config.margin_floor_m)
 
 
-def _is_cramped(turn: Turn) -> bool:
-    """Whether a loiter begun here would be sailed onto something, in a wind that fills the sails.
+def is_cramped(turn: Turn) -> bool:
+    """Return whether a loiter begun here would be sailed onto something, in a wind that fills the sails.
 
     Who lies in irons beside a wall is better helped by her way on, which was planned clear of it.
     """
@@ -262,7 +262,7 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
         return True
     if status.mode is not Mode.AUTO or memory.loitered or ahead is None or (ahead.is_clear and lies_in_loiter(turn)):
         return False
-    if _is_cramped(turn):
+    if is_cramped(turn):
         return False
     if not is_busy(turn, Mode.LOITER.name) and set_mode(turn, Mode.LOITER, f"{what}, {how}"):
         turn.update(after_operator=True)
