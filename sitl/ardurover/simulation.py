@@ -26,12 +26,14 @@ from companion.geo.frame import LocalFrame
 from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint, Mode
 from sitl.autopilot import Truth
-from sitl.world import Wind
+from sitl.world import Waters, Wind
 
 DEFAULTS = Path(__file__).with_name("sailboat.parm")
 MOTOR = "-motor"      # of a model: the hull with an auxiliary motor
 THROTTLE = ("SERVO3_FUNCTION 70", "SERVO3_MIN 1000", "SERVO3_MAX 2000", "SERVO3_TRIM 1500")
 _WIND_HZ = 5.0
+_WIND = ("SIM_WIND_DIR", "SIM_WIND_SPD")
+_TIDE = ("SIM_TIDE_DIR", "SIM_TIDE_SPEED")
 _WIND_REPEAT_S = 5.0
 _INSTANCES = 20
 _HARNESS = (250, mav.MAV_COMP_ID_MISSIONPLANNER)
@@ -53,6 +55,7 @@ class ArduRover:
         parameters: set besides those of the model's file, sailboat.parm or motorboat.parm.
         folder: where it keeps eeprom and logs; a temporary one when None.
         model: of the simulator; ``sailboat-motor`` has a throttle.
+        waters: wind and stream by place, told as they are where she is.
 
     ``link`` is the companion's LINK, ``shore_link`` another port (SERIAL2) for a ground station.
     """
@@ -60,13 +63,15 @@ class ArduRover:
     def __init__(
         self, program: Path, home: GeoPoint, wind: Wind, *, heading_rad: float = 0.0, speedup: float = 1.0,
         instance: int | None = None, parameters: Mapping[str, float] | None = None, folder: Path | None = None,
-        model: str = "sailboat",
+        model: str = "sailboat", waters: Waters | None = None,
     ) -> None:
         self._program, self._home, self._wind = program.resolve(), home, wind
         self._heading_rad, self._speedup = heading_rad, speedup
         self._wanted = instance
         self._parameters = dict(parameters or {})
         self._folder, self._model = folder, model
+        self._waters = waters
+        self._set_en_mps = (0.0, 0.0)
         self._stack = contextlib.AsyncExitStack()
         self._process: asyncio.subprocess.Process | None = None
         self._harness: Any = None
@@ -201,9 +206,10 @@ class ArduRover:
         self.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0)
 
     def set_current(self, set_to_rad: float, drift_mps: float) -> None:
-        """Let the water run towards ``set_to_rad``."""
-        self.set_parameter("SIM_TIDE_DIR", math.degrees(wrap_two_pi(set_to_rad + math.pi)))
-        self.set_parameter("SIM_TIDE_SPEED", drift_mps)
+        """Let the water run towards ``set_to_rad``, beside the stream of its waters."""
+        self._set_en_mps = drift_mps * math.sin(set_to_rad), drift_mps * math.cos(set_to_rad)
+        for name, value in zip(_TIDE, _tide(self._set_en_mps), strict=True):
+            self.set_parameter(name, value)
 
     def set_gps_jump(self, lat_deg: float, lon_deg: float) -> None:
         """Let the receiver err by so much; by the names of 4.5 and of 4.7, of which one is known to it."""
@@ -230,7 +236,7 @@ class ArduRover:
         east, north = self._frame.en_from_geo(position)
         ve, vn = moving.vy / 100.0, moving.vx / 100.0
         beat, servos, mission = (self._seen.get(n) for n in ("HEARTBEAT", "SERVO_OUTPUT_RAW", "MISSION_CURRENT"))
-        twd, tws = self._wind.at(self.t_s)
+        twd, tws = self._wind_here()
         return Truth(
             t_s=self.t_s, boot_s=self._boot_s, east_m=east, north_m=north, position=position,
             heading_rad=wrap_two_pi(sim.yaw), speed_mps=math.hypot(ve, vn), velocity_en_mps=(ve, vn),
@@ -270,20 +276,43 @@ class ArduRover:
     async def _live(self) -> None:
         """Heartbeat, and the wind as it is now."""
         beat_s = told_s = -math.inf
-        told: tuple[float, float] | None = None
+        told: tuple[float, ...] | None = None
         while True:
             if now_s() - beat_s >= 1.0:
                 beat_s = now_s()
                 self._send(mav.MAVLink_heartbeat_message(mav.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, 4, 3))
             if self._ready.is_set():
-                twd, tws = self._wind.at(max(0.0, self.t_s))
-                wind = (round(math.degrees(twd), 3), round(tws, 4))
+                twd, tws = self._wind_here()
+                weather = round(math.degrees(twd), 3), round(tws, 4), *self._stream_here()
                 # again now and then, in case a setting was lost on the way
-                if wind != told or now_s() - told_s > _WIND_REPEAT_S:
-                    told, told_s = wind, now_s()
-                    self.set_parameter("SIM_WIND_DIR", wind[0])
-                    self.set_parameter("SIM_WIND_SPD", wind[1])
+                if weather != told or now_s() - told_s > _WIND_REPEAT_S:
+                    told, told_s = weather, now_s()
+                    for name, value in zip((*_WIND, *_TIDE), weather, strict=False):
+                        self.set_parameter(name, value)
             await asyncio.sleep(1.0 / _WIND_HZ)
+
+    def _wind_here(self) -> tuple[float, float]:
+        t_s = max(0.0, self.t_s)
+        return self._wind.at(t_s) if self._waters is None else self._waters.wind_at(t_s, self._place())
+
+    def _stream_here(self) -> tuple[float, ...]:
+        """Return where the water comes from [deg] and how fast it runs [m/s]; nothing where it is not ours to say."""
+        if self._waters is None:
+            return ()
+        east, north = self._waters.stream_at(max(0.0, self.t_s), self._place())
+        return _tide((self._set_en_mps[0] + east, self._set_en_mps[1] + north))
+
+    def _place(self) -> tuple[float, float]:
+        sim = self._seen.get("SIMSTATE")
+        if sim is None:
+            return 0.0, 0.0
+        return self._frame.en_from_geo(GeoPoint(lat_deg=sim.lat / 1e7, lon_deg=sim.lng / 1e7))
+
+
+def _tide(stream_en_mps: tuple[float, float]) -> tuple[float, float]:
+    """Return a stream as the simulator is told of it: where it comes from [deg], how fast it runs [m/s]."""
+    east, north = stream_en_mps
+    return round(math.degrees(wrap_two_pi(math.atan2(-east, -north))), 2), round(math.hypot(east, north), 3)
 
 
 def _is_free(port: int) -> bool:

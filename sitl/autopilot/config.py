@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 
 from companion.boat import Polar
 from companion.messages import GeoPoint, Mode
+from sitl.autopilot.departures import Departures
+from sitl.world import Waters
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
 
@@ -34,6 +36,8 @@ class AutopilotConfig:
         polar: of a boat that is not the simulator's own; None: hers.
         has_motor: an auxiliary motor, run by DO_AUX_FUNCTION 74.
         epoch_s: Unix time of the start, as its GPS tells it.
+        departures: what the boat is that is not the plan's; None: nothing.
+        waters: wind and stream by place, in metres from home; None: the wind alone, everywhere the same.
         new_parameter_names: answer to ArduPilot 4.7's names (MAV_SYSID) instead of the older ones.
     """
 
@@ -51,6 +55,8 @@ class AutopilotConfig:
     polar: Polar | None = None
     has_motor: bool = False
     epoch_s: float = EPOCH_S
+    departures: Departures | None = None
+    waters: Waters | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

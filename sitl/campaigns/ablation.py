@@ -5,12 +5,8 @@ Asks what Wolsieffer 2020 leaves to future work: is a boat safer that plans with
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
-import sys
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +16,7 @@ import numpy as np
 
 from companion.errors import InputError
 from companion.geofence import Mission
-from sitl.campaigns.pool import in_processes
+from sitl.campaigns.pool import held, sailed
 from sitl.run.variation import Variation, foreknown, unspread
 
 HERE = Path(__file__).parents[1] / "scenarios"
@@ -105,40 +101,16 @@ def run_ablation(
             for n in range(runs) for path in scenarios for name in wanted]
     named = {path: load_scenario(path).name for path in scenarios}
     keys = {(named[job.scenario], job.variation, job.seed) for job in jobs}
-    records = [r for r in _held(out) if _key(r) in keys]
-    sailed = {_key(r) for r in records}
-    jobs = [job for job in jobs if (named[job.scenario], job.variation, job.seed) not in sailed]
-    began = time.perf_counter()
-    with contextlib.ExitStack() as stack:
-        file = None if out is None else stack.enter_context(out.open("a", encoding="utf-8"))
-        for n, record in enumerate(in_processes(sail_one, jobs, workers), 1):
-            records.append(record)
-            if file is not None:
-                file.write(json.dumps(record, separators=(",", ":")) + "\n")
-                file.flush()
-            left_s = (time.perf_counter() - began) / n * (len(jobs) - n)
-            sys.stderr.write(f"\r{n}/{len(jobs)} sailed, {left_s:.0f} s left   ")
-            sys.stderr.flush()
-    sys.stderr.write("\n" if jobs else "")
+    records = [r for r in held(out) if _key(r) in keys]
+    had = {_key(r) for r in records}
+    jobs = [job for job in jobs if (named[job.scenario], job.variation, job.seed) not in had]
+    records += sailed(sail_one, jobs, workers, out)
     for scenario in dict.fromkeys(record["scenario"] for record in sorted(records, key=_order)):
         print(f"{scenario}, {runs} seeds from {first_seed}")
         print(table([record for record in records if record["scenario"] == scenario], wanted))
     for record in (r for r in records if r["error"]):
         print(f"ERROR {record['scenario']}, {record['variation']}, seed {record['seed']}: {record['error'][:300]}")
     return 1 if any(r["error"] for r in records) else 0
-
-
-def _held(out: Path | None) -> list[dict[str, Any]]:
-    """Return the voyages that a file holds; a last line that was cut short is taken out."""
-    if out is None or not out.exists():
-        return []
-    text = out.read_text(encoding="utf-8")
-    if text and not text.endswith("\n"):
-        out.write_text(text[:text.rfind("\n") + 1], encoding="utf-8")
-    try:
-        return [json.loads(line) for line in text.splitlines(keepends=True) if line.endswith("\n")]
-    except ValueError as error:
-        raise InputError(str(out), "", f"holds a line that is no voyage ({error})", "name another file") from error
 
 
 def _key(record: Mapping[str, Any]) -> tuple[str, str, int]:

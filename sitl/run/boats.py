@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+import msgspec
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.errors import JobError, LinkError
@@ -26,7 +27,7 @@ from companion.mavlink.trust import LinkIdentity
 from companion.mavlink.wire import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import MOTOR, ArduRover, require
-from sitl.scene import EventSpec, Scenario, free_port
+from sitl.scene import EventSpec, Scenario, SensorsSpec, free_port, scenario_waters
 from sitl.trouble import give_order, set_parameter
 from sitl.world import Wind
 
@@ -34,6 +35,8 @@ from sitl.world import Wind
 WARM_BOOT_S = 60.0
 # A simulated autopilot's process may compile its kernels first [s of real time].
 START_S = 90.0
+# Of the real one's simulated receiver, which its filter knows of (SIM_GPS1_LAG_MS) [ms].
+REAL_LAG_MS = 100.0
 # What the judge asks for: the position and the bow, five times a second.
 JUDGE_STREAMS = (
     Stream("GLOBAL_POSITION_INT", 5.0, 3.0),
@@ -55,7 +58,7 @@ class Fix:
 
     @property
     def velocity_en_mps(self) -> tuple[float, float]:
-        """Along the bow: the simulated hulls make no leeway."""
+        """Along the bow: what leeway and stream make of it is left out, as by whoever sees her from another boat."""
         return self.speed_mps * math.sin(self.heading_rad), self.speed_mps * math.cos(self.heading_rad)
 
 
@@ -72,6 +75,11 @@ class Boat(Protocol):
 
     def fix(self) -> Fix | None:
         """Return the truth now; None before there is any."""
+        ...
+
+    @staticmethod
+    def cannot_be(scenario: Scenario) -> list[str]:
+        """Return what it cannot be of the boat that a scenario's tables ask for."""
         ...
 
     async def play(self, event: EventSpec, frame: LocalFrame) -> None:
@@ -130,6 +138,11 @@ class SimulatedBoat:
                 process.terminate()
             await process.wait()
 
+    @staticmethod
+    def cannot_be(scenario: Scenario) -> list[str]:
+        """Return what it cannot be: a boat whose sensors err, for they are what the judge listens to."""
+        return [] if scenario.sensors is None else ["[sensors]"]
+
     def fix(self) -> Fix | None:
         """Return what the simulated autopilot tells, whose sensors do not err unless a scenario says so."""
         state, status = self._state, self._pilot.status
@@ -171,13 +184,25 @@ class RealBoat:
         cls, scenario: Scenario, mission: Mission, wind: Wind, program: Path | None, pace: float, folder: Path,
     ) -> AsyncIterator[RealBoat]:
         """Run it while the block runs."""
+        waters = scenario_waters(scenario, wind, mission.frame().en_from_geo(mission.start or mission.origin))
+        parameters = dict(scenario.parameters)
+        if scenario.sensors is not None and scenario.sensors.gps_lag_s:
+            parameters |= {"SIM_GPS1_LAG_MS": REAL_LAG_MS + 1e3 * scenario.sensors.gps_lag_s}
         async with ArduRover(
-            require(program), mission.start or mission.origin, wind, speedup=pace, parameters=scenario.parameters,
+            require(program), mission.start or mission.origin, wind, speedup=pace, parameters=parameters,
             heading_rad=math.radians(heading_deg_of(scenario, mission)),
-            model="sailboat" + (MOTOR if mission.boat.motor else ""),
+            model="sailboat" + (MOTOR if mission.boat.motor else ""), waters=waters,
         ) as rover:
             yield cls(rover)
         (folder / "autopilot.log").write_text("\n".join(f"{t:.1f} {s} {x}" for t, s, x in rover.texts) + "\n")
+
+    @staticmethod
+    def cannot_be(scenario: Scenario) -> list[str]:
+        """Return what it cannot be: its hull has no leeway and no waves, and of its sensors only the position's age."""
+        told = SensorsSpec() if scenario.sensors is None else scenario.sensors
+        errs = msgspec.structs.replace(told, gps_lag_s=0.0) != SensorsSpec()
+        tables = {"[boat]": scenario.boat is not None, "[waves]": scenario.waves is not None, "[sensors]": errs}
+        return [name for name, asked in tables.items() if asked]
 
     def fix(self) -> Fix | None:
         """Return the simulator's own state."""

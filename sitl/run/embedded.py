@@ -36,7 +36,19 @@ from companion.telemetry.folder import STATE, VERDICT
 from companion.wind import Estimator, WindRoom
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.run.variation import Variation
-from sitl.scene import Others, Scenario, Verdict, free_port, is_all_ordinary, judge, own_polar, scenario_wind, tasks_of
+from sitl.scene import (
+    Others,
+    Scenario,
+    Verdict,
+    free_port,
+    is_all_ordinary,
+    judge,
+    own_polar,
+    scenario_departures,
+    scenario_waters,
+    scenario_wind,
+    tasks_of,
+)
 from sitl.trouble import KEY, FragilePlanner, MortalPlanner, Observer, Satellite, World, channel, happen
 
 TRUTH_EVERY_S = 0.25
@@ -137,7 +149,8 @@ async def run_embedded(
     autopilot = Autopilot(
         AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
                         parameters=scenario.parameters, has_ftp=scenario.has_ftp, has_motor=mission.boat.motor,
-                        polar=own_polar(mission), epoch_s=scenario.epoch_s),
+                        polar=own_polar(mission), epoch_s=scenario.epoch_s, departures=scenario_departures(scenario),
+                        waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(start))),
         wind, seed=seed,
     )
     link = MemoryLink("companion", seed=seed)

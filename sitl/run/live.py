@@ -112,13 +112,19 @@ def run_live(
     ``page`` is what the companion is told of its live page.
 
     Raises:
-        JobError: it has an event that this autopilot cannot play, or the companion left nothing.
+        JobError: it has an event that this autopilot cannot play, or a boat that it cannot be, or the companion left
+            nothing.
     """
     kind = RealBoat if autopilot == "ardurover" else SimulatedBoat
     cannot = sorted({e.kind for e in scenario.events} - OURS - kind.plays)
     if cannot:
         raise JobError(
             f"{scenario.name}: {', '.join(cannot)} can be played by the embedded autopilot only; leave out "
+            f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}")
+    unlike = kind.cannot_be(scenario)
+    if unlike:
+        raise JobError(
+            f"{scenario.name}: {', '.join(unlike)} can be had of the embedded autopilot only; leave out "
             f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}")
     pace = speedup or scenario.speedup
     track = Truth() if truth is None else truth

@@ -14,7 +14,7 @@ from pathlib import Path
 from companion.clock import run
 from companion.geofence import load_mission
 from sitl.autopilot import Autopilot, AutopilotConfig, serve
-from sitl.scene import load_scenario, own_polar, scenario_wind
+from sitl.scene import load_scenario, own_polar, scenario_departures, scenario_waters, scenario_wind
 
 
 def main() -> int:
@@ -28,10 +28,13 @@ def main() -> int:
     scenario = load_scenario(args.scenario)
     mission = load_mission(scenario.mission_path(args.scenario))
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
+    home, wind = mission.start or mission.origin, scenario_wind(scenario, args.scenario, args.seed)
     autopilot = Autopilot(
-        AutopilotConfig(home=mission.start or mission.origin, heading_rad=math.radians(heading_deg), is_warm=True,
-                        is_moored=True, parameters=scenario.parameters, polar=own_polar(mission)),
-        scenario_wind(scenario, args.scenario, args.seed), args.seed,
+        AutopilotConfig(home=home, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
+                        parameters=scenario.parameters, polar=own_polar(mission),
+                        departures=scenario_departures(scenario),
+                        waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(home))),
+        wind, args.seed,
     )
 
     async def sail() -> None:

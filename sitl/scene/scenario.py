@@ -19,6 +19,7 @@ from companion.errors import InputError
 from companion.words import choices
 from sitl.autopilot import EPOCH_S
 from sitl.scene.mariner import Manner
+from sitl.scene.mismatch import CurrentSpec, Degrees, HullSpec, LeeSpec, Positive, SensorsSpec, Share, Slope, WavesSpec
 from sitl.scene.road import Craft
 
 EventKind = Literal[
@@ -62,7 +63,7 @@ EventKind = Literal[
 
 
 class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The weather."""
+    """The weather; from ``gust_spread`` on also what varies in time beside it and over the water."""
 
     model: Literal["constant", "ou", "recorded"] = "ou"
     from_deg: float = 0.0
@@ -71,6 +72,12 @@ class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     tau_s: float = 28.0          # 1 / rho: Wolsieffer's 0.036 Hz
     tws_sd_mps: float = 0.3
     file: str | None = None
+    gust_spread: Share = 0.0           # of the strength's logarithm, about the strength that is there without gusts
+    gust_s: Positive = 15.0            # their correlation time
+    stronger_per_km: Slope = 0.0       # the wind is stronger by this share for each km from the mission's origin ...
+    stronger_to_deg: Degrees = 0.0     # ... in this direction ...
+    bends_deg_per_km: Degrees = 0.0    # ... and veers by so much there
+    lees: tuple[LeeSpec, ...] = ()
 
 
 class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -225,6 +232,10 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     system: int | None = None                 # of our autopilot, named in place of what the mission says
     satellite: SatelliteSpec | None = None    # ``far_order`` needs one
     wind: WindSpec = msgspec.field(default_factory=WindSpec)
+    current: CurrentSpec | None = None        # of these four: what the plan does not know of, None: it is as planned
+    waves: WavesSpec | None = None
+    boat: HullSpec | None = None
+    sensors: SensorsSpec | None = None
     parameters: dict[str, float] = {}
     events: tuple[EventSpec, ...] = ()
     expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)
@@ -283,7 +294,9 @@ def _suggestion(error: msgspec.ValidationError) -> str:
     if "unknown field" not in str(error):
         return ""
     word = str(error).partition("`")[2].partition("`")[0]
-    tables = {"wind": WindSpec, "satellite": SatelliteSpec, "events": EventSpec, "expect": ExpectSpec}
+    tables = {"wind": WindSpec, "satellite": SatelliteSpec, "events": EventSpec, "expect": ExpectSpec,
+              "wind.lees": LeeSpec, "current": CurrentSpec, "waves": WavesSpec, "boat": HullSpec,
+              "sensors": SensorsSpec}
     table = tables.get(_place(error).split("[")[0], Scenario)
     close = difflib.get_close_matches(word, table.__struct_fields__, n=1)
     return f"did you mean `{close[0]}`?" if close else f"known: {', '.join(table.__struct_fields__)}"

@@ -49,7 +49,7 @@ class Constant:
         return wrap_two_pi(self.twd_from_rad), self.tws_mps
 
 
-class _Process:
+class Process:
     """A stationary Ornstein-Uhlenbeck process of mean 0 and standard deviation 1, known on a fixed time grid.
 
     x(t + d) = exp(-rho d) x(t) + sqrt(1 - exp(-2 rho d)) n: exact at any d, so the spread does not depend on the
@@ -70,6 +70,7 @@ class _Process:
         self._values: list[float] = []
 
     def at(self, t_s: float) -> float:
+        """Return the process at ``t_s``; before 0 as at 0."""
         place = max(0.0, t_s) / self._step_s
         index = math.floor(place)
         share = place - index
@@ -115,8 +116,8 @@ class AR1:
     ) -> None:
         self.twd_from_rad, self.tws_mps = twd_from_rad, tws_mps
         self.sd_rad, self.rho_hz, self.tws_sd_mps = sd_rad, rho_hz, tws_sd_mps
-        self._direction = _Process(rho_hz, step_s, seed, 0, from_mean=from_mean)
-        self._speed = _Process(rho_hz, step_s, seed, 1, from_mean=from_mean)
+        self._direction = Process(rho_hz, step_s, seed, 0, from_mean=from_mean)
+        self._speed = Process(rho_hz, step_s, seed, 1, from_mean=from_mean)
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return the wind at ``t_s``."""

@@ -237,6 +237,17 @@ def lies_in_loiter(turn: Turn) -> bool:
         and water_at(turn.voyage.area, boat).path_clearance_m([boat, place]) >= turn.config.margin_floor_m)
 
 
+def is_cramped(turn: Turn) -> bool:
+    """Return whether a loiter begun here would be sailed onto something, in a wind that fills the sails.
+
+    Who lies in irons beside a wall is better helped by her way on, which was planned clear of it.
+    """
+    wind, boat = turn.wind_now, turn.boat_en
+    if wind is None or boat is None or wind[1] < LIGHT_MPS:
+        return False
+    return float(water_at(turn.voyage.area, boat).clearance_m([boat])[0]) < turn.config.loiter_radius_m
+
+
 def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
     """Keep LOITER, or ask for it where she drifts; a person who sets AUTO meanwhile is let have it."""
     status, state, memory = turn.autopilot, turn.state, turn.state.adrift
@@ -250,6 +261,8 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
         turn.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until she can sail")
         return True
     if status.mode is not Mode.AUTO or memory.loitered or ahead is None or (ahead.is_clear and lies_in_loiter(turn)):
+        return False
+    if is_cramped(turn):
         return False
     if not is_busy(turn, Mode.LOITER.name) and set_mode(turn, Mode.LOITER, f"{what}, {how}"):
         turn.update(after_operator=True)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.kernels.jit import kernel
+from sitl.autopilot.boat.departed import falls_off, side_mps, speed_share
 from sitl.autopilot.boat.sail import polar_force, polar_speed, sail_force
 from sitl.autopilot.boat.scalars import alpha, clip, wrap
 
@@ -49,14 +50,20 @@ S_INDIRECT = 66
 S_WANT_SPEED = 69                                             # desired speed, accelerated at P_ACCEL
 S_GPS_E, S_GPS_N = 67, 68                                       # error of the position that the autopilot believes
 S_COMPASS = 70                                                  # error of the heading that it believes [rad]
-S_SIZE = 72
+# of a boat that is not the plan's (``P_OTHER``): leeway to starboard [m/s], the share of her speed that waves leave,
+# the turn that they give her [rad/s], a number on 0..1 for the next tack, tacks tried and failed, the tack that she was
+# last settled on (its sign of the wind's angle), whether this one was tried, until when she lies in irons
+S_SIDE, S_SEA, S_WOBBLE, S_LOT, S_TRIES, S_FAILED, S_TACK_SIDE, S_TRIED, S_IRONS_END = range(72, 81)
+S_SIZE = 82
 
 # --- settings --------------------------------------------------------------------------------------------------
 (P_NOGO, P_XTRACK_MAX, P_IDEAL, P_SAIL_MIN, P_SAIL_MAX, P_LOITER_RADIUS, P_WP_RADIUS, P_WP_SPEED, P_PIVOT_RATE,
  P_ANG_P, P_RATE_P, P_RATE_I, P_RATE_FF, P_RATE_MAX, P_RATE_ACC, P_SCALE_BASE, P_POS_P, P_VEL_P, P_ACCEL,
  P_TURN_MAX_G, P_DIR_FILT, P_SPD_FILT, P_TRUE_FILT, P_WIND_TC, P_VANE, P_SPEED_MIN,
  P_TURN_RADIUS, P_VANE_OFFSET, P_SPEED_SENSOR) = range(29)
-P_SIZE = 32
+# of a boat that is not the plan's; none of them counts without the first
+P_OTHER, P_LEEWAY, P_BEAT, P_REACH, P_RUN, P_TACK_FAILS, P_IRONS_S = range(32, 39)
+P_SIZE = 40
 
 STEER_OFF, STEER_HOLD, STEER_LEG, STEER_LOITER, STEER_HEADING, STEER_RATE = range(6)
 FAULT_NONE, FAULT_FROZEN, FAULT_OFFSET, FAULT_SPIKES = range(4)
@@ -74,6 +81,11 @@ MOTOR_MPS = 2.0                   # speed under the auxiliary motor: what a smal
 TURNING_CIRCLE_M = 1.8
 RUDDER_MAX_RAD = math.radians(35.0)
 WIND_DELAY_S = 5.0
+# A tack is tried where the wind comes within the first of ahead, having been beyond the second.
+HEAD_TO_WIND_RAD = math.radians(12.0)
+SETTLED_RAD = math.radians(30.0)
+IRONS_DRAG = 4.0                  # in irons, sails and rudder across the stream: of the hull's own drag
+FALLING_OFF_S = 8.0               # at most, until she sails again
 # AP_WindVane filters with dt = 0.05 s, but its 20 Hz task runs at every second loop: 25 Hz.
 VANE_DT_S = 0.05
 VANE_LOOPS = 2
@@ -89,9 +101,12 @@ def _hull(s: Vector, p: Vector, polar: NDArray[np.float64]) -> None:
     dt = LOOP_S / SUBSTEPS
     we, wn = -s[S_WSPD] * math.sin(s[S_WDIR]), -s[S_WSPD] * math.cos(s[S_WDIR])
     ce, cn = (s[S_CURRENT_E], s[S_CURRENT_N]) if s[S_ARMED] else (0.0, 0.0)
+    is_other = p[P_OTHER] > 0.0
     for _ in range(SUBSTEPS):
         v, yaw = s[S_V], s[S_YAW]
         ve, vn = v * math.sin(yaw) + ce, v * math.cos(yaw) + cn
+        if is_other:
+            ve, vn = ve + s[S_SIDE] * math.cos(yaw), vn - s[S_SIDE] * math.sin(yaw)
         ae, an = ve - we, vn - wn
         aws = math.hypot(ae, an)
         awa = wrap(math.atan2(ae, an) - yaw)
@@ -106,14 +121,52 @@ def _hull(s: Vector, p: Vector, polar: NDArray[np.float64]) -> None:
             # the auxiliary motor, with the sails down: full throttle balances the drag at MOTOR_MPS
             force = s[S_THROTTLE] * 0.5 * MOTOR_MPS * MOTOR_MPS
         drag = 0.5 * v * abs(v)
+        if is_other:
+            twa = wrap(math.atan2(ce - we, cn - wn) - yaw)
+            force, drag, rate = _depart(s, p, twa, force, drag, rate)
+            s[S_SIDE] = side_mps(p[P_LEEWAY], aws, awa, v, s[S_SAIL], p[P_IDEAL])
         v += (force - drag) / MASS_KG * dt
         half = yaw + 0.5 * rate * dt
         s[S_VE], s[S_VN] = v * math.sin(half) + ce, v * math.cos(half) + cn
+        if is_other:
+            s[S_VE] += s[S_SIDE] * math.cos(half)
+            s[S_VN] -= s[S_SIDE] * math.sin(half)
         s[S_E] += s[S_VE] * dt
         s[S_N] += s[S_VN] * dt
         s[S_YAW] = wrap(yaw + rate * dt)
         s[S_V] = v
         s[S_RATE] = rate
+
+
+@kernel
+def _depart(s: Vector, p: Vector, twa: float, force: float, drag: float, rate: float) -> tuple[float, float, float]:
+    """Return force, drag and turn of a boat that is not the plan's: slower, thrown about by waves, caught in irons."""
+    t = s[S_TICK] * LOOP_S
+    if s[S_MOTOR] == 0.0:
+        share = speed_share(abs(twa), p[P_BEAT], p[P_REACH], p[P_RUN])
+        if force > 0.0:
+            force *= (share * s[S_SEA]) ** 2   # speed goes with the root of the force
+        side = 1.0 if twa > 0.0 else -1.0
+        if abs(twa) > SETTLED_RAD:
+            if t >= s[S_IRONS_END] or side == s[S_TACK_SIDE]:
+                s[S_TACK_SIDE], s[S_TRIED] = side, 0.0
+        elif abs(twa) < HEAD_TO_WIND_RAD and s[S_TRIED] == 0.0 and s[S_TACK_SIDE] != 0.0:
+            s[S_TRIED] = 1.0
+            s[S_TRIES] += 1.0
+            if s[S_LOT] < p[P_TACK_FAILS]:
+                s[S_FAILED] += 1.0
+                s[S_IRONS_END] = t + p[P_IRONS_S] + FALLING_OFF_S
+        if t < s[S_IRONS_END]:
+            is_caught = t < s[S_IRONS_END] - FALLING_OFF_S
+            rate, is_over = falls_off(twa * s[S_TACK_SIDE], is_caught)
+            rate *= s[S_TACK_SIDE]
+            if is_caught:
+                force = min(force, 0.0)
+                if s[S_V] > 0.0:
+                    drag *= IRONS_DRAG
+            elif is_over:
+                s[S_IRONS_END] = t
+    return force, drag, rate + s[S_WOBBLE]
 
 
 @kernel

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.boat import Polar
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.sail import polar_table
+from sitl.autopilot.boat.scalars import hash01
 from sitl.autopilot.boat.settings import fill
+from sitl.autopilot.boat.surroundings import Surroundings
 from sitl.world import Wind
 
 LOOP_S = k.LOOP_S
@@ -24,7 +27,7 @@ class Vehicle:
 
     def __init__(
         self, wind: Wind, parameters: Parameters, *, heading_rad: float, is_moored: bool, seed: int,
-        polar: Polar | None = None,
+        polar: Polar | None = None, surroundings: Surroundings | None = None,
     ) -> None:
         self.state = np.zeros(k.S_SIZE)
         self.tick = 0   # loops since the start: the state's own count
@@ -36,6 +39,10 @@ class Vehicle:
         self._seed = seed
         self._polar = np.zeros((0, 0)) if polar is None else polar_table(polar)
         self._still_until_s = 0.0
+        self._surroundings = surroundings
+        self._looked = -1   # the first loop of the tenth of a second for which they were looked at
+        self._tide = self._jump = (0.0, 0.0)
+        self._compass_rad = 0.0
         self.state[k.S_YAW] = heading_rad
         self.state[k.S_MOORED] = float(is_moored)
         self.state[k.S_TACK_END] = -k.TACK_RETRY_S
@@ -52,8 +59,10 @@ class Vehicle:
         get = self._parameters.get
         fill(self._settings, get)
         tide_from = math.radians(get("SIM_TIDE_DIR"))
-        self.state[k.S_CURRENT_E] = -get("SIM_TIDE_SPEED") * math.sin(tide_from)
-        self.state[k.S_CURRENT_N] = -get("SIM_TIDE_SPEED") * math.cos(tide_from)
+        self._tide = -get("SIM_TIDE_SPEED") * math.sin(tide_from), -get("SIM_TIDE_SPEED") * math.cos(tide_from)
+        self.state[k.S_CURRENT_E], self.state[k.S_CURRENT_N] = self._tide
+        if self._surroundings is not None:
+            self._surroundings.fill(self._settings)
 
     def still_air_until(self, t_s: float) -> None:
         """SITL has no wind in the first seconds after boot."""
@@ -75,6 +84,8 @@ class Vehicle:
 
     def advance(self, loops: int) -> tuple[int, int]:
         """Run up to ``loops`` loops; return (loops done, events)."""
+        if self._surroundings is not None:
+            return self._advance_among(self._surroundings, loops)
         first = self.tick + 1
         # the wind is asked for on a fixed grid of five loops, so chunks of any size see the same wind
         first -= first % _WIND_LOOPS
@@ -84,9 +95,26 @@ class Vehicle:
             t_s = (first + i * _WIND_LOOPS) * LOOP_S
             twd, tws = self.wind.at(t_s)
             wind[i, 0], wind[i, 1] = twd, (tws if t_s >= self._still_until_s else 0.0)
+        return self._loops(wind, first, loops)
+
+    def _advance_among(self, surroundings: Surroundings, loops: int) -> tuple[int, int]:
+        """Advance in pieces that end where the wind's grid does; at the first loop of each she looks about."""
+        done = events = 0
+        while done < loops and not events:
+            first = self.tick + 1 - (self.tick + 1) % _WIND_LOOPS
+            if first != self._looked:
+                self._looked, t_s = first, first * LOOP_S
+                surroundings.look(t_s, self.state, self._tide, self._jump, self._compass_rad)
+                twd, tws = surroundings.wind_at(t_s, self.state)
+                self._here = np.array([[twd, tws if t_s >= self._still_until_s else 0.0]])
+            piece, events = self._loops(self._here, first, min(loops - done, first + _WIND_LOOPS - 1 - self.tick))
+            done += piece
+        return done, events
+
+    def _loops(self, wind: NDArray[np.float64], first: int, loops: int) -> tuple[int, int]:
         noise = _NONE
         if self.state[k.S_VANE_FAULT] == k.FAULT_SPIKES:
-            noise = np.array([_hash01(self._seed, self.tick + 1 + i) for i in range(loops)])
+            noise = np.array([hash01(self._seed, self.tick + 1 + i) for i in range(loops)])
         done, events = k.advance(self.state, self._settings, wind, first, noise, loops, self._polar)
         self.tick = int(self.state[k.S_TICK])
         self.t_s = self.tick * LOOP_S
@@ -193,7 +221,7 @@ class Vehicle:
 
     def set_compass_error(self, error_rad: float) -> None:
         """Let the autopilot believe that it heads so much to starboard of where it does."""
-        self.state[k.S_COMPASS] = error_rad
+        self._compass_rad = self.state[k.S_COMPASS] = error_rad
 
     def anchor(self, *, down: bool) -> None:
         """Let go the anchor, which holds at once, or weigh it."""
@@ -205,7 +233,7 @@ class Vehicle:
 
     def set_position_error(self, east_m: float, north_m: float) -> None:
         """Let the autopilot believe that it is so far from where it is."""
-        self.state[k.S_GPS_E], self.state[k.S_GPS_N] = east_m, north_m
+        self._jump = self.state[k.S_GPS_E], self.state[k.S_GPS_N] = east_m, north_m
 
     def clear_tack(self) -> None:
         """A new mode knows no tack."""
@@ -251,6 +279,11 @@ class Vehicle:
         return float(self.state[k.S_DE]), float(self.state[k.S_DN])
 
     @property
+    def leg(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Where the present leg begins and ends [m]."""
+        return (float(self.state[k.S_OE]), float(self.state[k.S_ON])), self.destination
+
+    @property
     def current_en_mps(self) -> tuple[float, float]:
         """Of the water, towards east and north [m/s]."""
         return float(self.state[k.S_CURRENT_E]), float(self.state[k.S_CURRENT_N])
@@ -280,10 +313,3 @@ def _unit(east: float, north: float) -> tuple[float, float]:
     length = math.hypot(east, north)
     return (east / length, north / length) if length > 1e-9 else (0.0, 1.0)
 
-
-def _hash01(seed: int, tick: int) -> float:
-    """Return a number on 0..1 that depends on the seed and the loop only (splitmix64)."""
-    z = (seed * 0x9E3779B97F4A7C15 + tick * 0xBF58476D1CE4E5B9 + 1) & 0xFFFFFFFFFFFFFFFF
-    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & 0xFFFFFFFFFFFFFFFF
-    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & 0xFFFFFFFFFFFFFFFF
-    return ((z ^ (z >> 31)) >> 11) / float(1 << 53)

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from sitl.autopilot.boat.chart import Chart
 from sitl.autopilot.boat.kernel import WIND_DELAY_S
 from sitl.autopilot.boat.parameters import Parameters
+from sitl.autopilot.boat.surroundings import Surroundings
 from sitl.autopilot.boat.vehicle import Vehicle
 from sitl.autopilot.config import AutopilotConfig
 from sitl.autopilot.links.voice import Voice
@@ -34,7 +35,7 @@ class Core:
         self.parameters.put("SYSID_THISMAV", float(config.sysid))
         self.vehicle = Vehicle(
             wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed,
-            polar=config.polar,
+            polar=config.polar, surroundings=_about(config, wind, seed),
         )
         self._told = (self.vehicle.position, self.chart.to_e7(self.vehicle.position))
         self.battery_v = config.battery_v
@@ -133,3 +134,9 @@ class Core:
     def battery_percent(self) -> int:
         """Charge, reckoned from a three-cell battery's 9.6 to 12.6 V."""
         return max(0, min(100, round((self.battery_v - 9.6) / 3.0 * 100.0)))
+
+
+def _about(config: AutopilotConfig, wind: Wind, seed: int) -> Surroundings | None:
+    if config.departures is None and config.waters is None:
+        return None
+    return Surroundings(wind, config.departures, config.waters, seed)

@@ -9,7 +9,7 @@ import shapely
 import shapely.affinity
 
 from companion.messages import Mode
-from companion.skipper.deeds.adrift import CALL, MEANS, lies_in_loiter
+from companion.skipper.deeds.adrift import CALL, MEANS, is_cramped, lies_in_loiter
 from companion.skipper.step import actions as act
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
@@ -185,3 +185,19 @@ def test_the_mission_s_own_loiter_is_kept_where_she_is_in_it_or_has_a_clear_way_
     end = replace(route, items=route.items[-1:], points_en_m=(there,), leg_from_en_m=(here,), gate_of=(-1,))
     turn = Turn(voyage, w.skipper.config, replace(w.state, route=end, index=0), w.snapshot())
     assert lies_in_loiter(turn) is stays
+
+
+@pytest.mark.parametrize(("tws_mps", "rock_m", "cramped"), [
+    (5.0, 10.0, True), (5.0, 40.0, False),      # a loiter takes 12 m of room
+    (0.5, 10.0, False),                         # without wind she circles nowhere: LOITER keeps her from her old way
+])
+def test_no_loiter_is_begun_beside_a_rock_that_she_would_sail_onto(tws_mps, rock_m, cramped):
+    """A boat in irons in a channel was put into one, and touched when she sailed again (sitl mismatch, seed 2)."""
+    w = world(obstacles=())
+    w.run(CALM_S)
+    here = w.position
+    rock = shapely.box(here[0] + rock_m, here[1] - 50.0, here[0] + rock_m + 20.0, here[1] + 50.0)
+    voyage = replace(w.skipper.voyage, area=world(obstacles=(rock,)).skipper.voyage.area)
+    w.wind = lambda t: (-1.5, tws_mps)
+    w.run(15)
+    assert is_cramped(Turn(voyage, w.skipper.config, w.state, w.snapshot())) is cramped

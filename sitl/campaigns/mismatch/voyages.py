@@ -1,0 +1,111 @@
+"""Voyages of boats that are not the plan's, by seed: contact, floor, silence, and what was promised.
+
+Each is sailed on the embedded autopilot under the virtual clock. A voyage passes that touches nothing, is never silent
+and ends without an unhandled error; one below the margin's floor is counted and named. Arriving is counted, not
+required: a boat that cannot make way against the stream has done nothing wrong by not arriving.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from companion.errors import InputError
+from sitl.campaigns.mismatch.draw import draw
+from sitl.campaigns.mismatch.promises import Legs, legs_promised, promised_s
+from sitl.campaigns.mismatch.table import figures_of, told
+from sitl.campaigns.pool import held, sailed
+from sitl.run.variation import Variation
+
+EXPANSIONS = 8_000
+PLANNED = Variation(tables={"skipper": {"autopilot_beats": False}})
+NO_GO_RAD = math.radians(45.0)     # SAIL_NO_GO_ANGLE of the simulated autopilot
+# Of an arrival's promise: the first plan is for the first goal.
+ONE_GOAL = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One voyage; with ``planned`` no beat is left to the autopilot."""
+
+    seed: int
+    planned: bool = False
+    keep: Path | None = None
+
+
+def sail_one(job: Job) -> dict[str, Any]:
+    """Sail a seed; return what was drawn, promised and sailed. A voyage folder is left in ``job.keep``."""
+    from companion.clock import run_virtual
+    from sitl.run.embedded import mission_of, run_embedded
+
+    if job.keep is not None and job.keep.is_dir() and any(job.keep.iterdir()):
+        raise InputError("--keep", str(job.keep), "is not empty", "a voyage's folder is taken up where it was left")
+    began_s = time.process_time()
+    drawn = draw(job.seed)
+    mission = mission_of(drawn.scenario, drawn.source)
+    legs = Legs(mission.frame())
+    record: dict[str, Any] = {
+        "seed": job.seed, "scenario": drawn.scenario.name, "planned": job.planned, "kinds": list(drawn.kinds),
+        "drawn": drawn.told(), "floor_m": mission.margin_floor_m}
+    with tempfile.TemporaryDirectory(prefix="mismatch-") as scratch:
+        folder = job.keep if job.keep is not None else Path(scratch) / "voyage"
+        try:
+            verdict = run_virtual(run_embedded(
+                drawn.scenario, drawn.source, job.seed, folder, expansions=EXPANSIONS, observer=legs,
+                variation=PLANNED if job.planned else None))
+        except Exception as error:
+            return record | {"passed": False, "faults": [f"unhandled: {error!r}"], "cpu_s": 0.0}
+        summary = json.loads((folder / "summary.json").read_bytes())
+        promised = legs_promised(folder, legs.sailed, NO_GO_RAD)
+        time_s = promised_s(folder) if len(mission.goals) == ONE_GOAL else None
+    figures = verdict.figures
+    clear_m = figures["min_clearance_m"]
+    is_low = clear_m is not None and clear_m < mission.margin_floor_m
+    # the floor is counted by itself, beside what must never be
+    faults = [f"{c.name}: {c.figure}" for c in verdict.checks if not c.passed and c.name != "clearance, m"]
+    names = ("arrived", "contacts", "time_s", "tacks", "min_clearance_m", "silence_s", "replans", "promised_risk",
+             "no_go_entries", "end_reason")
+    return record | {
+        "passed": not faults, "faults": faults, "below_floor": is_low, **{name: figures[name] for name in names},
+        "path_risk": summary.get("path_risk"), "alerts": summary.get("alerts", {}), "promised_s": time_s,
+        "legs": promised, "cpu_s": time.process_time() - began_s}
+
+
+def run_mismatch(
+    *, runs: int, first_seed: int, workers: int | None, planned: bool, out: Path | None, json_path: Path | None,
+) -> int:
+    """Sail what ``out`` does not hold yet, print what failed and the table; return the exit code."""
+    seeds = range(first_seed, first_seed + runs)
+    records = [r for r in held(out) if r.get("planned") == planned and r.get("seed") in seeds]
+    had = {r["seed"] for r in records}
+    jobs = [Job(seed=seed, planned=planned) for seed in seeds if seed not in had]
+    count = {"failed": sum(not r["passed"] for r in records), "low": sum(r.get("below_floor", False) for r in records)}
+
+    def said(record: Mapping[str, Any]) -> str:
+        count["failed"] += not record["passed"]
+        count["low"] += record.get("below_floor", False)
+        return f", {count['failed']} failed, {count['low']} below the floor"
+
+    began_s = time.perf_counter()
+    for record in sailed(sail_one, jobs, workers, out, said):
+        records.append(record)
+        if not record["passed"]:
+            print(f"\rFAILED seed {record['seed']}, {record['scenario']}: {'; '.join(record['faults'])} "
+                  f"({', '.join(record['kinds']) or 'as planned'})", flush=True)
+    records.sort(key=lambda r: int(r["seed"]))
+    table = figures_of(records)
+    print(told(table))
+    print(f"{len(jobs)} sailed now in {time.perf_counter() - began_s:.0f} s, "
+          f"{sum(r['cpu_s'] for r in records) / max(1, len(records)):.2f} CPU s a voyage")
+    for record in records:
+        if not record["passed"] or record.get("below_floor"):
+            print(f"again: sitl mismatch --first-seed {record['seed']}{' --planned' if planned else ''} --keep DIR")
+    if json_path is not None:
+        json_path.write_text(json.dumps({"figures": table, "voyages": records}, indent=1) + "\n", encoding="utf-8")
+    return 0 if all(r["passed"] for r in records) else 1

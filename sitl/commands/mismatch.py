@@ -1,0 +1,49 @@
+"""``sitl mismatch``: boats, seas and sensors that are not the plan's, by the hundred."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from companion.program.arguments import out_file, out_folder, whole
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "mismatch", help=summary,
+        description="Sail the waters of the repository, each voyage with what the plan does not know of, drawn from "
+        "its seed: current and tide, gusts, lees and gradients of the wind, waves, a polar that errs by up to 20 %, "
+        "leeway, tacks that fail, a turned vane, a compass and a position that err. Judged by the truth: contact, "
+        "silence and errors fail a voyage; the margin's floor, the risk and the time that were promised are held "
+        "against what came. A seed repeats exactly.",
+        epilog="Example: sitl mismatch --runs 200 --out mismatch.jsonl, then sitl mismatch --first-seed 17 --keep v",
+    )
+    parser.add_argument("--runs", type=whole(at_least=1), default=100, metavar="N", help="seeds (default: 100)")
+    parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
+    parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
+                        help="processes (default: one per core)")
+    parser.add_argument("--planned", action="store_true",
+                        help="no beat is left to the autopilot: every board is planned, and its risk promised")
+    parser.add_argument("--out", type=out_file, metavar="FILE",
+                        help="append a line for each voyage as it ends; what it holds already is not sailed again")
+    parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
+    parser.add_argument("--keep", type=out_folder, metavar="DIR",
+                        help="sail only the first seed and keep its voyage folder")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from sitl.campaigns.mismatch.voyages import Job, run_mismatch, sail_one
+    from sitl.run.compiled import compile_ahead
+
+    compile_ahead()
+    if args.keep is not None:
+        record = sail_one(Job(seed=args.first_seed, planned=args.planned, keep=args.keep))
+        for key, value in record.items():
+            print(f"{key}: {json.dumps(value)}")
+        return 0 if record["passed"] else 1
+    return run_mismatch(runs=args.runs, first_seed=args.first_seed, workers=args.workers, planned=args.planned,
+                        out=args.out, json_path=args.json)
