@@ -85,6 +85,17 @@ def _near(mission: Mission, name: str, en_m: tuple[float, float]) -> tuple[float
     return en_m
 
 
+def told_of(mission: Mission) -> tuple[str, ...]:
+    """Return a line for each goal that is sailed by a field: which, and what ends it."""
+    frame, out = mission.frame(), []
+    for number, goal in enumerate(mission.goals, start=1):
+        if goal.field is not None:
+            made = composed_of(mission, number, goal.field, frame)
+            name = f", {goal.name}" if goal.name else ""
+            out.append(f"goal {number}{name}: by field {made.tree.text}, {made.until_words}")
+    return tuple(out)
+
+
 def findings_of(mission: Mission) -> tuple[Finding, ...]:
     """Return what is worth knowing of a mission's fields: atoms that nobody sails by, a field without a value."""
     frame, out, told = mission.frame(), [], set()

@@ -28,6 +28,7 @@ from companion.traffic import predict
 PATIENCE_S = 5.0      # without a heading ArduRover's GUIDED stops her after 3 s: a field that is weak keeps its last
 BACK_S = 10.0         # a field that was given up has said something for so long
 LEAVE_S = 45.0        # a plan from here takes a few seconds; one that is not found is the ladder's
+STEP_S = 1.5          # what made her leave, an order or the end, is seen a step after it asked for the plan
 INSIDE_M = 1.5        # a vessel is in the water when it is so far in: its position is noisy
 
 
@@ -59,7 +60,7 @@ def _is_left(turn: Turn, since_s: float) -> bool:
     goes_on = state.sailing and not state.over and (bound.has_place if bound is not None else turn.gate is not None)
     if not goes_on or turn.config.guidance is Guidance.FIELD or situation(turn) is None:
         return True
-    is_planned = state.last_plan_s >= since_s and state.pending_plan is None and state.pending_upload is None
+    is_planned = state.last_plan_s >= since_s - STEP_S and state.pending_plan is None and state.pending_upload is None
     return is_planned or turn.t_s - since_s > LEAVE_S
 
 
