@@ -10,6 +10,7 @@ from typing import Any
 from companion.addresses import Displays, OutputName, parse_nmea, parse_signalk
 from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant, read_polar
 from companion.errors import InputError
+from companion.fields import composed_of
 from companion.geo.frame import LocalFrame
 from companion.geo.units import MPS_PER_KNOT
 from companion.geofence import Mission
@@ -85,8 +86,9 @@ def voyage_of(mission: Mission) -> Voyage:
             search=None if g.search is None else Search(
                 area_en=free_water(g.search.shape, frame, mission.area), swath_m=g.search.swath_m,
                 coverage=g.search.coverage),
+            field=None if g.field is None else composed_of(mission, number, g.field, frame),
         )
-        for g in mission.goals
+        for number, g in enumerate(mission.goals, start=1)
     )
     return Voyage(
         name=mission.name, frame=frame, goals=goals, area=mission.area.local(frame), boat=boat_of(mission),

@@ -13,6 +13,7 @@ from msgspec import Meta, Struct
 
 from companion.geofence.mission import (
     BoxOptions,
+    FieldOptions,
     GateOptions,
     GoalOptions,
     Latitude,
@@ -65,7 +66,7 @@ class SketchedGoal(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     ``ring``: of a box or a search, where its file has it as one; None where it is in a file of its own, ``polygon``.
     """
 
-    kind: Literal["point", "gate", "box", "search"]
+    kind: Literal["point", "gate", "box", "search", "field"]
     key: Key = None
     name: Name = ""
     at: Place | None = None
@@ -80,6 +81,8 @@ class SketchedGoal(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     swath_m: float | None = None
     coverage: float | None = None
     polygon: str | None = None
+    field: str | None = None
+    until: str | None = None
 
 
 class SketchedRefuge(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -136,6 +139,9 @@ def _sketched(goal: GoalOptions, key: int) -> SketchedGoal:
             kind="gate", key=key, name=goal.name, port_mark=(goal.port_mark.lat, goal.port_mark.lon),
             starboard_mark=(goal.starboard_mark.lat, goal.starboard_mark.lon), mark_radius_m=goal.mark_radius_m,
             after_s=goal.after_s)
+    if isinstance(goal, FieldOptions):
+        return SketchedGoal(kind="field", key=key, name=goal.name, at=(goal.lat, goal.lon), radius_m=goal.radius_m,
+                            for_s=goal.for_s, polygon=goal.polygon, field=goal.field, until=goal.until)
     ring = _ring_of(goal.polygon)
     own = goal.polygon if ring is None else None
     if isinstance(goal, BoxOptions):
@@ -204,6 +210,14 @@ def _goal(goal: SketchedGoal, number: int, before: MissionOptions) -> GoalOption
             port_mark=marks[0], starboard_mark=marks[1], name=goal.name, after_s=goal.after_s,
             not_before=old.not_before if isinstance(old, GateOptions) else None)
         return _with(gate, mark_radius_m=goal.mark_radius_m)
+    if goal.kind == "field":
+        if goal.at is None or goal.field is None:
+            raise ValueError(f"[[goal]] {number} is a field without its place or its expression")
+        given = {"radius_m": goal.radius_m, "until": goal.until}
+        return msgspec.convert({
+            "kind": "field", "lat": goal.at[0], "lon": goal.at[1], "field": goal.field, "name": goal.name,
+            "for_s": goal.for_s, "polygon": goal.polygon, **{k: v for k, v in given.items() if v is not None},
+        }, FieldOptions)
     polygon = goal.polygon if goal.ring is None else _wkt_of(goal.ring)
     if isinstance(old, BoxOptions | SearchOptions) and goal.ring is not None and _ring_of(old.polygon) == goal.ring:
         polygon = old.polygon

@@ -82,6 +82,7 @@ class Line(Field):
 class Circle(Field):
     """Onto the circle of 10 m about the origin and round it clockwise (Jaulin's circle regulation, v0 = vr = 10).
 
+    With ``v0`` negative anticlockwise.
     At the centre, where the formula has no direction, it points east.
     """
 
@@ -157,6 +158,20 @@ class Sum(Field):
     def evaluate(self, p: Vectors) -> Vectors:
         """Return the vectors (n, 2)."""
         return self.left.evaluate(p) + self.right.evaluate(p)
+
+
+@dataclass(frozen=True, slots=True)
+class Longer(Field):
+    """At each place the longer of two vectors, the left one where they are alike: what is strongest has its way."""
+
+    left: Field
+    right: Field
+
+    def evaluate(self, p: Vectors) -> Vectors:
+        """Return the vectors (n, 2)."""
+        a, b = self.left.evaluate(p), self.right.evaluate(p)
+        is_left = np.hypot(a[:, 0], a[:, 1]) >= np.hypot(b[:, 0], b[:, 1])
+        return np.asarray(np.where(is_left[:, None], a, b), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,6 +48,31 @@ class Zone:
         d = points_en - np.asarray(self.at_en)
         return np.asarray(s * d[:, 1] - c * d[:, 0], dtype=np.float64)
 
+    def courses_rad(self, points_en: Vectors) -> NDArray[np.float64]:
+        """Return the trajectory's course beside each point (n,) [rad]."""
+        return np.full(len(points_en), self.course_rad)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RingZone:
+    """The hysteresis zone about a circle that is followed."""
+
+    at_en: tuple[float, float]
+    radius_m: float
+    is_clockwise: bool = True
+    half_m: float = ZONE_M
+
+    def offset_m(self, points_en: Vectors) -> NDArray[np.float64]:
+        """Return how far each point is to the LEFT of the way round [m], (n,): outside where that is clockwise."""
+        d = points_en - np.asarray(self.at_en)
+        outside = np.hypot(d[:, 0], d[:, 1]) - self.radius_m
+        return np.asarray(outside if self.is_clockwise else -outside, dtype=np.float64)
+
+    def courses_rad(self, points_en: Vectors) -> NDArray[np.float64]:
+        """Return the course round the circle beside each point (n,) [rad]."""
+        d = points_en - np.asarray(self.at_en)
+        return np.asarray(np.arctan2(d[:, 0], d[:, 1]) + (0.5 if self.is_clockwise else -0.5) * math.pi)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Projection:
@@ -56,7 +81,7 @@ class Projection:
     field: Field
     twd_from_rad: float
     no_go_half_rad: float = NO_GO_HALF_RAD
-    zone: Zone | None = None
+    zone: Zone | RingZone | None = None
 
     def side(self, points_en: Vectors, q: int) -> NDArray[np.int64]:
         """Return q at each point: by its side outside the zone, ``q`` inside it."""
@@ -100,11 +125,13 @@ class Projection:
     def _needs_projection(self, p: Vectors, heading: NDArray[np.float64]) -> NDArray[np.bool_]:
         limit = math.cos(self.no_go_half_rad)
         inside = np.cos(heading - self.twd_from_rad) > limit + 1e-12
-        if self.zone is not None and math.cos(self.zone.course_rad - self.twd_from_rad) > limit + 1e-12:
+        if self.zone is not None:
             # Jaulin and Le Bars, line 5: near a line that cannot be sailed, do not pinch along it either.
+            course = self.zone.courses_rad(p)
+            shut = np.cos(course - self.twd_from_rad) > limit + 1e-12
             near = np.abs(self.zone.offset_m(p)) < self.zone.half_m
-            ahead = np.cos(heading - self.zone.course_rad) > math.cos(self.no_go_half_rad + 1e-9)
-            inside = inside | (near & ahead)
+            ahead = np.cos(heading - course) > math.cos(self.no_go_half_rad + 1e-9)
+            inside = inside | (shut & near & ahead)
         return np.asarray(inside, dtype=np.bool_)
 
 

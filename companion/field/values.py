@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.field.algebra import Field
-from companion.field.projection import Zone
+from companion.field.projection import RingZone, Zone
 
 Clearance = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Points (n, 2) [m] to their distances from what stands still (n,) [m]: positive in free water."""
@@ -52,7 +52,7 @@ class Intent:
     """
 
     field: Field
-    zone: Zone | None = None
+    zone: Zone | RingZone | None = None
     stay_in: tuple[float, float, float, float] | None = None
     clearance: Clearance | None = None
 

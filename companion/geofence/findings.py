@@ -43,6 +43,7 @@ class Code(enum.Enum):
     DROPPED = "dropped"
     EXPANDED = "expanded"
     FORMAT = "format"
+    FIELD = "field"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

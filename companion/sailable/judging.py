@@ -17,6 +17,7 @@ from companion.compose import (
     voyage_of,
 )
 from companion.errors import InputError
+from companion.fields import atoms_of, findings_of
 from companion.geofence import Code, Finding, Mission, Severity
 from companion.geofence.check import Conditions, check_area
 from companion.geofence.mission import AreaOptions, kind_of, place_troubles, read_mission
@@ -56,7 +57,8 @@ def judge(path: Path, *, from_deg: float | None = None, given: Mapping[Path, byt
         no_go_half_rad=math.radians(mission.boat.no_go_half_deg)))
     told = {Code.START_OUTSIDE, Code.GOAL_OUTSIDE} if troubles else set()
     return Judged(mission=mission, refusals=troubles, findings=(
-        *mission.findings, *(f for f in found if f.severity is not Severity.ERROR or f.code not in told)))
+        *mission.findings, *(() if troubles else findings_of(mission)),
+        *(f for f in found if f.severity is not Severity.ERROR or f.code not in told)))
 
 
 def require_sailable(mission: Mission) -> Mission:
@@ -74,6 +76,7 @@ def require_sailable(mission: Mission) -> Mission:
         permissions_of(mission)
         target_limits_of(mission)
         config_of(mission)
+        atoms_of(mission, mission.frame())
         voyage_of(mission)
     except ValueError as error:
         raise InputError(source, "", str(error)) from error
@@ -91,8 +94,12 @@ def _require_consistent(mission: Mission, source: str) -> None:
         raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" steers in GUIDED, which nobody allows',
                          f"write {' and '.join(f'{key} = true' for key in missing)} in [operator], "
                          'or guidance = "plan"')
+    by_field = next((n for n, goal in enumerate(mission.goals, start=1) if goal.field is not None), None)
+    if by_field is not None and missing:
+        raise InputError(source, f"[[goal]] {by_field} kind", "a field is steered in GUIDED, which nobody allows",
+                         f"write {' and '.join(f'{key} = true' for key in missing)} in [operator]")
     kinds = [(n, kind_of(goal)) for n, goal in enumerate(mission.options.goal, start=1)]
-    task = next(((n, kind) for n, kind in kinds if kind != "point"), None)
+    task = next(((n, kind) for n, kind in kinds if kind not in {"point", "field"}), None)
     if skipper.guidance != "plan" and task is not None:
         raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" knows nothing of the {task[1]}, [[goal]] '
                          f"{task[0]}", 'write guidance = "plan"')

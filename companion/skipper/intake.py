@@ -11,7 +11,7 @@ from companion.skipper.deeds.failsafe import note
 from companion.skipper.deeds.helm import MOTOR_OFF, MOTOR_ON
 from companion.skipper.passing import pass_gates
 from companion.skipper.planning.answers import take_plan
-from companion.skipper.planning.errands import errand
+from companion.skipper.planning.errands import errand, is_composed
 from companion.skipper.planning.waits import utc_s
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.config import Guidance
@@ -136,7 +136,7 @@ def locate(turn: Turn) -> None:
         if guided:
             turn.update(index=min(turn.state.own_index, len(route.items) - 1), passed_since_s=None)
         pass_gates(turn)
-        if guided and turn.config.guidance is Guidance.FIELD and turn.state.route is not None:
+        if guided and turn.guidance is Guidance.FIELD and turn.state.route is not None:
             # Steered to the gates themselves: the waypoints before a gate that is passed need not be.
             done = [n + 1 for n, g in enumerate(route.gate_of) if 0 <= g < turn.state.gate]
             bound = errand(turn)
@@ -194,7 +194,7 @@ def _remember(turn: Turn) -> None:
     boat, ahead = turn.boat_en, turn.ahead()
     if boat is None:
         return
-    history = turn.state.history if ahead else ()   # at rest no way is made
+    history = turn.state.history if ahead and not is_composed(turn) else ()   # at rest no way is made, nor on a circle
     if history and turn.t_s - history[-1][0] < HISTORY_STEP_S:
         return
     left = 0.0

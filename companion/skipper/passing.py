@@ -6,6 +6,7 @@ import math
 
 import shapely
 
+from companion.skipper.composed import has_sailed
 from companion.skipper.planning.searching import end_search, follow_search, lay_sweeps
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, utc_s, waits_for_gun
 from companion.skipper.step.actions import CancelPlan, Severity
@@ -33,6 +34,10 @@ def pass_gates(turn: Turn) -> None:
         gate, number = turn.gate, turn.state.gate
         if gate.box is not None:
             if not _has_stayed(turn, gate, boat):
+                return
+            continue
+        if gate.field is not None:
+            if not has_sailed(turn, gate, boat):
                 return
             continue
         if gate.search is not None and gate.sweep[1] == 0:

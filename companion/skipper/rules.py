@@ -12,6 +12,7 @@ from companion.messages import Mode
 from companion.orders import Wanted
 from companion.skipper.board.custody import judge, stand_by
 from companion.skipper.board.on_board import mission_is_known
+from companion.skipper.composed import follow_field
 from companion.skipper.deeds.adrift import follow_ground
 from companion.skipper.deeds.doubt import follow
 from companion.skipper.deeds.failsafe import follow_answer, follow_stops, take_over
@@ -87,6 +88,7 @@ class Skipper:
         follow_answer(turn)
         follow(turn)
         follow_ground(turn)
+        follow_field(turn)
         locate(turn)
         look_out(turn)
         count_time(turn)

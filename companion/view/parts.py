@@ -94,6 +94,8 @@ def kind_of(goal: Goal) -> str:
         return "start line" if goal.line.is_start else "line"
     if goal.search is not None:
         return "search"
+    if goal.field is not None:
+        return "field"
     return "box" if goal.box is not None else "point" if goal.side is Side.NONE else "buoy"
 
 

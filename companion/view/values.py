@@ -171,7 +171,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
-    """A goal of the voyage: a point, a buoy to round (``side``), a line, a box or a search."""
+    """A goal of the voyage: a point, a buoy to round (``side``), a line, a box, a search, or a place of a field."""
 
     name: str
     kind: str

@@ -25,6 +25,7 @@ from companion.compose import (
     voyage_of,
 )
 from companion.geofence import load_mission
+from companion.geofence.mission.atom_options import ATOMS
 from companion.geofence.mission.goal_options import KINDS
 from companion.geofence.mission.options import tables
 from companion.skipper.step.config import Permissions
@@ -70,11 +71,20 @@ TASKS = {
     "box": {"kind": "box", "polygon": "POLYGON ((-1.309 50.820, -1.308 50.820, -1.308 50.821, -1.309 50.820))"},
     "search": {"kind": "search", "swath_m": 20.0,
                "polygon": "POLYGON ((-1.309 50.820, -1.308 50.820, -1.308 50.821, -1.309 50.820))"},
+    "field": {"kind": "field", "lat": 50.8196, "lon": -1.3082, "field": "a", "for_s": 100.0},
+}
+# The atoms of fields: one of each kind that has a key of its own.
+HERE, THERE = {"lat": 50.8196, "lon": -1.3082}, {"lat": 50.8199, "lon": -1.3070}
+ATOM = {
+    "circle": {"kind": "circle", **HERE, "radius_m": 40.0}, "line": {"kind": "line", "start": HERE, "end": THERE},
+    "repulsive_point": {"kind": "repulsive_point", **HERE}, "heading": {"kind": "heading", "heading_deg": 10.0},
+    "leave": {"kind": "leave", "polygon": TASKS["box"]["polygon"]},
 }
 TASK_KEYS = {
     "kind": "gate", "port_mark": {"lat": 50.8200, "lon": -1.3092}, "starboard_mark": {"lat": 50.8200, "lon": -1.3078},
     "polygon": "POLYGON ((-1.309 50.820, -1.3081 50.820, -1.3081 50.821, -1.309 50.820))", "for_s": 60.0,
     "swath_m": 30.0, "coverage": 0.5,
+    "field": "2 * a", "until": "time",
     "mark_radius_m": 8.0, "after_s": 400.0, "not_before": dt.datetime(2026, 11, 21, 12, tzinfo=dt.UTC),
 }
 
@@ -89,6 +99,10 @@ KALMAN = {"kalman_window": 50, "kalman_r_deg": 5.0, "kalman_r_mps": 1.0}
 OTHER = {
     "goal": {"lat": 50.8189, "lon": -1.3099, "radius_m": 30.0, "rounding": "starboard", "name": "other",
              **TASK_KEYS},
+    "field": {"kind": "station", "lat": 50.8197, "lon": -1.3083, "start": {"lat": 50.8191, "lon": -1.3083},
+              "end": {"lat": 50.8190, "lon": -1.3070}, "radius_m": 50.0, "turn": "anticlockwise",
+              "zone_m": 9.0, "range_m": 30.0, "heading_deg": 20.0,
+              "polygon": TASK_KEYS["polygon"]},
     "refuge": {"lat": 50.8173, "lon": -1.3091, "radius_m": 25.0, "name": "cove"},
     "start": {"lat": 50.8171, "lon": -1.3101, "heading_deg": 200.0},
     "area": {"obstacles": ["point.wkt"], "fence": "fence.wkt", "axis": "latlon", "margin_m": 14.0,
@@ -135,7 +149,18 @@ def mission(path, table="", key="", value=None):
         raw["area"]["obstacles"] = ["point.wkt"]
     if (table, key) == ("area", "axis"):
         (path / "point.wkt").write_text("POINT (50.8175 -1.3060)")
-    if table == "goal" and key in TASK_KEYS:
+    if table == "field":
+        name = atom_with(key)
+        raw["goal"].append(dict(TASKS["field"]))
+        raw["field"] = {"a": dict(ATOM[name])}
+        if value == "station":
+            raw["field"]["a"] = {"kind": value, **HERE}
+        elif value is not None:
+            raw["field"]["a"][key] = value
+    elif table == "goal" and key in {"field", "until"}:
+        raw["goal"].append({**TASKS["field"], key: value})
+        raw["field"] = {"a": dict(ATOM["circle"])}
+    elif table == "goal" and key in TASK_KEYS:
         raw["goal"].append(dict(TASKS[value if key == "kind" else kind_with(key)]))
         if key == "not_before":
             del raw["goal"][-1]["after_s"]
@@ -161,7 +186,15 @@ def kind_with(key):
     return next(kind for kind, options in KINDS.items() if kind != "point" and key in options.__struct_fields__)
 
 
+def atom_with(key):
+    return next(name for name, atom in ATOM.items() if key in {"kind", *ATOMS[name].__struct_fields__})
+
+
 def base_for(path, table, key):
+    if table == "field":
+        return mission(path, "field", key)
+    if table == "goal" and key in {"field", "until"}:
+        return mission(path, "goal", key, TASKS["field"].get(key, "told"))
     if table == "goal" and key in TASK_KEYS and key != "kind":
         return mission(path, "goal-kind", kind_with(key))
     if key == "tunnel":

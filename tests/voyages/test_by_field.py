@@ -83,3 +83,15 @@ def test_killed_in_the_middle_of_it_the_companion_takes_the_boat_back_to_auto(tm
     verdict = sail(LAST_RESORT, 0, tmp_path,
                    msgspec.structs.replace(scenario, events=(*scenario.events, kill), expect=expect))
     assert verdict.passed, failed(verdict)
+
+
+def test_killed_on_a_field_of_its_own_the_companion_goes_on_with_it_and_its_time(tmp_path):
+    path = FOLDER / "field-ring.toml"
+    scenario = load_scenario(path)
+    kill = EventSpec(at_s=150.0, kind="kill_companion", restart_after_s=8.0)
+    expect = msgspec.structs.replace(scenario.expect, max_silence_s=None)
+    verdict = sail(path, 0, tmp_path, msgspec.structs.replace(scenario, events=(kill,), expect=expect))
+    assert verdict.passed, failed(verdict)
+    texts = [d.get("text", "") for d in decisions(tmp_path)]
+    assert sum("The ring: steered by ring + islet" in t for t in texts) == 2
+    assert sum("her time is over after 420 s by field" in t for t in texts) == 1

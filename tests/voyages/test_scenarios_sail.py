@@ -3,20 +3,26 @@
 More seeds with ``-m campaign``; the day of ``endurance`` and the hours of ``far-away`` have tests of their own.
 """
 
+import csv
 import json
+import math
+from itertools import pairwise
 from pathlib import Path
 
 import msgspec
 import pytest
 
 from companion.clock import run_virtual
+from companion.geo.angles import difference_rad
+from companion.geo.frame import LocalFrame
+from companion.messages import GeoPoint
 from companion.replay import replay
 from sitl.run.embedded import run_embedded
 from sitl.scene.scenario import load_scenario
 
 FOLDER = Path("sitl/scenarios")
 # What is folded again from the record: the new inputs of a failsafe's answer and of a watched rest among them.
-REPLAYED = {"station-lost", "mode-switch", "at-rest", "watched", "rules-head-on"}
+REPLAYED = {"station-lost", "mode-switch", "at-rest", "watched", "rules-head-on", "field-ring", "field-square"}
 LONG = {"endurance", "far-away"}
 # Sailed with seed 0 by tests of their own, which ask for the verdict and for more: test_traffic and test_by_field.
 ELSEWHERE = {"crossing", "four-ships", "last-resort", "two-boats"}
@@ -41,8 +47,30 @@ def plans_by(algorithm):
     return check
 
 
+def goes_round(folder):
+    """More than once and a half round the islet, and near the ring but where she beats."""
+    frame = LocalFrame(GeoPoint(lat_deg=50.8185, lon_deg=-1.3085))
+    text = (folder / "track.csv").read_text().splitlines()
+    rows = [r for r in csv.DictReader(text) if r["mode"] == "GUIDED" and r["lat_deg"]]
+    ring = [frame.en_from_geo(GeoPoint(lat_deg=float(r["lat_deg"]), lon_deg=float(r["lon_deg"]))) for r in rows][90:]
+    far = [math.hypot(*p) for p in ring]
+    assert 30.0 < min(far) <= max(far) < 85.0
+    assert sum(45.0 < d < 75.0 for d in far) > 0.8 * len(far)
+    assert sum(difference_rad(math.atan2(*b), math.atan2(*a)) for a, b in pairwise(ring)) > 3.0 * math.pi
+
+
+def leaves_when_entered(folder):
+    """She is in the square until the vessel is, and out of it within a minute after."""
+    decisions = [json.loads(line) for line in (folder / "decisions.jsonl").read_text().splitlines()]
+    ends = [(d["t_s"], d["text"]) for d in decisions if d.get("code") == "goal"]
+    assert "is in its water" in ends[0][1]
+    assert "she is outside" in ends[1][1]
+    assert ends[1][0] - ends[0][0] < 60.0
+
+
 # What the record of one must show besides.
-RECORDED = {"foreign-mission": is_said_once_in_a_while, "out-of-time": ends_by_itself,
+RECORDED = {"field-ring": goes_round, "field-square": leaves_when_entered,
+            "foreign-mission": is_said_once_in_a_while, "out-of-time": ends_by_itself,
             "by-astar": plans_by("astar"), "by-rrtstar": plans_by("rrtstar")}
 
 

@@ -114,6 +114,7 @@ def _check(args: argparse.Namespace) -> int:
         print_findings(document.findings, args.file)
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
+    from companion.fields import told_of
     from companion.sailable import judge
 
     judged = judge(Path(args.file), from_deg=args.wind[1] if args.wind else None)
@@ -121,6 +122,8 @@ def _check(args: argparse.Namespace) -> int:
         raise judged.refusals[0]
     mission = judged.mission
     bad = print_findings(judged.findings, args.file)
+    for line in told_of(mission):
+        print(f"{args.file}: {line}")
     if args.plot:
         preview(mission, args)
     print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "

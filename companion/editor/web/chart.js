@@ -168,7 +168,7 @@ function handles() {
   }
   if (sketch.start) out.push({ ref: { of: "start", n: 0 }, kind: "point" });
   sketch.goals.forEach((goal, n) => {
-    if (goal.kind === "point") out.push({ ref: { of: "goal", n, part: "at" }, kind: "point" });
+    if (goal.kind === "point" || goal.kind === "field") out.push({ ref: { of: "goal", n, part: "at" }, kind: "point" });
     if (goal.kind === "gate") for (const part of /** @type {const} */ (["port_mark", "starboard_mark"])) out.push({ ref: { of: "goal", n, part }, kind: "point" });
   });
   sketch.refuges.forEach((_, n) => out.push({ ref: { of: "refuge", n }, kind: "point" }));

@@ -89,7 +89,7 @@ function view(sketch) {
     const place = placeOf(sketch, { of: "goal", n });
     if (place === null) return null;
     const line = goal.port_mark && goal.starboard_mark && goal.kind === "gate" ? [en(goal.port_mark), en(goal.starboard_mark)] : null;
-    return { name: `${n + 1}${goal.name ? ` ${goal.name}` : ""}`, at_en_m: en(place), radius_m: goal.kind === "point" ? goal.radius_m ?? 10 : null, side: goal.rounding ?? null, line_en_m: line, is_next: true, is_reached: false };
+    return { name: `${n + 1}${goal.name ? ` ${goal.name}` : ""}`, at_en_m: en(place), radius_m: goal.kind === "point" || goal.kind === "field" ? goal.radius_m ?? 10 : null, side: goal.rounding ?? null, line_en_m: line, is_next: true, is_reached: false };
   }).filter((goal) => goal !== null);
   const refuges = sketch.refuges.map((refuge, n) => ({ name: called(sketch, { of: "refuge", n }), at_en_m: en(refuge.at), radius_m: refuge.radius_m ?? 15 }));
   const start = sketch.start ? { at_en_m: en(sketch.start.at), heading_deg: sketch.start.heading_deg ?? 0, cog_deg: null, sog_mps: null } : { at_en_m: null, heading_deg: null, cog_deg: null, sog_mps: null };

@@ -4,7 +4,7 @@
 /** @typedef {[number, number]} Point  metres east, north */
 /** @typedef {{lat: number, lon: number, lat_m: number, lon_m: number}} Frame */
 /** @typedef {{type: "polygon" | "circle" | "point" | "line", zone: "inclusion" | "exclusion", rings: Place[][], radius_m?: number | null, margin_m?: number | null, name?: string, of?: string, key?: number | null}} Shape */
-/** @typedef {{kind: "point" | "gate" | "box" | "search", key?: number | null, name?: string, at?: Place | null, radius_m?: number | null, rounding?: "port" | "starboard" | null, port_mark?: Place | null, starboard_mark?: Place | null, mark_radius_m?: number | null, after_s?: number | null, ring?: Place[] | null, for_s?: number | null, swath_m?: number | null, coverage?: number | null, polygon?: string | null}} Goal */
+/** @typedef {{kind: "point" | "gate" | "box" | "search" | "field", key?: number | null, name?: string, at?: Place | null, radius_m?: number | null, rounding?: "port" | "starboard" | null, port_mark?: Place | null, starboard_mark?: Place | null, mark_radius_m?: number | null, after_s?: number | null, ring?: Place[] | null, for_s?: number | null, swath_m?: number | null, coverage?: number | null, polygon?: string | null, field?: string | null, until?: string | null}} Goal */
 /** @typedef {{at: Place, radius_m?: number, name?: string, key?: number | null}} Refuge */
 /** @typedef {{revision: string, name?: string | null, start?: {at: Place, heading_deg?: number} | null, goals: Goal[], refuges: Refuge[], shapes: Shape[], margin_m: number, margin_floor_m: number, point_radius_m: number, end: "loiter" | "home", laps: number}} Sketch */
 /** What one means: a thing, and one point of it. ring and v: of a polygon. @typedef {{of: "start" | "goal" | "refuge" | "shape", n: number, part?: "at" | "port_mark" | "starboard_mark" | "ring" | "", ring?: number, v?: number}} Ref */
@@ -92,7 +92,7 @@ export function moved(sketch, ref, to) {
   let changed = goal;
   if (ref.part === "ring" && ref.v !== undefined) changed = { ...goal, ring: put(goal.ring ?? [], ref.v, to) };
   else if (ref.part === "port_mark" || ref.part === "starboard_mark") changed = { ...goal, [ref.part]: to };
-  else if (goal.kind === "point") changed = { ...goal, at: to };
+  else if (goal.kind === "point" || goal.kind === "field") changed = { ...goal, at: to };
   else if (goal.ring) changed = { ...goal, ring: along(goal.ring) };
   else if (goal.port_mark && goal.starboard_mark) { const [port, starboard] = along([goal.port_mark, goal.starboard_mark]); changed = { ...goal, port_mark: port ?? null, starboard_mark: starboard ?? null }; }
   return { ...sketch, goals: put(sketch.goals, ref.n, changed) };
@@ -163,7 +163,7 @@ export function places(sketch) {
 export function called(sketch, ref) {
   if (ref.of === "start") return "Start";
   if (ref.of === "refuge") return sketch.refuges[ref.n]?.name || `Refuge ${ref.n + 1}`;
-  if (ref.of === "goal") { const goal = sketch.goals[ref.n]; return goal?.name || `${{ point: "Mark", gate: "Gate", box: "Box", search: "Search" }[goal?.kind ?? "point"]} ${ref.n + 1}`; }
+  if (ref.of === "goal") { const goal = sketch.goals[ref.n]; return goal?.name || `${{ point: "Mark", gate: "Gate", box: "Box", search: "Search", field: "Field" }[goal?.kind ?? "point"]} ${ref.n + 1}`; }
   const shape = sketch.shapes[ref.n];
   return shape?.name || `${shape?.zone === "inclusion" ? "Fence" : shape?.type === "point" || shape?.type === "circle" ? "Rock" : shape?.type === "line" ? "Line" : "Obstacle"} ${ref.n + 1}`;
 }

@@ -65,6 +65,7 @@ function summary(ref, kind) {
     const goal = sketch.goals[ref.n];
     if (goal?.kind === "point") return goal.rounding ? `leave to ${goal.rounding}` : `within ${goal.radius_m ?? 10} m`;
     if (goal?.kind === "gate") return goal.port_mark && goal.starboard_mark ? `gate, ${apart(goal.port_mark, goal.starboard_mark)} m wide` : "gate";
+    if (goal?.kind === "field") return `by field ${goal.field ?? ""}`;
     if (goal?.kind === "box") return goal.for_s ? `box, for ${goal.for_s} s` : "box, until told to go on";
     return `search, ${goal?.swath_m ?? "?"} m swath`;
   }
@@ -109,6 +110,10 @@ function ofGoal(ref, fields, box) {
   if (goal.kind === "point") {
     fields.append(...position({ ...ref, part: "at" }), number(ref, "radius_m", goal.rounding ? "room" : "reached within", "m", goal.radius_m ?? 10, 0.1, 5000),
       choice(ref, "rounding", "leave it to", goal.rounding ?? "", [["", "either side"], ["port", "port"], ["starboard", "starboard"]]));
+  } else if (goal.kind === "field") {
+    fields.append(...position({ ...ref, part: "at" }), number(ref, "radius_m", "there within", "m", goal.radius_m ?? 10, 0.1, 5000),
+      number(ref, "for_s", "at the longest", "s", goal.for_s ?? null, 1, 1e7, undefined, "until told"));
+    box.append(el("p", { class: "none" }, `She is steered by ${goal.field ?? ""}, and the mission on board leads here meanwhile. Its atoms, and what ends it, are in the file.`));
   } else if (goal.kind === "gate") {
     const swap = button("Sail through the other way", `swap-${id(ref)}`, false, () => editor.commit(changed(editor.sketch(), ref, { port_mark: goal.starboard_mark, starboard_mark: goal.port_mark }), ref));
     fields.append(...position({ ...ref, part: "port_mark" }, "port mark "), ...position({ ...ref, part: "starboard_mark" }, "starboard mark "),

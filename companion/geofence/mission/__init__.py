@@ -1,5 +1,16 @@
 """A mission: goals, area and options, read from TOML, made from drawings, checked before anything believes it."""
 
+from companion.geofence.mission.atom_options import (
+    AtomOptions,
+    CircleAtomOptions,
+    HeadingAtomOptions,
+    LeaveAtomOptions,
+    LineAtomOptions,
+    PointAtomOptions,
+    RepulsiveLineAtomOptions,
+    RepulsivePointAtomOptions,
+    StationAtomOptions,
+)
 from companion.geofence.mission.drawn import (
     NO_NAME,
     Drawn,
@@ -13,6 +24,7 @@ from companion.geofence.mission.drawn import (
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
 from companion.geofence.mission.goal_options import (
     BoxOptions,
+    FieldOptions,
     GateOptions,
     GoalOptions,
     Latitude,
@@ -22,7 +34,7 @@ from companion.geofence.mission.goal_options import (
     SearchOptions,
     kind_of,
 )
-from companion.geofence.mission.goals import Box, Gate, free_water, is_file
+from companion.geofence.mission.goals import Box, ByField, Gate, free_water, is_file
 from companion.geofence.mission.mission import load_area, load_mission, load_settings, place_troubles, read_mission
 from companion.geofence.mission.options import (
     AreaOptions,
@@ -34,9 +46,12 @@ from companion.geofence.mission.options import (
 from companion.geofence.mission.text import parse_options, read_options, without_defaults
 
 __all__ = [
-    "NO_NAME", "PERMITS", "AreaOptions", "Box", "BoxOptions", "Drawn", "Gate", "GateOptions", "GoalOptions", "Latitude",
-    "Longitude", "MarkOptions", "MissionFiles", "MissionOptions", "PointOptions", "RefugeOptions", "SearchOptions",
-    "StartOptions", "WindOptions", "document_of", "drawing_of", "drawn_mission", "free_water", "goal_losses",
-    "hindrance", "is_file", "kept", "kind_of", "load_area", "load_mission", "load_settings", "mission_files", "offer",
-    "parse_options", "place_troubles", "read_kept", "read_mission", "read_options", "without_defaults", "zones_only",
+    "NO_NAME", "PERMITS", "AreaOptions", "AtomOptions", "Box", "BoxOptions", "ByField", "CircleAtomOptions", "Drawn",
+    "FieldOptions", "Gate", "GateOptions", "GoalOptions", "HeadingAtomOptions", "Latitude", "LeaveAtomOptions",
+    "LineAtomOptions", "Longitude", "MarkOptions", "MissionFiles", "MissionOptions", "PointAtomOptions",
+    "PointOptions", "RefugeOptions", "RepulsiveLineAtomOptions", "RepulsivePointAtomOptions", "SearchOptions",
+    "StartOptions", "StationAtomOptions", "WindOptions", "document_of", "drawing_of", "drawn_mission", "free_water",
+    "goal_losses", "hindrance", "is_file", "kept", "kind_of", "load_area", "load_mission", "load_settings",
+    "mission_files", "offer", "parse_options", "place_troubles", "read_kept", "read_mission", "read_options",
+    "without_defaults", "zones_only",
 ]

@@ -44,6 +44,9 @@ def goal_losses(mission: Mission) -> Losses:
         losses.add(Severity.WARNING, "of a gate only the middle between its marks is carried by this format")
     if any(g.box or g.search for g in mission.goals):
         losses.add(Severity.WARNING, "of a box or a search only its roomiest place is carried by this format")
+    if any(g.field for g in mission.goals):
+        losses.add(Severity.WARNING, "of a field only the place where the mission leads meanwhile is carried by this "
+                   "format")
     plain = replace_defaults(mission.options)
     if plain:
         losses.add(Severity.NOTE, f"the mission's own settings ({', '.join(plain)}) are not carried by this format")
@@ -53,7 +56,7 @@ def goal_losses(mission: Mission) -> Losses:
 def replace_defaults(options: MissionOptions) -> list[str]:
     """Return the names of the tables that differ from their defaults."""
     default = MissionOptions(goal=options.goal)
-    return [t for t in ("risk", "boat", "wind", "operator", "skipper", "planner", "safety", "traffic")
+    return [t for t in ("field", "risk", "boat", "wind", "operator", "skipper", "planner", "safety", "traffic")
             if getattr(options, t) != getattr(default, t)]
 
 

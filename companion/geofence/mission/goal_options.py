@@ -65,9 +65,28 @@ class SearchOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     name: str = ""
 
 
-GoalOptions = PointOptions | GateOptions | BoxOptions | SearchOptions
+class FieldOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="field"):
+    """``kind = "field"``: sail by a field that is composed of the file's atoms (``[field.NAME]``), in GUIDED."""
+
+    lat: Latitude
+    lon: Longitude
+    """Where the mission on board leads meanwhile: she loiters there when she cannot be steered."""
+    field: str
+    """The expression: ``ring + 0.5 * islet``."""
+    until: Literal["told", "time", "place", "vessel", "outside"] = "told"
+    """What ends it: the order ``go_on``; ``for_s`` alone; she is within ``radius_m`` of the place; another vessel is
+    inside ``polygon``; she herself is outside of it. The order always does."""
+    for_s: Annotated[float, Meta(gt=0.0, le=1e7)] | None = None
+    """At the longest, counted from when the goal before was reached."""
+    radius_m: Annotated[float, Meta(gt=0.0, le=5000.0)] = 10.0
+    polygon: str | None = None
+    """As for a box: the water that ``until = "vessel"`` and ``"outside"`` speak of."""
+    name: str = ""
+
+
+GoalOptions = PointOptions | GateOptions | BoxOptions | SearchOptions | FieldOptions
 KINDS: dict[str, type[GoalOptions]] = {
-    "point": PointOptions, "gate": GateOptions, "box": BoxOptions, "search": SearchOptions}
+    "point": PointOptions, "gate": GateOptions, "box": BoxOptions, "search": SearchOptions, "field": FieldOptions}
 
 
 def kind_of(goal: GoalOptions) -> str:

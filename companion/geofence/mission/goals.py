@@ -13,7 +13,15 @@ from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area
 from companion.geofence.formats.registry import parse, read
-from companion.geofence.mission.goal_options import BoxOptions, GateOptions, GoalOptions, MarkOptions, SearchOptions
+from companion.geofence.mission.atom_options import LeaveAtomOptions
+from companion.geofence.mission.goal_options import (
+    BoxOptions,
+    FieldOptions,
+    GateOptions,
+    GoalOptions,
+    MarkOptions,
+    SearchOptions,
+)
 from companion.geofence.mission.options import MissionOptions
 from companion.geofence.shapes import Shape, ZoneKind, center_of, polygon_en
 from companion.messages import GeoPoint
@@ -24,6 +32,7 @@ LOITER_ROOM_M = 16.0   # a sailboat's loiter swings 12 m, about a place that is 
 LEAST_WATER = 0.5      # share of a search's area
 MOST_SWEEPS = 200      # each is two plans and two uploads
 WIDEST_M = 2000.0    # a longer line is two marks that do not belong together
+WATER_M = 3000.0     # across: what a field speaks of, or leads out of, is looked over from where she is
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,11 +67,22 @@ class Search:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ByField:
+    """A field to sail by: its expression, what ends it, the water that this speaks of."""
+
+    text: str
+    until: str = "told"
+    for_s: float | None = None
+    shape: Shape | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
     """A mark, reached inside ``radius_m``; ``rounding`` says which side of the boat it is left to.
 
     With ``gate`` two marks to pass between: ``point`` is the middle, and ``radius_m`` about it is for previews alone.
     With ``box`` or ``search`` some water: ``point`` is the place with the most room in it, and ``radius_m`` that room.
+    With ``field`` she is steered by that, and ``point`` is where the mission on board leads meanwhile.
     """
 
     point: GeoPoint
@@ -72,6 +92,7 @@ class Goal:
     gate: Gate | None = None
     box: Box | None = None
     search: Search | None = None
+    field: ByField | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,8 +128,36 @@ class GoalReader:
             return self._box(goal, place, area)
         if isinstance(goal, SearchOptions):
             return self._search(goal, place, area)
-        return Goal(point=GeoPoint(lat_deg=goal.lat, lon_deg=goal.lon), radius_m=goal.radius_m, rounding=goal.rounding,
-                    name=goal.name)
+        point = GeoPoint(lat_deg=goal.lat, lon_deg=goal.lon)
+        if isinstance(goal, FieldOptions):
+            return Goal(point=point, radius_m=goal.radius_m, name=goal.name, field=self._by_field(goal, place))
+        return Goal(point=point, radius_m=goal.radius_m, rounding=goal.rounding, name=goal.name)
+
+    def waters_of(self, options: MissionOptions) -> dict[str, Shape]:
+        """Return the water that each atom of a field leads out of, by its name."""
+        return {name: self._water(atom.polygon, f"[field.{name}] polygon") for name, atom in options.field.items()
+                if isinstance(atom, LeaveAtomOptions)}
+
+    def _by_field(self, goal: FieldOptions, place: str) -> ByField:
+        source, needs_water = str(self.path), goal.until in {"vessel", "outside"}
+        if goal.until == "time" and goal.for_s is None:
+            raise InputError(source, f"{place} until", '"time" says no time', "add for_s")
+        if needs_water and goal.polygon is None:
+            raise InputError(source, f"{place} until", f'"{goal.until}" names no water', "add polygon")
+        if goal.polygon is not None and not needs_water:
+            raise InputError(source, f"{place} polygon", f'until = "{goal.until}" does not ask for any water',
+                             'leave it out, or write until = "vessel" or "outside"')
+        shape = None if goal.polygon is None else self._water(goal.polygon, f"{place} polygon")
+        return ByField(text=goal.field, until=goal.until, for_s=goal.for_s, shape=shape)
+
+    def _water(self, text: str, place: str) -> Shape:
+        shape = self._shape(text, place)
+        west, south, east, north = polygon_en(shape, LocalFrame(center_of(shape)), cover=False).bounds
+        across_m = float(np.hypot(east - west, north - south))
+        if across_m > WATER_M:
+            raise InputError(str(self.path), place, f"is {across_m / 1000.0:.1f} km across",
+                             f"{WATER_M / 1000.0:g} km are the most for what a field leads out of or watches")
+        return shape
 
     def _box(self, goal: BoxOptions, place: str, area: Area) -> Goal:
         shape = self._shape(goal.polygon, f"{place} polygon")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import msgspec
@@ -33,7 +33,7 @@ from companion.geofence.mission.options import (
     WindOptions,
 )
 from companion.geofence.mission.text import parse_options, read_options
-from companion.geofence.shapes import Obstacle, Zone, ZoneKind
+from companion.geofence.shapes import Obstacle, Shape, Zone, ZoneKind
 from companion.messages import GeoPoint
 
 AS_IT_IS: Mapping[Path, bytes] = {}   # nothing is given: every file is read from the disk
@@ -54,6 +54,8 @@ class Mission:
     path: Path
     refuges: tuple[RefugePoint, ...] = ()
     findings: tuple[Finding, ...] = ()
+    waters: Mapping[str, Shape] = field(default_factory=dict)
+    """What atoms of fields lead out of, by their names."""
 
     @property
     def name(self) -> str:
@@ -211,7 +213,7 @@ def assembled(
         goals=reader.goals_of(options, area),
         start=GeoPoint(lat_deg=options.start.lat, lon_deg=options.start.lon) if options.start else None,
         area=area, path=path, findings=(*name_findings(options.name, path), *findings),
-        refuges=refuges_of(options),
+        refuges=refuges_of(options), waters=reader.waters_of(options),
     )
     if mission.polar_path is not None:
         _require(mission.polar_path, str(path), "[boat] polar",

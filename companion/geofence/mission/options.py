@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct
 
+from companion.geofence.mission.atom_options import ATOMS, AtomOptions
 from companion.geofence.mission.goal_options import KINDS, GoalOptions, Latitude, Longitude
 
 Positive = Annotated[float, Meta(gt=0.0)]
@@ -260,6 +261,8 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Goals, fence and refuges are those that were drawn and uploaded to the autopilot: there is no ``[[goal]]``."""
     start: StartOptions | None = None
     refuge: tuple[RefugeOptions, ...] = ()
+    field: dict[str, AtomOptions] = {}
+    """``[field.NAME]``: the atoms of the fields that goals of ``kind = "field"`` are sailed by."""
     area: AreaOptions = AreaOptions()
     risk: RiskOptions = RiskOptions()
     boat: BoatOptions = BoatOptions()
@@ -280,6 +283,7 @@ def tables() -> dict[str, tuple[str, ...]]:
         if isinstance(field.default, Struct):
             known[field.name] = type(field.default).__struct_fields__
     known["goal"] = tuple(dict.fromkeys(key for kind in KINDS.values() for key in ("kind", *kind.__struct_fields__)))
+    known["field"] = tuple(dict.fromkeys(key for kind in ATOMS.values() for key in ("kind", *kind.__struct_fields__)))
     known["refuge"] = RefugeOptions.__struct_fields__
     known["start"] = StartOptions.__struct_fields__
     return known

@@ -15,7 +15,8 @@ import tomli_w
 
 from companion.errors import InputError
 from companion.geofence.formats.raw.text import decode, read_bytes
-from companion.geofence.mission.goal_options import KINDS
+from companion.geofence.mission.atom_options import ATOMS, AtomOptions
+from companion.geofence.mission.goal_options import KINDS, PointOptions
 from companion.geofence.mission.options import MissionOptions, tables
 from companion.words import choices
 
@@ -44,6 +45,7 @@ def parse_options(text: str, source: str) -> MissionOptions:
     for goal in goals if isinstance(goals, list) else ():
         if isinstance(goal, dict):
             goal.setdefault("kind", "point")
+    _refuse_odd_atoms(raw.get("field"), source)
     try:
         return msgspec.convert(raw, MissionOptions)
     except msgspec.ValidationError as error:
@@ -54,26 +56,58 @@ def dump_options(options: MissionOptions) -> str:
     """Return the options as TOML, leaving out what has its default."""
     data = without_defaults(options)
     order = [
-        "name", "description", "from_autopilot", "start", "goal", "refuge", "area", "wind", "risk", "boat", "autopilot",
-        "operator", "skipper", "planner", "safety", "traffic", "output"]
+        "name", "description", "from_autopilot", "start", "goal", "field", "refuge", "area", "wind", "risk", "boat",
+        "autopilot", "operator", "skipper", "planner", "safety", "traffic", "output"]
     return tomli_w.dumps({k: data[k] for k in order if k in data})
 
 
 def without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
     """Return what a table of a mission file says where all that has its default is left out."""
     tag = struct.__struct_config__.tag
-    out: dict[str, Any] = {"kind": tag} if tag not in {None, "point"} else {}
+    is_default = tag is None or (tag == "point" and isinstance(struct, PointOptions))
+    out: dict[str, Any] = {} if is_default else {"kind": tag}
     for field in msgspec.structs.fields(struct):
         value = getattr(struct, field.name)
-        if value is None or (field.default is not msgspec.NODEFAULT and value == field.default):
+        if value is None or value == {} or (field.default is not msgspec.NODEFAULT and value == field.default):
             continue
         if isinstance(value, msgspec.Struct):
             out[field.name] = without_defaults(value)
+        elif isinstance(value, dict):
+            out[field.name] = {key: without_defaults(inner) for key, inner in value.items()}
         elif isinstance(value, tuple):
             out[field.name] = [without_defaults(v) if isinstance(v, msgspec.Struct) else v for v in value]
         else:
             out[field.name] = value
     return out
+
+
+def _refuse_odd_atoms(atoms: object, source: str) -> None:
+    """Raise for an atom of a field that is wrong, by its name, which msgspec does not tell."""
+    for name, atom in atoms.items() if isinstance(atoms, dict) else ():
+        table = f"[field.{name[:40]}]"
+        if not isinstance(atom, dict):
+            raise InputError(source, table, f"{_short(atom)} is no table", f"write {table} and its kind below")
+        kind = atom.get("kind")
+        if kind not in ATOMS:
+            near = difflib.get_close_matches(str(kind), ATOMS, n=1, cutoff=0.5)
+            problem = "is missing" if kind is None else f"{_short(kind)} is no kind of atom"
+            raise InputError(source, f"{table} kind", problem,
+                             f'did you mean "{near[0]}"?' if near else "write " + " or ".join(f'"{k}"' for k in ATOMS))
+        try:
+            msgspec.convert(atom, AtomOptions)
+        except msgspec.ValidationError as error:
+            problem, _, path = str(error).partition(" - at `")
+            key = path.rstrip("`").removeprefix("$").removeprefix(".")
+            unknown = re.search(r"unknown field `(.+)`", problem)
+            missing = re.search(r"missing required field `(.+)`", problem)
+            if unknown:
+                fields = ("kind", *ATOMS[kind].__struct_fields__)
+                near = difflib.get_close_matches(unknown.group(1), fields, n=1, cutoff=0.5)
+                raise InputError(source, f"{table} {unknown.group(1)}", "unknown key",
+                                 f"did you mean {near[0]!r}?" if near else "known keys: " + ", ".join(fields)) from None
+            if missing:
+                raise InputError(source, f"{table} {missing.group(1)}", "is missing", "add it") from None
+            raise InputError(source, f"{table} {key}".rstrip(), problem[:1].lower() + problem[1:]) from None
 
 
 def _refuse_odd_numbers(value: object, source: str, place: str) -> None:

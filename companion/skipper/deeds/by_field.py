@@ -1,4 +1,4 @@
-"""Steering by vector field under GUIDED: the last resort before a vessel too near to plan for, and a mode of its own.
+"""Steering by vector field under GUIDED: the last resort, a mode of its own, and the fields that goals have.
 
 The last resort begins with the watchdog "vessel too near" and ends when it is over and a plan made since then, from
 where the boat has come to, is in place. Headings go out every step: they die after 3 s. What stands still and the
@@ -14,21 +14,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from companion.field.guidance import follow_line, go_to, step
-from companion.field.station import Station, keep
-from companion.field.values import Habits, Intent, Obstacle, Situation
+from companion.field.guidance import follow_line, go_to, hold_heading, step
+from companion.field.leave import way_out_rad
+from companion.field.station import RETURNED_M, Phase, Station, StationState, keep
+from companion.field.tree import LEAST, Conditions, field_of, lengths, zone_of
+from companion.field.values import Habits, Intent, Obstacle, Setpoint, Situation
+from companion.geo.angles import wrap_pi
 from companion.messages import Mode
 from companion.skipper.deeds.helm import hand_back, is_busy, set_mode
 from companion.skipper.planning.asking import request
-from companion.skipper.planning.errands import errand
+from companion.skipper.planning.errands import errand, is_composed
 from companion.skipper.planning.manners import held_of
 from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
 from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.step.config import Guidance
-from companion.skipper.step.state import ByField, Phase
+from companion.skipper.step.state import ByField
+from companion.skipper.step.state import Phase as Doing
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import marks_of
 from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.voyage import Composed, PointEn
 from companion.traffic import Vessel, predict
 from companion.traffic.encounters import expected
 
@@ -42,6 +47,11 @@ LEFT_ALONE_S = 60.0           # after somebody set AUTO in the middle of it
 LAG_S = 3.0                   # a boat of a few metres gathers its speed in this time
 HORIZON_S = 60.0
 QUICK_RADPS = math.radians(20.0)   # a boat that turns faster ends its boards on the station by tacking
+WEAK = 5.0                    # of 10: what else a field says must be weaker for a station to be kept
+AROUND_M = 60.0               # outside a vessel's disc: nearer than this she is not on a station
+ROOM_M = 12.0                 # of the boards and loops about a station, beyond what is kept clear of the shore
+STOP_M = 3.0                  # a motorboat lies still this near to its station
+SLOW = 0.3                    # of full thrust, at least: a motorboat is slower in a turn, or circles a mark inside it
 
 
 # ------------------------------------------------------------------------------------- what is seen
@@ -90,15 +100,16 @@ def _lies_still(vessel: Vessel) -> bool:
 
 
 def situation(turn: Turn) -> Situation | None:
-    """Return what the guidance sees, None without position or wind: a sailboat is not steered blind."""
+    """Return what the guidance sees, None without position or, under sail, wind: a sailboat is not steered blind."""
     boat, vehicle, wind = turn.boat_en, turn.snapshot.vehicle, turn.wind_now
-    if boat is None or vehicle is None or wind is None:
+    if boat is None or vehicle is None or (wind is None and turn.config.sails):
         return None
     seen = obstacles(turn, near(turn))
     buoys = tuple(Obstacle(en_m=mark, keep_m=keep_m) for mark, keep_m in marks_of(turn.voyage))
     return Situation(
         t_s=turn.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
-        twd_from_rad=wind[0], tws_mps=wind[1], obstacles=(*seen, *buoys),
+        twd_from_rad=wind[0] if wind is not None and turn.config.sails else None,
+        tws_mps=wind[1] if wind is not None else 0.0, obstacles=(*seen, *buoys),
     )
 
 
@@ -107,6 +118,7 @@ def habits(turn: Turn, tws_mps: float) -> Habits:
     boat = turn.voyage.boat
     twa, speed = boat.polar.curve(max(1.0, tws_mps))
     return Habits(
+        is_sailing=turn.config.sails,
         no_go_half_rad=turn.planned_no_go_rad, polar_twa_rad=tuple(map(float, twa)),
         polar_mps=tuple(map(float, speed)), turn_rate_radps=boat.turn_rate_radps, tack_s=max(1.0, boat.tack_loss_s),
         lag_s=LAG_S, horizon_s=HORIZON_S, keep_m=turn.config.margin_floor_m,
@@ -120,7 +132,7 @@ def intent(turn: Turn, seen: Situation) -> Intent:
     """
     leg, gate, bound = turn.leg(), turn.gate, errand(turn)
     place = bound.en_m if bound is not None and bound.has_place else gate.en_m if gate is not None else None
-    if turn.config.guidance is Guidance.FIELD and place is not None:
+    if turn.guidance is Guidance.FIELD and place is not None:
         wanted = go_to(place, seen.twd_from_rad or 0.0)
     elif leg is not None and distance_m(*leg) > 1.0:
         wanted = follow_line(*leg)
@@ -129,15 +141,80 @@ def intent(turn: Turn, seen: Situation) -> Intent:
     return replace(wanted, clearance=turn.voyage.area.clearance_m)
 
 
-def heading(turn: Turn) -> tuple[float, str] | None:
-    """Return the heading to send now [rad] and what it is for, None when nothing can be told: it then times out."""
-    seen = situation(turn)
+def heading(turn: Turn) -> Setpoint | None:
+    """Return the heading to send now and what it is for, None when nothing can be told: it then times out."""
+    seen, gate = situation(turn), turn.gate
     if seen is None:
         return None
-    guidance, setpoint = step(
-        turn.state.by_field.guidance, seen, intent(turn, seen), habits(turn, seen.tws_mps))
-    turn.update(by_field=replace(turn.state.by_field, guidance=guidance))
-    return setpoint.heading_rad, setpoint.reason
+    if is_composed(turn) and gate is not None and gate.field is not None:
+        setpoint = _composed(turn, seen, gate.field)
+        setpoint = replace(setpoint, reason=f"{gate.name}: {setpoint.reason}")
+    else:
+        guidance, setpoint = step(
+            turn.state.by_field.guidance, seen, intent(turn, seen), habits(turn, seen.tws_mps))
+        turn.update(by_field=replace(turn.state.by_field, guidance=guidance))
+    return setpoint if turn.config.sails else _slowed(setpoint, seen)
+
+
+def _slowed(setpoint: Setpoint, seen: Situation) -> Setpoint:
+    """Return what is told to a motorboat: she is slower through sharp turns."""
+    ahead = math.cos(wrap_pi(setpoint.heading_rad - seen.heading_rad))
+    return replace(setpoint, thrust=min(setpoint.thrust, max(SLOW, ahead)) if setpoint.thrust > 0.0 else 0.0)
+
+
+# --------------------------------------------------------------------------------- a goal's own field
+def strength(turn: Turn, seen: Situation, field: Composed) -> float:
+    """Return how strong a goal's field is where the boat is; about its station it is as strong as need be."""
+    place = field.tree.station_en
+    if place is not None and distance_m(seen.en_m, place) < Station(at_en=place).far_m:
+        return math.inf
+    conditions = Conditions(seen=seen, habits=habits(turn, seen.tws_mps), way_out_rad=0.0)
+    return float(lengths(field.tree, conditions, np.array([seen.en_m]))[0])
+
+
+def _composed(turn: Turn, seen: Situation, field: Composed) -> Setpoint:
+    """Return what a goal's field says, kept clear of vessels and shore; about its station the station keeper."""
+    memory, tree, can = turn.state.by_field, field.tree, habits(turn, seen.tws_mps)
+    way_out = None if tree.leaves is None else way_out_rad(seen, tree.leaves, can, memory.way_out_rad)
+    conditions = Conditions(seen=seen, habits=can, way_out_rad=way_out)
+    station = _station(turn, seen, field, conditions)
+    if station is not None:
+        after, setpoint = keep(memory.station, seen, station, can)
+        turn.update(by_field=replace(memory, station=after))
+        return setpoint
+    made, last = field_of(tree, conditions), memory.guidance.wanted_rad
+    value = made(seen.en_m)[0]
+    wanted = Intent(field=made, zone=zone_of(tree, conditions), clearance=turn.voyage.area.clearance_m)
+    is_weak = math.hypot(value[0], value[1]) < LEAST
+    if is_weak:   # for a moment: over a point that is sailed to
+        wanted = replace(hold_heading(seen.heading_rad if last is None else last), clearance=wanted.clearance)
+    guidance, setpoint = step(memory.guidance, seen, wanted, can)
+    turn.update(by_field=replace(memory, guidance=guidance, station=StationState(), way_out_rad=way_out))
+    place = tree.station_en
+    lies = not turn.config.sails and place is not None and distance_m(seen.en_m, place) < STOP_M
+    return replace(setpoint, thrust=0.0) if lies else setpoint
+
+
+def _station(turn: Turn, seen: Situation, field: Composed, conditions: Conditions) -> Station | None:
+    """Return the station to keep: she is there, under sail, with room, and nothing else presses."""
+    place = field.tree.station_en
+    if place is None or conditions.twd_from_rad is None:
+        return None
+    station = _station_at(turn, place)
+    is_there = turn.state.by_field.station.phase is not Phase.RETURN
+    if distance_m(seen.en_m, place) > (station.far_m if is_there else RETURNED_M):
+        return None
+    if float(turn.voyage.area.clearance_m([place])[0]) < turn.config.margin_floor_m + ROOM_M:
+        return None
+    if any(distance_m(seen.en_m, o.en_m) < o.keep_m + AROUND_M for o in seen.obstacles):
+        return None
+    rest = field_of(field.tree, conditions, without_station=True)(seen.en_m)[0]
+    return station if math.hypot(rest[0], rest[1]) < WEAK else None
+
+
+def _station_at(turn: Turn, place: PointEn) -> Station:
+    station = Station(at_en=place)
+    return replace(station, tacks=True) if turn.voyage.boat.turn_rate_radps >= QUICK_RADPS else station
 
 
 # -------------------------------------------------------------------------------------- last resort
@@ -145,7 +222,7 @@ def last_resort(turn: Turn) -> bool:
     """Steer clear of a vessel that is too near to plan for; True while the helm is the field's."""
     memory, status, may = turn.state.by_field, turn.autopilot, turn.snapshot.permissions
     raised = turn.is_raised(NAME)
-    if status is None or (turn.config.guidance is Guidance.FIELD and turn.steers):
+    if status is None or (turn.guidance is Guidance.FIELD and turn.steers):
         return False
     if not memory.resort.engaged:
         if not raised or turn.t_s < memory.not_before_s:
@@ -181,10 +258,11 @@ def last_resort(turn: Turn) -> bool:
     _plan(turn)
     told = heading(turn)
     if told is None:
-        turn.phase(Phase.LAST_RESORT, "steering by field: no position or no wind, so no heading")
+        turn.phase(Doing.LAST_RESORT, "steering by field: no position or no wind, so no heading")
         return True
-    turn.act(SteerHeading(heading_rad=told[0], text=f"last resort: {told[1]}"))
-    turn.phase(Phase.LAST_RESORT, f"keeping clear by field: {math.degrees(told[0]) % 360.0:.0f}° ({told[1]})"
+    turn.act(SteerHeading(heading_rad=told.heading_rad, thrust=told.thrust, text=f"last resort: {told.reason}"))
+    where = f"{math.degrees(told.heading_rad) % 360.0:.0f}°"
+    turn.phase(Doing.LAST_RESORT, f"keeping clear by field: {where} ({told.reason})"
                + ("" if raised else "; clear, waiting for the plan"))
     return True
 
@@ -226,8 +304,8 @@ def keeps_station(turn: Turn) -> bool:
         return False
     place = turn.gates[-1].en_m
     off = "" if boat is None else f", {distance_m(boat, place):.0f} m off"
-    turn.phase(Phase.HOLDING, f"keeping station: waiting {left_s:.0f} s more{off}")
-    if turn.config.guidance is not Guidance.FIELD or not turn.steers:
+    turn.phase(Doing.HOLDING, f"keeping station: waiting {left_s:.0f} s more{off}")
+    if turn.guidance is not Guidance.FIELD or not turn.steers:
         hand_back(turn)   # out of GUIDED, where the goal was reached by headings
         return True
     status, seen = turn.autopilot, situation(turn)
@@ -235,10 +313,7 @@ def keeps_station(turn: Turn) -> bool:
         set_mode(turn, Mode.GUIDED, "keeping station by field")
     elif seen is not None:
         turn.update(own_mode=Mode.GUIDED)
-        station = Station(at_en=place)
-        if turn.voyage.boat.turn_rate_radps >= QUICK_RADPS:
-            station = replace(station, tacks=True)
-        after, setpoint = keep(memory.station, seen, station, habits(turn, seen.tws_mps))
+        after, setpoint = keep(memory.station, seen, _station_at(turn, place), habits(turn, seen.tws_mps))
         turn.update(by_field=replace(turn.state.by_field, station=after))
         turn.act(SteerHeading(
             heading_rad=setpoint.heading_rad, thrust=setpoint.thrust, text=f"station: {setpoint.reason}"))

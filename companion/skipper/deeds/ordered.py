@@ -142,10 +142,11 @@ def _go_on(turn: Turn, _: Order) -> Answer:
     if was is None:
         turn.update(plan_retry=PATIENT)
         gate = turn.gate
-        if gate is not None and gate.box is not None and turn.state.inside is not None:
+        if gate is not None and (gate.box or gate.field) is not None and turn.state.inside is not None:
             turn.update(released=gate.goal)
             following = turn.gates[turn.state.gate + 1] if turn.state.gate + 1 < len(turn.gates) else None
-            return _done(f"the end of her stay in {gate.name}" + (f": on to {following.name}" if following else ""))
+            what = "her stay in" if gate.box is not None else "the field of"
+            return _done(f"the end of {what} {gate.name}" + (f": on to {following.name}" if following else ""))
         return _done(f"no order stands: {_next(turn)}")
     turn.update(standing=None, plan_retry=PATIENT, history=())
     if was.verb is Verb.STOP and turn.state.sailing:

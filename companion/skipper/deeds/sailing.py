@@ -18,11 +18,12 @@ from companion.skipper.deeds.rest import comes_to_rest, rest
 from companion.skipper.deeds.short_tack import short_tack
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S
-from companion.skipper.planning.errands import Errand, errand, is_at_rest
+from companion.skipper.planning.errands import Errand, errand, is_at_rest, is_composed
 from companion.skipper.planning.manners import stands_on
 from companion.skipper.planning.not_found import hold
 from companion.skipper.planning.triggers import find_trigger, is_buoy
 from companion.skipper.planning.vessels import near
+from companion.skipper.planning.waits import stay_left_s
 from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.step.causes import HOMEWARD, STOPPING
 from companion.skipper.step.config import Guidance
@@ -70,8 +71,8 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         return
     if turn.steers:
         _send_heading(turn)
-    elif turn.config.guidance is not Guidance.PLAN:
-        turn.say(Severity.WARNING, "guidance", f"guidance by {turn.config.guidance.value} is asked for and steering is "
+    elif turn.guidance is not Guidance.PLAN:
+        turn.say(Severity.WARNING, "guidance", f"guidance by {turn.guidance.value} is asked for and steering is "
                  "not permitted: by plan", every_s=600.0)
         check_current(turn)
     else:
@@ -156,16 +157,17 @@ def _send_heading(turn: Turn) -> None:
     if status is None:
         return
     if status.mode is not Mode.GUIDED:
-        set_mode(turn, Mode.GUIDED, "steering by headings")
+        set_mode(turn, Mode.GUIDED, f"steering by {'field' if turn.guidance is Guidance.FIELD else 'headings'}")
         return
     turn.update(own_mode=Mode.GUIDED)
-    if turn.config.guidance is Guidance.FIELD:
+    if turn.guidance is Guidance.FIELD:
         told = by_field_heading(turn)
+        if told is not None:
+            turn.act(SteerHeading(heading_rad=told.heading_rad, thrust=told.thrust, text=told.reason))
     else:
         wanted = desired_heading_rad(turn)
-        told = None if wanted is None else (wanted, "leg")
-    if told is not None:
-        turn.act(SteerHeading(heading_rad=told[0], text=told[1]))
+        if wanted is not None:
+            turn.act(SteerHeading(heading_rad=wanted, text="leg"))
     if status.mission_seq is not None and status.mission_seq < turn.state.index + 1:
         make_current(turn, turn.state.index + 1)
 
@@ -237,7 +239,11 @@ def _name(turn: Turn) -> None:
     raised = ", ".join(r.name for r in state.raised)
     tail = (f"; {state.task}" if state.task else "") + (f"; {raised}" if raised else "")
     gate, bound = turn.gate, errand(turn)
-    if not turn.ahead():
+    if is_composed(turn) and gate is not None and gate.field is not None:
+        left_s = stay_left_s(turn, gate)
+        field, time = gate.field, "" if math.isinf(left_s) else f"; {left_s:.0f} s left"
+        turn.phase(Phase.STANDARD, f"{gate.name}: by field {field.tree.text}, {field.until_words}{time}{tail}")
+    elif not turn.ahead():
         wait = state.plan_retry.not_before_s - turn.t_s
         again = f", trying again in {wait:.0f} s" if wait > 0.0 else ""
         turn.phase(Phase.HOLDING, f"loitering in the mission's safe end: waiting for a plan{again}{tail}")

@@ -38,6 +38,7 @@ class Kind(enum.Enum):
     INSIDE = "inside"        # back into the autopilot's own fence
     START = "start"          # before a start line, until the gun
     BOX = "box"              # water to stay in
+    FIELD = "field"          # where she waits while a goal's field cannot be sailed
     STAY = "stay"            # where there is room near by
 
 
@@ -67,7 +68,28 @@ class Errand:
 def errand(turn: Turn) -> Errand | None:
     """Return where she is bound for instead of the next goal, None: nowhere."""
     return pressing(turn) or _ordered(turn) or _at_the_end(turn) or _kept_in(turn) or _before_start(turn) or (
-        _in_box(turn))
+        _in_box(turn) or _off_field(turn))
+
+
+def is_composed(turn: Turn) -> bool:
+    """Return whether it is the field of the goal that is next that steers her now."""
+    memory, gate = turn.state.by_field, turn.gate
+    return memory.composed and memory.left_s is None and gate is not None and gate.field is not None
+
+
+def _off_field(turn: Turn) -> Errand | None:
+    """Return where she waits while the field of the goal that is next cannot be sailed, None: it can."""
+    gate, may = turn.gate, turn.snapshot.permissions
+    if gate is None or gate.field is None or turn.state.over:
+        return None
+    why = turn.state.by_field.lost or (
+        "" if may.may_steer and may.may_set_mode else "its field is not sailed, for steering is not permitted")
+    if not why:
+        return None
+    left_s = stay_left_s(turn, gate)
+    until = "until it can be sailed, or told to go on" if math.isinf(left_s) else f"{left_s:.0f} s more"
+    return Errand(kind=Kind.FIELD, name=f"the place of {gate.name}", why=why, en_m=gate.en_m, radius_m=gate.radius_m,
+                  until=until)
 
 
 def _in_box(turn: Turn) -> Errand | None:

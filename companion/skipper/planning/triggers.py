@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from companion.geo.angles import difference_rad
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
-from companion.skipper.planning.errands import HOME, Errand, Kind, errand, homeward
+from companion.skipper.planning.errands import HOME, Errand, Kind, errand, homeward, is_composed
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
 from companion.skipper.step.actions import ReplanReason, Severity
@@ -49,13 +49,13 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
     state, config = turn.state, turn.config
     if turn.boat_en is None or turn.snapshot.wind.forecast is None or turn.is_raised("becalmed"):
         return None
-    bound = errand(turn)
+    bound, route = errand(turn), turn.state.route
     if state.over if bound is None else not bound.has_place:
         return None
     if state.after_operator:
         text = f"stopped by the {state.answering} failsafe" if state.answering else "the operator gave the boat back"
         return Trigger(reason=ReplanReason.OPERATOR_BACK, text=text)
-    if state.route is not None and state.route.plan_id == NO_PLAN:
+    if route is not None and route.plan_id == NO_PLAN:
         # It need not lead to our goals: nothing is planned but another way, and that as soon as the wind is known.
         if turn.snapshot.wind.record_s < config.wind_settle_s:
             return None
@@ -70,7 +70,9 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
-    if turn.config.guidance is Guidance.FIELD and turn.steers:
+    if turn.guidance is Guidance.FIELD and turn.steers:
+        if is_composed(turn) and route is not None and turn.state.gate in route.gate_of:
+            return None   # what is on board leads to the goal's place: that is where she goes when she is not steered
         return _at_end(turn) or _extension(turn, bound)   # the mission on board need not be the way that is sailed
     trigger = _traffic(turn)
     if trigger is None and not turn.is_raised("wind untrusted"):
@@ -81,7 +83,8 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
 
 REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST,
            Kind.GOAL: ReplanReason.ORDER, Kind.INSIDE: ReplanReason.OBSTACLE,
-           Kind.START: ReplanReason.NEXT_GOAL, Kind.BOX: ReplanReason.NEXT_GOAL}
+           Kind.START: ReplanReason.NEXT_GOAL, Kind.BOX: ReplanReason.NEXT_GOAL,
+           Kind.FIELD: ReplanReason.RETRY}
 
 
 def _errand(turn: Turn, bound: Errand | None) -> Trigger | None:

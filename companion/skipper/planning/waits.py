@@ -99,8 +99,8 @@ def waiting_en(turn: Turn, gate: Gate) -> PointEn:
 
 
 def stay_left_s(turn: Turn, gate: Gate) -> float:
-    """Return how long she still stays in a gate's box [s]; inf: until told, or not in it yet."""
-    inside, box = turn.state.inside, gate.box
+    """Return how long she still stays in a gate's box, or sails by its field [s]; inf: until told, or not yet."""
+    inside, box = turn.state.inside, gate.box or gate.field
     if box is None or box.for_s is None or inside is None or inside.goal != gate.goal:
         return math.inf
     return box.for_s - inside.age_s(turn.t_s, utc_s(turn))

@@ -143,11 +143,17 @@ class ByField:
     guidance: GuidanceState = field(default_factory=GuidanceState)
     station: StationState = field(default_factory=StationState)
     station_since_s: float | None = None
+    composed: bool = False                # a goal's own field steers, or did until a plan from here is in place
+    left_s: float | None = None           # since when the latter
+    way_out_rad: float | None = None      # the way out of some water that is being taken
+    weak_since_s: float | None = None     # since when the field says nothing of where to go
+    strong_since_s: float | None = None   # ... and, given up for that, does again
+    lost: str = ""                        # why it is given up, in words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inside:
-    """She has come into the box of a goal: when, and when by the autopilot's clock (None: not known then)."""
+    """Since when she is in the box of a goal, or sails by its field, and by the autopilot's clock (None: not known)."""
 
     goal: int
     t_s: float

@@ -274,10 +274,15 @@ class Turn:
         return name == own.name and state.stop.t_s < accepted_s and self.t_s < accepted_s + SHOWS_S
 
     @property
+    def guidance(self) -> Guidance:
+        """What steers her now: the mission's guidance, or the field of the goal that is next."""
+        return Guidance.FIELD if self.state.by_field.composed else self.config.guidance
+
+    @property
     def steers(self) -> bool:
         """Whether the boat is steered by headings, a plan's or a field's (and may be)."""
         may = self.snapshot.permissions
-        return self.config.guidance is not Guidance.PLAN and may.may_steer and may.may_set_mode
+        return self.guidance is not Guidance.PLAN and may.may_steer and may.may_set_mode
 
     def leg(self) -> tuple[PointEn, PointEn] | None:
         """Return the planned leg being sailed (from, to), None without a route."""

@@ -9,7 +9,7 @@ from companion.geo.angles import difference_rad
 from companion.geo.sun import sun_height_rad
 from companion.skipper.deeds.adrift import meets_in_s, sails
 from companion.skipper.deeds.by_field import meets_in
-from companion.skipper.planning.errands import Kind, errand
+from companion.skipper.planning.errands import Kind, errand, is_composed
 from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.turn import Turn
@@ -102,8 +102,8 @@ def corridor_m(turn: Turn) -> float:
 def _corridor(turn: Turn) -> float | None:
     """Share of the corridor used; in open water the grid size bounds it, not the margin."""
     boat, leg = turn.boat_en, turn.leg()
-    if boat is None or leg is None or not turn.ahead() or turn.state.own_mode in STOPPING:
-        return None      # stopped she follows no leg
+    if boat is None or leg is None or not turn.ahead() or turn.state.own_mode in STOPPING or is_composed(turn):
+        return None      # stopped, or by a field of her own, she follows no leg
     if distance_m(*leg) < 1.0:
         return 0.0
     if along_m(boat, *leg) < 0.0:
@@ -125,7 +125,8 @@ def _stuck(turn: Turn) -> float | None:
 
 def _ended(turn: Turn) -> float | None:
     route = turn.state.route
-    if route is None or turn.gate is None or turn.autopilot is None or errand(turn) is not None:
+    if route is None or turn.gate is None or turn.autopilot is None or errand(turn) is not None or (
+        is_composed(turn)):
         return None
     return float(turn.state.index >= len(route.items) - 1 or turn.autopilot.mission_state.name == "COMPLETE")
 

@@ -31,7 +31,7 @@ from companion.skipper.way.line import (
     wings_wkt,
 )
 from companion.skipper.way.sweeps import Sweep
-from companion.skipper.way.voyage import Area, Box, Goal, Line, PointEn, Search, Side, Voyage
+from companion.skipper.way.voyage import Area, Box, Composed, Goal, Line, PointEn, Search, Side, Voyage
 
 ARC_RAD = math.radians(100.0)       # gates around a buoy are at most this far apart
 STRAIGHT_RAD = math.radians(60.0)   # a bend the other way up to this is passed with one gate, not with a loop
@@ -68,7 +68,7 @@ class Gate:
     beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With ``line`` it
     is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place before it. With
     ``box`` it is where she stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before there
-    are any, of none.
+    are any, of none. With ``field`` she is steered by that, and it is where the mission on board leads meanwhile.
     """
 
     en_m: PointEn
@@ -90,6 +90,7 @@ class Gate:
     box: Box | None = None
     search: Search | None = None
     sweep: tuple[int, int] = (0, 0)
+    field: Composed | None = None
 
     @property
     def is_crossed(self) -> bool:
@@ -128,6 +129,7 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
                 en_m=goal.en_m, radius_m=goal.radius_m if goal.box is None else BOX_RADIUS_M, goal=i,
                 ends_goal=True, name=name, from_en_m=before,
                 bandwidth_m=goal.bandwidth_m, keep_out=discs, box=goal.box, search=goal.search,
+                field=goal.field,
             ))
         else:
             turn_rad = approach.turn_rad if approach is not None else None

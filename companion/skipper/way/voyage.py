@@ -16,6 +16,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.boat import Boat, outline_en_m
+from companion.field.tree import Tree
 from companion.geo.frame import LocalFrame
 
 PointEn = tuple[float, float]
@@ -74,6 +75,36 @@ class Search:
     coverage: float = 0.95
 
 
+class Until(enum.Enum):
+    """What ends the sailing of a composed field. The order ``go_on`` always does, and so does its time."""
+
+    TOLD = "told"
+    TIME = "time"
+    PLACE = "place"            # she is at the goal
+    VESSEL = "vessel"          # another vessel is in its water
+    OUTSIDE = "outside"        # she is outside of its water
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Composed:
+    """A field to sail by, at the longest for ``for_s``; ``water_en`` is what ``until`` speaks of."""
+
+    tree: Tree
+    until: Until = Until.TOLD
+    for_s: float | None = None
+    water_en: Polygon | None = None
+
+    @property
+    def until_words(self) -> str:
+        """What ends it."""
+        at_most = "" if self.for_s is None or self.until is Until.TIME else f", {self.for_s:.0f} s at the most"
+        return {
+            Until.TOLD: "until told to go on", Until.TIME: f"for {self.for_s or 0.0:.0f} s",
+            Until.PLACE: "until she is at its place", Until.VESSEL: "until a vessel is in its water",
+            Until.OUTSIDE: "until she is outside of its water",
+        }[self.until] + at_most
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
     """A place to reach within ``radius_m``, a buoy to round, or a line to cross.
@@ -81,7 +112,8 @@ class Goal:
     With ``side`` the position is the buoy's, which the boat rounds at ``rounding_m``; with ``line`` it is the middle
     between the marks, with ``box`` the roomiest place in it, with
     ``search`` one inside. ``bandwidth_m`` bounds the way from the goal before (or
-    the start) to this one: half the width of Büsser's band (section 4.2).
+    the start) to this one: half the width of Büsser's band (section 4.2). With ``field`` she is steered by that, and
+    the position is where the mission on board leads meanwhile.
     """
 
     en_m: PointEn
@@ -93,6 +125,7 @@ class Goal:
     line: Line | None = None
     box: Box | None = None
     search: Search | None = None
+    field: Composed | None = None
 
 
 class Area(Protocol):

@@ -41,8 +41,11 @@ def write_copies(mission: Mission, recorder: Recorder) -> str:
     if mission.options.area.fence is not None:
         area["fence"] = copied(mission.options.area.fence)
     for goal in options["goal"]:
-        if is_file(goal.get("polygon", "(")):
+        if is_file(goal.get("polygon") or "("):
             goal["polygon"] = copied(goal["polygon"])
+    for atom in options["field"].values():
+        if is_file(atom.get("polygon", "(")):
+            atom["polygon"] = copied(atom["polygon"])
     if mission.polar_path is not None:
         options["boat"]["polar"] = copied(str(mission.boat.polar))
     try:
