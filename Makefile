@@ -91,6 +91,7 @@ bench: $(ENV)
 figures: $(ENV)
 	$(BIN)/python -m bench.rooms
 	$(BIN)/python -m bench.figures
+	$(BIN)/python -m bench.tracking --figures docs/figures
 
 # The Debian package of this machine's release and architecture, into dist/ (about three minutes; see packaging/).
 deb:

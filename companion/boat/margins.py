@@ -34,14 +34,17 @@ class AutopilotLimits:
     """The autopilot's parameters that decide where the boat goes; ArduRover's sailboat defaults."""
 
     PARAMETERS: ClassVar[tuple[str, ...]] = (
-        "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS", "TURN_RADIUS", "FENCE_ENABLE", "FENCE_ACTION",
-        "FENCE_TYPE", "FENCE_RADIUS")
+        "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS", "TURN_RADIUS", "WP_SPEED", "WP_ACCEL", "WP_JERK",
+        "ATC_ACCEL_MAX", "FENCE_ENABLE", "FENCE_ACTION", "FENCE_TYPE", "FENCE_RADIUS")
     CIRCLE_BIT: ClassVar[int] = 2   # of FENCE_TYPE
 
     sail_no_go_angle_rad: float = math.radians(45.0)
     sail_xtrack_max_m: float = 10.0  # 0: no corridor, long boards to the layline
     wp_radius_m: float = 2.0
     turn_radius_m: float = 0.9
+    wp_speed_mps: float = 2.0        # of the point that the boat follows; a sailboat's speed does not obey it
+    wp_accel_mps2: float = 1.0       # of that point
+    wp_jerk_mps3: float = 1.0
     fence_action: int | None = None  # None: no fence guards this obstacle; 0 report .. 4, see FENCE_ACTION
     fence_circle_m: float | None = None   # radius of the fence around home, if something would be done about it
     rc_channels: tuple[int, ...] = (1, 3, 8)  # of the rudder, the throttle and the mode switch, from 1
@@ -64,6 +67,7 @@ class AutopilotLimits:
         default = cls()
         fenced = params.get("FENCE_ENABLE", 0.0) > 0.0
         action = int(params.get("FENCE_ACTION", 1.0))
+        accel = params.get("WP_ACCEL", 0.0) or params.get("ATC_ACCEL_MAX", 0.0) or default.wp_accel_mps2
         is_circled = action > 0 and bool(int(params.get("FENCE_TYPE", 0.0)) & cls.CIRCLE_BIT)
         return cls(
             sail_no_go_angle_rad=math.radians(
@@ -71,6 +75,8 @@ class AutopilotLimits:
             sail_xtrack_max_m=float(params.get("SAIL_XTRACK_MAX", default.sail_xtrack_max_m)),
             wp_radius_m=float(params.get("WP_RADIUS", default.wp_radius_m)),
             turn_radius_m=float(params.get("TURN_RADIUS", default.turn_radius_m)),
+            wp_speed_mps=params.get("WP_SPEED", 0.0) or default.wp_speed_mps,
+            wp_accel_mps2=accel, wp_jerk_mps3=params.get("WP_JERK", 0.0) or accel,
             fence_action=action if fenced else None,
             fence_circle_m=params.get("FENCE_RADIUS") if is_circled else None,
             rc_channels=tuple(int(params.get(name, channel)) for name, channel in zip(

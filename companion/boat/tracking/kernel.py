@@ -1,0 +1,207 @@
+"""The predicted track, compiled: a point that runs along the legs, a boat that is steered to it, and her tacks.
+
+The guidance is ArduRover's since 4.3, restated: AR_WPNav's point on the legs, which waits for the boat and rounds each
+corner in a curve of its own acceleration; AR_PosControl, which turns the boat by what her velocity lacks; and
+sailboat.cpp, which holds the edge of the no-go zone on a leg that is inside it and tacks where she is a corridor off
+the line. The boat is a speed that follows the polar and a yaw rate that follows what is asked: no more is known of most
+boats. What it leaves out is in the stated error (``companion.boat.tracking.error``).
+
+Frame: east, north [m]; headings [rad] clockwise from north; the wind's direction is where it comes from.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.boat.tracking.scurve import leg_s, on_leg, top_speed_mps
+from companion.kernels.jit import kernel
+
+STEP_S = 0.05
+WIND_STEPS = 10            # the wind is given every half second
+KEEP_STEPS = 4             # of the track every fifth of a second is kept
+
+# --- settings
+(H_WP_RADIUS, H_TURN_RADIUS, H_WP_SPEED, H_ACCEL, H_POS_P, H_VEL_P, H_LATERAL, H_NO_GO, H_CORRIDOR, H_PIVOT_RATE,
+ H_RATE_MAX, H_RATE_CHANGE, H_GATHER_M, H_ANGLE_P, H_WIND_LAG_S, H_LATENCY_S,
+ H_JERK) = range(17)
+H_SIZE = 17
+
+# --- columns of the track
+T_E, T_N, T_LEG, T_BEATS, T_SIDE, T_SIZE = 0, 1, 2, 3, 4, 5
+
+NO_GO_PAD_RAD = math.radians(10.0)
+TACK_DONE_RAD = math.radians(10.0)
+TACK_TIMEOUT_S = 5.0
+TACK_RETRY_S = 5.0
+TRACK_LEAD = 0.05
+OVERSPEED = 5.0
+SLOWEST_MPS = 0.1
+# ATC_STR_RAT_P, _I, _FF and MOT_SPD_SCA_BASE of a boat whose rudder is tuned: the yaw rate is soon what is asked
+RATE_P, RATE_I, RATE_FF = 0.2, 0.2, 0.75
+RUDDER_BASE_MPS = 1.0
+RUDDER_MAX_RAD = math.radians(35.0)
+
+
+@kernel
+def turn_to(angle_rad: float) -> float:
+    """Return the angle on -pi to pi."""
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@kernel
+def polar_at(curve: NDArray[np.float64], twa_rad: float) -> float:
+    """Return the speed at an angle to the wind, from speeds at even steps from 0 to pi."""
+    place = abs(twa_rad) / math.pi * (curve.shape[0] - 1)
+    i = min(int(place), curve.shape[0] - 2)
+    return float(curve[i] + (curve[i + 1] - curve[i]) * (place - i))
+
+
+@kernel
+def sail(
+    points: NDArray[np.float64], state: NDArray[np.float64], wind_rad: NDArray[np.float64],
+    curve: NDArray[np.float64], h: NDArray[np.float64], out: NDArray[np.float64],
+) -> int:
+    """Sail the legs between ``points`` (n, 2), and fill ``out`` (m, T_SIZE); return how many rows were filled.
+
+    ``state`` is east, north, heading and speed at the start; ``wind_rad`` the wind's direction every
+    WIND_STEPS steps (the last one holds on); ``curve`` the polar in this wind; ``h`` the settings. Ends when the last
+    point is reached or ``out`` is full.
+    """
+    e, n, yaw, v = state[0], state[1], state[2], state[3]
+    rate, want_rate, integral = 0.0, 0.0, 0.0
+    dt = STEP_S
+    leg, last = 0, points.shape[0] - 2
+    accel, jerk, fastest = h[H_ACCEL], h[H_JERK], h[H_WP_SPEED]
+    t_prev, t_this, t_next = 0.0, 0.0, 0.0      # along the curves of the leg before, this one, the next
+    l_prev, v_prev, pe, pn = 0.0, 1.0, 0.0, 0.0
+    scale, pace = 0.0, 0.0
+    he, hn, te, tn = 0.0, 0.0, points[0, 0], points[0, 1]
+    want_speed = 0.0
+    tacking, tack_yaw, tack_start, tack_end = False, 0.0, 0.0, -TACK_RETRY_S
+    heard = wind_rad[0]
+    rows, step = 0, 0
+    while rows < out.shape[0]:
+        t = step * dt
+        i = step // WIND_STEPS
+        share = (step - i * WIND_STEPS) / WIND_STEPS
+        i = min(i, wind_rad.shape[0] - 1)
+        j = min(i + 1, wind_rad.shape[0] - 1)
+        twd = wind_rad[i] + share * turn_to(wind_rad[j] - wind_rad[i])
+        heard += dt / max(h[H_WIND_LAG_S], dt) * turn_to(twd - heard)
+        # what the autopilot believes of its place is a little old
+        ve, vn = v * math.sin(yaw), v * math.cos(yaw)
+        be, bn = e - ve * h[H_LATENCY_S], n - vn * h[H_LATENCY_S]
+        oe, on, de, dn = points[leg, 0], points[leg, 1], points[leg + 1, 0], points[leg + 1, 1]
+        xe, xn = (points[leg + 2, 0], points[leg + 2, 1]) if leg < last else (de, dn)
+        length = math.hypot(de - oe, dn - on)
+        ue, un = ((de - oe) / length, (dn - on) / length) if length > 1e-6 else (math.sin(yaw), math.cos(yaw))
+        after = max(math.hypot(xe - de, xn - dn), 1e-6)
+        ge, gn = (xe - de) / after, (xn - dn) / after
+        v_this, v_next = top_speed_mps(length, fastest, accel, jerk), top_speed_mps(after, fastest, accel, jerk)
+        whole, whole_next = leg_s(length, v_this, accel, jerk), leg_s(after, v_next, accel, jerk)
+        # --- the point on the legs waits for the boat, or hurries with her
+        want = 1.0
+        if pace > 1e-6:
+            re, rn = he / pace, hn / pace
+            behind = (te - be) * re + (tn - bn) * rn
+            want = min(max(TRACK_LEAD + (ve * re + vn * rn - h[H_POS_P] * behind) / pace, 0.0), OVERSPEED)
+        scale += (want - scale) * min(1.0, dt * jerk / accel)
+        ahead_s = scale * dt
+        t_this += ahead_s
+        s1, w1, a1 = on_leg(t_this, length, v_this, accel, jerk)
+        te, tn, he, hn, ae, an = oe + s1 * ue, on + s1 * un, w1 * ue, w1 * un, a1 * ue, a1 * un
+        if l_prev > 0.0:
+            # what is left of the leg before is sailed at the same time: that is the corner
+            t_prev += ahead_s
+            s0, w0, a0 = on_leg(t_prev, l_prev, v_prev, accel, jerk)
+            te, tn = te + (s0 - l_prev) * pe, tn + (s0 - l_prev) * pn
+            he, hn, ae, an = he + w0 * pe, hn + w0 * pn, ae + a0 * pe, an + a0 * pn
+        arrived = t_this >= whole
+        if leg < last:
+            left = whole - t_this
+            if t_next <= 0.0 and left < 0.5 * min(whole, whole_next):
+                # the next leg may begin when the middle of the corner is within the radius, slow and soft enough
+                s1, w1, a1 = on_leg(t_this + 0.5 * left, length, v_this, accel, jerk)
+                s2, w2, a2 = on_leg(0.5 * left, after, v_next, accel, jerk)
+                turn_m = math.hypot((s1 - length) * ue + s2 * ge, (s1 - length) * un + s2 * gn)
+                if (
+                    turn_m < h[H_WP_RADIUS] and math.hypot(w1 * ue + w2 * ge, w1 * un + w2 * gn) < min(v_this, v_next)
+                    and math.hypot(a1 * ue + a2 * ge, a1 * un + a2 * gn) < h[H_LATERAL]
+                ):
+                    t_next = 1e-9
+            if t_next > 0.0:
+                t_next += ahead_s
+                s2, w2, a2 = on_leg(t_next, after, v_next, accel, jerk)
+                te, tn, he, hn = te + s2 * ge, tn + s2 * gn, he + w2 * ge, hn + w2 * gn
+                ae, an = ae + a2 * ge, an + a2 * gn
+                arrived = arrived or t_next >= whole - t_this
+        pace = math.hypot(he, hn)
+        # --- reached?
+        dist = math.hypot(de - be, dn - bn)
+        xtrack = (bn - on) * ue - (be - oe) * un    # to the left of the leg
+        past = (be - oe) * ue + (bn - on) * un >= length
+        reached = arrived and (leg < last or dist <= h[H_WP_RADIUS] or past)
+        # --- what is steered
+        bearing = math.atan2(de - be, dn - bn)
+        beats = tacking or abs(turn_to(heard - bearing)) <= h[H_NO_GO] + NO_GO_PAD_RAD
+        if beats:
+            on_port = turn_to(twd - yaw) < 0.0
+            should = False
+            heading = turn_to(heard + h[H_NO_GO]) if on_port else turn_to(heard - h[H_NO_GO])
+            if abs(turn_to(heard - bearing)) > h[H_NO_GO] and not tacking:
+                if (turn_to(heard - bearing) < 0.0) == on_port:
+                    heading = bearing
+                else:
+                    should = True
+            if not tacking and not should and abs(xtrack) >= h[H_CORRIDOR] > 0.0:
+                should = (xtrack > 0.0) != on_port
+            if should and t - tack_end > TACK_RETRY_S:
+                tack_yaw = turn_to(heard - h[H_NO_GO]) if on_port else turn_to(heard + h[H_NO_GO])
+                tacking, tack_start = True, t
+            if tacking:
+                heading = tack_yaw
+                if abs(turn_to(tack_yaw - yaw)) <= TACK_DONE_RAD or t - tack_start > TACK_TIMEOUT_S:
+                    tacking, tack_end = False, t
+            asked = h[H_ANGLE_P] * turn_to(heading - yaw)
+            if tacking and h[H_PIVOT_RATE] > 0.0:
+                asked = min(max(asked, -h[H_PIVOT_RATE]), h[H_PIVOT_RATE])
+        else:
+            le, ln = h[H_POS_P] * (te - be) + he, h[H_POS_P] * (tn - bn) + hn
+            wanted = math.hypot(le, ln)
+            if wanted > h[H_WP_SPEED]:
+                le, ln, wanted = le * h[H_WP_SPEED] / wanted, ln * h[H_WP_SPEED] / wanted, h[H_WP_SPEED]
+            sin, cos = math.sin(yaw), math.cos(yaw)
+            lateral = h[H_VEL_P] * ((le - ve) * cos - (ln - vn) * sin) + ae * cos - an * sin
+            slowest = min(wanted, math.sqrt(h[H_LATERAL] * h[H_TURN_RADIUS]))
+            ahead = max(le * sin + ln * cos, slowest)
+            want_speed = min(max(ahead, want_speed - h[H_ACCEL] * dt), want_speed + h[H_ACCEL] * dt)
+            asked = min(max(lateral, -h[H_LATERAL]), h[H_LATERAL]) / max(want_speed, SLOWEST_MPS)
+        # --- the boat
+        asked = min(max(asked, -h[H_RATE_MAX]), h[H_RATE_MAX])
+        want_rate = min(max(asked, want_rate - h[H_RATE_CHANGE] * dt), want_rate + h[H_RATE_CHANGE] * dt)
+        miss = want_rate - rate
+        integral = min(max(integral + RATE_I * miss * dt, -1.0), 1.0)
+        rudder = min(max(RATE_P * miss + integral + RATE_FF * want_rate, -1.0), 1.0) / max(v, RUDDER_BASE_MPS)
+        rate = v * math.sin(rudder * RUDDER_MAX_RAD) / (max(h[H_TURN_RADIUS], 0.1) * math.sin(RUDDER_MAX_RAD))
+        top = polar_at(curve, turn_to(twd - yaw))
+        v = max(v + (top * top - v * v) / (2.0 * h[H_GATHER_M]) * dt, 0.0)
+        half = yaw + 0.5 * rate * dt
+        e += v * math.sin(half) * dt
+        n += v * math.cos(half) * dt
+        yaw = turn_to(yaw + rate * dt)
+        if step % KEEP_STEPS == 0:
+            out[rows, T_E], out[rows, T_N], out[rows, T_LEG] = e, n, leg
+            out[rows, T_BEATS] = 1.0 if beats else 0.0
+            out[rows, T_SIDE] = 1.0 if turn_to(twd - yaw) >= 0.0 else -1.0
+            rows += 1
+        step += 1
+        if reached:
+            if leg == last:
+                break
+            l_prev, v_prev, pe, pn, t_prev = length, v_this, ue, un, t_this
+            t_this, t_next = t_next, 0.0
+            leg += 1
+    return rows
