@@ -10,6 +10,8 @@
 Outcomes that are part of normal life (no plan found, an upload refused) are enums in values, not exceptions.
 """
 
+from __future__ import annotations
+
 
 class CompanionError(Exception):
     """Root of everything this program raises on purpose."""
@@ -29,6 +31,10 @@ class InputError(CompanionError):
         self.source, self.place, self.problem, self.remedy = source, place, problem, remedy
         where = f"{source}: {place}" if place else source
         super().__init__(f"{where}: {problem}" + (f"; {remedy}" if remedy else ""))
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
+        """Return how it is made again in another process."""
+        return type(self), (self.source, self.place, self.problem, self.remedy)
 
 
 class UnreadableError(InputError):

@@ -13,6 +13,9 @@ EXTRAS = {
     "scipy": "shore",
     "tomlkit": "shore",
     "websockets": "signalk",
+    "distributed": "cluster",
+    "bokeh": "cluster",
+    "pyarrow": "results",
     "filterpy": "papers",
 }
 

@@ -16,8 +16,9 @@ import numpy as np
 
 from companion.errors import InputError
 from companion.geofence import Mission
-from sitl.campaigns.pool import held, sailed
+from sitl.means import Means
 from sitl.run.variation import Variation, foreknown, unspread
+from sitl.runner import Key, file_hash, sail
 
 HERE = Path(__file__).parents[1] / "scenarios"
 SCENARIOS = (HERE / "two-channels.toml", HERE / "figures" / "two-channels-rough.toml", HERE / "narrow-channel.toml")
@@ -70,6 +71,14 @@ def sail_one(job: Job) -> dict[str, Any]:
     return {**said, "error": "", **{name: verdict.figures[name] for name in names}, "floor_m": _floor_m(job.scenario)}
 
 
+def key_of(job: Job) -> Key:
+    """Return what a voyage is known by."""
+    from sitl.scene import load_scenario
+
+    return {"scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario),
+            "variation": job.variation, "seed": job.seed}
+
+
 def _floor_m(path: Path) -> float:
     return _mission(path).margin_floor_m
 
@@ -82,12 +91,10 @@ def _mission(path: Path) -> Mission:
 
 
 def run_ablation(
-    scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int, workers: int | None,
-    out: Path | None,
+    scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int, means: Means,
 ) -> int:
-    """Sail what ``out`` does not hold yet, append each voyage as it ends, print the tables; return the exit code."""
+    """Sail what has no result yet, print the tables; return the exit code."""
     from sitl.run.compiled import compile_ahead
-    from sitl.scene import load_scenario
 
     unknown = next((name for name in names if name not in VARIATIONS), None)
     if unknown is not None:
@@ -99,22 +106,14 @@ def run_ablation(
         compile_ahead(planner)
     jobs = [Job(scenario=path, variation=name, seed=first_seed + n)
             for n in range(runs) for path in scenarios for name in wanted]
-    named = {path: load_scenario(path).name for path in scenarios}
-    keys = {(named[job.scenario], job.variation, job.seed) for job in jobs}
-    records = [r for r in held(out) if _key(r) in keys]
-    had = {_key(r) for r in records}
-    jobs = [job for job in jobs if (named[job.scenario], job.variation, job.seed) not in had]
-    records += sailed(sail_one, jobs, workers, out)
+    sailed = sail("ablate", sail_one, jobs, means, key=key_of, is_failed=lambda record: bool(record["error"]))
+    records = sailed.records
     for scenario in dict.fromkeys(record["scenario"] for record in sorted(records, key=_order)):
         print(f"{scenario}, {runs} seeds from {first_seed}")
         print(table([record for record in records if record["scenario"] == scenario], wanted))
     for record in (r for r in records if r["error"]):
         print(f"ERROR {record['scenario']}, {record['variation']}, seed {record['seed']}: {record['error'][:300]}")
-    return 1 if any(r["error"] for r in records) else 0
-
-
-def _key(record: Mapping[str, Any]) -> tuple[str, str, int]:
-    return record["scenario"], record["variation"], record["seed"]
+    return sailed.exit_code(is_good=not any(r["error"] for r in records))
 
 
 def _order(record: Mapping[str, Any]) -> tuple[str, int, int]:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import shutil
 import statistics
-import sys
 import tempfile
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from companion.words import file_name
-from sitl.campaigns.pool import in_processes
+from sitl.means import Means
+from sitl.runner import Key, file_hash, sail
 
 FAILURES = Path("campaign-failures")
 
@@ -35,7 +35,6 @@ def sail_one(job: Job) -> dict[str, Any]:
     from sitl.run.embedded import run_embedded
     from sitl.scene import load_scenario
 
-    began = time.perf_counter()
     scenario = load_scenario(job.scenario)
     place = job.keep / f"{file_name(scenario.name)}-{job.seed:04d}" if job.keep else None
     with tempfile.TemporaryDirectory(prefix="voyage-") as scratch:
@@ -51,14 +50,22 @@ def sail_one(job: Job) -> dict[str, Any]:
             kept = FAILURES / f"{file_name(scenario.name)}-{job.seed:04d}"
             shutil.rmtree(kept, ignore_errors=True)
             if folder.is_dir():
-                kept.parent.mkdir(exist_ok=True)
-                shutil.copytree(folder, kept)
-    return {**verdict, "wall_s": time.perf_counter() - began}
+                with contextlib.suppress(OSError):   # a seed repeats: its result is worth more than its folder
+                    kept.parent.mkdir(exist_ok=True)
+                    shutil.copytree(folder, kept)
+    return verdict
+
+
+def key_of(job: Job) -> Key:
+    """Return what a run is known by."""
+    from sitl.scene import load_scenario
+
+    return {"scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario), "seed": job.seed}
 
 
 def run_campaign(
-    scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, workers: int | None = None,
-    json_path: Path | None = None, keep: Path | None = None,
+    scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, means: Means, json_path: Path | None = None,
+    keep: Path | None = None,
 ) -> int:
     """Run and print; return the exit code."""
     from sitl.run.compiled import compile_ahead
@@ -71,29 +78,19 @@ def run_campaign(
     compile_ahead()
     names = [scenario.name for scenario in loaded]
     jobs = [Job(scenario=p, seed=first_seed + k, keep=keep) for p in scenarios for k in range(runs)]
-    records: list[dict[str, Any]] = []
-    began = time.perf_counter()
-    for record in in_processes(sail_one, jobs, workers):
-        records.append(record)
-        print(json.dumps(record, separators=(",", ":")), flush=True)
-        failed = sum(not r["passed"] for r in records)
-        elapsed = time.perf_counter() - began
-        left = elapsed / len(records) * (len(jobs) - len(records))
-        sys.stderr.write(f"\r{len(records)}/{len(jobs)} sailed, {failed} failed, {left:.0f} s left   ")
-        sys.stderr.flush()
-    sys.stderr.write("\n")
+    sailed = sail("campaign", sail_one, jobs, means, key=key_of,
+                  on_record=lambda record: print(json.dumps(record, separators=(",", ":")), flush=True))
+    records = sailed.records
     table = [figures(name, [r for r in records if r["scenario"] == name]) for name in names]
     print_table(table)
-    wall_s = time.perf_counter() - began
-    print(f"{len(records)} voyages in {wall_s:.0f} s; "
-          f"{sum(t['sailed_s'] for t in table) / max(1e-9, sum(r['wall_s'] for r in records)):.0f} times real time "
-          "per core")
+    rate = sum(t["sailed_s"] for t in table) / sailed.cpu_s if sailed.now == len(records) and sailed.cpu_s else None
+    print(sailed.took + (f"; {rate:.0f} times real time per core" if rate else ""))
     for record in sorted((r for r in records if not r["passed"]), key=lambda r: (r["scenario"], r["seed"])):
         bad = "; ".join(f"{c['name']}: {c['figure']}" for c in record["checks"] if not c["passed"])
         print(f"FAILED {record['scenario']} seed {record['seed']}: {bad[:300]}")
     if json_path is not None:
-        json_path.write_text(json.dumps({"table": table, "wall_s": wall_s}, indent=1) + "\n", encoding="utf-8")
-    return 0 if all(r["passed"] for r in records) else 1
+        json_path.write_text(json.dumps({"table": table, "wall_s": sailed.wall_s}, indent=1) + "\n", encoding="utf-8")
+    return sailed.exit_code(is_good=all(r["passed"] for r in records))
 
 
 def figures(name: str, records: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import json
 import statistics
-import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from sitl.campaigns.encounter_draw import KINDS, Kind, Policy, draw
-from sitl.campaigns.pool import in_processes
+from sitl.means import Means
+from sitl.runner import Key, file_hash, sail
 
 EXPANSIONS = 4_000
 _SOURCE = Path(__file__).parents[1] / "scenarios" / "crossing.toml"   # the drawn ones are as if they lay beside it
@@ -40,7 +39,6 @@ def sail_encounter(job: Job) -> dict[str, Any]:
     from companion.clock import run_virtual
     from sitl.run.embedded import run_embedded
 
-    began_s = time.process_time()
     scenario = draw(job.seed, job.kind, job.policy)
     figures: dict[str, Any] = {}
     with tempfile.TemporaryDirectory(prefix="encounter-") as scratch:
@@ -66,43 +64,44 @@ def sail_encounter(job: Job) -> dict[str, Any]:
         "vessel": f"{event.craft} of {event.length_m:g} m, {event.sog_mps:g} m/s, {event.course_deg:+g} deg off our "
                   f"course, every {event.every_s:g} s by {event.receiver}, "
                   + ("keeps the rules" if event.manner == "rules" else "keeps her course"),
-        "replans": figures.get("replans"), "cpu_s": time.process_time() - began_s,
+        "replans": figures.get("replans"),
     }
+
+
+def key_of(job: Job) -> Key:
+    """Return what an encounter is known by."""
+    return {"scenario": "encounter", "hash": file_hash(_SOURCE), "kind": job.kind, "policy": job.policy,
+            "seed": job.seed}
 
 
 def run_encounters(
     *, runs: int, kinds: Sequence[Kind] = KINDS, policies: Sequence[Policy] = ("rules",), first_seed: int = 0,
-    workers: int | None = None, json_path: Path | None = None,
+    means: Means, json_path: Path | None = None,
 ) -> int:
     """Sail ``runs`` seeds of each kind and policy, print what failed and the table; return the exit code."""
-    began_s = time.perf_counter()
     jobs = [Job(kind=kind, policy=policy, seed=first_seed + n)
             for n in range(runs) for kind in kinds for policy in policies]
-    records: list[dict[str, Any]] = []
-    for record in in_processes(sail_encounter, jobs, workers):
-        records.append(record)
+
+    def tell(record: dict[str, Any]) -> None:
         if not record["passed"]:
-            print(f"\rFAILED {record['kind']}, {record['policy']}, seed {record['seed']}: "
+            print(f"FAILED {record['kind']}, {record['policy']}, seed {record['seed']}: "
                   f"{'; '.join(record['faults'])} ({record['vessel']}; wind {record['wind']}"
                   f"{'; shoal' if record['shoal'] else ''})", flush=True)
-        left_s = (time.perf_counter() - began_s) / len(records) * (len(jobs) - len(records))
-        failed = sum(not r["passed"] for r in records)
-        sys.stderr.write(f"\r{len(records)}/{len(jobs)} sailed, {failed} failed, {left_s:.0f} s left   ")
-        sys.stderr.flush()
-    sys.stderr.write("\n")
+
+    sailed = sail("encounters", sail_encounter, jobs, means, key=key_of, on_record=tell)
+    records = sailed.records
     records.sort(key=lambda r: (r["policy"], r["kind"], r["seed"]))
     rows = [row(kind, policy, found) for policy in policies for kind in kinds
             if (found := [r for r in records if (r["kind"], r["policy"]) == (kind, policy)])]
     print_rows(rows)
-    print(f"{len(records)} voyages in {time.perf_counter() - began_s:.0f} s, "
-          f"{statistics.mean(r['cpu_s'] for r in records):.2f} CPU s each")
+    print(sailed.took)
     for record in records:
         if not record["passed"]:
             print(f"again: sitl encounters --kind {record['kind']} --policy \"{record['policy']}\" "
                   f"--first-seed {record['seed']} --keep DIR")
     if json_path is not None:
         json_path.write_text(json.dumps({"table": rows, "voyages": records}, indent=1) + "\n", encoding="utf-8")
-    return 0 if all(r["passed"] for r in records) else 1
+    return sailed.exit_code(is_good=all(r["passed"] for r in records))
 
 
 def row(kind: str, policy: str, records: Sequence[dict[str, Any]]) -> dict[str, Any]:

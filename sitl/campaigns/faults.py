@@ -12,9 +12,7 @@ from __future__ import annotations
 
 import json
 import statistics
-import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +27,8 @@ from companion.messages import CompanionStatus
 from sitl.campaigns.counterfactual import avoidable
 from sitl.campaigns.fault_draw import draw, draw_planner
 from sitl.campaigns.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
-from sitl.campaigns.pool import in_processes
+from sitl.means import Means
+from sitl.runner import Key, file_hash, sail
 from sitl.scene import EventSpec, Scenario, is_all_ordinary, load_scenario
 
 BASE = Path(__file__).parents[1] / "scenarios" / "faults" / "rocks.toml"
@@ -54,7 +53,6 @@ def sail_faults(
     """Sail a scenario, read from ``base``, with what else a ``seed`` decides, and return how it went."""
     if keep is not None and keep.is_dir() and any(keep.iterdir()):
         raise InputError("--keep", str(keep), "is not empty", "a voyage's folder is taken up where it was left")
-    began_s = time.process_time()
     voyage = _sail(scenario, seed, base, keep, worker_pace)
     watch, figures, errors = voyage.watch, voyage.figures, voyage.errors
 
@@ -94,7 +92,7 @@ def sail_faults(
         "below_floor": is_low, "weather_only": is_weather,
         "mixture_s": mixture_s, "held_back_s": watch.held_back_s(),
         "silence_s": silence_s, "sailed": watch.has_sailed, "errors": errors,
-        "simulated_s": watch.t_s[-1] if watch.t_s else 0.0, "cpu_s": time.process_time() - began_s,
+        "simulated_s": watch.t_s[-1] if watch.t_s else 0.0,
     }
 
 
@@ -163,35 +161,35 @@ def told(event: EventSpec) -> str:
 
 
 def run_faults(
-    *, runs: int, first_seed: int = 0, workers: int | None = None, json_path: Path | None = None,
-    worker: bool = False,
+    *, runs: int, first_seed: int = 0, means: Means, json_path: Path | None = None, worker: bool = False,
 ) -> int:
     """Sail ``runs`` seeds, print those that failed and what was counted; return the exit code."""
-    began_s = time.perf_counter()
-    records: list[dict[str, Any]] = []
-    sail_one = sail_worker_seed if worker else sail_seed
-    for record in in_processes(sail_one, range(first_seed, first_seed + runs), workers):
-        records.append(record)
+    water = {"scenario": load_scenario(BASE).name, "hash": file_hash(BASE), "trouble": "worker" if worker else "all"}
+
+    def key_of(seed: int) -> Key:
+        return {**water, "seed": seed}
+
+    def tell(record: dict[str, Any]) -> None:
         if not record["passed"]:
             drawn = record["events"] + [f"{name} {value:g}" for name, value in record["parameters"].items()]
-            print(f"\rFAILED seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})", flush=True)
-        left_s = (time.perf_counter() - began_s) / len(records) * (runs - len(records))
-        failed = sum(not r["passed"] for r in records)
-        sys.stderr.write(f"\r{len(records)}/{runs} sailed, {failed} failed, {left_s:.0f} s left   ")
-        sys.stderr.flush()
-    sys.stderr.write("\n")
-    records.sort(key=lambda r: int(r["seed"]))
-    table = figures_of(records, time.perf_counter() - began_s)
+            print(f"FAILED seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})", flush=True)
+
+    sailed = sail("faults", sail_worker_seed if worker else sail_seed, range(first_seed, first_seed + runs), means,
+                  key=key_of, on_record=tell)
+    records = sailed.records
+    table = figures_of(records)
     print_figures(table)
+    print(f"{table['simulated_s'] / 3600.0:.1f} h simulated; {sailed.took}")
     for record in records:
         if not record["passed"]:
             print(f"again: sitl faults --first-seed {record['seed']} --keep DIR")
     if json_path is not None:
-        json_path.write_text(json.dumps({"figures": table, "voyages": records}, indent=1) + "\n", encoding="utf-8")
-    return 0 if all(r["passed"] for r in records) else 1
+        plain = {"figures": {**table, "wall_s": sailed.wall_s, "cpu_s": sailed.cpu_s}, "voyages": records}
+        json_path.write_text(json.dumps(plain, indent=1) + "\n", encoding="utf-8")
+    return sailed.exit_code(is_good=all(r["passed"] for r in records))
 
 
-def figures_of(records: Sequence[dict[str, Any]], wall_s: float) -> dict[str, Any]:
+def figures_of(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return what was counted over all voyages."""
     touched: Counter[str] = Counter()
     low = [r for r in records if r["below_floor"]]
@@ -217,14 +215,12 @@ def figures_of(records: Sequence[dict[str, Any]], wall_s: float) -> dict[str, An
         "unhandled": sum(bool(r["errors"]) for r in records),
         "time_median_s": statistics.median(times) if times else None,
         "faults": dict(sorted(kinds.items())),
-        "simulated_s": sum(r["simulated_s"] for r in records), "cpu_s": sum(r["cpu_s"] for r in records),
-        "wall_s": wall_s,
+        "simulated_s": sum(r["simulated_s"] for r in records),
     }
 
 
 def print_figures(table: dict[str, Any]) -> None:
     """Print what was counted."""
-    n = max(1, table["voyages"])
     print(f"{table['voyages']} voyages, {table['passed']} passed, {table['arrived']} arrived in time")
     print(f"touched something: {table['touched']} voyages; longest mixture {table['mixture_max_s']:.1f} s; "
           f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}")
@@ -234,5 +230,3 @@ def print_figures(table: dict[str, Any]) -> None:
           "in ordinary weather")
     print(f"  a mission held back by a slow upload, ended by a loiter: {table['held_back_max_s']:.1f} s at most")
     print("voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items()))
-    print(f"{table['simulated_s'] / 3600.0:.1f} h simulated in {table['wall_s']:.0f} s, "
-          f"{table['cpu_s'] / n:.2f} CPU s per voyage")

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 import statistics
-import sys
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from companion.errors import JobError, LinkError
 from sitl.campaigns.baselines import sail_alone, sail_ardurover, sail_companion, sail_companion_ardurover
-from sitl.campaigns.pool import in_processes
+from sitl.means import Means
+from sitl.runner import Key, file_hash, read_results, sail
 from sitl.scene import load_scenario
 
 HERE = Path(__file__).parents[1] / "scenarios"
@@ -35,49 +32,47 @@ class Job:
     set_sail: tuple[float, float, float] | None = None
 
 
-def sail(job: Job) -> dict[str, Any]:
-    """Sail a job; what went wrong with the harness is in ``error``."""
-    began = time.perf_counter()
-    try:
-        if job.who == "companion":
-            record = sail_companion(job.scenario, job.seed)
-        elif job.who == "companion-ardurover":
-            record = sail_companion_ardurover(job.scenario, job.seed, job.speedup)
-        elif job.who == "alone-embedded":
-            record = sail_alone(job.scenario, job.seed)
-        else:
-            record = sail_ardurover(job.scenario, job.seed, job.who, job.speedup, job.set_sail)
-    except (JobError, LinkError) as error:
-        record = {"who": job.who, "scenario": load_scenario(job.scenario).name, "seed": job.seed, "error": str(error)}
-    return {**record, "wall_s": time.perf_counter() - began}
+def sail_one(job: Job) -> dict[str, Any]:
+    """Sail a job; JobError or LinkError where the harness fails, and then there is no result."""
+    if job.who == "companion":
+        return sail_companion(job.scenario, job.seed)
+    if job.who == "companion-ardurover":
+        return sail_companion_ardurover(job.scenario, job.seed, job.speedup)
+    if job.who == "alone-embedded":
+        return sail_alone(job.scenario, job.seed)
+    return sail_ardurover(job.scenario, job.seed, job.who, job.speedup, job.set_sail)
+
+
+def key_of(job: Job) -> Key:
+    """Return what a voyage is known by: of those on the real ArduRover the pace and where they set sail, too."""
+    key: dict[str, str | int | float | None] = {
+        "who": job.who, "scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario), "seed": job.seed}
+    if job.who in {"companion-ardurover", "alone", "dijkstra"}:
+        key["speedup"] = job.speedup
+    if job.set_sail is not None and job.who in {"alone", "dijkstra"}:
+        key["from"] = "{:.6f},{:.6f},{:.1f}".format(*job.set_sail)
+    return key
 
 
 def run_baselines(
-    *, who: Sequence[str], scenarios: Sequence[Path], seeds: int, workers: int, speedup: float, out: Path,
+    *, who: Sequence[str], scenarios: Sequence[Path], seeds: int, means: Means, speedup: float,
 ) -> int:
-    """Sail everything, append each voyage to ``out`` as it ends, print the table of all that ``out`` holds."""
-    began = {(r["scenario"], r["seed"]): tuple(r["start"]) for r in (read(out) if out.exists() else []) if "start" in r}
+    """Sail everything that has no result yet, print the table of all that the file holds; return the exit code."""
+    began: dict[tuple[str, int], tuple[float, float, float]] = {}
+    if means.file is not None and means.file.is_file() and means.file.stat().st_size:
+        began = {(key["scenario"], key["seed"]): tuple(result["start"])
+                 for key, result in read_results(means.file).pairs() if "start" in result}
     jobs = [
         Job(who=w, scenario=p, seed=s, speedup=speedup, set_sail=began.get((load_scenario(p).name, s)))
         for w in who for s in range(seeds) for p in scenarios]
-    with out.open("a", encoding="utf-8") as file:
-        for n, record in enumerate(in_processes(sail, jobs, workers), 1):
-            file.write(json.dumps(record, separators=(",", ":")) + "\n")
-            file.flush()
-            sys.stderr.write(f"\r{n}/{len(jobs)} sailed   ")
-            sys.stderr.flush()
-    sys.stderr.write("\n")
-    print(table(read(out)))
-    return 0
+    sailed = sail("baselines", sail_one, jobs, means, key=key_of)
+    print(table(latest([result for _, result in sailed.held.pairs()])))
+    return sailed.exit_code(is_good=True)
 
 
-def read(path: Path) -> list[dict[str, Any]]:
-    """Return the newest record of every voyage in a file."""
-    newest = {}
-    for line in path.read_text(encoding="utf-8").splitlines():
-        record = json.loads(line)
-        newest[record["who"], record["scenario"], record["seed"]] = record
-    return list(newest.values())
+def latest(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return one record of every sailor, scenario and seed: of those that set sail here and there, the last."""
+    return list({(r["who"], r["scenario"], r["seed"]): r for r in records}.values())
 
 
 def table(records: Sequence[dict[str, Any]]) -> str:
@@ -91,16 +86,11 @@ def table(records: Sequence[dict[str, Any]]) -> str:
         "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|",
     ]
     names = list(dict.fromkeys(load_scenario(p).name for p in SCENARIOS))
-    sailed = [r for r in records if "error" not in r]
-    for name in [*names, *sorted({r["scenario"] for r in sailed} - set(names))]:
+    for name in [*names, *sorted({r["scenario"] for r in records} - set(names))]:
         for who in ("companion", "companion, ArduRover", "alone, embedded", "alone, ArduRover", "dijkstra, ArduRover"):
-            rows = [r for r in sailed if r["scenario"] == name and r["who"] == who]
+            rows = [r for r in records if r["scenario"] == name and r["who"] == who]
             if rows:
                 lines.append(_row(name, who, rows))
-    lost = len(records) - len(sailed)
-    if lost:
-        lines.append(f"\n{lost} voyages could not be sailed (harness): " + "; ".join(
-            sorted({str(r["error"]) for r in records if "error" in r})))
     return "\n".join(lines)
 
 

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from companion.program.arguments import out_file, whole
+from companion.program.arguments import whole
+from sitl.means import add_options, means_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -25,10 +26,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         help="only these variations (default: all; a wrong name lists them)")
     parser.add_argument("--runs", type=whole(at_least=1), default=20, metavar="N", help="seeds (default: 20)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S")
-    parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
-                        help="processes (default: one per core)")
-    parser.add_argument("--out", type=out_file, metavar="FILE",
-                        help="append a line for each voyage as it ends; what it holds already is not sailed again")
+    add_options(parser)
     parser.set_defaults(run=run)
 
 
@@ -38,4 +36,4 @@ def run(args: argparse.Namespace) -> int:
 
     return run_ablation(
         args.scenarios or SCENARIOS, names=args.only or tuple(VARIATIONS), runs=args.runs, first_seed=args.first_seed,
-        workers=args.workers, out=args.out)
+        means=means_of(args))

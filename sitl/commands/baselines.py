@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from companion.program.arguments import number, out_file, whole
+from companion.program.arguments import number, whole
+from sitl.means import add_options, means_of
 
 SAILORS = ("companion", "companion-ardurover", "alone-embedded", "alone", "dijkstra")
 
@@ -25,11 +26,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--who", nargs="+", choices=SAILORS, default=list(SAILORS), help="sailors (default: all)")
     parser.add_argument("--scenarios", type=Path, nargs="+", metavar="FILE", help="scenario files (default: the six)")
     parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
-    parser.add_argument("--workers", type=whole(at_least=1), default=1, metavar="W",
-                        help="voyages at a time (default: 1)")
     parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=20.0, metavar="X",
                         help="of the real ArduRover (default: 20)")
-    parser.add_argument("--out", type=out_file, default="baselines.jsonl", metavar="FILE", help="voyages, appended")
+    add_options(parser, workers=1, out=Path("baselines.jsonl"))
     parser.set_defaults(run=run)
 
 
@@ -43,6 +42,6 @@ def run(args: argparse.Namespace) -> int:
         load_scenario(path)
     compile_ahead()
     return run_baselines(
-        who=args.who, scenarios=args.scenarios or SCENARIOS, seeds=args.seeds, workers=args.workers,
-        speedup=args.speedup, out=args.out,
+        who=args.who, scenarios=args.scenarios or SCENARIOS, seeds=args.seeds, means=means_of(args),
+        speedup=args.speedup,
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import out_file, out_folder, whole
+from sitl.means import add_options, means_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -20,12 +21,11 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.toml")
     parser.add_argument("--runs", type=whole(at_least=1), default=50, metavar="N", help="seeds 0..N-1 (default: 50)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S")
-    parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
-                        help="processes (default: one per core)")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the table's figures")
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="keep the voyage folders (default: failed ones only, "
                         "in campaign-failures/)")
+    add_options(parser)
     parser.set_defaults(run=run)
 
 
@@ -34,6 +34,6 @@ def run(args: argparse.Namespace) -> int:
     from sitl.campaigns.campaign import run_campaign
 
     return run_campaign(
-        args.scenarios, runs=args.runs, first_seed=args.first_seed, workers=args.workers, json_path=args.json,
+        args.scenarios, runs=args.runs, first_seed=args.first_seed, means=means_of(args), json_path=args.json,
         keep=args.keep,
     )

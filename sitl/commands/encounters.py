@@ -7,6 +7,7 @@ from typing import Any
 
 from companion.program.arguments import out_file, out_folder, whole
 from sitl.campaigns.encounter_draw import KINDS, POLICIES, Policy
+from sitl.means import add_options, means_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -25,11 +26,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--policy", choices=(*POLICIES, "both"), default="rules",
                         help="[traffic] policy of our boat (default: rules)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
-    parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
-                        help="processes (default: one per core)")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="sail only the first seed and keep its voyage folder")
+    add_options(parser)
     parser.set_defaults(run=run)
 
 
@@ -47,4 +47,4 @@ def run(args: argparse.Namespace) -> int:
             print(f"{key}: {value}")
         return 0 if record["passed"] else 1
     return run_encounters(runs=args.runs, kinds=kinds, policies=policies, first_seed=args.first_seed,
-                          workers=args.workers, json_path=args.json)
+                          means=means_of(args), json_path=args.json)

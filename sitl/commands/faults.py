@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from companion.program.arguments import out_file, out_folder, whole
+from sitl.means import add_options, means_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -23,13 +24,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--runs", type=whole(at_least=1), default=1000, metavar="N",
                         help="seeds to sail (default: 1000)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
-    parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
-                        help="processes (default: one per core)")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="sail only the first seed and keep its voyage folder")
     parser.add_argument("--worker", action="store_true",
                         help="the planner's real process, killed, stopped, out of memory: in real time (a minute each)")
+    add_options(parser)
     parser.set_defaults(run=run)
 
 
@@ -44,5 +44,5 @@ def run(args: argparse.Namespace) -> int:
         for key, value in record.items():
             print(f"{key}: {value}")
         return 0 if record["passed"] else 1
-    return run_faults(runs=args.runs, first_seed=args.first_seed, workers=args.workers, json_path=args.json,
+    return run_faults(runs=args.runs, first_seed=args.first_seed, means=means_of(args), json_path=args.json,
                       worker=args.worker)

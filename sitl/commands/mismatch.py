@@ -7,6 +7,7 @@ import json
 from typing import Any
 
 from companion.program.arguments import out_file, out_folder, whole
+from sitl.means import add_options, means_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -22,15 +23,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
     )
     parser.add_argument("--runs", type=whole(at_least=1), default=100, metavar="N", help="seeds (default: 100)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
-    parser.add_argument("--workers", type=whole(at_least=1), default=None, metavar="W",
-                        help="processes (default: one per core)")
     parser.add_argument("--planned", action="store_true",
                         help="no beat is left to the autopilot: every board is planned, and its risk promised")
-    parser.add_argument("--out", type=out_file, metavar="FILE",
-                        help="append a line for each voyage as it ends; what it holds already is not sailed again")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="sail only the first seed and keep its voyage folder")
+    add_options(parser)
     parser.set_defaults(run=run)
 
 
@@ -45,5 +43,5 @@ def run(args: argparse.Namespace) -> int:
         for key, value in record.items():
             print(f"{key}: {json.dumps(value)}")
         return 0 if record["passed"] else 1
-    return run_mismatch(runs=args.runs, first_seed=args.first_seed, workers=args.workers, planned=args.planned,
-                        out=args.out, json_path=args.json)
+    return run_mismatch(runs=args.runs, first_seed=args.first_seed, means=means_of(args), planned=args.planned,
+                        json_path=args.json)

@@ -14,7 +14,6 @@ import json
 import math
 import sys
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,8 @@ from numpy.typing import NDArray
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
+from sitl.means import Means, add_options, means_of
+from sitl.runner import Sailed, sail
 from sitl.tasks.wrsc2013_planner import PlanSkipper
 from sitl.tasks.wrsc2013_skippers import HALF_M, FieldSkipper
 from sitl.world import LENGTH_M, Afloat, habits_for, summary, wind_for
@@ -202,13 +203,11 @@ def _one(job: tuple[int, str]) -> dict[str, Any]:
     return {k: (round(v, 2) if isinstance(v, float) else v) for k, v in out.items()}
 
 
-def campaign(seeds: Iterable[int], method: str, workers: int) -> list[dict[str, Any]]:
-    """Return one row per seed."""
-    jobs = [(seed, method) for seed in seeds]
-    if workers <= 1:
-        return [_one(job) for job in jobs]
-    with ProcessPoolExecutor(max_workers=workers) as pool:
-        return list(pool.map(_one, jobs, chunksize=4))
+def campaign(seeds: Iterable[int], methods: Iterable[str], means: Means) -> Sailed:
+    """Sail each seed by each method."""
+    jobs = [(seed, method) for method in methods for seed in seeds]
+    return sail("wrsc2013", _one, jobs, means, is_failed=lambda row: not row["complete"],
+                key=lambda job: {"scenario": "wrsc2013", "method": job[1], "seed": job[0]})
 
 
 def table(rows: list[dict[str, Any]], method: str) -> dict[str, Any]:
@@ -236,14 +235,15 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--runs", type=int, default=50, help="seeds 0..N-1 (default 50)")
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--method", choices=[*METHODS, "all"], default="all", help="who steers (default: all)")
-    parser.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     parser.add_argument("--json", type=Path, help="write the tables' figures here")
     parser.add_argument("--rows", type=Path, help="write one JSON line per run here")
+    add_options(parser)
     args = parser.parse_args(argv)
-    tables, lines = [], []
-    for method in METHODS if args.method == "all" else (args.method,):
-        rows = campaign(range(args.first, args.first + args.runs), method, args.workers)
-        lines += rows
+    methods = METHODS if args.method == "all" else (args.method,)
+    sailed = campaign(range(args.first, args.first + args.runs), methods, means_of(args))
+    lines, tables = sailed.records, []
+    for method in methods:
+        rows = [row for row in lines if row["method"] == method]
         t = table(rows, method)
         tables.append(t)
         q = t["quantiles"]
@@ -261,7 +261,7 @@ def main(argv: list[str] | None = None) -> int:
         args.json.write_text(json.dumps(tables, indent=1) + "\n", encoding="utf-8")
     if args.rows:
         args.rows.write_text("".join(json.dumps(r) + "\n" for r in lines), encoding="utf-8")
-    return 0
+    return sailed.exit_code(is_good=True)
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ from companion.skipper.step.config import Permissions
 from companion.skipper.watch.watchdogs import TABLE
 from companion.skipper.way.gates import gates_of
 from sitl import cli as sitl_cli
+from sitl import means
 from sitl.scene.scenario import load_scenario
 from sitl.scene.ships import free_port
 
@@ -301,9 +302,13 @@ def options_of(parser):
 
 
 def read_names(package):
-    """Return every attribute that the command modules read, and every name given to getattr."""
+    """Return every attribute that the command modules read, and every name given to getattr.
+
+    The options that campaigns share are read where they are made.
+    """
     names = set()
-    for path in Path(inspect.getfile(package)).parent.rglob("*.py"):
+    paths = [*Path(inspect.getfile(package)).parent.rglob("*.py")]
+    for path in paths if package.__name__ != "sitl.commands" else [*paths, Path(inspect.getfile(means))]:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):
                 names.add(node.attr)

@@ -10,8 +10,6 @@ from __future__ import annotations
 import json
 import math
 import tempfile
-import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,8 +18,9 @@ from companion.errors import InputError
 from sitl.campaigns.mismatch.draw import draw
 from sitl.campaigns.mismatch.promises import Legs, legs_promised, promised_s
 from sitl.campaigns.mismatch.table import figures_of, told
-from sitl.campaigns.pool import held, sailed
+from sitl.means import Means
 from sitl.run.variation import Variation
+from sitl.runner import Key, file_hash, sail
 
 EXPANSIONS = 8_000
 PLANNED = Variation(tables={"skipper": {"autopilot_beats": False}})
@@ -46,7 +45,6 @@ def sail_one(job: Job) -> dict[str, Any]:
 
     if job.keep is not None and job.keep.is_dir() and any(job.keep.iterdir()):
         raise InputError("--keep", str(job.keep), "is not empty", "a voyage's folder is taken up where it was left")
-    began_s = time.process_time()
     drawn = draw(job.seed)
     mission = mission_of(drawn.scenario, drawn.source)
     legs = Legs(mission.frame())
@@ -60,7 +58,7 @@ def sail_one(job: Job) -> dict[str, Any]:
                 drawn.scenario, drawn.source, job.seed, folder, expansions=EXPANSIONS, observer=legs,
                 variation=PLANNED if job.planned else None))
         except Exception as error:
-            return record | {"passed": False, "faults": [f"unhandled: {error!r}"], "cpu_s": 0.0}
+            return record | {"passed": False, "faults": [f"unhandled: {error!r}"]}
         summary = json.loads((folder / "summary.json").read_bytes())
         promised = legs_promised(folder, legs.sailed, NO_GO_RAD)
         time_s = promised_s(folder) if len(mission.goals) == ONE_GOAL else None
@@ -74,38 +72,35 @@ def sail_one(job: Job) -> dict[str, Any]:
     return record | {
         "passed": not faults, "faults": faults, "below_floor": is_low, **{name: figures[name] for name in names},
         "path_risk": summary.get("path_risk"), "alerts": summary.get("alerts", {}), "promised_s": time_s,
-        "legs": promised, "cpu_s": time.process_time() - began_s}
+        "legs": promised}
+
+
+def key_of(job: Job) -> Key:
+    """Return what a voyage is known by."""
+    drawn = draw(job.seed)
+    return {"scenario": drawn.scenario.name, "hash": file_hash(drawn.source), "planned": job.planned, "seed": job.seed}
 
 
 def run_mismatch(
-    *, runs: int, first_seed: int, workers: int | None, planned: bool, out: Path | None, json_path: Path | None,
+    *, runs: int, first_seed: int, means: Means, planned: bool, json_path: Path | None,
 ) -> int:
-    """Sail what ``out`` does not hold yet, print what failed and the table; return the exit code."""
-    seeds = range(first_seed, first_seed + runs)
-    records = [r for r in held(out) if r.get("planned") == planned and r.get("seed") in seeds]
-    had = {r["seed"] for r in records}
-    jobs = [Job(seed=seed, planned=planned) for seed in seeds if seed not in had]
-    count = {"failed": sum(not r["passed"] for r in records), "low": sum(r.get("below_floor", False) for r in records)}
+    """Sail what has no result yet, print what failed and the table; return the exit code."""
+    jobs = [Job(seed=seed, planned=planned) for seed in range(first_seed, first_seed + runs)]
 
-    def said(record: Mapping[str, Any]) -> str:
-        count["failed"] += not record["passed"]
-        count["low"] += record.get("below_floor", False)
-        return f", {count['failed']} failed, {count['low']} below the floor"
-
-    began_s = time.perf_counter()
-    for record in sailed(sail_one, jobs, workers, out, said):
-        records.append(record)
+    def tell(record: dict[str, Any]) -> None:
         if not record["passed"]:
-            print(f"\rFAILED seed {record['seed']}, {record['scenario']}: {'; '.join(record['faults'])} "
+            print(f"FAILED seed {record['seed']}, {record['scenario']}: {'; '.join(record['faults'])} "
                   f"({', '.join(record['kinds']) or 'as planned'})", flush=True)
+
+    sailed = sail("mismatch", sail_one, jobs, means, key=key_of, on_record=tell)
+    records = sailed.records
     records.sort(key=lambda r: int(r["seed"]))
     table = figures_of(records)
     print(told(table))
-    print(f"{len(jobs)} sailed now in {time.perf_counter() - began_s:.0f} s, "
-          f"{sum(r['cpu_s'] for r in records) / max(1, len(records)):.2f} CPU s a voyage")
+    print(sailed.took)
     for record in records:
         if not record["passed"] or record.get("below_floor"):
             print(f"again: sitl mismatch --first-seed {record['seed']}{' --planned' if planned else ''} --keep DIR")
     if json_path is not None:
         json_path.write_text(json.dumps({"figures": table, "voyages": records}, indent=1) + "\n", encoding="utf-8")
-    return 0 if all(r["passed"] for r in records) else 1
+    return sailed.exit_code(is_good=all(r["passed"] for r in records))

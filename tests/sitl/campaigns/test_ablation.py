@@ -110,7 +110,9 @@ def test_a_voyage_of_each_is_sailed_and_written(tmp_path, capsys):
     assert cli.main(words) == 0
     printed = capsys.readouterr().out
     first = out.read_text()
-    assert [json.loads(line)["variation"] for line in first.splitlines()] == [AS_IT_IS, "no spread"]
+    head, *lines = map(json.loads, first.splitlines())
+    assert head["campaign"] == "ablate"
+    assert [line["key"]["variation"] for line in lines] == [AS_IT_IS, "no spread"]
     assert "1/1" in printed
     out.write_text(first[:-20])   # interrupted in a line: what was sailed before it is not sailed again
     assert cli.main(words) == 0

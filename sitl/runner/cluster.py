@@ -1,0 +1,179 @@
+"""Work on a Dask cluster: its scheduler shares jobs out, tries again what a dead worker had, and is found again itself.
+
+Workers must be this very program, and do one voyage at a time in each process. Both are asked when a run begins; a
+worker that comes later is asked before each job (``sitl.runner.work``).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import queue
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from companion.errors import JobError
+from sitl.runner.identity import MadeBy, made_by
+from sitl.runner.processes import WorkerDiedError, cores
+from sitl.runner.work import UnfitError
+
+JobT = TypeVar("JobT")
+ResultT = TypeVar("ResultT")
+LOCAL = "local"
+ANSWER_S = 10.0      # within which a scheduler answers that is there
+PATIENCE_S = 120.0   # until which one that went is waited for
+RETRIES = 1          # of a job that raised: a card or a link may be better elsewhere
+
+
+class _GoneError(Exception):
+    """The scheduler went, and what it knew with it."""
+
+
+def settled_on(
+    address: str, work: Callable[[JobT], ResultT], jobs: Mapping[int, JobT], workers: int | None, *,
+    say: Callable[[str], None], patience_s: float = PATIENCE_S,
+) -> Iterator[tuple[int, ResultT | Exception]]:
+    """Yield the number of each job with its result or what it raised, as they are done.
+
+    ``address`` is a scheduler's, a scheduler file (``*.json``), or "local" for a cluster of ``workers`` processes here.
+
+    Raises:
+        JobError: no scheduler answers, it went and did not come back, or it or its workers are another program.
+    """
+    import distributed
+
+    # What it logs of lost links is said here, in one line each.
+    logging.getLogger(distributed.__name__).setLevel(logging.CRITICAL)
+    left = dict(jobs)
+    with contextlib.ExitStack() as stack:
+        place = stack.enter_context(_local(workers or cores())) if address == LOCAL else address
+        client = _connected(place, address)
+        try:
+            while left:
+                require_same(client, address)
+                say(f"{address}: {_count(client)}; dashboard: {client.dashboard_link}")
+                try:
+                    for number, result in _round(client, work, left):
+                        del left[number]
+                        yield number, result
+                except _GoneError:
+                    say(f"{address}: the scheduler went; it is waited for ({patience_s:.0f} s); {len(left)} jobs to do")
+                    _close(client)
+                    client = _connected(place, address, patience_s=patience_s)
+        finally:
+            _close(client)
+
+
+def require_same(client: Any, address: str) -> None:
+    """Raise JobError unless scheduler and workers are this program, and workers do one job at a time."""
+    try:
+        told: dict[str, Any] = {"the scheduler": client.run_on_scheduler(_told), **client.run(_told)}
+        infos = client.scheduler_info()["workers"]
+    except (OSError, TimeoutError):
+        return   # a worker that goes now is no worker; the scheduler's going is seen next
+    except Exception as error:
+        raise JobError(f"{address}: the scheduler or a worker cannot load this program ({type(error).__name__}: "
+                       f"{str(error)[:120]}); install the same version there") from error
+    for who, plain in told.items():
+        try:
+            unlike = made_by().unlike(MadeBy.from_dict(plain))
+        except (KeyError, TypeError, ValueError):
+            unlike = "one that tells other things of itself"
+        if unlike:
+            raise JobError(f"{address}: {who} runs another version ({unlike}); install the same there")
+    many = next((name for name, info in infos.items() if info["nthreads"] > 1), None)
+    if many is not None:
+        raise JobError(f"{address}: {many} has {infos[many]['nthreads']} threads, and a voyage wants a process of its "
+                       "own; start workers with --nthreads 1")
+
+
+def _told() -> dict[str, Any]:
+    return made_by().to_dict()
+
+
+def _count(client: Any) -> str:
+    number = len(client.scheduler_info()["workers"])
+    return f"{number} worker{'s' if number != 1 else ''}" if number else "no worker yet, waiting for one"
+
+
+@contextlib.contextmanager
+def _local(workers: int) -> Iterator[Any]:
+    import distributed
+    from dask import config
+
+    # A voyage may have processes of its own, which a daemon may not.
+    with config.set({"distributed.worker.daemon": False}), distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL) as cluster:
+        yield cluster
+
+
+def _connected(place: Any, address: str, patience_s: float = 0.0) -> Any:
+    """Return a client, by ``patience_s`` from now."""
+    from distributed import Client
+
+    is_file = isinstance(place, str) and place.endswith(".json")
+    where = {"scheduler_file": place} if is_file else {"address": place}
+    until_s = time.monotonic() + patience_s
+    while True:
+        try:
+            if is_file:
+                Path(place).read_bytes()   # dask would wait for it, and say nothing
+            return Client(**where, timeout=f"{ANSWER_S}s", set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            if time.monotonic() < until_s and isinstance(error, OSError):
+                time.sleep(0.5)
+                continue
+            why = " ".join(str(error).split())[:120]
+            remedy = "the same command goes on when it is back" if patience_s else "is it running, can it be reached?"
+            raise JobError(f"{address}: no Dask scheduler answers ({why}); {remedy}") from error
+
+
+def _close(client: Any) -> None:
+    with contextlib.suppress(Exception):   # one that lost its scheduler has nothing to say goodbye to
+        client.close(timeout=5)
+
+
+def _round(
+    client: Any, work: Callable[[JobT], ResultT], jobs: Mapping[int, JobT],
+) -> Iterator[tuple[int, ResultT | Exception]]:
+    """Yield what comes of the jobs until all are done; raise _GoneError when the scheduler goes."""
+    from distributed import CancelledError, KilledWorker
+
+    landed: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    flying = {}
+    try:
+        for number, job in jobs.items():
+            future = client.submit(work, job, pure=False, retries=RETRIES)
+            flying[future.key] = (number, future)
+            future.add_done_callback(landed.put)
+        while flying:
+            try:
+                future = landed.get(timeout=1.0)
+            except queue.Empty:
+                if client.status != "running":
+                    raise _GoneError from None
+                continue
+            number = flying[future.key][0]
+            try:
+                result = future.result()
+            except CancelledError as error:
+                raise _GoneError from error
+            except KilledWorker as error:
+                result = WorkerDiedError(f"{error.allowed_failures + 1} workers died of it, one after the other")
+            except UnfitError:
+                raise
+            except Exception as error:
+                if client.status != "running":
+                    raise _GoneError from error
+                result = error
+            del flying[future.key], future
+            yield number, result
+    except (OSError, RuntimeError) as error:
+        if client.status == "running":
+            raise
+        raise _GoneError from error
+    finally:
+        flying.clear()   # gives back what is not done: the scheduler forgets it

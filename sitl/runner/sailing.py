@@ -1,0 +1,163 @@
+"""Sailing a campaign: its jobs given to whoever does them, each result kept as it comes, and what could not be had."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from companion.errors import JobError
+from companion.words import counted
+from sitl.means import Means
+from sitl.runner.cargo import Cargo
+from sitl.runner.cluster import LOCAL, settled_on
+from sitl.runner.identity import made_by, processor
+from sitl.runner.ledger import Held, Key, Ledger, text_of
+from sitl.runner.processes import settled
+from sitl.runner.work import Done, NoRoomError, Task, UnfitError, perform
+
+JobT = TypeVar("JobT")
+TOLD = 10   # of the jobs that were lost
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sailed:
+    """The results that there are, in the order of the jobs; what was lost and why; what the sailing now took."""
+
+    records: list[dict[str, Any]]
+    held: Held
+    lost: list[tuple[str, str]]
+    now: int
+    wall_s: float
+    cpu_s: float
+
+    @property
+    def took(self) -> str:
+        """What it took, in words; nothing was sailed now: "", of which the rest was held."""
+        if not self.now:
+            return f"{counted(len(self.records), 'voyage')}, all of them in the file before"
+        return (f"{counted(self.now, 'voyage')} in {self.wall_s:.0f} s, {self.cpu_s / self.now:.2f} CPU s each"
+                + (f"; {len(self.records) - self.now} in the file before" if len(self.records) > self.now else ""))
+
+    def exit_code(self, *, is_good: bool) -> int:
+        """Say what was lost; return 0 where nothing was and all else is good."""
+        for key, why in self.lost[:TOLD]:
+            sys.stdout.write(f"LOST {key}: {why[:300]}\n")
+        if self.lost:
+            sys.stdout.write(f"{counted(len(self.lost), 'job')} without a result: the same command tries them again\n")
+        return 0 if is_good and not self.lost else 1
+
+
+def sail(
+    campaign: str, work: Callable[[JobT], dict[str, Any]], jobs: Sequence[JobT], means: Means, *,
+    key: Callable[[JobT], Key], on_record: Callable[[dict[str, Any]], None] | None = None,
+    is_failed: Callable[[dict[str, Any]], bool] = lambda record: not record.get("passed", True),
+) -> Sailed:
+    """Have every job of this part done that has no result yet, and return all results.
+
+    ``work`` is a function of a module and gives what JSON can hold; ``key`` says what a job is known by. ``on_record``
+    sees each new result as it comes.
+
+    Raises:
+        InputError: the file of results is another campaign's or program's.
+        JobError: the disk is full, no cluster answers, workers are another program or die at once. What was done is
+            in the file.
+    """
+    mine = means.part(jobs)
+    names = [text_of(key(job)) for job in mine]
+    began_s, cpu_s, lost = time.monotonic(), 0.0, []
+    with contextlib.ExitStack() as stack:
+        ledger = None if means.file is None else stack.enter_context(Ledger(means.file, campaign))
+        held = Held(campaign=campaign, by=made_by()) if ledger is None else ledger.held
+        left = {n: job for n, (name, job) in enumerate(zip(names, mine, strict=True)) if name not in held.results}
+        progress = _Progress(len(left))
+        for n, done in _settled(work, left, means, progress.line):
+            if isinstance(done, UnfitError | NoRoomError):
+                kept = f"; {means.file} holds {len(held.results)} results" if means.file is not None else ""
+                raise JobError(f"{done}{kept}") from done
+            if isinstance(done, Exception):
+                lost.append((names[n], str(done)))
+                progress.add(is_failed=True)
+                continue
+            cpu_s += done.facts["cpu_s"]
+            progress.processor(done.facts)
+            if ledger is None:
+                held.results[names[n]] = done.result
+            else:
+                ledger.add(names[n], done.result, done.facts)
+            if on_record is not None:
+                progress.clear()
+                on_record(done.result)
+            progress.add(is_failed=is_failed(done.result))
+        progress.end()
+    return Sailed(
+        records=[held.results[name] for name in names if name in held.results], held=held, lost=lost,
+        now=len(left) - len(lost), wall_s=time.monotonic() - began_s, cpu_s=cpu_s)
+
+
+def _settled(
+    work: Callable[[JobT], Any], jobs: Mapping[int, JobT], means: Means, say: Callable[[str], None],
+) -> Iterator[tuple[int, Done | Exception]]:
+    """Yield jobs' numbers and what came of them, by the means."""
+    if not jobs:
+        return
+    if means.dask is None:
+        numbers = list(jobs)
+        tasks = [Task(work=work, job=job) for job in jobs.values()]
+        for n, done in settled(perform, tasks, means.workers):
+            yield numbers[n], done
+        return
+    paths = set() if means.dask == LOCAL else {path for job in jobs.values() for path in _scenarios(job)}
+    cargoes = {path: Cargo.of(path) for path in paths}
+    tasks_on = {n: Task(work=work, job=job, by=made_by(), cargoes={
+        path: cargoes[path] for path in _scenarios(job) if path in cargoes}) for n, job in jobs.items()}
+    yield from settled_on(means.dask, perform, tasks_on, means.workers, say=say)
+
+
+def _scenarios(job: Any) -> list[Path]:
+    """Return the scenarios that a job names."""
+    if not is_dataclass(job):
+        return []
+    values = [getattr(job, f.name) for f in fields(job)]
+    return [v for v in values if isinstance(v, Path) and v.suffix == ".toml" and v.is_file()]
+
+
+class _Progress:
+    """The line on the terminal: how many, how long."""
+
+    def __init__(self, of: int) -> None:
+        self._of, self._done, self._failed = of, 0, 0
+        self._began_s = time.monotonic()
+        self._strange: set[str] = set()
+
+    def line(self, text: str) -> None:
+        """Say something of the run."""
+        sys.stderr.write(f"\r{text}\n")
+        sys.stderr.flush()
+
+    def processor(self, facts: Mapping[str, Any]) -> None:
+        """Say once of a host that its processor is of another kind."""
+        if facts["processor"] != processor() and facts["host"] not in self._strange:
+            self._strange.add(facts["host"])
+            self.line(f"{facts['host']} has a processor of another kind: the last bit of a figure may be another there")
+
+    def clear(self) -> None:
+        """Leave the line to what is printed."""
+        sys.stderr.write("\r")
+
+    def add(self, *, is_failed: bool) -> None:
+        """Count one."""
+        self._done += 1
+        self._failed += is_failed
+        left_s = (time.monotonic() - self._began_s) / self._done * (self._of - self._done)
+        sys.stderr.write(f"\r{self._done}/{self._of} sailed, {self._failed} failed, {left_s:.0f} s left   ")
+        sys.stderr.flush()
+
+    def end(self) -> None:
+        """End the line."""
+        if self._of:
+            sys.stderr.write("\n")
