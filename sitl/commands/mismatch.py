@@ -25,6 +25,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
     parser.add_argument("--planned", action="store_true",
                         help="no beat is left to the autopilot: every board is planned, and its risk promised")
+    parser.add_argument("--as-planned", action="store_true",
+                        help="the control: the same waters and winds, and nothing that the plan does not know of")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="sail only the first seed and keep its voyage folder")
@@ -39,9 +41,9 @@ def run(args: argparse.Namespace) -> int:
 
     compile_ahead()
     if args.keep is not None:
-        record = sail_one(Job(seed=args.first_seed, planned=args.planned, keep=args.keep))
+        record = sail_one(Job(seed=args.first_seed, planned=args.planned, as_planned=args.as_planned, keep=args.keep))
         for key, value in record.items():
             print(f"{key}: {json.dumps(value)}")
         return 0 if record["passed"] else 1
     return run_mismatch(runs=args.runs, first_seed=args.first_seed, means=means_of(args), planned=args.planned,
-                        json_path=args.json)
+                        as_planned=args.as_planned, json_path=args.json)

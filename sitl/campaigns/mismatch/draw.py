@@ -10,7 +10,7 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -34,6 +34,7 @@ WATERS = (
     _HERE / "gybing.toml", _HERE / "home.toml", _HERE / "upwind.toml",
     _HERE / "figures" / "two-channels-rough.toml",
 )
+Spec = TypeVar("Spec", HullSpec, SensorsSpec)
 LIMIT_S = 1500.0
 MAX_SILENCE_S = 10.0
 EVEN = 0.5              # of the voyages that have a kind of mismatch
@@ -65,8 +66,11 @@ def _differing(spec: msgspec.Struct) -> dict[str, Any]:
     return {key: value for key, value in msgspec.to_builtins(spec).items() if value != plain[key]}
 
 
-def draw(seed: int) -> Drawn:
-    """Return what a seed is; waters take turns, so that seeds in a row are sailed on all of them."""
+def draw(seed: int, *, as_planned: bool = False) -> Drawn:
+    """Return what a seed is; waters take turns, so that seeds in a row are sailed on all of them.
+
+    ``as_planned``: the control. The same water and mean wind, and nothing that the plan does not know of.
+    """
     from sitl.run.embedded import mission_of
 
     rng = random.Random(f"mismatch {seed}")
@@ -76,7 +80,7 @@ def draw(seed: int) -> Drawn:
     kinds: list[str] = []
 
     def has(kind: str) -> bool:
-        if rng.random() < EVEN:
+        if rng.random() < EVEN and not as_planned:
             kinds.append(kind)
             return True
         return False
@@ -90,8 +94,13 @@ def draw(seed: int) -> Drawn:
     drawn = msgspec.structs.replace(
         scenario, wind=wind, limit_s=LIMIT_S, expect=ExpectSpec(arrived=None, max_silence_s=MAX_SILENCE_S),
         current=_current(rng) if has("current") else None, waves=_waves(rng) if has("waves") else None,
-        boat=_boat(rng, has), sensors=_sensors(rng, has))
+        boat=_other(_boat(rng, has)), sensors=_other(_sensors(rng, has)))
     return Drawn(source=source, scenario=drawn, kinds=tuple(kinds))
+
+
+def _other(spec: Spec) -> Spec | None:
+    """Return a table, None where nothing in it is another than the plan's."""
+    return None if spec == type(spec)() else spec
 
 
 def _round(value: float) -> float:

@@ -22,6 +22,7 @@ from sitl.means import Means
 from sitl.run.variation import Variation
 from sitl.runner import Key, file_hash, sail
 
+CAMPAIGN = "mismatch"
 EXPANSIONS = 8_000
 PLANNED = Variation(tables={"skipper": {"autopilot_beats": False}})
 NO_GO_RAD = math.radians(45.0)     # SAIL_NO_GO_ANGLE of the simulated autopilot
@@ -31,10 +32,11 @@ ONE_GOAL = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """One voyage; with ``planned`` no beat is left to the autopilot."""
+    """One voyage; with ``planned`` no beat is left to the autopilot, ``as_planned`` is the control."""
 
     seed: int
     planned: bool = False
+    as_planned: bool = False
     keep: Path | None = None
 
 
@@ -45,11 +47,12 @@ def sail_one(job: Job) -> dict[str, Any]:
 
     if job.keep is not None and job.keep.is_dir() and any(job.keep.iterdir()):
         raise InputError("--keep", str(job.keep), "is not empty", "a voyage's folder is taken up where it was left")
-    drawn = draw(job.seed)
+    drawn = draw(job.seed, as_planned=job.as_planned)
     mission = mission_of(drawn.scenario, drawn.source)
     legs = Legs(mission.frame())
     record: dict[str, Any] = {
-        "seed": job.seed, "scenario": drawn.scenario.name, "planned": job.planned, "kinds": list(drawn.kinds),
+        "seed": job.seed, "scenario": drawn.scenario.name, "planned": job.planned,
+        "as_planned": job.as_planned, "kinds": list(drawn.kinds),
         "drawn": drawn.told(), "floor_m": mission.margin_floor_m}
     with tempfile.TemporaryDirectory(prefix="mismatch-") as scratch:
         folder = job.keep if job.keep is not None else Path(scratch) / "voyage"
@@ -78,29 +81,31 @@ def sail_one(job: Job) -> dict[str, Any]:
 def key_of(job: Job) -> Key:
     """Return what a voyage is known by."""
     drawn = draw(job.seed)
-    return {"scenario": drawn.scenario.name, "hash": file_hash(drawn.source), "planned": job.planned, "seed": job.seed}
+    return {"scenario": drawn.scenario.name, "hash": file_hash(drawn.source), "planned": job.planned,
+            "as_planned": job.as_planned, "seed": job.seed}
 
 
 def run_mismatch(
-    *, runs: int, first_seed: int, means: Means, planned: bool, json_path: Path | None,
+    *, runs: int, first_seed: int, means: Means, planned: bool, as_planned: bool, json_path: Path | None,
 ) -> int:
     """Sail what has no result yet, print what failed and the table; return the exit code."""
-    jobs = [Job(seed=seed, planned=planned) for seed in range(first_seed, first_seed + runs)]
+    jobs = [Job(seed=seed, planned=planned, as_planned=as_planned) for seed in range(first_seed, first_seed + runs)]
 
     def tell(record: dict[str, Any]) -> None:
         if not record["passed"]:
             print(f"FAILED seed {record['seed']}, {record['scenario']}: {'; '.join(record['faults'])} "
                   f"({', '.join(record['kinds']) or 'as planned'})", flush=True)
 
-    sailed = sail("mismatch", sail_one, jobs, means, key=key_of, on_record=tell)
+    sailed = sail(CAMPAIGN, sail_one, jobs, means, key=key_of, on_record=tell)
     records = sailed.records
     records.sort(key=lambda r: int(r["seed"]))
     table = figures_of(records)
     print(told(table))
     print(sailed.took)
+    how = "".join(f" {name}" for name, is_set in (("--planned", planned), ("--as-planned", as_planned)) if is_set)
     for record in records:
         if not record["passed"] or record.get("below_floor"):
-            print(f"again: sitl mismatch --first-seed {record['seed']}{' --planned' if planned else ''} --keep DIR")
+            print(f"again: sitl mismatch --first-seed {record['seed']}{how} --keep DIR")
     if json_path is not None:
         json_path.write_text(json.dumps({"figures": table, "voyages": records}, indent=1) + "\n", encoding="utf-8")
     return sailed.exit_code(is_good=all(r["passed"] for r in records))

@@ -53,6 +53,14 @@ def test_what_is_drawn_is_what_its_name_says_and_within_what_was_asked_for(drawn
         assert s.limit_s == LIMIT_S
 
 
+def test_the_control_is_the_same_water_and_wind_and_nothing_else(drawn):
+    for seed, other in enumerate(drawn[:len(WATERS)]):
+        control = draw(seed, as_planned=True)
+        assert (control.source, control.kinds) == (other.source, ())
+        assert control.scenario.wind.tws_mps == other.scenario.wind.tws_mps
+        assert [getattr(control.scenario, name) for name in ("current", "waves", "boat", "sensors")] == [None] * 4
+
+
 def test_a_voyage_is_judged_kept_and_repeats(tmp_path, capsys):
     records = [sail_one(Job(seed=ROCKS, keep=tmp_path / str(n))) for n in range(2)]
     assert records[0] == records[1]
@@ -65,8 +73,9 @@ def test_a_voyage_is_judged_kept_and_repeats(tmp_path, capsys):
 
 def record(seed, *, kinds=(), passed=True, clear_m=12.0, time_s=100.0, arrived=True, legs=()):
     return {
-        "seed": seed, "scenario": "demo", "planned": False, "kinds": list(kinds), "drawn": {}, "floor_m": 8.0,
-        "passed": passed, "faults": [] if passed else ["contacts: 1"], "below_floor": clear_m < 8.0,
+        "seed": seed, "scenario": "demo", "planned": False, "as_planned": False, "kinds": list(kinds),
+        "drawn": {}, "floor_m": 8.0, "passed": passed, "faults": [] if passed else ["contacts: 1"],
+        "below_floor": clear_m < 8.0,
         "arrived": arrived, "contacts": int(not passed), "time_s": time_s, "tacks": 3, "min_clearance_m": clear_m,
         "silence_s": 1.0, "replans": 2, "promised_risk": 0.1, "no_go_entries": 0, "end_reason": "arrived",
         "path_risk": 0.2, "alerts": {}, "promised_s": 100.0, "legs": list(legs)}
@@ -77,8 +86,8 @@ RECORDS = [
                                      {"promised": 0.5, "came": True, "is_beat": True}]),
     record(1, kinds=("vane", "gusts"), clear_m=3.0, time_s=140.0),
     record(2, kinds=("gusts",), passed=False, clear_m=0.0, arrived=False),
-    {"seed": 3, "scenario": "gates", "planned": False, "kinds": [], "drawn": {}, "floor_m": None, "passed": False,
-     "faults": ["unhandled: x"]},
+    {"seed": 3, "scenario": "gates", "planned": False, "as_planned": False, "kinds": [], "drawn": {},
+     "floor_m": None, "passed": False, "faults": ["unhandled: x"]},
 ]
 
 
