@@ -70,6 +70,7 @@ def boat_of(mission: Mission) -> Boat:
         gybe_room_m=mission.boat.gybe_room_m,
         hull=Hull(length_m=mission.boat.length_m, beam_m=mission.boat.beam_m),
         has_motor=mission.boat.motor,
+        leeway_rad=math.radians(mission.boat.leeway_deg),
     )
 
 

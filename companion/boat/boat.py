@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from companion.boat.leeway import coefficient_of, leeway_at
 from companion.boat.polar import Polar
 
 
@@ -46,6 +48,7 @@ class Boat:
         gybe_room_m: Leg to leeward that gybing round needs [m]; None: five turning radii at full speed.
         hull: Its size.
         has_motor: It has an auxiliary motor that the autopilot can run.
+        leeway_rad: On a beat, the apparent wind 30 degrees off her bow and three times as fast as she; see ``leeway``.
     """
 
     polar: Polar
@@ -58,6 +61,7 @@ class Boat:
     gybe_room_m: float | None = None
     hull: Hull = field(default_factory=Hull)
     has_motor: bool = False
+    leeway_rad: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.no_go_half_rad < math.pi:
@@ -70,16 +74,42 @@ class Boat:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} is {value}; it must be 0 s or more")
+        if not 0.0 <= self.leeway_rad < math.pi / 4.0:
+            raise ValueError(f"leeway of {math.degrees(self.leeway_rad):.1f}° is outside 0..45°")
         if self.gybe_room_m is not None and not (math.isfinite(self.gybe_room_m) and self.gybe_room_m >= 0.0):
             raise ValueError(f"gybe_room_m is {self.gybe_room_m}; it must be 0 m or more")
+
+    def made_good_rad(self, twa_rad: float, tws_mps: float) -> float:
+        """Return the angle to the wind of her course through the water, with her bow at ``twa_rad`` [rad, 0..π]."""
+        if self.leeway_rad == 0.0:
+            return twa_rad
+        speed = self.polar.speed_mps(twa_rad, tws_mps)
+        return min(twa_rad + leeway_at(coefficient_of(self.leeway_rad), twa_rad, tws_mps, speed), math.pi)
+
+    def _made_good(
+        self, twa_rad: NDArray[np.float64], speed_mps: NDArray[np.float64], tws_mps: float,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return a polar's curve by her course in place of her bow's angle, and the speed along it."""
+        k = coefficient_of(self.leeway_rad)
+        bows = np.unique(np.concatenate([twa_rad, np.radians(np.arange(0.0, 181.0, 5.0))]))
+        speeds = np.interp(bows, twa_rad, speed_mps)
+        slips = np.array([leeway_at(k, float(b), tws_mps, float(v)) for b, v in zip(bows, speeds, strict=True)])
+        courses = np.minimum(bows + slips, math.pi)
+        # Nearer to the wind than where her course comes nearest to it she only drifts more: not sailed by anybody.
+        later = np.append(np.minimum.accumulate(courses[::-1])[::-1][1:], math.inf)
+        kept = courses < later - 1e-6
+        return courses[kept], (speeds / np.maximum(np.cos(slips), 0.1))[kept]
 
     def problem_boat(self, tws_mps: float) -> dict[str, Any]:
         """Return the ``boat`` part of a planning problem in this wind (degrees, as its JSON has them).
 
         A polar that is the same at every angle becomes the constant model. Losses and what is
-        unusual are written where there are any.
+        unusual are written where there are any. Angles are those of courses through the water: with leeway they are
+        wider than the bow's.
         """
         twa_rad, speed_mps = self.polar.curve(tws_mps)
+        if self.leeway_rad > 0.0:
+            twa_rad, speed_mps = self._made_good(twa_rad, speed_mps, tws_mps)
         speed: dict[str, Any]
         if bool(np.all(speed_mps == speed_mps[0])):
             speed = {"model": "constant", "v_mps": float(speed_mps[0])}
@@ -87,7 +117,7 @@ class Boat:
             twa_deg = [round(float(a), 9) for a in np.degrees(twa_rad)]
             speed = {"model": "polar", "twa_deg": twa_deg, "v_mps": [float(v) for v in speed_mps]}
         out: dict[str, Any] = {
-            "no_go_half_deg": math.degrees(self.no_go_half_rad),
+            "no_go_half_deg": math.degrees(self.made_good_rad(self.no_go_half_rad, tws_mps)),
             "max_twa_deg": math.degrees(self.max_twa_rad),
             "turn_rate_rad_s": self.turn_rate_radps,
             "speed": speed,

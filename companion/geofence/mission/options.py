@@ -76,6 +76,8 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     length_m: Annotated[float, Meta(gt=0.0, le=100.0)] = 1.0
     beam_m: Annotated[float, Meta(gt=0.0, le=30.0)] = 0.3
     """The hull: what touches, and what vessels are kept clear of. The position is taken to be amidships."""
+    leeway_deg: Annotated[float, Meta(ge=0.0, le=30.0)] = 0.0
+    """How far to leeward of her bow she goes on a beat: apparent wind 30 degrees off it, three times as fast as she."""
     motor: bool = False
     """The boat has an auxiliary motor that the autopilot can run: used when she drifts onto something."""
 

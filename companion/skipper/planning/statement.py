@@ -190,7 +190,8 @@ def problem_dict(
     length_s = 1.5 * distance_m(start.en_m, aim.en_m) / max(0.3, voyage.boat.polar.max_speed_mps(speed))
     wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s)
     boat = dict(voyage.boat.problem_boat(wind["speed_mps"]))
-    boat["no_go_half_deg"] = math.degrees(max(no_go_half_rad, voyage.boat.no_go_half_rad))
+    boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(
+        max(no_go_half_rad, voyage.boat.no_go_half_rad), wind["speed_mps"]))
     return {
         "id": voyage.name,
         "title": title,

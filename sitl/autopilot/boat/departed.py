@@ -4,27 +4,17 @@ from __future__ import annotations
 
 import math
 
+from companion.boat.leeway import CROSS_FLOW
 from companion.kernels.jit import kernel
 from sitl.autopilot.boat.scalars import clip
 
-# Cross-flow drag of hull and keel as a share of the slope of the keel's lift: a plate's drag of 1.17 across the stream
-# (Hoerner, Fluid-Dynamic Drag, 3) over the slope 2 pi / (1 + 2 / A) of a keel whose aspect ratio A is about 1.
-CROSS_FLOW = 0.5
+# Of the push on a boat whose sails are eased: what hull and mast leave.
 WINDAGE = 0.25
-# Where the leeway of a boat is stated: close-hauled, the apparent wind so many times her speed.
-STATED_AWA_RAD = math.radians(30.0)
-STATED_RATIO = 3.0
 # Angles to the wind at which the shares of speed are stated, straight between and level beyond them.
 BEAT_RAD, REACH_RAD, RUN_RAD = math.radians(45.0), math.radians(90.0), math.radians(150.0)
 # A boat in irons lies so far off the wind, on the tack that she came from; she sails again beyond the other.
 IRONS_RAD, FILLED_RAD = math.radians(15.0), math.radians(50.0)
 SETTLING_HZ, FALLING_RADPS = 0.5, 0.35
-
-
-def leeway_of(beat_rad: float) -> float:
-    """Return the coefficient of ``side_mps`` for a boat whose leeway on a beat is ``beat_rad``."""
-    slope = math.tan(beat_rad)
-    return (slope + CROSS_FLOW * slope * slope) / (STATED_RATIO**2 * math.sin(STATED_AWA_RAD))
 
 
 @kernel
@@ -33,10 +23,7 @@ def side_mps(
 ) -> float:
     """Return the speed to starboard [m/s] at which the water's push balances that of the sail.
 
-    The sail's side force grows with the square of the apparent wind and the sine of its angle; the keel's lift with
-    speed times side speed, the drag of the flow across it with the square of that. At small angles it is the well
-    known leeway = K heel / speed^2 (Garrett, The Symmetry of Sailing, 1987), with the heel that goes with that force;
-    without way on it is a drift that stays finite. An eased sail leaves ``WINDAGE`` of the push, of hull and mast.
+    As ``companion.boat.leeway`` has it, and an eased sail leaves ``WINDAGE`` of the push.
     """
     drawing = clip((abs(awa_rad) - sail_rad) / max(ideal_rad, 0.1), 0.0, 1.0)
     push = coefficient * aws_mps * aws_mps * abs(math.sin(awa_rad)) * (WINDAGE + (1.0 - WINDAGE) * drawing)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.boat.leeway import coefficient_of
 from sitl.autopilot.boat import kernel as k
-from sitl.autopilot.boat.departed import leeway_of
 from sitl.autopilot.boat.scalars import hash01
 from sitl.autopilot.departures import Departures
 from sitl.world import Process, Waters, Wind
@@ -31,7 +31,7 @@ class Surroundings:
         """Set what stays as it is; after the parameters, to which the vane's error is added."""
         boat = self.departures
         settings[k.P_OTHER] = 1.0
-        settings[k.P_LEEWAY] = leeway_of(boat.leeway_rad)
+        settings[k.P_LEEWAY] = coefficient_of(boat.leeway_rad)
         settings[k.P_BEAT], settings[k.P_REACH], settings[k.P_RUN] = boat.beat, boat.reach, boat.run
         settings[k.P_TACK_FAILS], settings[k.P_IRONS_S] = boat.tack_fails, boat.irons_s
         settings[k.P_VANE_OFFSET] += boat.sensors.vane_rad

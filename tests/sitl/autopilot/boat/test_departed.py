@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.boat import constant
+from companion.boat.leeway import coefficient_of, leeway_rad
 from sitl.autopilot.boat import kernel as k
-from sitl.autopilot.boat.departed import leeway_of, side_mps, speed_share
+from sitl.autopilot.boat.departed import side_mps, speed_share
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.surroundings import Surroundings
 from sitl.autopilot.boat.vehicle import Vehicle
@@ -75,17 +76,17 @@ def test_she_makes_leeway_away_from_the_wind(heading):
     assert track_deg(sailed(AS_PLANNED, heading)) == pytest.approx(heading, abs=0.1)
 
 
-def test_the_stated_leeway_is_that_of_the_stated_beat():
-    speed = 2.0
-    side = side_mps(leeway_of(math.radians(5.0)), 3.0 * speed, math.radians(30.0), speed, math.radians(5.0),
-                    math.radians(25.0))
-    assert math.degrees(math.atan2(-side, speed)) == pytest.approx(5.0, abs=1e-6)
+@given(beat=st.floats(0.01, 0.3), aws=st.floats(0.5, 20.0), awa=st.floats(0.45, 3.1), v=st.floats(0.0, 5.0))
+def test_her_leeway_is_that_of_the_boats_model(beat, aws, awa, v):
+    ideal = math.radians(25.0)
+    side = side_mps(coefficient_of(beat), aws, awa, v, awa - ideal, ideal)
+    assert math.atan2(-side, v) == pytest.approx(leeway_rad(coefficient_of(beat), aws, awa, v), abs=1e-9)
 
 
 @settings(max_examples=50, deadline=None)
 @given(beat=st.floats(0.0, 0.3), aws=st.floats(0.0, 20.0), awa=st.floats(-3.14, 3.14), v=st.floats(-2.0, 5.0))
 def test_the_drift_is_finite_and_to_leeward_without_way_too(beat, aws, awa, v):
-    side = side_mps(leeway_of(beat), aws, awa, v, 0.0, 0.44)
+    side = side_mps(coefficient_of(beat), aws, awa, v, 0.0, 0.44)
     assert math.isfinite(side)
     assert side * awa <= 0.0
     assert abs(side) <= aws
