@@ -32,7 +32,7 @@ def leg_problem(
     *, wind: Wind, title: str = "", local: LocalArea | None = None,
 ) -> Problem:
     """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady."""
-    local = mission.area.local(mission.frame()) if local is None else local
+    local = mission.water() if local is None else local
     return Problem.from_json({
         "id": mission.name, "title": title,
         "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
@@ -62,7 +62,7 @@ def legs(mission: Mission, wind: Wind, *, goes_home: bool = True) -> Generator[P
     if mission.start is None:
         return
     frame = mission.frame()
-    here, local = frame.en_from_geo(mission.start), mission.area.local(frame)
+    here, local = frame.en_from_geo(mission.start), mission.water()
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     targets = [(goal.point, goal.radius_m, goal.name) for goal in mission.goals]
     if goes_home and mission.skipper.end == "home":
