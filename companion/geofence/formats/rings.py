@@ -110,7 +110,6 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
         if not math.isclose(coordinates[0, 0], coordinates[-1, 0], abs_tol=1e-6):
             findings.add(Severity.ERROR, Code.ANTIMERIDIAN, place, "the ring goes round a pole", "cut it in two")
             return np.empty((0, 2))
-        coordinates[-1] = coordinates[0]   # what unwrapping rounds would make the ring cross itself at its beginning
     return coordinates
 
 
