@@ -137,6 +137,8 @@ class Vehicle:
             s[e], s[n] = shift.vector((float(s[e]), float(s[n])))
         for angle in _ANGLES:
             s[angle] = wrap_pi(float(s[angle]) + shift.turn_rad)
+        if self._surroundings is not None:
+            self._surroundings.carry(shift)
 
     # ----------------------------------------------------------------------------------------- orders
     def hold(self) -> None:
