@@ -11,11 +11,13 @@ from companion.addresses import Displays, OutputName, parse_nmea, parse_signalk
 from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant, read_polar
 from companion.errors import InputError
 from companion.fields import composed_of
+from companion.fold import Waters
 from companion.geo.frame import LocalFrame
 from companion.geo.units import MPS_PER_KNOT
-from companion.geofence import Mission
+from companion.geofence import LocalArea, Mission
 from companion.geofence.mission import Gate, free_water
 from companion.geofence.shapes import polygon_en
+from companion.messages import GeoPoint
 from companion.orders import ALL, Verb, unknown
 from companion.planner.settings import AUTO, SETTINGS, Choice
 from companion.skipper.step import (
@@ -29,10 +31,14 @@ from companion.skipper.step import (
     SafeEnd,
     SkipperConfig,
 )
-from companion.skipper.way import Box, Goal, Line, Refuge, Search, Side, Voyage
+from companion.skipper.way import FAR_M, Box, Goal, Line, Refuge, Search, Side, Voyage
 from companion.traffic import Policy, TargetLimits
 from companion.traffic.feeds import parse_feed
 from companion.wind import Estimator, make
+
+# A passage: how far the boat sails in one frame, and what of the area is in it: a plan may go aside as far as ahead.
+RECENTRE_M = 10_000.0
+HORIZONS, BEYOND_M = 1.5, 10_000.0
 
 _POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
 _KALMAN = {"kalman_window": "n", "kalman_r_deg": "r_deg", "kalman_r_mps": "r_mps"}
@@ -75,13 +81,30 @@ def boat_of(mission: Mission) -> Boat:
 
 
 def voyage_of(mission: Mission) -> Voyage:
-    """Return the voyage in the mission's local frame."""
-    frame = mission.frame()
+    """Return the voyage in the mission's local frame, with its whole area."""
+    return _voyage_in(mission, mission.frame(), mission.water())
+
+
+def waters_of(mission: Mission) -> Waters | None:
+    """Return what makes a passage's voyage about a place, with the area that a plan from there can meet; None: none."""
+    if not mission.is_passage:
+        return None
+    reach_m = (mission.passage.recentre_m or RECENTRE_M) + HORIZONS * mission.skipper.horizon_m + BEYOND_M
+
+    def about(origin: GeoPoint) -> Voyage:
+        frame = LocalFrame(origin)
+        return _voyage_in(mission, frame, mission.area.about(frame, reach_m))
+
+    return about
+
+
+def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
     goals = tuple(
         Goal(
             en_m=frame.en_from_geo(g.point), radius_m=g.radius_m, name=g.name, side=_SIDES[g.rounding],
             rounding_m=max(g.radius_m, mission.margin_m) if g.rounding else 12.0,
-            bandwidth_m=mission.skipper.bandwidth_m, line=_line(g.gate, frame),
+            bandwidth_m=mission.skipper.bandwidth_m if g.bandwidth_m is None else g.bandwidth_m,
+            line=_line(g.gate, frame),
             box=None if g.box is None else Box(
                 area_en=polygon_en(g.box.shape, frame, cover=False), for_s=g.box.for_s),
             search=None if g.search is None else Search(
@@ -92,10 +115,12 @@ def voyage_of(mission: Mission) -> Voyage:
         for number, g in enumerate(mission.goals, start=1)
     )
     return Voyage(
-        name=mission.name, frame=frame, goals=goals, area=mission.area.local(frame), boat=boat_of(mission),
+        name=mission.name, frame=frame, goals=goals, area=area, boat=boat_of(mission),
         laps=mission.skipper.laps,
         refuges=tuple(
             Refuge(name=r.name, en_m=frame.en_from_geo(r.point), radius_m=r.radius_m) for r in mission.refuges),
+        recentre_m=(mission.passage.recentre_m or RECENTRE_M) if mission.is_passage else None,
+        far_m=max(FAR_M, mission.passage.leg_m or 0.0),
     )
 
 
@@ -133,6 +158,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "traffic_policy": Policy(mission.traffic.policy),
         "wind_change_rad": math.radians(options.wind_shift_deg),
         "grid_size_m": options.off_track_m,
+        "horizon_m": options.horizon_m,
         "safe_end": SafeEnd.RETURN if options.end == "home" else SafeEnd.LOITER,
     }
     if options.max_replan_s is not None:

@@ -7,11 +7,14 @@ the same actions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from companion.boat import AutopilotLimits
 from companion.geo.angles import wrap_pi
+from companion.geo.frame import LocalFrame
+from companion.geo.shift import Shift, carried
 from companion.mavlink.trust import GAP_S, UID_EVERY_S, Identity, Witness
 from companion.mavlink.wire import (
     AUTOPILOT_COMPONENT,
@@ -27,12 +30,13 @@ from companion.messages import (
     AisReport,
     ApparentWind,
     AutopilotStatus,
+    GeoPoint,
     Mode,
     StatusText,
     VehicleState,
     WindSample,
 )
-from companion.skipper import Skipper
+from companion.skipper import Skipper, Voyage
 from companion.skipper.step import (
     Action,
     AutopilotRebooted,
@@ -65,24 +69,37 @@ _UNTRUSTED = frozenset({
 _LIMITS = frozenset({"SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS"})
 
 Value = VehicleState | AutopilotStatus | WindSample | ApparentWind | StatusText | AisReport
+Waters = Callable[[GeoPoint], Voyage]
+"""A passage's voyage in the metres of a frame about a place."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """What one tick saw and decided."""
+    """What one tick saw and decided.
+
+    Its metres are those of ``voyage``'s frame; with ``shift`` that frame has replaced another just before it.
+    """
 
     snapshot: Snapshot
     state: SkipperState
     actions: tuple[Action, ...]
+    voyage: Voyage
+    shift: Shift | None = None
 
 
 class VoyageFold:
-    """The fold. ``skipper`` holds the rules, ``wind`` the forecaster; everything else here is bookkeeping."""
+    """The fold. ``skipper`` holds the rules, ``wind`` the forecaster; everything else here is bookkeeping.
+
+    With ``waters`` the voyage is a passage: between two steps, when the boat has come far enough from the origin of its
+    frame, a frame about the boat takes its place, and everything that is remembered in metres is carried over.
+    """
 
     def __init__(
         self, skipper: Skipper, wind: WindRoom, permissions: Permissions, persisted: Persisted | None = None,
-        *, known: tuple[str, ...] = (), traffic: TargetLimits | None = None,
+        *, known: tuple[str, ...] = (), traffic: TargetLimits | None = None, waters: Waters | None = None,
     ) -> None:
+        self._waters = waters
+        skipper, persisted = begun(skipper, persisted, waters)
         self.skipper, self.wind, self.permissions = skipper, wind, permissions
         self.state: SkipperState = skipper.initial(persisted, known)
         self.assembler = VehicleAssembler()
@@ -246,10 +263,22 @@ class VoyageFold:
     # -------------------------------------------------------------------------------------- step
     def tick(self, t_s: float) -> Step:
         """Step the skipper at ``t_s``."""
+        shift = self._follow()
         snapshot = self._snapshot(t_s)
         self._events, self._outcomes = [], []
         self.state, actions = self.skipper.step(self.state, snapshot)
-        return Step(snapshot=snapshot, state=self.state, actions=actions)
+        return Step(
+            snapshot=snapshot, state=self.state, actions=actions, voyage=self.skipper.voyage, shift=shift)
+
+    def _follow(self) -> Shift | None:
+        """Replace the frame by one about the boat when she has left its water; None: she has not."""
+        here = None if self._vehicle is None else self._vehicle.position
+        if self._waters is None or here is None or not self.skipper.leaves_water(self.state, here):
+            return None
+        before = self.skipper.voyage.frame
+        self.skipper, self.state = self.skipper.in_water(self._waters(here), self.state)
+        self._targets = self._targets.in_frame(self.skipper.voyage.frame)
+        return Shift(before, self.skipper.voyage.frame)
 
     def _snapshot(self, t_s: float) -> Snapshot:
         vehicle, autopilot = self._vehicle, self._autopilot
@@ -309,3 +338,15 @@ class VoyageFold:
             verdict="" if health is WindHealth.GOOD else status.reason,
         )
 
+
+def begun(
+    skipper: Skipper, persisted: Persisted | None, waters: Waters | None,
+) -> tuple[Skipper, Persisted | None]:
+    """Return the skipper and the saved state in one frame: that of the saved state, where the voyage is a passage."""
+    own = skipper.voyage.frame
+    saved = own if persisted is None or persisted.water is None else LocalFrame(persisted.water)
+    if waters is not None and (saved != own or not math.isfinite(skipper.voyage.area.reach_m)):
+        skipper = replace(skipper, voyage=waters(saved.origin))
+    if persisted is not None and waters is None and saved != own:   # it was one when it was saved
+        persisted = replace(carried(persisted, Shift(saved, own)), water=None)
+    return skipper, persisted

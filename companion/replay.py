@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from companion.compose import config_of, estimator_of, target_limits_of, voyage_of
+from companion.compose import config_of, estimator_of, target_limits_of, voyage_of, waters_of
 from companion.errors import InputError
 from companion.fold import Step, VoyageFold
 from companion.geofence import load_mission
@@ -145,7 +145,7 @@ class Recorded:
 
     def steps(self) -> Iterator[Folded]:
         """Yield the steps in their order."""
-        skipper = Skipper(voyage=self.voyage, config=self.config)
+        skipper, waters = Skipper(voyage=self.voyage, config=self.config), waters_of(self.mission)
         # Frames of another life, stamped by a clock that was set since, are years off: not of the last one either.
         last_s = max((t_s for t_s, *_ in self.rows), default=0.0) + _AFTER_S
         ends = [*(start[0] for start in self._starts[1:]), last_s]
@@ -157,7 +157,7 @@ class Recorded:
                 self._starts, ends, _gaps(self._decisions), strict=True):
             fold = VoyageFold(
                 skipper, WindRoom(estimator=estimator_of(self.mission)), self._permissions, persisted, known=known,
-                traffic=target_limits_of(self.mission),
+                traffic=target_limits_of(self.mission), waters=waters,
             )
             yield from self._life(fold, start_s, end_s, gap_s, fed, epoch_s)
 

@@ -17,8 +17,7 @@ from companion.fold import Step, VoyageFold
 from companion.orders import LOCAL, Answer, Verb, Wanted, permitted
 from companion.page import Address, Chart, Live, plan_figures, served
 from companion.planner import Plan
-from companion.skipper import Skipper
-from companion.view import Area, Event, View
+from companion.view import Event, View
 
 # All browsers are one station: an order that is sent twice in haste is done once. No connection of the socket on
 # board has this number.
@@ -30,15 +29,15 @@ LAST_S = 5.0           # for one that is being made when the voyage ends
 class LivePage:
     """Shows the steps of a voyage on ``live``."""
 
-    def __init__(self, live: Live, area: Area, skipper: Skipper, planner: Planner, crew: Crew) -> None:
-        self._live, self._area, self._skipper, self._planner, self._crew = live, area, skipper, planner, crew
+    def __init__(self, live: Live, showing: Showing, fold: VoyageFold, planner: Planner, crew: Crew) -> None:
+        self._live, self._showing, self._fold, self._planner, self._crew = live, showing, fold, planner, crew
         self._step: Step | None = None
         self._plan: asyncio.Task[Plan] | None = None
 
     def show(self, view: View, events: tuple[Event, ...], step: Step) -> None:
         """Show a step."""
         self._step = step
-        self._live.show(view, events, self._area)
+        self._live.show(view, events, self._showing.area)
 
     async def ask(self, wanted: Wanted) -> Answer:
         """Give an order."""
@@ -49,7 +48,7 @@ class LivePage:
         step = self._step
         if step is None:
             return {"error": "nothing is known of the boat yet"}
-        asked = self._skipper.preview(step.state, step.snapshot, wanted)
+        asked = self._fold.skipper.preview(step.state, step.snapshot, wanted)
         if isinstance(asked, str):
             return {"error": asked}
         if step.state.pending_plan is not None or (self._plan is not None and not self._plan.done()):
@@ -82,11 +81,10 @@ async def opened(
 
     ``pace``: seconds of the loop for each second. ``refuse`` hears why it is not served.
     """
-    skipper, verbs = fold.skipper, fold.permissions.local_orders
-    area = showing.area
-    live = Live(name=skipper.voyage.name, unix_s=showing.epoch_s, area=area,
+    verbs = fold.permissions.local_orders
+    live = Live(name=fold.skipper.voyage.name, unix_s=showing.epoch_s, area=showing.area,
                 permitted=tuple(verb.value for verb in Verb if permitted(verb, verbs)))
-    page = LivePage(live, area, skipper, planner, crew)
+    page = LivePage(live, showing, fold, planner, crew)
     if address.token:
         live.ask, live.preview = page.ask, page.preview
     try:

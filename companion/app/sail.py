@@ -27,8 +27,8 @@ from companion.app.options import Far, SailOptions
 from companion.app.page import opened
 from companion.app.showing import OnView, Showing
 from companion.clock import now_s
-from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of
-from companion.fold import Step, VoyageFold
+from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of, waters_of
+from companion.fold import Step, VoyageFold, begun
 from companion.geofence import Mission
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
@@ -192,6 +192,8 @@ class _Shell:
         options = self.options
         skipper = Skipper(voyage=self.voyage, config=self.config)
         persisted, known = self.state_file.load(), (*self.state_file.known(), *options.known)
+        waters = waters_of(self.mission)
+        skipper, persisted = begun(skipper, persisted, waters)
         if persisted is not None and skipper.has_arrived(persisted):
             self._arrived_before = not options.is_again
             if options.is_again:
@@ -202,10 +204,10 @@ class _Shell:
         self.fold = VoyageFold(
             skipper, options.room(estimator_of(self.mission)),
             permissions_of(self.mission, dry_run=options.dry_run), persisted, known=known,
-            traffic=target_limits_of(self.mission),
+            traffic=target_limits_of(self.mission), waters=waters,
         )
         # Growing a jagged coast takes seconds; under way the loop must not wait for it.
-        skipper.prepare()
+        self.fold.skipper.prepare()
         t_s = self.log.now_s()
         self.log.begin(t_s, self.mission, self.voyage, self.fold.permissions, persisted, known, {
             "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
@@ -311,13 +313,13 @@ class _Shell:
         snapshot = step.snapshot
         clearance_m = None
         if snapshot.position_en_m is not None and snapshot.vehicle is not None:
-            value = self.voyage.hull_clearance_m(snapshot.position_en_m, snapshot.vehicle.heading_rad)
+            value = step.voyage.hull_clearance_m(snapshot.position_en_m, snapshot.vehicle.heading_rad)
             clearance_m = value if math.isfinite(value) else None
         self.log.step(step, clearance_m)
         if not self.options.dry_run:   # which must not take the place of a voyage that is interrupted
             await self.state_file.save(self.fold.skipper.persisted(step.state))
         self._compare_clocks(snapshot)
-        status = companion_status(step, self.voyage, self.log.figures, clearance_m, link.bytes_per_s()[1],
+        status = companion_status(step, step.voyage, self.log.figures, clearance_m, link.bytes_per_s()[1],
                                   self.feeds.open_feeds, self.feeds.dropped)
         trouble = self._trouble()
         if trouble and not status.alert_code:

@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     if Path(args.problem).suffix.lower() == ".toml":
         mission = _mission(args)
         answers = _sail_through(mission, args)
-        ground = {"area": mission.area.local(mission.frame()), "margin_m": mission.margin_m}
+        ground = {"area": mission.water(), "margin_m": mission.margin_m}
     elif args.wind is not None:
         raise InputError("--wind", "", "a problem has a wind of its own", "leave it out, or plan a mission TOML")
     else:

@@ -14,7 +14,7 @@ from companion.geofence.mission import MissionOptions, parse_options, without_de
 LISTS = ("goal", "refuge")
 # Where a table is put that was not there: before the first of those behind it.
 ORDER = ("", "start", "goal", "refuge", "area", "wind", "risk", "boat", "autopilot", "operator", "skipper", "planner",
-         "safety", "traffic", "output")
+         "passage", "safety", "traffic", "output")
 Keys = Sequence[int | None]
 
 

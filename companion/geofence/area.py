@@ -19,6 +19,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.geo.frame import LocalFrame
+from companion.geofence.about import polygons_about
 from companion.geofence.shapes import Obstacle, Zone, ZoneKind, polygon_en
 from companion.words import listed
 
@@ -101,13 +102,31 @@ class Area:
             limits=limits,
         )
 
+    def about(self, frame: LocalFrame, reach_m: float) -> LocalArea:
+        """Return what of the area lies within ``reach_m`` of the origin of ``frame``, in its metres.
+
+        For a passage: edges are straight in longitude and latitude, however long they are, and the limits end where the
+        area does.
+        """
+        limits: BaseGeometry | None = None
+        for zone in self.fence.inclusions:
+            pieces = polygons_about(zone.shape, frame, reach_m, cover=False)
+            polygon = buffer_in(shapely.union_all(pieces), zone.margin_m or 0.0)
+            limits = polygon if limits is None else shapely.intersection(limits, polygon)
+        near = [(o, o.name or f"obstacle {i + 1}", p) for i, o in enumerate(self.solids)
+                for p in polygons_about(o.shape, frame, reach_m)]
+        return LocalArea(
+            frame=frame, names=tuple(name for _, name, _ in near), polygons=tuple(p for *_, p in near),
+            own_margins_m=tuple(o.margin_m or 0.0 for o, *_ in near), limits=limits, reach_m=reach_m)
+
 
 @dataclass(frozen=True, eq=False)
 class LocalArea:
     """Obstacles and limits in metres, x east, y north.
 
     ``names``, ``polygons`` and ``own_margins_m`` run in parallel, one per obstacle. ``limits`` is the water that
-    the fence leaves (polygon or multipolygon, possibly empty), None without a fence. Points are (n, 2) arrays.
+    the fence leaves (polygon or multipolygon, possibly empty), None without a fence. Points are (n, 2) arrays. What is
+    farther than ``reach_m`` from the origin may not be in it.
     """
 
     frame: LocalFrame
@@ -116,6 +135,7 @@ class LocalArea:
     own_margins_m: tuple[float, ...]
     limits: BaseGeometry | None
     edge_name: str = "the fence"
+    reach_m: float = math.inf
 
     @functools.cached_property
     def unfenced(self) -> LocalArea:

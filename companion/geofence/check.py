@@ -34,6 +34,7 @@ SEA_ROUND_M = 500.0   # open water round everything, without a fence
 class Conditions:
     """What the area is checked for: places, margin and wind. None leaves the check that needs it out.
 
+    ``is_passage``: edges are too long to be straight in one frame.
     ``near`` is a place that should lie on the water, as a drawing's home; ``drawing`` the name of the file.
     """
 
@@ -41,6 +42,7 @@ class Conditions:
     goals: tuple[GeoPoint, ...] = ()
     near: GeoPoint | None = None
     drawing: str = ""
+    is_passage: bool = False
     margin_m: float | None = None
     twd_from_rad: float | None = None
     no_go_half_rad: float = math.radians(47.0)
@@ -54,7 +56,7 @@ def check_area(area: Area, conditions: Conditions) -> tuple[Finding, ...]:
         return ()
     origin = conditions.start or (conditions.goals[0] if conditions.goals else center_of(shapes[0]))
     frame = LocalFrame(origin)
-    local = area.local(frame)
+    local = area.about(frame, math.inf) if conditions.is_passage else area.local(frame)
     _inclusions(area, frame, findings)
     _holes(area, findings)
     _places(local, conditions, findings)

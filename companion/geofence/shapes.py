@@ -111,7 +111,10 @@ def unwrapped(lonlat_deg: ArrayLike, *, near_lon_deg: float | None = None) -> ND
     """Return an (n, 2) array of lon, lat whose longitudes have no jump of more than 180 degrees."""
     lonlat = np.array(lonlat_deg, dtype=np.float64).reshape(-1, 2)
     if lonlat.shape[0] and float(np.ptp(lonlat[:, 0])) > 180.0:
+        is_ring = bool(np.array_equal(lonlat[0], lonlat[-1]))
         lonlat[:, 0] = np.unwrap(lonlat[:, 0], period=360.0)
+        if is_ring and abs(lonlat[0, 0] - lonlat[-1, 0]) < 1e-6:
+            lonlat[-1] = lonlat[0]   # what is rounded would make the ring cross itself where it begins
     if near_lon_deg is not None and lonlat.shape[0]:
         lonlat[:, 0] += 360.0 * round((near_lon_deg - float(lonlat[0, 0])) / 360.0)
     return lonlat

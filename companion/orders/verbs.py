@@ -58,8 +58,8 @@ TABLE: tuple[Row, ...] = (
     Row(verb=Verb.GOAL, number=6, takes="LAT LON", stands=True,
         means="sail to that place, then on to the goals that are left",
         refused="it is no position (0, 0; not a number; outside ±90 or ±180), on land, outside the fence, nearer to "
-        "something than the margin's floor, farther than 50 km, or latitude and longitude are swapped; she is not "
-        "under way; as `hold`"),
+        "something than the margin's floor, farther than 50 km (on a passage than its longest leg), or latitude and "
+        "longitude are swapped; she is not under way; as `hold`"),
     Row(verb=Verb.REPLAN, number=7, button="Plan again",
         means="a new plan from where she is", refused="she is not sailing to anywhere"),
     Row(verb=Verb.STOP, number=8, stands=True, button="Give the boat up",

@@ -81,8 +81,12 @@ class Outputs:
     ) -> None:
         await self._stack.aclose()
 
-    def tell(self, view: View, utc_s: float | None) -> None:
-        """Tell all of a view; ``utc_s`` is the time by GPS. Returns at once and never raises."""
+    def tell(self, view: View, utc_s: float | None, frame: LocalFrame | None = None) -> None:
+        """Tell all of a view; ``utc_s`` is the time by GPS, ``frame`` that of its metres, where it has moved along.
+
+        Returns at once and never raises.
+        """
+        self._frame = frame or self._frame
         self._tell(self.nmea, lambda: lines_of(view, self._frame, utc_s))
         self._tell(self.signalk, lambda: values_of(view, self._frame))
 

@@ -39,6 +39,8 @@ class Live:
 
     def show(self, view: View, events: Sequence[Event], area: Area | None) -> None:
         """Show the next step."""
+        if self.area is not None and area is not None and area.hash != self.area.hash:
+            self.trail.follow(self.area.frame, area.frame)   # a passage: the metres count from elsewhere now
         self.area = area
         self.trail.add(sample_of(view))
         self.hub.publish(view, events)

@@ -71,7 +71,7 @@ def save_mission(
     goal. Raises InputError when the file cannot be written.
     """
     frame = mission.frame()
-    local = mission.area.local(frame)
+    local = mission.water()
     start = frame.en_from_geo(mission.start) if mission.start is not None else None
     goals = [frame.en_from_geo(g.point) for g in mission.goals]
     figure, axes = plt.subplots(figsize=(8.0, 8.6), layout="constrained")

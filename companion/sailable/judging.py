@@ -53,6 +53,7 @@ def judge(path: Path, *, from_deg: float | None = None, given: Mapping[Path, byt
         return Judged(mission=None, refusals=(error,))
     found = check_area(mission.area, Conditions(
         start=mission.start, goals=tuple(g.point for g in mission.goals), margin_m=mission.margin_m,
+        is_passage=mission.is_passage,
         twd_from_rad=math.radians(mission.wind.preview_from_deg if from_deg is None else from_deg),
         no_go_half_rad=math.radians(mission.boat.no_go_half_deg)))
     told = {Code.START_OUTSIDE, Code.GOAL_OUTSIDE} if troubles else set()
@@ -103,6 +104,10 @@ def _require_consistent(mission: Mission, source: str) -> None:
     if skipper.guidance != "plan" and task is not None:
         raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" knows nothing of the {task[1]}, [[goal]] '
                          f"{task[0]}", 'write guidance = "plan"')
+    passage = mission.passage
+    if passage.leg_m is None and passage.recentre_m is not None:
+        raise InputError(source, "[passage] recentre_m", "is of a passage, and nothing says how long its legs are",
+                         "add leg_m, the longest leg in metres, or leave it out")
     if skipper.max_replan_s is not None and skipper.max_replan_s < skipper.min_replan_s:
         raise InputError(source, "[skipper] max_replan_s",
                          f"{skipper.max_replan_s:g} s is less than min_replan_s, {skipper.min_replan_s:g} s",

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
-from companion.compose import boat_of
+from companion.compose import RECENTRE_M, boat_of, voyage_of
+from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission
 from companion.planner import Plan, Problem
 from companion.skipper.planning import HOME_RADIUS_M
+
+PROBE_M = 100.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +36,7 @@ def leg_problem(
     *, wind: Wind, title: str = "", local: LocalArea | None = None,
 ) -> Problem:
     """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady."""
-    local = mission.area.local(mission.frame()) if local is None else local
+    local = mission.water() if local is None else local
     return Problem.from_json({
         "id": mission.name, "title": title,
         "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
@@ -62,18 +66,40 @@ def legs(mission: Mission, wind: Wind, *, goes_home: bool = True) -> Generator[P
     if mission.start is None:
         return
     frame = mission.frame()
-    here, local = frame.en_from_geo(mission.start), mission.area.local(frame)
+    here, local = frame.en_from_geo(mission.start), mission.water()
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     targets = [(goal.point, goal.radius_m, goal.name) for goal in mission.goals]
     if goes_home and mission.skipper.end == "home":
         targets.append((mission.start, HOME_RADIUS_M, "home"))
     for point, radius_m, title in targets:
-        answer = yield leg_problem(mission, here, heading_deg, frame.en_from_geo(point), radius_m, wind=wind,
+        blows = replace(wind, from_deg=wind.from_deg + _north_deg(frame, here)) if mission.is_passage else wind
+        answer = yield leg_problem(mission, here, heading_deg, frame.en_from_geo(point), radius_m, wind=blows,
                                    title=title, local=local)
         if not answer.has_path:
             return
         here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
         heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
+
+
+def _north_deg(frame: LocalFrame, here_en: tuple[float, float]) -> float:
+    """Return where true north is on the grid of a frame at a place far from its origin [deg, clockwise]."""
+    there = LocalFrame(frame.geo_from_en(*here_en)).geo_from_en(0.0, PROBE_M)
+    east_m, north_m = frame.en_from_geo(there)
+    return math.degrees(math.atan2(east_m - here_en[0], north_m - here_en[1]))
+
+
+def passage_words(mission: Mission) -> str:
+    """Return in words what a passage is: how far, in which waters, how far a plan looks."""
+    if mission.start is None:
+        return "a passage from wherever she lies"
+    places = [mission.start, *(goal.point for goal in mission.goals)]
+    lengths_km = [math.hypot(*LocalFrame(a).en_from_geo(b)) / 1000.0 for a, b in pairwise(places)]
+    bands = sorted({goal.bandwidth_m for goal in voyage_of(mission).goals if goal.bandwidth_m is not None})
+    widths = " and ".join(f"{band / 1000.0:g}" for band in bands)
+    band = f"bands of {widths} km to either side" if bands else "no band"
+    return (f"a passage of {sum(lengths_km):.0f} km, the longest leg {max(lengths_km):.0f} km, {band}; "
+            f"plans for {mission.skipper.horizon_m / 1000.0:g} km at a time, the frame moves along every "
+            f"{(mission.passage.recentre_m or RECENTRE_M) / 1000.0:g} km")
 
 
 def walked(walk: Generator[Problem, Plan, None], answer: Callable[[Problem], Plan]) -> list[Plan]:

@@ -6,9 +6,11 @@ watchdogs, then act by who has the boat: nobody yet (start), somebody else (oper
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
-from companion.messages import Mode
+from companion.geo.shift import Shift
+from companion.messages import GeoPoint, Mode
 from companion.orders import Wanted
 from companion.skipper.board.custody import judge, stand_by
 from companion.skipper.board.on_board import mission_is_known
@@ -37,6 +39,7 @@ from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import Snapshot
 from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState, saved_of, standing_saved
 from companion.skipper.step.turn import Turn
+from companion.skipper.step.water import in_water
 from companion.skipper.watch.charge import follow_charge
 from companion.skipper.watch.lookout import look_out
 from companion.skipper.watch.stopped import speak_of_stop
@@ -115,9 +118,29 @@ class Skipper:
 
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
+        water = self.voyage.frame.origin if self.voyage.is_passage else None
         if state.adoptable is not None and (state.foreign or not state.checked_mission):
-            return replace(state.adoptable, standing=standing_saved(state), skipped=state.skipped)
-        return saved_of(state, self.voyage.name)
+            return replace(state.adoptable, standing=standing_saved(state), skipped=state.skipped, water=water)
+        return replace(saved_of(state, self.voyage.name), water=water)
+
+    def leaves_water(self, state: SkipperState, here: GeoPoint) -> bool:
+        """Return whether the frame is to be replaced by one about ``here``, where the boat is.
+
+        Not while a plan is being made: it would come in metres of the frame that it was asked for in. Not for a
+        position that has just jumped, which may be false.
+        """
+        voyage = self.voyage
+        if voyage.recentre_m is None or state.pending_plan is not None:
+            return False
+        en_m = voyage.frame.en_from_geo(here)
+        if math.hypot(*en_m) <= voyage.recentre_m:
+            return False
+        last = state.last_seen
+        return last is None or (state.doubt is None and math.dist(en_m, last.en_m) <= voyage.recentre_m)
+
+    def in_water(self, voyage: Voyage, state: SkipperState) -> tuple[Skipper, SkipperState]:
+        """Return the skipper and the state in the metres of ``voyage``'s frame."""
+        return replace(self, voyage=voyage), in_water(state, Shift(self.voyage.frame, voyage.frame))
 
 
 def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.geo.frame import LocalFrame
+from companion.geo.shift import Shift, carried
 from companion.messages import AisReport
 from companion.traffic.picture import Change, TrafficCounts, TrafficPicture
 from companion.traffic.predict import predict, risk_factor
@@ -93,6 +94,11 @@ class Targets:
         if not (math.isfinite(en[0]) and math.isfinite(en[1])) or math.dist(en, own_en_m) > FAR_M:
             return self.counted(counts, now, far=1)
         return self._placed(report, en, own_en_m, counts, now)
+
+    def in_frame(self, frame: LocalFrame) -> Targets:
+        """Return the fold in the metres of another frame."""
+        shift = Shift(self.frame, frame)
+        return replace(self, frame=frame, vessels={key: carried(v, shift) for key, v in self.vessels.items()})
 
     # ------------------------------------------------------------------------------------- inside
     def counted(self, counts: TrafficCounts, now_s: float, **more: int) -> Targets:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import msgspec
 import shapely
@@ -14,6 +15,9 @@ from companion.messages import GeoPoint
 from companion.skipper.way import Voyage
 from companion.view.air import PointEn
 from companion.view.numbers import metres
+
+if TYPE_CHECKING:
+    from companion.geo.frame import LocalFrame
 
 SIMPLER_M = 0.25     # a coast is drawn to this; nothing is decided by the picture
 HASH_DIGITS = 16
@@ -39,6 +43,13 @@ class Area:
     grown: tuple[tuple[Ring, ...], ...] = ()
     limits: tuple[tuple[Ring, ...], ...] = ()
     margin_m: float | None = None
+
+    @property
+    def frame(self) -> LocalFrame:
+        """The frame of its metres."""
+        from companion.geo.frame import LocalFrame
+
+        return LocalFrame(GeoPoint(lat_deg=self.origin_lat_deg, lon_deg=self.origin_lon_deg))
 
 
 def area_of(voyage: Voyage, margin_m: float) -> Area:

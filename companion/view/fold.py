@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import replace
 
 from companion.fold import Step
+from companion.geo.shift import Shift, carried
 from companion.messages import CompanionStatus
 from companion.planner import Leg
 from companion.planner.explain import bounds_in_words
@@ -40,8 +41,6 @@ class ViewFold:
         self._said: dict[str, str] = {}
         self._track: deque[tuple[float, PointEn, air.Tack | None]] = deque()
         self._number = 0
-        self._refuges = tuple(
-            values.Place(name=r.name, at_en_m=place(r.en_m), radius_m=rounded(r.radius_m, 1)) for r in voyage.refuges)
 
     def unix_s(self, t_s: float) -> float | None:
         """Return the Unix time at ``t_s`` [s]."""
@@ -52,6 +51,7 @@ class ViewFold:
     ) -> tuple[values.View, tuple[Event, ...]]:
         """Return the view at a step, and what happened in it."""
         t_s = step.snapshot.t_s
+        self._follow(step.voyage)
         self._note(step)
         events = []
         for found in happenings(step, self._phase, self._whys):
@@ -62,6 +62,16 @@ class ViewFold:
         if step.state.phase.value != self._phase:
             self._phase, self._phase_s = step.state.phase.value, t_s
         return self._view(step, status, figures), tuple(events)
+
+    def _follow(self, voyage: Voyage) -> None:
+        """Draw another water when the frame has moved along with the boat."""
+        shift, self._voyage = Shift(self._voyage.frame, voyage.frame), voyage
+        if shift.before == shift.after:
+            return
+        self.area = area_of(voyage, self._config.margin_m)
+        self._track = deque((t_s, place(shift.point(at)), tack) for t_s, at, tack in self._track)
+        self._plans = {number: replace(chosen, plan=carried(chosen.plan, shift))
+                       for number, chosen in self._plans.items()}
 
     def _note(self, step: Step) -> None:
         """Keep what later views need: plans, what was said, the track."""
@@ -115,7 +125,7 @@ class ViewFold:
             predicted=predicted_of(step, voyage),
             track=tuple(values.TrackPoint(ago_s=round(t_s - at_s, 1), at_en_m=at, tack=tack)
                         for at_s, at, tack in self._track),
-            vessels=vessels_of(step), goals=goals, refuges=self._refuges, home=parts.home_of(step, voyage),
+            vessels=vessels_of(step), goals=goals, refuges=parts.refuges_of(voyage), home=parts.home_of(step, voyage),
             safe_end=safe_end_of(route), orders=parts.orders_of(step),
             figures=parts.figures_of(step, figures, voyage), health=parts.health_of(step, status))
 

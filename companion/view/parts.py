@@ -125,6 +125,12 @@ def home_of(step: Step, voyage: Voyage) -> values.Place | None:
     return None if home is None else values.Place(name="home", at_en_m=place(home))
 
 
+def refuges_of(voyage: Voyage) -> tuple[values.Place, ...]:
+    """Return the refuges."""
+    return tuple(
+        values.Place(name=r.name, at_en_m=place(r.en_m), radius_m=rounded(r.radius_m, 1)) for r in voyage.refuges)
+
+
 def orders_of(step: Step) -> values.Orders:
     """Return the order that stands, the last answer, and what is permitted on board."""
     state, t_s = step.state, step.snapshot.t_s

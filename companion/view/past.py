@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
+from companion.geo.frame import LocalFrame
+from companion.geo.shift import Shift
+from companion.view.numbers import place
 from companion.view.values import View
 
 MOST = 3600        # samples kept: an hour at one a second, a day at one in 24 s
@@ -61,12 +64,25 @@ class Trail:
         self._most = most
         self.samples: list[Sample] = []
 
+    def follow(self, before: LocalFrame, after: LocalFrame) -> None:
+        """Let the metres of all samples count in another frame."""
+        if before != after:
+            shift = Shift(before, after)
+            self.samples = [_carried(sample, shift) for sample in self.samples]
+
     def add(self, sample: Sample) -> None:
         """Take the next one."""
         self.samples.append(sample)
         if len(self.samples) > self._most:
             half = self._most // 2
             self.samples = [*self.samples[:half][::2], *self.samples[half:]]
+
+
+def _carried(sample: Sample, shift: Shift) -> Sample:
+    if sample.east_m is None or sample.north_m is None:
+        return sample
+    east_m, north_m = place(shift.point((sample.east_m, sample.north_m)))
+    return replace(sample, east_m=east_m, north_m=north_m)
 
 
 def sample_of(view: View) -> Sample:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from companion.geo.shift import Shift, carried
 from companion.replay import Recorded
 from companion.telemetry.folder import TLOG, VoyageFigures, is_from_the_start, parts, read_voyage
 from companion.telemetry.status import companion_status
@@ -44,22 +45,27 @@ def recorded_views(folder: Path) -> RecordedViews:
         recorded = Recorded(folder)
         fold = ViewFold(recorded.voyage, recorded.config, source="recorded", epoch_s=recorded.epoch_s)
         return RecordedViews(name=recorded.mission.name, area=fold.area, count=len(recorded.rows), is_whole=True,
-                             moments=_folded(recorded, fold))
+                             moments=_folded(recorded, fold, fold.area))
     record = read_voyage(folder)
     area = area_of_chart(record)
     return RecordedViews(name=record.chart.name, area=area, count=len(record.columns["t_s"]), is_whole=False,
                          moments=zip(views_of_rows(record, area), events_of_record(record), strict=True))
 
 
-def _folded(recorded: Recorded, fold: ViewFold) -> Iterator[Moment]:
+def _folded(recorded: Recorded, fold: ViewFold, area: Area) -> Iterator[Moment]:
     figures = VoyageFigures()
     for folded in recorded.steps():
         if folded.step is None:
             continue
         snapshot, clearance_m = folded.step.snapshot, None
         if snapshot.position_en_m is not None and snapshot.vehicle is not None:
-            value = recorded.voyage.hull_clearance_m(snapshot.position_en_m, snapshot.vehicle.heading_rad)
+            value = folded.step.voyage.hull_clearance_m(snapshot.position_en_m, snapshot.vehicle.heading_rad)
             clearance_m = value if math.isfinite(value) else None
         figures.take(folded.step, clearance_m)
-        status = companion_status(folded.step, recorded.voyage, figures, clearance_m, None)
-        yield fold.take(folded.step, status, figures)
+        status = companion_status(folded.step, folded.step.voyage, figures, clearance_m, None)
+        view, events = fold.take(folded.step, status, figures)
+        if folded.step.voyage.frame != recorded.voyage.frame:
+            # A passage is drawn whole, in the metres of its beginning: far from there north is not quite up.
+            shift = Shift(folded.step.voyage.frame, recorded.voyage.frame)
+            view = replace(carried(view, shift), area=area.hash)
+        yield view, events

@@ -23,14 +23,14 @@ The shell joins it to transports and to the event loop's clock, whatever that is
 
 from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.boat.parameters import check_parameters
-from sitl.autopilot.config import EPOCH_S, HOME, AutopilotConfig, GpsFault, Truth, VaneFault, VaneState
+from sitl.autopilot.config import EPOCH_S, FRAME_M, HOME, AutopilotConfig, GpsFault, Truth, VaneFault, VaneState
 from sitl.autopilot.departures import Departures, Sensors, Waves
 from sitl.autopilot.links.memory import PERFECT, FrameStream, Impairment, MemoryEnd, MemoryLink
 from sitl.autopilot.protocol.ais_list import Vessel
 from sitl.autopilot.server import Server, serve
 
 __all__ = [
-    "EPOCH_S", "HOME", "PERFECT", "Autopilot", "AutopilotConfig", "Departures", "FrameStream", "GpsFault", "Impairment",
-    "MemoryEnd", "MemoryLink", "Sensors", "Server", "Truth", "VaneFault", "VaneState", "Vessel", "Waves",
+    "EPOCH_S", "FRAME_M", "HOME", "PERFECT", "Autopilot", "AutopilotConfig", "Departures", "FrameStream", "GpsFault",
+    "Impairment", "MemoryEnd", "MemoryLink", "Sensors", "Server", "Truth", "VaneFault", "VaneState", "Vessel", "Waves",
     "check_parameters", "serve",
 ]

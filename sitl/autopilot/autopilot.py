@@ -56,6 +56,8 @@ class Autopilot:
             left = end - vehicle.tick
             chunk = 1 if left == 1 else max(1, min(left, self._due_tick() - vehicle.tick, _CHUNK))
             _, events = vehicle.advance(chunk)
+            if self.core.follow():
+                self.pilot.fence.reload()
             self._loop(events)
 
     @property

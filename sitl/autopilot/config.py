@@ -13,6 +13,8 @@ from sitl.world import Waters
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
 
+FRAME_M = 50_000.0   # metres about one place are good to here
+
 # 2026-06-09, 10:13 UTC. Unix time of every simulated voyage's start: stamps must not depend on when it was run.
 EPOCH_S = 1_781_000_000.0
 
@@ -22,7 +24,8 @@ class AutopilotConfig:
     """One boat.
 
     Attributes:
-        home: where it lies at power-up; the origin of ``Truth.east_m`` and ``north_m``.
+        home: where it lies at power-up; the origin of ``Truth.east_m`` and ``north_m`` until she is ``recentre_m`` off.
+        recentre_m: so far from the origin of its metres the boat is what they count from next.
         heading_rad: of the bow at power-up.
         is_warm: powered up long ago: boot time starts at 60 s, EKF ready, filters settled, wind there from the
             first step. Otherwise it boots as the real one does: wind after 5 s, ready after 42 s.
@@ -42,6 +45,7 @@ class AutopilotConfig:
     """
 
     home: GeoPoint = HOME
+    recentre_m: float = FRAME_M
     heading_rad: float = 0.0
     is_warm: bool = False
     is_moored: bool = False
@@ -64,7 +68,7 @@ class Truth:
     """What is so, whatever the sensors and the telemetry say. Read by judges and plots, never by a companion.
 
     ``t_s`` is the simulated time since the ``Autopilot`` was made (a reboot does not set it back); the wind is the
-    true wind that acts on the boat now. Positions are metres east and north of ``AutopilotConfig.home``.
+    true wind that acts on the boat now. Metres are east and north of ``AutopilotConfig.home``, as said there.
     """
 
     t_s: float

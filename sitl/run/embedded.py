@@ -44,6 +44,7 @@ from sitl.scene import (
     is_all_ordinary,
     judge,
     own_polar,
+    recentre_m,
     scenario_departures,
     scenario_waters,
     scenario_wind,
@@ -150,7 +151,8 @@ async def run_embedded(
         AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
                         parameters=scenario.parameters, has_ftp=scenario.has_ftp, has_motor=mission.boat.motor,
                         polar=own_polar(mission), epoch_s=scenario.epoch_s, departures=scenario_departures(scenario),
-                        waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(start))),
+                        waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(start)),
+                        recentre_m=recentre_m(mission)),
         wind, seed=seed,
     )
     link = MemoryLink("companion", seed=seed)
@@ -177,7 +179,7 @@ async def run_embedded(
         for task in side_tasks:
             with contextlib.suppress(asyncio.CancelledError):
                 await task
-    area = mission.area.local(frame)
+    area = mission.water()
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
         hull=boat_of(mission).hull, floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,

@@ -188,7 +188,7 @@ async def _run(
     summary: dict[str, Any] = json.loads(summary_path.read_bytes())
     verdict = judge(
         scenario=scenario.name, seed=seed, expect=scenario.expect, truth=truth,
-        solid=solid_of(mission.area.local(frame)), hull=boat_of(mission).hull,
+        solid=solid_of(mission.water()), hull=boat_of(mission).hull,
         floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point),
         summary=summary, status_times_s=None, alerts=summary.get("alerts", {}), errors=errors,

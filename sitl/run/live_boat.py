@@ -14,7 +14,7 @@ from pathlib import Path
 from companion.clock import run
 from companion.geofence import load_mission
 from sitl.autopilot import Autopilot, AutopilotConfig, serve
-from sitl.scene import load_scenario, own_polar, scenario_departures, scenario_waters, scenario_wind
+from sitl.scene import load_scenario, own_polar, recentre_m, scenario_departures, scenario_waters, scenario_wind
 
 
 def main() -> int:
@@ -33,7 +33,8 @@ def main() -> int:
         AutopilotConfig(home=home, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
                         parameters=scenario.parameters, polar=own_polar(mission),
                         departures=scenario_departures(scenario),
-                        waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(home))),
+                        waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(home)),
+                        recentre_m=recentre_m(mission)),
         wind, args.seed,
     )
 

@@ -1,7 +1,7 @@
 """A scene: the scenario's file, its weather, its other vessels, and the judge of what the boat did."""
 
 from sitl.scene.clearance import HullTrack
-from sitl.scene.hull import own_polar
+from sitl.scene.hull import own_polar, recentre_m
 from sitl.scene.mariner import CLOSE_HAULED_DEG, Manner, met_by
 from sitl.scene.mismatch import CurrentSpec, HullSpec, LeeSpec, SensorsSpec, WavesSpec
 from sitl.scene.others import TRAFFIC, Others
@@ -25,6 +25,6 @@ __all__ = [
     "CALL_HOLDS_S", "CLOSE_HAULED_DEG", "TASK_S", "TRAFFIC", "Craft", "CurrentSpec", "EventSpec", "ExpectSpec",
     "HullSpec", "HullTrack", "LeeSpec", "Manner", "Motion", "Mover", "Others", "SatelliteSpec", "Scenario",
     "SensorsSpec", "StationScore", "Tasks", "Truth", "Verdict", "WavesSpec", "WindSpec", "count_tacks", "duty",
-    "free_port", "is_all_ordinary", "judge", "load_scenario", "met_by", "own_polar", "scenario_departures",
-    "scenario_waters", "scenario_wind", "station_score", "tasks_of",
+    "free_port", "is_all_ordinary", "judge", "load_scenario", "met_by", "own_polar", "recentre_m",
+    "scenario_departures", "scenario_waters", "scenario_wind", "station_score", "tasks_of",
 ]

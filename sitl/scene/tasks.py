@@ -61,7 +61,7 @@ def tasks_of(mission: Mission, epoch_s: float) -> Tasks:
         Pair(port_en_m=frame.en_from_geo(g.gate.port), starboard_en_m=frame.en_from_geo(g.gate.starboard),
              not_before_s=g.gate.not_before_s, after_s=g.gate.after_s)
         for g in mission.goals if g.gate is not None)
-    solid = list(mission.area.local(frame).polygons)
+    solid = list(mission.water().polygons)
     boxes = tuple(polygon_en(g.box.shape, frame, cover=False) for g in mission.goals if g.box is not None)
     searches = tuple(
         (shapely.difference(polygon_en(g.search.shape, frame, cover=False), shapely.union_all(solid) if solid else

@@ -99,6 +99,7 @@ KALMAN = {"kalman_window": 50, "kalman_r_deg": 5.0, "kalman_r_mps": 1.0}
 # Every key with another value than the mission's or its default.
 OTHER = {
     "goal": {"lat": 50.8189, "lon": -1.3099, "radius_m": 30.0, "rounding": "starboard", "name": "other",
+             "bandwidth_m": 200.0,
              **TASK_KEYS},
     "field": {"kind": "station", "lat": 50.8197, "lon": -1.3083, "start": {"lat": 50.8191, "lon": -1.3083},
               "end": {"lat": 50.8190, "lon": -1.3070}, "radius_m": 50.0, "turn": "anticlockwise",
@@ -117,10 +118,11 @@ OTHER = {
     "operator": {"arm": False, "set_auto": True, "guided": True, "upload_fence": True, "replace_foreign": True,
                  "orders": ["hold"], "local_orders": ["stop"], "far_orders": ["home"]},
     "skipper": {"replan": "forecast", "end": "home", "autopilot_beats": False, "guidance": "field", "station_s": 60.0,
-                "laps": 2, "bandwidth_m": 90.0, "planning_budget_s": 1.0, "expansions": 123, "seed": 7,
-                "min_replan_s": 25.0, "max_replan_s": 700.0, "wind_shift_deg": 30.0, "off_track_m": 45.0,
+                "laps": 2, "bandwidth_m": 90.0, "horizon_m": 3000.0, "planning_budget_s": 1.0, "expansions": 123,
+                "seed": 7, "min_replan_s": 25.0, "max_replan_s": 700.0, "wind_shift_deg": 30.0, "off_track_m": 45.0,
                 "voyage_timeout_s": 900.0, "planner": "astar"},
     "planner": {**ASTAR, **RRTSTAR},
+    "passage": {"leg_m": 70_000.0, "recentre_m": 2000.0},
     "safety": {"battery": "stay", "battery_v": 10.5, "leak": "home", "out_of_time": "say", "dark": "refuge",
                "dark_below_deg": 0.0, "shore_lost": "stay", "shore_lost_s": 60.0, "battery_reserve": 3.0,
                "position_failsafe": "leave", "battery_failsafe": "stay", "fence_failsafe": "refuge",
@@ -174,6 +176,8 @@ def mission(path, table="", key="", value=None):
                              (KALMAN, {"wind": {"estimator": "kalman"}})):
             if table in {"planner", "wind"} and key in others:
                 raw |= keys
+        if key == "recentre_m":
+            raw["passage"] = {"leg_m": 60_000.0}
         if key == "tunnel":
             raw["planner"] = {"tunnel_width_m": 60.0}
         place = raw[table][0] if table in {"goal", "refuge"} else raw.setdefault(table, {})
@@ -199,6 +203,8 @@ def base_for(path, table, key):
         return mission(path, "goal", key, TASKS["field"].get(key, "told"))
     if table == "goal" and key in TASK_KEYS and key != "kind":
         return mission(path, "goal-kind", kind_with(key))
+    if key == "recentre_m":
+        return mission(path, "passage", "leg_m", 60_000.0)
     if key == "tunnel":
         return mission(path, "planner", "tunnel_width_m", 60.0)
     if table == "planner":
@@ -220,7 +226,8 @@ def sailed(m):
         estimator.update(float(n), 0.3 * math.sin(n), 5.0 + math.cos(n))
     wind = estimator.forecast(60.0)
     return repr((
-        m.name, voyage.frame.origin, voyage.goals, voyage.laps, voyage.refuges, gates_of(voyage),
+        m.name, voyage.recentre_m, voyage.far_m, voyage.frame.origin, voyage.goals, voyage.laps, voyage.refuges,
+        gates_of(voyage),
         voyage.area.obstacles_wkt(0.0), voyage.area.fence_wkt(0.0), speeds, rest, config_of(m), permissions_of(m),
         target_limits_of(m), feeds_of(m), displays_of(m), type(estimator).__name__, wind, needs_of(m),
     ))

@@ -52,7 +52,8 @@ def steps():
     for n in range(3):
         said = (Announce(severity=Severity.WARNING, code="x", text="the fence is not in force"),) if n == 1 else ()
         snapshot = replace(world.snapshot(), t_s=float(n))
-        out.append(Step(snapshot=snapshot, state=_with(world.state, why=LONG), actions=said))
+        out.append(Step(snapshot=snapshot, state=_with(world.state, why=LONG), actions=said,
+                        voyage=world.skipper.voyage))
     return out
 
 
@@ -88,9 +89,10 @@ def test_without_a_terminal_what_is_said_is_a_line_at_once(steps):
 
 def test_what_is_left_behind_is_said_with_where_she_will_end():
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
-    assert "disarmed" in left_behind(Step(snapshot=world.snapshot(), state=world.state, actions=()))
+    made = world.skipper.voyage
+    assert "disarmed" in left_behind(Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=made))
     world.run(60)
-    step = Step(snapshot=world.snapshot(), state=world.state, actions=())
+    step = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=made)
     assert step.snapshot.autopilot.mode is Mode.AUTO
     end = world.state.route.items[-1].point
     assert re.fullmatch(

@@ -122,8 +122,9 @@ def fold_of(tmp_path):
 
 
 def test_what_is_not_known_is_null_and_never_nought(tmp_path):
-    step = Step(snapshot=Snapshot(t_s=5.0), state=SkipperState(), actions=())
-    view, _ = fold_of(tmp_path).take(step, CompanionStatus(t_s=5.0, state="idle"), VoyageFigures())
+    fold = fold_of(tmp_path)
+    step = Step(snapshot=Snapshot(t_s=5.0), state=SkipperState(), actions=(), voyage=fold._voyage)
+    view, _ = fold.take(step, CompanionStatus(t_s=5.0, state="idle"), VoyageFigures())
     valid(view)
     assert (view.wind, view.no_go, view.laylines, view.polar, view.plan, view.safe_end) == (None,) * 6
     assert view.age_s is None
@@ -172,7 +173,7 @@ def step_at(here, sigma_deg=(2.0, 6.0, 12.0), heading_deg=310.0):
                     present_twd_from_rad=0.0, present_tws_mps=5.0)
     snapshot = Snapshot(t_s=0.0, vehicle=vehicle(2.0 * math.sin(heading), 2.0 * math.cos(heading), heading),
                         position_en_m=here, wind=wind)
-    return Step(snapshot=snapshot, state=SkipperState(), actions=())
+    return Step(snapshot=snapshot, state=SkipperState(), actions=(), voyage=None)
 
 
 def test_the_no_go_zone_widens_by_the_promises_quantile(tmp_path):

@@ -1,6 +1,7 @@
 """Every scenario file of ours, sailed once under the virtual clock on the embedded autopilot.
 
-More seeds with ``-m campaign``; the day of ``endurance`` and the hours of ``far-away`` have tests of their own.
+More seeds with ``-m campaign``; the day of ``endurance``, the hours of ``far-away`` and the four hundred kilometres of
+``ocean`` have tests of their own.
 """
 
 import csv
@@ -22,10 +23,12 @@ from sitl.scene.scenario import load_scenario
 
 FOLDER = Path("sitl/scenarios")
 # What is folded again from the record: the new inputs of a failsafe's answer and of a watched rest among them.
-REPLAYED = {"station-lost", "mode-switch", "at-rest", "watched", "rules-head-on", "field-ring", "field-square"}
-LONG = {"endurance", "far-away"}
-# Sailed with seed 0 by tests of their own, which ask for the verdict and for more: test_traffic and test_by_field.
-ELSEWHERE = {"crossing", "four-ships", "last-resort", "two-boats"}
+REPLAYED = {
+    "station-lost", "mode-switch", "at-rest", "watched", "rules-head-on", "field-ring", "field-square", "far-north"}
+LONG = {"endurance", "far-away", "ocean"}
+# Sailed with seed 0 by tests of their own, which ask for the verdict and for more: test_traffic, test_by_field and
+# test_passage.
+ELSEWHERE = {"crossing", "date-line", "four-ships", "last-resort", "two-boats"}
 ALL = sorted(str(p.relative_to(FOLDER).with_suffix("")) for p in FOLDER.rglob("*.toml") if p.stem not in LONG)
 
 

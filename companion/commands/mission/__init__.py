@@ -126,6 +126,10 @@ def _check(args: argparse.Namespace) -> int:
         print(f"{args.file}: {line}")
     if args.plot:
         preview(mission, args)
+    if mission.is_passage:
+        from companion.sailable.previews import passage_words
+
+        print(passage_words(mission))
     print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
           f"{counted(len(mission.area.solids), 'obstacle')}: "
           f"{'NOT in order' if bad else 'in order'}")

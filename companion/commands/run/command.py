@@ -236,7 +236,7 @@ async def _sail(
                     manager.alive(f"{step.state.phase.value}: {step.state.why}")
 
                 def tell(view: Any, _: Any, step: Any) -> None:
-                    outputs.tell(view, unix_of_boat(step.snapshot, step.snapshot.t_s))
+                    outputs.tell(view, unix_of_boat(step.snapshot, step.snapshot.t_s), step.voyage.frame)
 
                 return await sail(
                     mission, transport, planner, folder, chosen, on_status=show, stop=stop, on_refusal=progress.note,

@@ -183,7 +183,7 @@ _BY_ENDING = {ending: row for row in FORMATS for ending in row.endings}
 
 def read(
     path: str | Path, *, kind: ZoneKind = ZoneKind.EXCLUSION, axis: str = "auto", near: GeoPoint | None = None,
-    areas: bool = False,
+    areas: bool = False, far_m: float = FAR_M,
 ) -> Document:
     """Read a file of any known format, told by its content.
 
@@ -195,7 +195,7 @@ def read(
     """
     path = Path(path)
     document = parse(read_bytes(path), str(path), kind=kind, axis=axis, areas=areas, extension=path.suffix.lower())
-    return check_place(document, near) if near is not None else document
+    return check_place(document, near, far_m) if near is not None else document
 
 
 def parse(
@@ -236,20 +236,20 @@ def write(document: Document, path: str | Path, *, format_name: str = "", part: 
     return _BY_NAME[format_name or format_of(path)].write(document, part)
 
 
-def check_place(document: Document, near: GeoPoint) -> Document:
-    """Return the document with a finding if part of it lies more than 50 km from ``near``."""
+def check_place(document: Document, near: GeoPoint, far_m: float = FAR_M) -> Document:
+    """Return the document with a finding if part of it lies more than ``far_m`` from ``near``."""
     frame = LocalFrame(near)
     places = [(z.name or f"zone {i + 1}", z.shape) for i, z in enumerate(document.zones)]
     places += [(m.name or f"mark {i + 1}", m.geometry) for i, m in enumerate(document.marks)]
     for name, shape in places:
         center = center_of(shape)
         distance_m = float(np.hypot(*frame.en_from_geo(center)))
-        if distance_m <= FAR_M or (not isinstance(shape, Circle) and _covers(shape, near)):
+        if distance_m <= far_m or (not isinstance(shape, Circle) and _covers(shape, near)):
             continue
         code, remedy = Code.FAR_AWAY, "check the coordinates"
         if abs(center.lon_deg) <= 90.0:
             swapped = GeoPoint(lat_deg=center.lon_deg, lon_deg=center.lat_deg)
-            if float(np.hypot(*frame.en_from_geo(swapped))) <= FAR_M:
+            if float(np.hypot(*frame.en_from_geo(swapped))) <= far_m:
                 code = Code.SWAPPED_AXES
                 remedy = 'latitude and longitude look swapped: try --axis latlon (in a mission: axis = "latlon")'
         finding = Finding(

@@ -56,7 +56,8 @@ def goal_losses(mission: Mission) -> Losses:
 def replace_defaults(options: MissionOptions) -> list[str]:
     """Return the names of the tables that differ from their defaults."""
     default = MissionOptions(goal=options.goal)
-    return [t for t in ("field", "risk", "boat", "wind", "operator", "skipper", "planner", "safety", "traffic")
+    return [t for t in ("field", "risk", "boat", "wind", "operator", "skipper", "planner", "passage", "safety",
+                        "traffic")
             if getattr(options, t) != getattr(default, t)]
 
 

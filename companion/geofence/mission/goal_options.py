@@ -26,6 +26,8 @@ class PointOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     radius_m: Annotated[float, Meta(gt=0.0, le=5000.0)] = 10.0
     rounding: Literal["port", "starboard"] | None = None
     """Leave the mark to this side of the boat; None: just come within the radius."""
+    bandwidth_m: Annotated[float, Meta(gt=0.0)] | None = None
+    """Half width of the lane that leads here; None: as ``[skipper] bandwidth_m`` has it."""
     name: str = ""
 
 

@@ -83,12 +83,14 @@ class Goal:
     With ``gate`` two marks to pass between: ``point`` is the middle, and ``radius_m`` about it is for previews alone.
     With ``box`` or ``search`` some water: ``point`` is the place with the most room in it, and ``radius_m`` that room.
     With ``field`` she is steered by that, and ``point`` is where the mission on board leads meanwhile.
+    ``bandwidth_m`` is half the width of the lane that leads here, None: as the mission has it.
     """
 
     point: GeoPoint
     radius_m: float
     rounding: str | None = None
     name: str = ""
+    bandwidth_m: float | None = None
     gate: Gate | None = None
     box: Box | None = None
     search: Search | None = None
@@ -131,7 +133,8 @@ class GoalReader:
         point = GeoPoint(lat_deg=goal.lat, lon_deg=goal.lon)
         if isinstance(goal, FieldOptions):
             return Goal(point=point, radius_m=goal.radius_m, name=goal.name, field=self._by_field(goal, place))
-        return Goal(point=point, radius_m=goal.radius_m, rounding=goal.rounding, name=goal.name)
+        return Goal(point=point, radius_m=goal.radius_m, rounding=goal.rounding, name=goal.name,
+                    bandwidth_m=goal.bandwidth_m)
 
     def waters_of(self, options: MissionOptions) -> dict[str, Shape]:
         """Return the water that each atom of a field leads out of, by its name."""

@@ -16,7 +16,7 @@ from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Document
 from companion.geofence.findings import Finding, Severity
 from companion.geofence.formats.raw.text import decode
-from companion.geofence.formats.registry import check_place, parse, read
+from companion.geofence.formats.registry import FAR_M, check_place, parse, read
 from companion.geofence.mission.goals import Gate, Goal, GoalReader, RefugePoint, refuges_of
 from companion.geofence.mission.names import called, name_findings
 from companion.geofence.mission.options import (
@@ -26,6 +26,7 @@ from companion.geofence.mission.options import (
     MissionOptions,
     OperatorOptions,
     OutputOptions,
+    PassageOptions,
     RiskOptions,
     SafetyOptions,
     SkipperOptions,
@@ -73,8 +74,17 @@ class Mission:
         return (*(g.point for g in self.goals), *(r.point for r in self.refuges))
 
     def frame(self) -> LocalFrame:
-        """Return the mission's local frame."""
+        """Return the mission's local frame; of a passage it is the first."""
         return LocalFrame(self.origin)
+
+    @property
+    def is_passage(self) -> bool:
+        """Whether it leads farther than one local frame."""
+        return self.passage.leg_m is not None
+
+    def water(self) -> LocalArea:
+        """Return the whole area in the metres of the mission's frame."""
+        return self.area.about(self.frame(), np.inf) if self.is_passage else self.area.local(self.frame())
 
     @property
     def risk(self) -> RiskOptions:
@@ -105,6 +115,11 @@ class Mission:
     def skipper(self) -> SkipperOptions:
         """The ``[skipper]`` table."""
         return self.options.skipper
+
+    @property
+    def passage(self) -> PassageOptions:
+        """The ``[passage]`` table."""
+        return self.options.passage
 
     @property
     def safety(self) -> SafetyOptions:
@@ -203,7 +218,11 @@ def assembled(
     """
     reader = GoalReader(path=path, axis=options.area.axis)
     origin = reader.origin_of(options)
-    area, findings = load_area(options.area, path, origin, given)
+    far_m = FAR_M
+    if options.passage.leg_m is not None:
+        frame = LocalFrame(origin)
+        far_m += max(float(np.hypot(*frame.en_from_geo(g.point))) for g in reader.goals_of(options, Area()))
+    area, findings = load_area(options.area, path, origin, given, far_m)
     if drawn is not None:
         limits = tuple(z for z in drawn.zones if z.kind is ZoneKind.INCLUSION)
         area = Area(obstacles=(*area.obstacles, *drawn.as_obstacles(options.area.point_radius_m)),
@@ -231,8 +250,12 @@ def _require(path: Path, source: str, place: str, remedy: str) -> None:
 
 def load_area(
     options: AreaOptions, mission_path: Path, origin: GeoPoint, given: Mapping[Path, bytes] = AS_IT_IS,
+    far_m: float = FAR_M,
 ) -> tuple[Area, tuple[Finding, ...]]:
-    """Return the area that ``[area]`` names and what its files gave rise to. Raises InputError."""
+    """Return the area that ``[area]`` names and what its files gave rise to; nothing of it is farther than ``far_m``.
+
+    Raises InputError.
+    """
     folder = mission_path.parent
     obstacles: list[Obstacle] = []
     zones: list[Zone] = []
@@ -242,10 +265,11 @@ def load_area(
         path = folder / name
         if path in given:
             document = check_place(parse(given[path], str(path), kind=kind, axis=options.axis, areas=True,
-                                         extension=path.suffix.lower()), origin).require_clean()
+                                         extension=path.suffix.lower()), origin, far_m).require_clean()
         else:
             _require(path, str(mission_path), f"[area] {key}", "paths are relative to the mission file")
-            document = read(path, kind=kind, axis=options.axis, near=origin, areas=True).require_clean()
+            document = read(path, kind=kind, axis=options.axis, near=origin, areas=True,
+                            far_m=far_m).require_clean()
         findings.extend(f for f in document.findings if f.severity is not Severity.NOTE)
         return document
 
@@ -271,6 +295,9 @@ def check_places(mission: Mission) -> None:
 
 def place_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
     """Yield (place in the file, what is wrong, remedy) for the start, goals and refuges that are not in free water."""
+    if mission.is_passage:
+        yield from passage_troubles(mission)
+        return
     frame = mission.frame()
     local = mission.area.local(frame)
     places = [(f"[[goal]] {i + 1}", g.point) for i, g in enumerate(mission.goals)]
@@ -281,7 +308,7 @@ def place_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
         east_m, north_m = frame.en_from_geo(point)
         if max(abs(east_m), abs(north_m)) > RANGE_M:
             yield (place, f"is {np.hypot(east_m, north_m) / 1000.0:.0f} km from the origin",
-                   "are lat and lon swapped? the local frame holds 50 km")
+                   "are lat and lon swapped? beyond 50 km it is a passage, which says so: [passage] leg_m")
             continue
         problem = trouble_at(local, (east_m, north_m))
         if problem:
@@ -291,6 +318,37 @@ def place_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
         problem = "" if goal.gate is None else gate_trouble(goal.gate, frame, local, mission.margin_floor_m)
         if problem:
             yield f"[[goal]] {number}", problem, "move its marks into free water or correct the area's files"
+
+
+def passage_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
+    """Yield the same for a passage, each place in a frame of its own; none is farther than a leg from the one before.
+
+    A refuge may lie a leg from any goal, or from the start.
+    """
+    leg_m = mission.passage.leg_m or RANGE_M
+    goals = [(f"[[goal]] {i + 1}", g.point) for i, g in enumerate(mission.goals)]
+    way = goals if mission.start is None else [("[start]", mission.start), *goals]
+    refuges = [(f"[[refuge]] {i + 1}", r.point) for i, r in enumerate(mission.refuges)]
+    for number, (place, point) in enumerate([*way, *refuges]):
+        frame = LocalFrame(point)
+        is_goal = number < len(way)
+        near = [way[number - 1][1]] if is_goal and number > 0 else [point] if is_goal else [p for _, p in way]
+        least_m = min(float(np.hypot(*frame.en_from_geo(other))) for other in near)
+        if least_m > leg_m:
+            yield (place, f"is {least_m / 1000.0:.0f} km from {way[number - 1][0] if is_goal else 'every goal'}",
+                   f"are lat and lon swapped? [passage] leg_m says {leg_m / 1000.0:g} km")
+            continue
+        local = mission.area.about(frame, RANGE_M)
+        problem = trouble_at(local, (0.0, 0.0))
+        if problem:
+            yield (place, f"{point.lat_deg:.6f}, {point.lon_deg:.6f} {problem}",
+                   "move it into free water or correct the area's files")
+            continue
+        goal = next((g for p, g in zip(goals, mission.goals, strict=True) if p[0] == place), None)
+        problem = "" if goal is None or goal.gate is None else gate_trouble(
+            goal.gate, frame, local, mission.margin_floor_m)
+        if problem:
+            yield place, problem, "move its marks into free water or correct the area's files"
 
 
 def trouble_at(local: LocalArea, point_en: tuple[float, float]) -> str:

@@ -149,6 +149,16 @@ class PlannerOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """RRT*: what the greatest risk of one state costs."""
 
 
+class PassageOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[passage]``: a voyage farther than 50 km: the local frame moves along with the boat."""
+
+    leg_m: Annotated[float, Meta(gt=0.0, le=1e7)] | None = None
+    """The longest leg: a goal farther from the one before, or the start, is a mistake. None: no passage; all goals lie
+    within 50 km of the origin."""
+    recentre_m: Annotated[float, Meta(ge=500.0, le=25_000.0)] | None = None
+    """The frame is replaced when the boat is so far from its origin; None: 10 km."""
+
+
 class AutopilotOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """``[autopilot]``: which autopilot is ours."""
 
@@ -175,7 +185,9 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Stay at the last goal for this long."""
     laps: Annotated[int, Meta(ge=1, le=10_000)] = 1
     bandwidth_m: Positive | None = None
-    """Half width of the lane between two goals; None: no lane."""
+    """Half width of the lane between two goals; None: no lane. A goal may have its own."""
+    horizon_m: Annotated[float, Meta(ge=500.0, le=60_000.0)] = 5000.0
+    """A plan covers the next so many metres of the way (Büsser: 15 to 20 nautical miles at sea)."""
     planner: Literal["auto", "rrtstar", "astar"] = "auto"
     """The project's own; or Wolsieffer's RRT*, or Büsser's A*, by the numbers of ``[planner]``. What these do not find
     is planned by ``auto``."""
@@ -273,6 +285,7 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     operator: OperatorOptions = OperatorOptions()
     skipper: SkipperOptions = SkipperOptions()
     planner: PlannerOptions = PlannerOptions()
+    passage: PassageOptions = PassageOptions()
     safety: SafetyOptions = SafetyOptions()
     traffic: TrafficOptions = TrafficOptions()
     output: OutputOptions = OutputOptions()

@@ -57,7 +57,7 @@ def dump_options(options: MissionOptions) -> str:
     data = without_defaults(options)
     order = [
         "name", "description", "from_autopilot", "start", "goal", "field", "refuge", "area", "wind", "risk", "boat",
-        "autopilot", "operator", "skipper", "planner", "safety", "traffic", "output"]
+        "autopilot", "operator", "skipper", "planner", "passage", "safety", "traffic", "output"]
     return tomli_w.dumps({k: data[k] for k in order if k in data})
 
 

@@ -11,7 +11,7 @@ from companion.skipper.board.uploads import upload
 from companion.skipper.deeds.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.ends import announcement
-from companion.skipper.planning.errands import FAR_M, fenced_off, home_trouble
+from companion.skipper.planning.errands import fenced_off, home_trouble
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import SafeEnd
 from companion.skipper.step.snapshot import WindHealth
@@ -76,7 +76,7 @@ def _misplaced(turn: Turn) -> str:
     if here is None:
         return ""
     far_m = distance_m(here, turn.voyage.goals[0].en_m)
-    if far_m > FAR_M:
+    if far_m > turn.voyage.far_m:
         return f"she is {far_m / 1000.0:.0f} km from the first goal; is it the right mission, and the right home?"
     clearance_m = float(turn.voyage.area.clearance_m([here])[0])
     if clearance_m > 0.0:

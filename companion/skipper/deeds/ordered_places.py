@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from companion.orders import Place, Wanted, which
-from companion.skipper.planning.errands import FAR_M, home_trouble, place_trouble
+from companion.skipper.planning.errands import home_trouble, place_trouble
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import PointEn
@@ -43,8 +43,9 @@ def goal_place(turn: Turn, wanted: Wanted) -> Found | str:
         return "a goal needs a position"
     trouble = _trouble(turn, place)
     if trouble:
-        is_near = not place.swapped.trouble and distance_m(_en(turn, place.swapped), (0.0, 0.0)) <= FAR_M
-        is_far = bool(place.trouble) or distance_m(_en(turn, place), (0.0, 0.0)) > FAR_M
+        far_m = turn.voyage.far_m
+        is_near = not place.swapped.trouble and distance_m(_en(turn, place.swapped), (0.0, 0.0)) <= far_m
+        is_far = bool(place.trouble) or distance_m(_en(turn, place), (0.0, 0.0)) > far_m
         return f"{trouble}; latitude and longitude are swapped?" if is_near and is_far else trouble
     return f"{place.lat_deg:.5f} {place.lon_deg:.5f}", _en(turn, place)
 

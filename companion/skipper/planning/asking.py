@@ -145,6 +145,8 @@ def _aim(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
 def _nearer(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
     """Return a safe place that is nearer than the goal: a refuge, or a roomy place on the way."""
     left = distance_m(start.en_m, target.en_m)
+    if turn.voyage.is_passage:
+        left = min(left, turn.config.horizon_m)
     course = bearing_rad(start.en_m, target.en_m)
     refuges = [r.en_m for r in turn.voyage.refuges]
     candidates = [p for p in refuges if p != target.en_m and distance_m(start.en_m, p) < left]

@@ -25,7 +25,6 @@ DRAGGED = "dragged off"   # a watchdog
 HOME, REST = "home", "the place to rest"
 GOAL_RADIUS_M = 10.0     # a place that is named under way: there within this
 HOME_RADIUS_M = 15.0     # home is where she was armed: a place in the water or at its edge, not a mark
-FAR_M = 50_000.0         # the local frame's reach: a home beyond it is not one of this water
 
 
 class Kind(enum.Enum):
@@ -251,8 +250,11 @@ def home_trouble(turn: Turn) -> str:
 
 def place_trouble(turn: Turn, what: str, en_m: PointEn) -> str:
     """Return why no way can be planned to a place (empty: one can be looked for)."""
-    if not math.hypot(*en_m) <= FAR_M:
-        return f"{what} is {math.hypot(*en_m) / 1000.0:.0f} km from this water"
+    far_m = math.hypot(*en_m)
+    if not far_m <= turn.voyage.far_m:
+        return f"{what} is {far_m / 1000.0:.0f} km from this water"
+    if far_m > turn.voyage.area.reach_m:
+        return ""   # what lies there is seen when she comes there
     clearance = float(turn.voyage.area.clearance_m([en_m])[0])
     floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
     if clearance < floor_m:

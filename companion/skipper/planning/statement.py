@@ -21,6 +21,7 @@ from companion.skipper.step.config import SkipperConfig
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.judge import half_width_rad, mean_twd_rad
+from companion.skipper.way.passage import along, leg_line
 from companion.skipper.way.voyage import PointEn, Voyage
 
 # The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
@@ -138,23 +139,39 @@ def aim_at(voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], gate: i
         return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
     course = bearing_rad(start_en, target.en_m)
     radius = max(50.0, 0.02 * config.horizon_m)
+    line, most_m = _leg(voyage, target, start_en), math.inf
+    if line is not None and target.bandwidth_m is not None:
+        radius = min(radius, 0.25 * target.bandwidth_m)
+        most_m = target.bandwidth_m - 2.0 * radius
     for share in np.arange(1.0, 0.3, -0.05):
         for side in (0.0, 1.0, -1.0, 2.0, -2.0, 4.0, -4.0):
-            on_line = moved(start_en, course, float(share) * config.horizon_m)
-            place = moved(on_line, course + math.pi / 2.0, side * 2.0 * radius)
+            if abs(side * 2.0 * radius) > most_m:
+                continue
+            if line is not None:
+                place = along(line, start_en, float(share) * config.horizon_m, side * 2.0 * radius)
+            else:
+                on_line = moved(start_en, course, float(share) * config.horizon_m)
+                place = moved(on_line, course + math.pi / 2.0, side * 2.0 * radius)
             if float(voyage.area.clearance_m([place])[0]) >= config.margin_m + radius:
                 return Aim(en_m=place, radius_m=radius, gate=-1)
     return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
 
 
-def band(gate: Gate, start_en: PointEn, aim_en: PointEn) -> Polygon | None:
+def _leg(voyage: Voyage, gate: Gate, start_en: PointEn) -> LineString | None:
+    """Return the leg of a passage that has a band, as far as a plan from ``start_en`` can see; None: it has none."""
+    if not voyage.is_passage or gate.bandwidth_m is None:
+        return None
+    return leg_line(voyage.frame, gate.from_en_m or start_en, gate.en_m, start_en, voyage.area.reach_m)
+
+
+def band(voyage: Voyage, gate: Gate, start_en: PointEn, aim_en: PointEn) -> Polygon | None:
     """Return the corridor to the gate: everything within the bandwidth of the line between global waypoints.
 
     A boat outside its band is let in: the band reaches around it.
     """
     if gate.bandwidth_m is None:
         return None
-    line = LineString([gate.from_en_m or start_en, gate.en_m])
+    line = _leg(voyage, gate, start_en) or LineString([gate.from_en_m or start_en, gate.en_m])
     corridor = shapely.buffer(line, gate.bandwidth_m, quad_segs=8)
     for point in (start_en, aim_en):
         if not corridor.covers(shapely.points(point)):
@@ -178,7 +195,7 @@ def problem_dict(
     obstacles = [*voyage.area.obstacles_wkt(margin_m)]
     if start.notch_m > 0.0:
         obstacles, fence = _notched(voyage, start, obstacles, fence, floor_m)
-    corridor = band(gate, start.en_m, aim.en_m)
+    corridor = band(voyage, gate, start.en_m, aim.en_m)
     if corridor is not None:
         limits = shapely.intersection(corridor, shapely.from_wkt(fence)) if fence is not None else corridor
         pieces = [p for p in shapely.get_parts(limits) if isinstance(p, Polygon) and not p.is_empty]

@@ -113,7 +113,7 @@ class SkipperConfig:
     lead_s: float = 12.0               # the new tail is asked for this long before the waypoint
     keep_gain: float = 0.02            # a sound old tail stays unless the new one is at least 2 % faster
     keep_gain_s: float = 2.0           # ... and at least this much
-    horizon_m: float = 5000.0          # the local plan covers the next few miles only (Büsser 4.1)
+    horizon_m: float = 5000.0          # the local plan covers the next few miles only (Büsser 4)
     # Büsser's skipper, section 3.2.1
     wind_change_rad: float = 0.349066  # 20 deg
     wind_change_level: float = 0.80    # ... and outside this interval of the forecast that the plan used

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from companion.mavlink.wire import mission_hash
-from companion.messages import MissionItem, Mode
+from companion.messages import GeoPoint, MissionItem, Mode
 from companion.orders import BY_VERB, Verb
 from companion.skipper.step.route import Route
 from companion.skipper.step.standing import Standing
@@ -54,6 +54,7 @@ class Persisted:
     inside: tuple[int, float] | None = None   # the goal whose box she stays in, Unix time of entry
     searched: tuple[tuple[float, float], ...] = ()   # the track of the search that is next
     covered: tuple[tuple[int, float], ...] = ()      # goals searched, and the share that was seen
+    water: GeoPoint | None = None      # the origin of all metres here; None: the mission's
 
     @property
     def lists(self) -> tuple[Route, ...]:
@@ -77,6 +78,7 @@ class Persisted:
             "standing": _standing_to_dict(self.standing), "skipped": self.skipped,
             "set_sail_utc_s": self.set_sail_utc_s, "inside": None if self.inside is None else list(self.inside),
             "searched": [list(p) for p in self.searched], "covered": [list(c) for c in self.covered],
+            **({} if self.water is None else {"water": [self.water.lat_deg, self.water.lon_deg]}),
         }
 
     @classmethod
@@ -107,6 +109,8 @@ class Persisted:
                     _whole(data["inside"][0], 0, MAX_GOALS), _number(data["inside"][1])),
                 searched=tuple((_number(e), _number(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
                 covered=tuple((_whole(g, 0, MAX_GOALS), _number(s)) for g, s in data.get("covered", ())[:MAX_GOALS]),
+                water=None if data.get("water") is None else GeoPoint(
+                    lat_deg=_number(data["water"][0]), lon_deg=_number(data["water"][1])),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error

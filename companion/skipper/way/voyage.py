@@ -148,6 +148,11 @@ class Area(Protocol):
         """Return the area with one limit more: a circle."""
         ...
 
+    @property
+    def reach_m(self) -> float:
+        """How far from the frame's origin it is known [m]."""
+        ...
+
     def nearest_name(self, point_en: ArrayLike) -> str:
         """Return what the nearest obstacle or limit to a point is called; empty in open water."""
         ...
@@ -181,9 +186,16 @@ class Refuge:
     radius_m: float = 15.0
 
 
+FAR_M = 50_000.0   # what lies farther off is not of this water; a passage says what is far for it
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Voyage:
-    """Goals in their order, sailed ``laps`` times, in ``area``."""
+    """Goals in their order, sailed ``laps`` times, in ``area``.
+
+    With ``recentre_m`` it is a passage: a frame serves until the boat is so far from its origin, then it is replaced
+    (``companion.fold``), and ``area`` is what lies about the frame's origin. Nothing may be farther off than ``far_m``.
+    """
 
     name: str
     frame: LocalFrame
@@ -193,6 +205,8 @@ class Voyage:
     laps: int = 1
     refuges: tuple[Refuge, ...] = ()
     home_en_m: PointEn | None = None
+    recentre_m: float | None = None
+    far_m: float = FAR_M
 
     def __post_init__(self) -> None:
         if not self.goals or self.laps < 1:
@@ -201,6 +215,11 @@ class Voyage:
     def hull_clearance_m(self, en_m: PointEn, heading_rad: float) -> float:
         """Return the distance of the hull's outline to the nearest obstacle or limit [m], at most 0 on contact."""
         return self.area.path_clearance_m(outline_en_m(self.boat.hull, [en_m], [heading_rad])[0])
+
+    @property
+    def is_passage(self) -> bool:
+        """Whether the frame moves along with the boat."""
+        return self.recentre_m is not None
 
     @property
     def legs(self) -> tuple[Goal, ...]:

@@ -9,6 +9,8 @@ from typing import Any
 
 from companion.clock import now_s
 from companion.fold import Step
+from companion.geo.frame import LocalFrame
+from companion.geo.shift import Shift
 from companion.geofence import Mission
 from companion.mavlink.tlog import stamp
 from companion.skipper.step import Permissions, Persisted, SkipperConfig
@@ -17,7 +19,7 @@ from companion.telemetry.folder.copies import write_copies
 from companion.telemetry.folder.description import chart_record, voyage_record
 from companion.telemetry.folder.names import AREA
 from companion.telemetry.folder.recorder import Recorder
-from companion.telemetry.folder.records import action_record, track_row
+from companion.telemetry.folder.records import action_record, track_row, water_record
 from companion.telemetry.folder.summary import VoyageFigures
 
 
@@ -30,6 +32,8 @@ class Logbook:
         self._frames = 0
         self._framed_s, self._framed_us = float("nan"), 0
         self._phase = ""
+        self._frame: LocalFrame | None = None     # of the chart, and of the last record that says which
+        self._water: LocalFrame | None = None
 
     # ---------------------------------------------------------------------------------------------- time
     def quantised(self, t_s: float) -> tuple[int, float]:
@@ -70,6 +74,7 @@ class Logbook:
         known: tuple[str, ...], run: Mapping[str, Any],
     ) -> None:
         """Write down what is sailed, with copies of its files, and what was known of earlier voyages."""
+        self._frame = self._water = voyage.frame
         self.recorder.whole(AREA, json.dumps(chart_record(mission, voyage, self._config.margin_m)).encode())
         copy = write_copies(mission, self.recorder)
         started = datetime.fromtimestamp(self._epoch_s + t_s, UTC).isoformat()
@@ -81,9 +86,12 @@ class Logbook:
 
     def step(self, step: Step, clearance_m: float | None) -> None:
         """Write a step down: where the boat is, what was decided, and by which numbers."""
-        snapshot = step.snapshot
+        snapshot, frame = step.snapshot, step.voyage.frame
         self.figures.take(step, clearance_m)
-        self.recorder.track(track_row(step, self._frames, clearance_m))
+        if self._water is not None and frame != self._water:
+            self.note(snapshot.t_s, water_record(step, Shift(self._water, frame)))
+            self._water = frame
+        self.recorder.track(track_row(step, self._frames, clearance_m, self._frame))
         self._frames = 0
         for action in step.actions:
             self.note(snapshot.t_s, action_record(action, snapshot, self._config))

@@ -20,6 +20,9 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from companion.errors import InputError
+from companion.geo.frame import LocalFrame
+from companion.geo.shift import Shift
+from companion.messages import GeoPoint
 from companion.telemetry.folder.names import AREA, DECISIONS, SUMMARY, TRACK, VOYAGE
 from companion.telemetry.folder.recorder import TRACK_COLUMNS, read_jsonl
 from companion.telemetry.folder.segments import parts, read_part
@@ -171,7 +174,7 @@ def read_voyage(folder: Path) -> VoyageRecord:
         columns={name: np.array([row[name] for row in rows], dtype=np.float64)
                  for name in TRACK_COLUMNS if name not in _WORDS},
         texts={name: [row[name] for row in rows] for name in _WORDS},
-        plans=_plans(read_decisions(folder), folder / DECISIONS),
+        plans=_plans(read_decisions(folder), folder / DECISIONS, chart.origin),
         chart=chart, figures=figures, summary=_converted(figures, Summary, folder / SUMMARY),
         began_utc=run.started_utc, epoch_s=run.epoch_s,
     )
@@ -249,16 +252,37 @@ def _number(cell: str) -> float:
     return value
 
 
-def _plans(decisions: list[dict[str, Any]], path: Path) -> tuple[RecordedPlan, ...]:
-    """Return the plans, each with the facts of its request."""
+def _plans(decisions: list[dict[str, Any]], path: Path, origin: Origin) -> tuple[RecordedPlan, ...]:
+    """Return the plans, each with the facts of its request, in the metres of the chart."""
     requests = {d.get("request_id"): d for d in decisions if d.get("action") == "RequestPlan"}
-    plans = []
+    plans, shift = [], None
     for decision in decisions:
         if decision["kind"] == "plan":
             request = requests.get(decision.get("request_id"), {})
             facts = {key: request.get(key) for key in ("reason", "twd_deg", "widening")}
-            plans.append(_converted({**facts, **decision}, RecordedPlan, path, f"t_s = {decision['t_s']} "))
+            plan = _converted({**facts, **decision}, RecordedPlan, path, f"t_s = {decision['t_s']} ")
+            if shift is not None and plan.plan is not None:
+                plan = msgspec.structs.replace(plan, plan=_carried(plan.plan, shift))
+            plans.append(plan)
+        elif decision["kind"] == "start":
+            shift = None
+        elif decision["kind"] == "water":
+            shift = _shift(decision, path, origin)
     return tuple(plans)
+
+
+def _shift(water: dict[str, Any], path: Path, origin: Origin) -> Shift:
+    """Return how the metres of another water become those of the chart."""
+    with believed(path, f"t_s = {water['t_s']}"):
+        there = GeoPoint(lat_deg=float(water["lat_deg"]), lon_deg=float(water["lon_deg"]))
+    return Shift(LocalFrame(there), LocalFrame(GeoPoint(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg)))
+
+
+def _carried(way: PlannedWay, shift: Shift) -> PlannedWay:
+    return msgspec.structs.replace(
+        way, waypoints=tuple(shift.point(p) for p in way.waypoints),
+        legs=tuple(msgspec.structs.replace(leg, start_en=shift.point(leg.start_en), end_en=shift.point(leg.end_en))
+                   for leg in way.legs))
 
 
 def _read_json(path: Path) -> Any:

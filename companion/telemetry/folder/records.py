@@ -11,8 +11,10 @@ from typing import Any
 
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
+from companion.geo.frame import LocalFrame
+from companion.geo.shift import Shift
 from companion.mavlink.wire import mission_hash
-from companion.messages import AisReport, GeoPoint
+from companion.messages import AisReport, Command, GeoPoint
 from companion.orders import Order
 from companion.skipper.step import (
     Action,
@@ -116,11 +118,27 @@ def outcome_record(outcome: Outcome) -> dict[str, Any]:
     return {"kind": "outcome", "outcome": type(outcome).__name__, **values}
 
 
-def track_row(step: Step, frames: int, clearance_m: float | None) -> tuple[Any, ...]:
-    """Return one row of track.csv (see TRACK_COLUMNS)."""
+def water_record(step: Step, shift: Shift) -> dict[str, Any]:
+    """Return that another frame has begun: the metres of a passage's records count from its origin from here on.
+
+    ``drift_m`` is how far the route's points, which have been carried over at each change, are at most from the items
+    on the autopilot, which are degrees.
+    """
+    origin, route = shift.after.origin, step.state.route
+    apart = [] if route is None else [
+        math.dist(shift.after.en_from_geo(item.point), en_m)
+        for item, en_m in zip(route.items, route.points_en_m, strict=True) if item.command == Command.NAV_WAYPOINT]
+    return {"kind": "water", "lat_deg": origin.lat_deg, "lon_deg": origin.lon_deg,
+            "turn_deg": math.degrees(shift.turn_rad), "drift_m": max(apart, default=None)}
+
+
+def track_row(step: Step, frames: int, clearance_m: float | None, frame: LocalFrame | None = None) -> tuple[Any, ...]:
+    """Return one row of track.csv (see TRACK_COLUMNS); its metres are those of ``frame``, None: of the step's."""
     snapshot = step.snapshot
     vehicle, autopilot, wind = snapshot.vehicle, snapshot.autopilot, snapshot.wind
     east_m, north_m = snapshot.position_en_m or (None, None)
+    if vehicle is not None and frame is not None and frame != step.voyage.frame:
+        east_m, north_m = frame.en_from_geo(vehicle.position)
     sigma_rad = sigma_ahead_rad(snapshot)
     return (
         # The time is written so that reading it back gives the same number: a replay depends on it.

@@ -60,6 +60,8 @@ class VoyageFigures:
     def take(self, step: Step, clearance_m: float | None) -> None:
         """Take one step and the clearance [m] of the hull at it (None: nothing to be clear of, or no position)."""
         snapshot = step.snapshot
+        if step.shift is not None and self._anchor is not None:
+            self._anchor = step.shift.point(self._anchor)
         for action in step.actions:
             if isinstance(action, RequestPlan):
                 self.plans += 1

@@ -1,8 +1,9 @@
-"""Metres east and north of the boat's home, and the wire's degrees x 1e7."""
+"""Metres east and north of the boat's home, or of where she was last far from it, and the wire's degrees x 1e7."""
 
 from __future__ import annotations
 
 from companion.geo.frame import LocalFrame
+from companion.geo.shift import Shift
 from companion.messages import GeoPoint
 
 _CACHE, _TOLD = 4096, 64
@@ -15,6 +16,14 @@ class Chart:
         self._frame = LocalFrame(home)
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
         self._told: dict[tuple[float, float], tuple[int, int]] = {}
+
+    def follow(self, en: tuple[float, float]) -> Shift:
+        """Let the metres count from a place from now on; return how those of before become those."""
+        shift = Shift(self._frame, LocalFrame(self._frame.geo_from_en(*en)))
+        self._frame = shift.after
+        self._seen.clear()
+        self._told.clear()
+        return shift
 
     def point(self, en: tuple[float, float]) -> GeoPoint:
         """Return a position in metres as a GeoPoint."""

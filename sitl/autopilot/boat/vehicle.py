@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from companion.boat import Polar
 from companion.geo.angles import wrap_pi, wrap_two_pi
+from companion.geo.shift import Shift
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.sail import polar_table
@@ -20,6 +21,10 @@ from sitl.world import Wind
 LOOP_S = k.LOOP_S
 _WIND_LOOPS = 5
 _NONE = np.empty(0)
+# What of the state is a place, a way, or an angle on the grid.
+_PLACES = ((k.S_E, k.S_N), (k.S_OE, k.S_ON), (k.S_DE, k.S_DN), (k.S_XE, k.S_XN), (k.S_TE, k.S_TN), (k.S_LE, k.S_LN))
+_WAYS = ((k.S_VE, k.S_VN), (k.S_PE, k.S_PN), (k.S_GPS_E, k.S_GPS_N))
+_ANGLES = (k.S_YAW, k.S_NAV_YAW, k.S_BEARING, k.S_TACK_YAW, k.S_LOITER_YAW)
 
 
 class Vehicle:
@@ -119,6 +124,21 @@ class Vehicle:
         self.tick = int(self.state[k.S_TICK])
         self.t_s = self.tick * LOOP_S
         return int(done), int(events)
+
+    def carry(self, shift: Shift) -> None:
+        """Count in other metres: places are where they were, and what has a direction on their grid turns with it.
+
+        Wind and current are of true north: they blow as before.
+        """
+        s = self.state
+        for e, n in _PLACES:
+            s[e], s[n] = shift.point((float(s[e]), float(s[n])))
+        for e, n in _WAYS:
+            s[e], s[n] = shift.vector((float(s[e]), float(s[n])))
+        for angle in _ANGLES:
+            s[angle] = wrap_pi(float(s[angle]) + shift.turn_rad)
+        if self._surroundings is not None:
+            self._surroundings.carry(shift)
 
     # ----------------------------------------------------------------------------------------- orders
     def hold(self) -> None:

@@ -98,6 +98,17 @@ class Core:
             self._told = (here, self.chart.to_e7(here))
         return self._told[1]
 
+    def follow(self) -> bool:
+        """Let all metres count from the boat when she is far from where they do; True: places must be taken anew."""
+        if math.hypot(*self.vehicle.true_position) < self.config.recentre_m:
+            return False
+        shift = self.chart.follow(self.vehicle.true_position)
+        self.vehicle.carry(shift)
+        self.origin_en = shift.point(self.origin_en)
+        self.home_en = None if self.home_en is None else shift.point(self.home_en)
+        self._told = (self.vehicle.position, self.chart.to_e7(self.vehicle.position))
+        return True
+
     def take_origin(self) -> None:
         """Let local positions count from here."""
         self.has_origin, self.origin_en = True, self.vehicle.position

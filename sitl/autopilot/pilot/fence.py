@@ -17,6 +17,8 @@ from sitl.autopilot.pilot.items import Item
 CHECK_S = 0.1
 TYPE_CIRCLE, TYPE_POLYGON = 2, 4
 BACKUP_M = 20.0   # so much farther outside the home circle there is another one: a new breach and a new action
+LONG_E7, PIECE_E7 = 4_500_000, 200_000   # an edge of half a degree is cut into pieces of two kilometres
+_HALF_E7 = 1_800_000_000
 _POLYGONS = {mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: 1.0, mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: -1.0}
 _CIRCLES = {mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: 1.0, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: -1.0}
 
@@ -75,7 +77,7 @@ def zones(items: Sequence[Item], to_en: Callable[[int, int], tuple[float, float]
                 g.command != item.command or int(g.p1) != count for g in group
             ):
                 return None
-            out.append(Polygon(_POLYGONS[item.command], np.array([to_en(g.x, g.y) for g in group])))
+            out.append(Polygon(_POLYGONS[item.command], np.array([to_en(*place) for place in _ring(group)])))
             i += count
         else:
             if item.command in _CIRCLES:
@@ -83,6 +85,18 @@ def zones(items: Sequence[Item], to_en: Callable[[int, int], tuple[float, float]
                     return None
                 out.append(Circle(_CIRCLES[item.command], *to_en(item.x, item.y), float(item.p1)))
             i += 1
+    return out
+
+
+def _ring(group: Sequence[Item]) -> list[tuple[int, int]]:
+    """Return a ring's places [deg x 1e7], its long edges cut up: ArduPilot draws them straight in these degrees."""
+    out: list[tuple[int, int]] = []
+    for a, b in zip(group, (*group[1:], group[0]), strict=True):
+        lat, lon = b.x - a.x, (b.y - a.y + _HALF_E7) % (2 * _HALF_E7) - _HALF_E7
+        longest = max(abs(lat), abs(lon))
+        count = 1 if longest < LONG_E7 else math.ceil(longest / PIECE_E7)
+        out += [(a.x + lat * n // count, (a.y + lon * n // count + _HALF_E7) % (2 * _HALF_E7) - _HALF_E7)
+                for n in range(count)]
     return out
 
 
@@ -119,6 +133,10 @@ class Fence:
             return False
         self.items, self._zones = list(items), found
         return True
+
+    def reload(self) -> None:
+        """Take the zones from the stored items again: the metres count from elsewhere."""
+        self.load(self.items)
 
     def _clearance_m(self) -> float:
         """Return the distance [m] to the nearest forbidden water, negative in it, infinite without a fence.
