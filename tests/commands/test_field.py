@@ -35,7 +35,7 @@ def test_a_field_as_a_picture(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("arguments", "says"), [
-    (["missions/block.toml"], "[[goal]]: no goal is sailed by a field; write kind = \"field\" in one"),
+    (["missions/block.toml"], '[[goal]]: no goal is sailed by a field; write kind = "field" in one'),
     (["missions/field-lane.toml", "--goal", "2"], "[[goal]] 2: is not sailed by a field; name one that is: 1"),
     (["missions/none.toml"], "no such file"),
 ])

@@ -175,6 +175,8 @@ def mission(path, table="", key="", value=None):
                 raw |= keys
         if key == "tunnel":
             raw["planner"] = {"tunnel_width_m": 60.0}
+        if (table, key) == ("autopilot", "frame"):
+            raw["boat"] = {"polar": 2.0}
         place = raw[table][0] if table in {"goal", "refuge"} else raw.setdefault(table, {})
         place[key] = value
     elif key:
@@ -200,6 +202,8 @@ def base_for(path, table, key):
         return mission(path, "goal-kind", kind_with(key))
     if key == "tunnel":
         return mission(path, "planner", "tunnel_width_m", 60.0)
+    if (table, key) == ("autopilot", "frame"):
+        return mission(path, "boat", "polar", 2.0)
     if table == "planner":
         return mission(path, "skipper", "planner", "rrtstar" if key in RRTSTAR else "astar")
     if key in KALMAN:
