@@ -5,7 +5,8 @@
 - wolsieffer-7: two channels; the wind just lets the right-hand one be sailed, noise closes it, down wind.
 - busser-5-1 .. busser-5-4: AVALON's costs added one by one: sailing time alone; turning; estimate and tunnel;
   other winds.
-- field-atoms, field-trees: Schmitt's figures 6.1 to 6.5, and her trees 4.2 and 4.3; wrsc2013-field: her task.
+- field-atoms, field-trees: Schmitt's figures 6.1 to 6.5, and her trees 4.2 and 4.3; wrsc2013-field: her task;
+  field-composed: missions/field-ring.toml, as `companion field --plot` draws it.
 - risk: the promise of a path against simulated winds, as its limit is tightened.
 
 The problems are in ``bench.papers``.
@@ -29,14 +30,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
+from companion.geofence import load_mission
 from companion.planner import Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.plan import Plan, PlanStatus
 from companion.planner.reference.astar import search as search_astar
 from companion.planner.risk import simulate_entries
 from companion.planner.settings import AstarSettings
+from companion.plots.composed import field_figure
 from companion.plots.field import atoms_figure, encounter_figure, trees_figure
 from companion.plots.plan import draw_plan
+from companion.sailable.fields import fan_of, previewed, sailed
 from sitl.tasks.wrsc2013 import HALF_M
 from sitl.tasks.wrsc2013 import run as run_wrsc2013
 
@@ -172,6 +176,12 @@ def field_trees():
     save(trees_figure(), "field-trees")
 
 
+def field_composed():
+    mission = load_mission("missions/field-ring.toml")
+    seen = previewed(mission)
+    save(field_figure(seen, fan_of(seen), sailed(seen), title=f"{mission.name}: {seen.tree.text}"), "field-composed")
+
+
 def wrsc2013():
     sailed = run_wrsc2013(WRSC_SEED)
     course, score = sailed.course, sailed.score
@@ -188,7 +198,7 @@ WRSC_SEED = 9
 FIGURES = {
     "wolsieffer-6": wolsieffer_6, "wolsieffer-7": wolsieffer_7, "busser-5-1": busser_5_1, "busser-5-2": busser_5_2,
     "busser-5-3": busser_5_3, "busser-5-4": busser_5_4, "risk": risk, "field-atoms": field_atoms,
-    "field-trees": field_trees, "wrsc2013-field": wrsc2013,
+    "field-trees": field_trees, "field-composed": field_composed, "wrsc2013-field": wrsc2013,
 }
 
 

@@ -21,6 +21,7 @@ PROGRAM = Program(
         "far": "orders and statuses over a satellite link",
         "fence": "check, convert, upload, download fences",
         "mission": "check, make, convert, upload, download missions",
+        "field": "what a field that a mission composes would do",
         "setup": "write a mission and the settings of its service",
         "doctor": "is this autopilot set up to be sailed?",
         "key": "make a signing key, put it on the autopilot, take it off",

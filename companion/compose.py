@@ -64,7 +64,14 @@ def polar_of(mission: Mission) -> Polar:
 
 
 def boat_of(mission: Mission) -> Boat:
-    """Return the mission's boat."""
+    """Return the mission's boat; one that does not sail has no no-go zone, and tacks cost her nothing."""
+    if mission.autopilot.frame == "motor":
+        if isinstance(mission.boat.polar, str):
+            raise InputError(str(mission.path), "[boat] polar", "a motor boat has no polar, and hers is "
+                             f"{mission.boat.polar!r}", "write her speed [m/s]: polar = 2.0")
+        return Boat(polar=polar_of(mission), no_go_half_rad=0.0, has_motor=True,
+                    turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s),
+                    hull=Hull(length_m=mission.boat.length_m, beam_m=mission.boat.beam_m))
     return Boat(
         polar=polar_of(mission),
         no_go_half_rad=math.radians(mission.boat.no_go_half_deg),

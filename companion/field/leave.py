@@ -36,7 +36,7 @@ def way_out_rad(seen: Situation, water: Polygon, habits: Habits, last_rad: float
     size_m = math.hypot(water.bounds[2] - water.bounds[0], water.bounds[3] - water.bounds[1])
     look_s = min(MOST_LOOK_S, max(LOOK_S, 1.5 * size_m / max(*habits.polar_mps, 0.3)))
     track, _ = foresee(fan, seen.twd_from_rad if habits.is_sailing else None, seen, replace(habits, horizon_s=look_s))
-    outside = ~shapely.contains_xy(shapely.buffer(water, BEYOND_M), track[:, :, 0], track[:, :, 1])
+    outside = ~shapely.contains_xy(shapely.buffer(water, BEYOND_M, join_style="mitre"), track[:, :, 0], track[:, :, 1])
     step_s = look_s / max(1, track.shape[1] - 1)
     cost = np.where(outside.any(axis=1), outside.argmax(axis=1), outside.shape[1]) * step_s
     if seen.obstacles:
@@ -50,9 +50,9 @@ def way_out_rad(seen: Situation, water: Polygon, habits: Habits, last_rad: float
 
 @dataclass(frozen=True, slots=True)
 class WayOut(Field):
-    """The way out of some water from each place, as a nominal field: as ``way_out_rad`` finds it for a boat there.
+    """The way out of some water from each place in it, a nominal field: as ``way_out_rad`` finds it for a boat there.
 
-    With ``at_rad`` the same heading everywhere: the one that was found for the boat.
+    With ``at_rad`` the same heading everywhere: the one that was found for the boat. Outside it has no value.
     """
 
     water: Polygon
@@ -62,10 +62,9 @@ class WayOut(Field):
 
     def evaluate(self, p: Vectors) -> Vectors:
         """Return the vectors (n, 2)."""
-        if self.at_rad is not None:
-            headings = np.full(len(p), self.at_rad)
-        else:
-            headings = np.array([
-                way_out_rad(replace(self.seen, en_m=(float(e), float(n)), velocity_en_mps=(0.0, 0.0)),
-                            self.water, self.habits) for e, n in p])
-        return NOMINAL * np.column_stack([np.sin(headings), np.cos(headings)])
+        inside = shapely.contains_xy(shapely.buffer(self.water, BEYOND_M), p[:, 0], p[:, 1])
+        headings = np.zeros(len(p)) if self.at_rad is None else np.full(len(p), self.at_rad)
+        for i in np.flatnonzero(inside) if self.at_rad is None else ():
+            here = replace(self.seen, en_m=(float(p[i, 0]), float(p[i, 1])), velocity_en_mps=(0.0, 0.0))
+            headings[i] = way_out_rad(here, self.water, self.habits)
+        return np.where(inside[:, None], NOMINAL * np.column_stack([np.sin(headings), np.cos(headings)]), 0.0)

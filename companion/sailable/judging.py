@@ -95,6 +95,9 @@ def _require_consistent(mission: Mission, source: str) -> None:
         raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" steers in GUIDED, which nobody allows',
                          f"write {' and '.join(f'{key} = true' for key in missing)} in [operator], "
                          'or guidance = "plan"')
+    if skipper.guidance == "heading" and mission.autopilot.frame == "motor":
+        raise InputError(source, "[skipper] guidance", '"heading" is for a boat that sails',
+                         'write guidance = "plan" or "field", or frame = "sailboat" in [autopilot]')
     by_field = next((n for n, goal in enumerate(mission.goals, start=1) if goal.field is not None), None)
     if by_field is not None and missing:
         raise InputError(source, f"[[goal]] {by_field} kind", "a field is steered in GUIDED, which nobody allows",

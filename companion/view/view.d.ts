@@ -108,7 +108,7 @@ export interface Figures {
 }
 
 /**
- * A goal of the voyage: a point, a buoy to round (``side``), a line, a box or a search.
+ * A goal of the voyage: a point, a buoy to round (``side``), a line, a box, a search, or a place of a field.
  */
 export interface Goal {
   name: string;

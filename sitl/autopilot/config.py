@@ -38,6 +38,7 @@ class AutopilotConfig:
         has_ftp: offer MAVFTP; small boards are built without it.
         polar: of a boat that is not the simulator's own; None: hers.
         has_motor: an auxiliary motor, run by DO_AUX_FUNCTION 74.
+        is_motorboat: it has no sail, and its motor runs; ``SAIL_ENABLE`` and ``WNDVN_TYPE`` are 0.
         epoch_s: Unix time of the start, as its GPS tells it.
         departures: what the boat is that is not the plan's; None: nothing.
         waters: wind and stream by place, in metres from home; None: the wind alone, everywhere the same.
@@ -58,6 +59,7 @@ class AutopilotConfig:
     has_ftp: bool = True
     polar: Polar | None = None
     has_motor: bool = False
+    is_motorboat: bool = False
     epoch_s: float = EPOCH_S
     departures: Departures | None = None
     waters: Waters | None = None

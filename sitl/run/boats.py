@@ -191,7 +191,9 @@ class RealBoat:
         async with ArduRover(
             require(program), mission.start or mission.origin, wind, speedup=pace, parameters=parameters,
             heading_rad=math.radians(heading_deg_of(scenario, mission)),
-            model="sailboat" + (MOTOR if mission.boat.motor else ""), waters=waters,
+            model="motorboat" if mission.autopilot.frame == "motor" else (
+                "sailboat" + (MOTOR if mission.boat.motor else "")),
+            waters=waters,
         ) as rover:
             yield cls(rover)
         (folder / "autopilot.log").write_text("\n".join(f"{t:.1f} {s} {x}" for t, s, x in rover.texts) + "\n")

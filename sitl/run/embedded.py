@@ -150,6 +150,7 @@ async def run_embedded(
     autopilot = Autopilot(
         AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
                         parameters=scenario.parameters, has_ftp=scenario.has_ftp, has_motor=mission.boat.motor,
+                        is_motorboat=mission.autopilot.frame == "motor",
                         polar=own_polar(mission), epoch_s=scenario.epoch_s, departures=scenario_departures(scenario),
                         waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(start)),
                         recentre_m=recentre_m(mission)),

@@ -32,9 +32,9 @@ def main() -> int:
     autopilot = Autopilot(
         AutopilotConfig(home=home, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
                         parameters=scenario.parameters, polar=own_polar(mission),
-                        departures=scenario_departures(scenario),
-                        waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(home)),
-                        recentre_m=recentre_m(mission)),
+                         is_motorboat=mission.autopilot.frame == "motor", departures=scenario_departures(scenario),
+                         waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(home)),
+                         recentre_m=recentre_m(mission)),
         wind, args.seed,
     )
 

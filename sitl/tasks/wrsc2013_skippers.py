@@ -9,13 +9,12 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
+import shapely
 
 from companion.field.algebra import Uniform
 from companion.field.guidance import go_to, step
-from companion.field.look_ahead import crosses_ahead, foresee, margins
+from companion.field.leave import way_out_rad
 from companion.field.values import GuidanceState, Habits, Intent, Obstacle, Situation
-from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.traffic import TargetLimits, Targets, Vessel, decode_json, predict
 from companion.traffic.occupancy import Keep
@@ -25,7 +24,6 @@ from sitl.world import LENGTH_M
 HALF_M = 100.0
 SHUTTLE_M = 30.0      # while waiting: to and fro across the wind, this far each side of the centre
 WAIT_BOX_M = 85.0
-AHEAD_S = 25.0        # what crossing ahead of the intruder is held to cost, at its bow
 FAR_M = 600.0         # beyond what both can run in a minute and a half
 CLEARANCE_M = 12.0    # between hulls; the task asks for 5
 KEEP = Keep(sigmas=risk_factor(1e-4), clearance_m=CLEARANCE_M, own_radius_m=0.5 * LENGTH_M, own_timing_mps=0.05,
@@ -100,18 +98,8 @@ class FieldSkipper:
         assert seen.twd_from_rad is not None
         if max(abs(seen.en_m[0]), abs(seen.en_m[1])) > self._half_m + 30.0 and self._exit_rad is not None:
             return Intent(field=Uniform(self._exit_rad))
-        fan = np.radians(np.arange(0.0, 360.0, 10.0))
-        twa = np.abs((seen.twd_from_rad - fan + math.pi) % (2.0 * math.pi) - math.pi)
-        fan = fan[twa > habits.no_go_half_rad + math.radians(4.0)]
-        track, _ = foresee(fan, seen.twd_from_rad, seen, replace(habits, horizon_s=150.0))
-        outside = np.max(np.abs(track), axis=2) > self._half_m + 5.0
-        soon = np.where(outside.any(axis=1), outside.argmax(axis=1), outside.shape[1]) * 2.5
-        margin = margins(track, seen.obstacles)
-        cost = soon + np.where(margin < 10.0, 20.0 * (10.0 - np.maximum(margin, -20.0)) / 10.0, 0.0)
-        cost = cost + AHEAD_S * crosses_ahead(track, seen.obstacles)
-        if self._exit_rad is not None:
-            cost = cost + 8.0 * (1.0 - np.cos(fan - self._exit_rad))
-        self._exit_rad = wrap_pi(float(fan[int(np.argmin(cost))]))
+        square = shapely.box(-self._half_m, -self._half_m, self._half_m, self._half_m)
+        self._exit_rad = way_out_rad(seen, square, habits, self._exit_rad)
         return Intent(field=Uniform(self._exit_rad))
 
 

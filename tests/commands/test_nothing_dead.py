@@ -180,6 +180,8 @@ def mission(path, table="", key="", value=None):
             raw["passage"] = {"leg_m": 60_000.0}
         if key == "tunnel":
             raw["planner"] = {"tunnel_width_m": 60.0}
+        if (table, key) == ("autopilot", "frame"):
+            raw["boat"] = {"polar": 2.0}
         place = raw[table][0] if table in {"goal", "refuge"} else raw.setdefault(table, {})
         place[key] = value
     elif key:
@@ -207,6 +209,8 @@ def base_for(path, table, key):
         return mission(path, "passage", "leg_m", 60_000.0)
     if key == "tunnel":
         return mission(path, "planner", "tunnel_width_m", 60.0)
+    if (table, key) == ("autopilot", "frame"):
+        return mission(path, "boat", "polar", 2.0)
     if table == "planner":
         return mission(path, "skipper", "planner", "rrtstar" if key in RRTSTAR else "astar")
     if key in KALMAN:

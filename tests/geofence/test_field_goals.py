@@ -170,6 +170,17 @@ def test_whatever_stands_for_an_atom_raises_input_error_alone(value, kind):
     assert "\n" not in said
 
 
+def test_a_motor_boat_has_a_speed_and_no_polar(tmp_path):
+    text = RING + '[autopilot]\nframe = "motor"\n'
+    with pytest.raises(InputError, match=r"\[boat\] polar: a motor boat has no polar, and hers is 'ardurover'; write"):
+        load(tmp_path, text)
+    boat = voyage_of(load(tmp_path, text + "[boat]\npolar = 2.0\n")).boat
+    assert boat.no_go_half_rad == 0.0
+    assert boat.polar.speed_mps(0.0, 7.0) == boat.polar.speed_mps(3.0, 1.0) == 2.0
+    with pytest.raises(InputError, match='"heading" is for a boat that sails'):
+        load(tmp_path, text + '[boat]\npolar = 2.0\n[skipper]\nguidance = "heading"\n')
+
+
 def test_check_tells_of_atoms_that_nobody_sails_by_and_of_a_field_without_a_value(tmp_path, capsys):
     (tmp_path / "m.toml").write_text(RING + MORE.partition("[field.lane]")[0])
     assert main(["mission", "check", str(tmp_path / "m.toml")]) == 0

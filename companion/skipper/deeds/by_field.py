@@ -305,8 +305,8 @@ def keeps_station(turn: Turn) -> bool:
     place = turn.gates[-1].en_m
     off = "" if boat is None else f", {distance_m(boat, place):.0f} m off"
     turn.phase(Doing.HOLDING, f"keeping station: waiting {left_s:.0f} s more{off}")
-    if turn.guidance is not Guidance.FIELD or not turn.steers:
-        hand_back(turn)   # out of GUIDED, where the goal was reached by headings
+    if turn.guidance is not Guidance.FIELD or not turn.steers or not turn.config.sails:
+        hand_back(turn)   # out of GUIDED; a motorboat lies still in the autopilot's own loiter
         return True
     status, seen = turn.autopilot, situation(turn)
     if status is not None and status.mode is not Mode.GUIDED:

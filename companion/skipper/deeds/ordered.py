@@ -244,7 +244,7 @@ def _replace(turn: Turn, _: Order) -> Answer:
 
 def _say_why(turn: Turn, _: Order) -> Answer:
     state = turn.state
-    tack_s = next_tack_s(turn, turn.voyage.boat.polar)
+    tack_s = next_tack_s(turn, turn.voyage.boat.polar) if turn.config.sails else None
     tack = "" if tack_s is None else f"; next tack in {tack_s:.0f} s"
     order = state.standing
     under = "" if order is None else f"; {order.words} for {order.age_s(turn.t_s) / 60.0:.0f} min, {order.why}"

@@ -31,7 +31,7 @@ def corridor_room_m(turn: Turn) -> float | None:
     the autopilot then sails to the layline, wherever that is.
     """
     corridor, wind = turn.tack_corridor_m, turn.wind_mean
-    if wind is None or not 0.0 < corridor <= WIDEST_M:
+    if wind is None or not 0.0 < corridor <= WIDEST_M or not turn.config.sails:
         return None
     speed = turn.voyage.boat.polar.speed_mps(turn.no_go_half_rad, wind[1])
     return corridor + OVERSHOOT_S * speed + turn.config.margin_floor_m

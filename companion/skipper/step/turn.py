@@ -32,6 +32,7 @@ from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import Snapshot, wind_mean, wind_now
 from companion.skipper.step.state import Phase, Retry, SkipperState, is_given_up
+from companion.skipper.step.still_air import still_air
 from companion.skipper.way.circle import Circle, circle_of
 from companion.skipper.way.gates import Approach, Gate, gates_of
 from companion.skipper.way.voyage import PointEn, Voyage
@@ -76,7 +77,8 @@ class Turn:
     ) -> None:
         self.circle = circle_of(voyage, snapshot.limits, snapshot.autopilot, snapshot.position_en_m)
         self.voyage, self.config = _kept_in(voyage, self.circle), config
-        self.state, self.snapshot = state, snapshot
+        self.state = state
+        self.snapshot = snapshot if config.sails else replace(snapshot, wind=still_air(snapshot.t_s))
         self.actions: list[Action] = []
         self._gates: tuple[tuple[Approach, ...], tuple[Gate, ...]] | None = None
 
@@ -218,13 +220,17 @@ class Turn:
 
     @property
     def no_go_half_rad(self) -> float:
-        """Where the autopilot stops following the line: SAIL_NO_GO_ANGLE."""
+        """Where the autopilot stops following the line: SAIL_NO_GO_ANGLE; nowhere where it does not sail."""
+        if not self.config.sails:
+            return 0.0
         limits = self.snapshot.limits
         return self.config.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
 
     @property
     def planned_no_go_rad(self) -> float:
         """The half angle that plans keep out of."""
+        if not self.config.sails:
+            return 0.0
         return max(self.no_go_half_rad + self.config.no_go_pad_rad, self.voyage.boat.no_go_half_rad)
 
     @property

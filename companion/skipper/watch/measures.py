@@ -57,7 +57,7 @@ def _becalmed(turn: Turn) -> float | None:
 
 def _irons(turn: Turn) -> float | None:
     wind, vehicle = turn.wind_now, turn.snapshot.vehicle
-    if wind is None or vehicle is None or wind[1] < IRONS_TWS_MPS or turn.boat_en is None:
+    if wind is None or vehicle is None or wind[1] < IRONS_TWS_MPS or turn.boat_en is None or not turn.config.sails:
         return None
     if abs(difference_rad(wind[0], vehicle.heading_rad)) > IRONS_TWA_RAD:
         return BY_NAME["in irons"].exit

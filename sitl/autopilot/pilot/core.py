@@ -20,6 +20,8 @@ INVALID_RESULT = 0x20000000
 INTERNAL_ERROR = f"Internal errors 0x{INVALID_RESULT:x} l:90 invalid arguments"
 WARM_BOOT_S = 60.0
 
+MOTORBOAT = {"SAIL_ENABLE": 0.0, "WNDVN_TYPE": 0.0}   # there is no sail, and nothing that tells the wind
+
 
 class Core:
     """State that belongs to no single part. ``power_up`` forgets what a reboot forgets."""
@@ -28,7 +30,8 @@ class Core:
         self.config = config
         self.voice = Voice(config.sysid)
         self.chart = Chart(config.home)
-        self.parameters = Parameters(config.parameters, new_names=config.new_parameter_names)
+        given = {**(MOTORBOAT if config.is_motorboat else {}), **config.parameters}
+        self.parameters = Parameters(given, new_names=config.new_parameter_names)
         twd, tws = wind.at(0.0)
         self.parameters.put("SIM_WIND_DIR", math.degrees(twd))
         self.parameters.put("SIM_WIND_SPD", tws)
@@ -37,6 +40,7 @@ class Core:
             wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed,
             polar=config.polar, surroundings=_about(config, wind, seed),
         )
+        self.run_motor(on=False)
         self._told = (self.vehicle.position, self.chart.to_e7(self.vehicle.position))
         self.battery_v = config.battery_v
         self.leaks: bool | None = None   # what a script of the boat's tells of her bilge
@@ -132,7 +136,7 @@ class Core:
 
         As on the real one (measured) nothing is said by a boat that has none.
         """
-        self.vehicle.run_motor(on=on and self.config.has_motor)
+        self.vehicle.run_motor(on=self.config.is_motorboat or (on and self.config.has_motor))
 
     def err_internally(self) -> None:
         """Find a result that cannot be, as the S-curve of a leg without limits is: no arming until a reboot."""

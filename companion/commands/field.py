@@ -1,0 +1,106 @@
+"""``companion field``: what a field that a mission composes would do, in words, as a picture, as a page."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import TYPE_CHECKING
+
+from companion.commands.output import patience
+from companion.program.arguments import picture, whole, wind
+
+if TYPE_CHECKING:
+    from companion.geofence import Mission
+    from companion.sailable.fields import Previewed
+
+_EPILOG = """\
+examples:
+  companion field missions/field-ring.toml
+  companion field missions/field-square.toml --goal 2 --plot leave.png
+  companion field missions/field-lane.toml --wind 5@40 --fans --plot lane.png
+
+FILE is a mission with a goal of kind = "field", or one of [skipper] guidance = "field". The wind is steady, there
+are no vessels and no current; the boat is at the start, or where the goal before was.
+Exit codes: 0 told or drawn, 2 the mission cannot be read, or has no field.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
+    """Add the command's options."""
+    parser = subparsers.add_parser(
+        "field", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", metavar="FILE", help="a mission TOML")
+    parser.add_argument("--goal", type=whole(at_least=1), metavar="N", help="its number (else the first by a field)")
+    parser.add_argument("--wind", type=wind, metavar="SPEED@FROM",
+                        help="[m/s, degrees] (else what the mission's previews assume)")
+    parser.add_argument("--plot", type=picture, metavar="P.png", help="draw it with the boat's fan, wind and obstacles")
+    parser.add_argument("--fans", action="store_true", help="in the picture: Schmitt's fan at every arrow, too")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Tell of a field, and draw it."""
+    from companion.geofence import load_mission
+    from companion.sailable import require_sailable
+    from companion.sailable.fields import fan_of, previewed, sailed
+
+    mission = require_sailable(load_mission(args.file))
+    seen = previewed(mission, number=args.goal, wind=args.wind)
+    fan, track = fan_of(seen), sailed(seen)
+    print("\n".join(_words(mission, seen)))
+    end = math.dist(track[-1, 1:3], seen.place_en)
+    print(f"the boat at {seen.here_en[0]:.0f} m east, {seen.here_en[1]:.0f} m north: the field says "
+          f"{_heading(fan.wanted_rad)}, she is steered {_heading(fan.chosen_rad)}")
+    print(f"sailed by it in a steady wind: {track[-1, 0]:.0f} s, ends {end:.0f} m from {seen.name}")
+    if args.plot:
+        from companion.plots.composed import save_field
+
+        with patience("drawing"):
+            save_field(seen, fan, track, args.plot, has_fans=args.fans,
+                       title=f"{mission.name}, goal {seen.number}: {seen.tree.text}")
+        print(f"{args.plot}: written")
+    return 0
+
+
+def _words(mission: Mission, seen: Previewed) -> list[str]:
+    """Return what the field is made of."""
+    from companion.field.tree import Along, AwayFrom, AwayFromLine, Heading, OutOf, PointTo, Round, StayAt
+    from companion.sailable.fields import without_value
+
+    def place(at: tuple[float, float]) -> str:
+        return f"{at[0]:.0f} m east, {at[1]:.0f} m north"
+
+    out = [f"{mission.path}: goal {seen.number}, {seen.name}: {seen.tree.text}, {seen.composed.until_words}"]
+    for name, atom in seen.tree.atoms:
+        if isinstance(atom, Round):
+            words = f"round a circle of {atom.radius_m:g} m about {place(atom.at_en)}, " + (
+                "clockwise" if atom.is_clockwise else "anticlockwise")
+        elif isinstance(atom, PointTo | StayAt):
+            words = f"{'to and about' if isinstance(atom, StayAt) else 'to'} {place(atom.at_en)}"
+        elif isinstance(atom, Along):
+            words = f"along the line from {place(atom.from_en)} to {place(atom.to_en)}"
+        elif isinstance(atom, AwayFrom):
+            words = f"away from {place(atom.at_en)}, within about {atom.range_m:g} m"
+        elif isinstance(atom, AwayFromLine):
+            ends = f"{place(atom.from_en)} and {place(atom.to_en)}"
+            words = f"away from the line through {ends}, within about {atom.range_m:g} m"
+        elif isinstance(atom, Heading):
+            words = f"{_heading(atom.heading_rad)} everywhere"
+        else:
+            assert isinstance(atom, OutOf)
+            words = f"out of {atom.water_en.area / 1e4:.1f} ha of water by the heading that is soonest out"
+        out.append(f"  {name}: {words}")
+    twd = seen.conditions.twd_from_rad
+    out.append("a motorboat: no wind is needed" if twd is None else
+               f"wind {seen.conditions.seen.tws_mps:g} m/s from {_heading(twd)}, no-go zone "
+               f"{math.degrees(seen.conditions.habits.no_go_half_rad):.0f}° to either side")
+    share = without_value(seen)
+    if share > 0.0:
+        out.append(f"without a value in {100.0 * share:.0f} % of the square of {2.0 * seen.half_m:.0f} m about it: "
+                   "there she would not be steered")
+    return out
+
+
+def _heading(heading_rad: float) -> str:
+    return f"{math.degrees(heading_rad) % 360.0:03.0f}°"
