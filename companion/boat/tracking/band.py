@@ -3,8 +3,8 @@
 The autopilot tacks where she is a corridor off the line, at most every five seconds; what she sails beyond the edge
 depends on her speed and on how squarely she crosses it. A wind that spreads turns her course by as much as the leg may
 lie off the wind: so legs off the wind by ``SQUARE_RAD`` to either side stand for it. In winds with a spread of 18.6
-degrees nine boards in ten stay within this (a test holds it); which share of the boards of a plan's own legs keeps clear
-is judged in drawn winds (``companion.planner.track``).
+degrees nine boards in ten stay within this (a test holds it); which share of the boards of a plan's own legs keeps
+clear is judged in drawn winds (``companion.planner.track``).
 """
 
 from __future__ import annotations

@@ -16,8 +16,14 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.boat.tracking import Predicted, are_near_short, drawn_winds, predict, stated_error_m
-from companion.boat.tracking.helm import CURVE_NODES
+from companion.boat.tracking import (
+    CURVE_NODES,
+    Predicted,
+    are_near_short,
+    drawn_winds,
+    predict,
+    stated_error_m,
+)
 from companion.planner.plan import Leg
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.tracking import Tracking
