@@ -14,6 +14,6 @@ from companion.boat.tracking.helm import CURVE_NODES, Helm
 from companion.boat.tracking.predict import Predicted, curve_of, drawn_winds, predict
 
 __all__ = [
-    "CURVE_NODES", "SHORT_S", "Helm", "Predicted", "are_near_short", "beat_band_m", "curve_of", "drawn_winds", "predict",
-    "stated_error_m",
+    "CURVE_NODES", "SHORT_S", "Helm", "Predicted", "are_near_short", "beat_band_m", "curve_of", "drawn_winds",
+    "predict", "stated_error_m",
 ]

@@ -30,7 +30,7 @@ from companion.planner.problem.tracking import Tracking
 from companion.planner.problem.value import Problem
 
 RUN_UP_M = 40.0      # of the leg before the start: she is on it, and rounds the corner between
-BESIDE_M = 15.0      # of that leg's end the corner is the plan's
+BESIDE_M = 15.0      # of that leg's end the corner is the plan's; within this of her own place the error grows
 SPARE_M = 0.3        # a start that is nearer than the floor need come no nearer than this more
 SIGMA_AT_S = 60.0    # horizon at which the spread is taken for boards
 
@@ -99,7 +99,10 @@ def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray
     best = float(np.max(curve))
     near = are_near_short(np.hypot(*np.diff(whole, axis=0).T), best)[first:]
     errors = np.array([stated_error_m(best, has_short=bool(short) or not tracking.is_known) for short in near])
-    room = distance - errors[leg] - tracking.reach_m
+    error = errors[leg]
+    if not first:
+        error = error * np.minimum(1.0, np.hypot(*(en - path[0]).T) / BESIDE_M)   # where she begins is known
+    room = distance - error - tracking.reach_m
     need = np.full(len(room), tracking.floor_m)
     clear = np.flatnonzero(room >= need)
     begin = int(clear[0]) if len(clear) else len(room)

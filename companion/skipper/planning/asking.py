@@ -54,7 +54,9 @@ def request(
             turn.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
             delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
             beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk,
-            tracking=problem_tracking(turn, start, from_index, floor_m=floor_m, forecast=forecast),
+            tracking=problem_tracking(
+                turn, start, from_index, floor_m=min(turn.config.margin_floor_m, turn.config.margin_m),
+                forecast=forecast),
         ))
     except (ValueError, InputError) as error:
         turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")

@@ -40,8 +40,8 @@ def rungs(config: SkipperConfig, *, track_m: float = 0.0) -> tuple[Rung, ...]:
                 planner=config.planner)]
     if config.planner.algorithm != AUTO.algorithm:
         out.append(replace(out[0], name=f"planner {AUTO.algorithm}", planner=AUTO))
-    if config.margin_floor_m + track_m > config.margin_m:
-        needed = config.margin_floor_m + track_m
+    needed = min(config.margin_floor_m, config.margin_m) + track_m
+    if needed > config.margin_m:
         out.append(replace(out[-1], name=f"margin {needed:.1f} m for her track", margin_m=needed))
     for share in (*config.margin_ladder, 0.0):
         margin = floor + share * room

@@ -40,7 +40,7 @@ def problem_tracking(
         "floor_m": floor_m, "reach_m": turn.voyage.boat.hull.reach_m,
         "solids": area.obstacles_wkt(0.0), "limits": area.fence_wkt(0.0, start.en_m),
         "before": None if before is None else {"x": before[0], "y": before[1]},
-        "correlation_s": forecast.correlation_time_s, "known": limits is not None,
+        "correlation_s": forecast.correlation_time_s, "known": _is_known(turn),
     }
 
 
@@ -50,9 +50,15 @@ def steps(turn: Turn) -> tuple[Rung, ...]:
     if wind is None:
         return rungs(turn.config)
     best = turn.voyage.boat.polar.max_speed_mps(wind[1])
-    error_m = stated_error_m(best, has_short=turn.snapshot.limits is None)
+    error_m = stated_error_m(best, has_short=not _is_known(turn))
     track_m = error_m + turn.voyage.boat.hull.reach_m
     return rungs(turn.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m))
+
+
+def _is_known(turn: Turn) -> bool:
+    """Return whether the parameters that shape the track were read."""
+    limits = turn.snapshot.limits
+    return limits is not None and limits.wp_speed_mps is not None
 
 
 def of_way(problem: Problem, way: Sequence[PointEn], *, heading_rad: float, before_en: PointEn | None) -> Expected:
