@@ -42,7 +42,7 @@ class AutopilotLimits:
     sail_xtrack_max_m: float = 10.0  # 0: no corridor, long boards to the layline
     wp_radius_m: float = 2.0
     turn_radius_m: float = 0.9
-    wp_speed_mps: float = 2.0        # of the point that the boat follows; a sailboat's speed does not obey it
+    wp_speed_mps: float | None = None   # of the point that she follows, not of her; None: it was not read
     wp_accel_mps2: float = 1.0       # of that point
     wp_jerk_mps3: float = 1.0
     fence_action: int | None = None  # None: no fence guards this obstacle; 0 report .. 4, see FENCE_ACTION
@@ -75,7 +75,7 @@ class AutopilotLimits:
             sail_xtrack_max_m=float(params.get("SAIL_XTRACK_MAX", default.sail_xtrack_max_m)),
             wp_radius_m=float(params.get("WP_RADIUS", default.wp_radius_m)),
             turn_radius_m=float(params.get("TURN_RADIUS", default.turn_radius_m)),
-            wp_speed_mps=params.get("WP_SPEED", 0.0) or default.wp_speed_mps,
+            wp_speed_mps=params.get("WP_SPEED", 0.0) or None,
             wp_accel_mps2=accel, wp_jerk_mps3=params.get("WP_JERK", 0.0) or accel,
             fence_action=action if fenced else None,
             fence_circle_m=params.get("FENCE_RADIUS") if is_circled else None,

@@ -85,7 +85,8 @@ def in_words(record: VoyageRecord) -> list[str]:
     lines += _plans(record)
     if s.min_clearance_m is not None:
         touched = "no contact" if not s.contacts else f"{counted(s.contacts, 'contact')}!"
-        lines.append(f"Nearest to an obstacle or the fence: {s.min_clearance_m:.1f} m, {touched}.")
+        promised = "" if s.promised_clearance_m is None else f" (plans expected {s.promised_clearance_m:.1f} m or more)"
+        lines.append(f"Nearest to an obstacle or the fence: {s.min_clearance_m:.1f} m{promised}, {touched}.")
     if s.promised_risk is not None:
         whole = f" and {100.0 * s.path_risk:.0f} % over a whole way" if s.path_risk is not None else ""
         lines.append(f"Chance that plans gave the wind to force her into the no-go zone: up to "

@@ -80,7 +80,9 @@ class Plan:
     ``cost_s`` is the time of the path (inf without one), ``lower_bound_s`` a proved bound from below (inf when
     INFEASIBLE). ``expansions`` is the effort spent, ``elapsed_s`` the computing time, ``first_s`` the computing
     time to the first path (None without one). ``risk`` is what is promised of the whole path, wind and vessels added;
-    ``vessel_risk`` is the vessels' part of it (0 where none is uncertain).
+    ``vessel_risk`` is the vessels' part of it (0 where none is uncertain). ``expected_clearance_m`` is the least
+    distance from what is solid that is expected of the hull on the predicted track, that prediction's error taken off,
+    and ``expected_at_en`` where (None: the problem says nothing of the track, or nothing is solid).
     """
 
     status: PlanStatus
@@ -96,6 +98,8 @@ class Plan:
     first_s: float | None = None
     risk: float | None = None
     vessel_risk: float = 0.0
+    expected_clearance_m: float | None = None
+    expected_at_en: tuple[float, float] | None = None
     why: Why = Why()
     trace: Mapping[str, Any] = field(default_factory=dict)
 
@@ -127,6 +131,9 @@ class Plan:
             "first_s": self.first_s,
             "risk": self.risk,
             "vessel_risk": self.vessel_risk,
+            **({} if self.expected_clearance_m is None else {
+                "expected_clearance_m": self.expected_clearance_m,
+                "expected_at": None if self.expected_at_en is None else list(self.expected_at_en)}),
             "legs": [_leg_dict(leg) for leg in self.legs],
             "why": {"text": self.why.text, "data": dict(self.why.data)},
         }
@@ -151,6 +158,8 @@ class Plan:
             first_s=raw["first_s"],
             risk=raw["risk"],
             vessel_risk=float(raw.get("vessel_risk", 0.0)),
+            expected_clearance_m=raw.get("expected_clearance_m"),
+            expected_at_en=None if raw.get("expected_at") is None else (raw["expected_at"][0], raw["expected_at"][1]),
             why=Why(text=raw["why"]["text"], data=raw["why"]["data"]),
         )
 

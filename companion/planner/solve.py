@@ -11,15 +11,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from companion.errors import InputError
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.defects import defect_of
-from companion.planner.problem.evaluate import clearances, evaluate
+from companion.planner.problem.evaluate import Evaluation, clearances, evaluate
 from companion.planner.problem.sharing import resolved
 from companion.planner.problem.value import Problem
 from companion.planner.settings import SETTINGS, Settings
@@ -104,19 +106,25 @@ def _solved(problem: Problem, effort: Effort, empty: Plan, settings: Settings | 
     search: Search = found if settings is None else partial(found, settings=settings)
     from companion.planner.risk.wind import keep_limit, search_within, with_risk
 
-    def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
-        return search(resolved(problem), effort, seed)
-
     if problem.beat is not None and problem.boat.can_tack and empty.algorithm == "auto":
         from companion.planner.beat_search import with_beats
 
         search = with_beats(search, problem.beat)
+
+    def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
+        return search(resolved(problem), effort, seed)
+
+    whole: Search = search_resolved
+    if problem.tracking is not None:
+        from companion.planner.track import with_track
+
+        whole = with_track(search_resolved)
     if problem.risk is None:
-        return with_risk(problem, _judged(problem, search_resolved(problem, effort, empty.seed), effort, empty))
+        return with_risk(problem, _judged(problem, whole(problem, effort, empty.seed), effort, empty))
     if empty.algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)
-        outcome = search_resolved(problem, effort, empty.seed)
+        outcome = whole(problem, effort, empty.seed)
     else:
-        outcome = search_within(search_resolved, problem, effort, empty.seed)
+        outcome = search_within(whole, problem, effort, empty.seed)
     return keep_limit(problem, _judged(problem, outcome, effort, empty))
 
 
@@ -140,5 +148,16 @@ def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> 
     return replace(
         spent, status=status, reason=reason, waypoints_en=np.array(outcome.waypoints_en, dtype=np.float64),
         legs=clearances(problem, judged.legs), cost_s=judged.time_s, lower_bound_s=bound, first_s=effort.first_s,
-        elapsed_s=effort.elapsed_s,
+        elapsed_s=effort.elapsed_s, **_expected(problem, outcome.waypoints_en, judged),
     )
+
+
+def _expected(problem: Problem, waypoints_en: NDArray[np.float64], judged: Evaluation) -> dict[str, Any]:
+    """Return what a plan says of its track, by its fields."""
+    if problem.tracking is None:
+        return {}
+    from companion.planner.track import expected
+
+    seen = expected(problem, waypoints_en, judged.legs)
+    is_near = math.isfinite(seen.clearance_m)
+    return {"expected_clearance_m": seen.clearance_m if is_near else None, "expected_at_en": seen.at_en}

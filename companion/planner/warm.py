@@ -19,6 +19,7 @@ def warm_problems() -> tuple[Problem, Problem]:
                  "speed": {"model": "polar", "twa_deg": [0, 45, 90, 180], "v_mps": [0, 1, 1.6, 1.2]}},
         "delta_s": 0.6, "targets": [{"x": 500, "y": 500, "radius_m": 1, "spread": {
             "vessel": 1, "x": 500, "y": 500, "course_deg": 0, "keep_m": 1, "along_m": 1, "across_m": 1, "sigma_m": 1}}],
+        "tracking": {"floor_m": 1.0, "solids": ["POLYGON ((-14 41, 14 41, 14 59, -14 59, -14 41))"]},
     }
     tacks = base["boat"] | {"can_tack": True, "tack_loss_s": 2.0}
     return Problem.from_json(base), Problem.from_json(base | {"boat": tacks, "fence": None, "targets": []})

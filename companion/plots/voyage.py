@@ -55,7 +55,8 @@ def _title(record: VoyageRecord) -> str:
             parts.append(f"{s.time_s:.0f} s, {s.distance_m or 0.0:.0f} m")
         parts.append(f"{counted(s.tacks, 'tack')}, {counted(s.replans, 'replan')}")
         if s.min_clearance_m is not None:
-            parts.append(f"smallest clearance {s.min_clearance_m:.1f} m")
+            promised = "" if s.promised_clearance_m is None else f" (expected {s.promised_clearance_m:.1f} m)"
+            parts.append(f"smallest clearance {s.min_clearance_m:.1f} m{promised}")
         if s.promised_risk is not None:
             parts.append(f"promised risk {100.0 * s.promised_risk:.0f} %")
     return "   ·   ".join([chart.name or record.folder.name, *(w for w in where if w)]) + "\n" + "   ·   ".join(parts)

@@ -32,6 +32,7 @@ from companion.skipper.intake import (
     take_outcomes,
 )
 from companion.skipper.planning.ladder import rungs
+from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.step.actions import Action, CancelPlan, RequestPlan, Severity
 from companion.skipper.step.causes import PERSON
 from companion.skipper.step.config import SkipperConfig
@@ -112,7 +113,8 @@ class Skipper:
 
         It changes nothing but the time of the first plans.
         """
-        for margin_m in sorted({step.margin_m for step in rungs(self.config)}):
+        ladders = [rungs(self.config, track_m=track_m) for track_m in TRACKS_M[:2]]   # of winds up to 5 m/s, mostly
+        for margin_m in sorted({0.0, *(step.margin_m for ladder in ladders for step in ladder)}):
             self.voyage.area.obstacles_wkt(margin_m)
         self.voyage.area.clearance_m([(0.0, 0.0)])
 

@@ -156,4 +156,6 @@ def print_verdict(verdict: Any) -> None:
     print(f"{'PASSED' if verdict.passed else 'FAILED'}  {verdict.scenario} seed {verdict.seed}: "
           f"{f['time_s']:.0f} s, {f['distance_m']:.0f} m, {counted(f['tacks'], 'tack')}, "
           f"{counted(f['replans'], 'replan')}, " + (
-              "nothing to be clear of" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"))
+              "nothing to be clear of" if f["min_clearance_m"] is None else
+              f"clearance {f['min_clearance_m']:.1f} m" + (
+                  "" if f.get("promised_clearance_m") is None else f" (promised {f['promised_clearance_m']:.1f} m)")))

@@ -305,6 +305,7 @@ def judge(
             "end_distance_m": end_distance,
             "silence_s": silence_s,
             "replans": summary.get("replans"),
+            "promised_clearance_m": summary.get("promised_clearance_m"),
             "promised_risk": summary.get("promised_risk"),
             "no_go_entries": summary.get("no_go_entries"),
             "end_reason": summary.get("end_reason"),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from companion.boat.margins import AutopilotLimits
 from companion.boat.tracking import kernel as k
 
+DEFAULT_WP_SPEED_MPS = 2.0   # the firmware's
 CURVE_NODES = 91           # of the polar: every two degrees
 
 
@@ -41,7 +42,7 @@ class Helm:
 
     wp_radius_m: float = 2.0
     turn_radius_m: float = 0.9
-    wp_speed_mps: float = 2.0
+    wp_speed_mps: float = DEFAULT_WP_SPEED_MPS
     accel_mps2: float = 1.0
     jerk_mps3: float = 1.0
     pos_p: float = 0.2
@@ -68,9 +69,10 @@ class Helm:
 
     @classmethod
     def of(cls, limits: AutopilotLimits) -> Helm:
-        """Return the helm of an autopilot whose parameters are known."""
+        """Return the helm of an autopilot; what was not read is ArduRover's default."""
+        speed = DEFAULT_WP_SPEED_MPS if limits.wp_speed_mps is None else limits.wp_speed_mps
         return cls(
-            wp_radius_m=limits.wp_radius_m, turn_radius_m=limits.turn_radius_m, wp_speed_mps=limits.wp_speed_mps,
+            wp_radius_m=limits.wp_radius_m, turn_radius_m=limits.turn_radius_m, wp_speed_mps=speed,
             accel_mps2=limits.wp_accel_mps2, jerk_mps3=limits.wp_jerk_mps3,
             no_go_half_rad=limits.sail_no_go_angle_rad, corridor_m=limits.sail_xtrack_max_m)
 

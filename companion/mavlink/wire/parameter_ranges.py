@@ -18,6 +18,11 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "SAIL_LOIT_RADIUS": (0.0, 10_000.0),
     "WP_RADIUS": (0.0, 10_000.0),
     "TURN_RADIUS": (0.0, 10_000.0),
+    # the point on the legs that she follows
+    "WP_SPEED": (0.0, 100.0),
+    "WP_ACCEL": (0.0, 100.0),
+    "WP_JERK": (0.0, 100.0),
+    "ATC_ACCEL_MAX": (0.0, 100.0),
     "FENCE_ENABLE": (0.0, 1.0),
     "FENCE_ACTION": (0.0, 255.0),
     "FENCE_TYPE": (0.0, 255.0),

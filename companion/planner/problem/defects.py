@@ -72,6 +72,7 @@ def defect_of(p: Problem) -> str | None:
         (p.beat is None or (0.0 < p.beat.no_go_half_rad < 0.5 * math.pi and 0.0 < p.beat.corridor_m < math.inf
                             and 0.0 <= p.beat.clearance_m < math.inf and 0.0 <= p.beat.tack_s < math.inf),
          "beat needs 0 < no_go_half_deg < 90, corridor_m > 0, clearance_m >= 0 and tack_s >= 0"),
+        (p.tracking is None or p.tracking.is_finite, "tracking has a number that is negative or not finite"),
         (p.beat is None or p.current.drift_mps == 0.0, "a beat left to the autopilot is not planned in a current"),
     )
     for holds, text in checks:

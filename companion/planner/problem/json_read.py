@@ -25,9 +25,11 @@ from companion.planner.problem.parts import (
 )
 
 if TYPE_CHECKING:
+    from companion.planner.problem.tracking import Tracking
     from companion.traffic.occupancy import Spread
 
 T = TypeVar("T")
+HELM_KEYS = ("wp_radius_m", "turn_radius_m", "wp_speed_mps", "accel_mps2", "jerk_mps3", "corridor_m")
 _NAN = re.compile(r"\bnan\b", re.IGNORECASE)
 
 
@@ -163,7 +165,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         raise InputError(source, "targets", "is not a list", "write a list of objects")
     twa, mps = _parse_speed(boat.child("speed"))
     known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
-             "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat", "obstacle_names"}
+             "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat", "obstacle_names", "tracking"}
     fields: dict[str, Any] = dict(  # noqa: C408, the names of Problem's fields
         id=top.text("id", ""),
         title=top.text("title", ""),
@@ -199,6 +201,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         risk=_parse_risk(_Reader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,
         clearance_floor_m=top.number("clearance_floor_m", 0.0),
         beat=_parse_beat(top.child("beat")) if raw.get("beat") is not None else None,
+        tracking=_parse_tracking(top.child("tracking")) if raw.get("tracking") is not None else None,
         extra={k: v for k, v in raw.items() if k not in known},
     )
     return fields | ({"leg_saving": top.number("leg_saving")} if "leg_saving" in raw else {})
@@ -286,3 +289,27 @@ def _parse_beat(beat: _Reader) -> Beat:
     return Beat(
         no_go_half_rad=math.radians(beat.number("no_go_half_deg")), corridor_m=beat.number("corridor_m"),
         clearance_m=beat.number("clearance_m"), tack_s=beat.number("tack_s", 0.0))
+
+
+def _parse_tracking(track: _Reader) -> Tracking:
+    from companion.boat.tracking import Helm
+    from companion.planner.problem.tracking import Tracking
+
+    default = Helm()
+    numbers = {name: track.number(name, getattr(default, name)) for name in HELM_KEYS}
+    angle = track.number("no_go_half_deg", math.degrees(default.no_go_half_rad))
+    try:
+        helm = Helm(**numbers, no_go_half_rad=math.radians(angle))
+    except ValueError as error:
+        raise InputError(track.source, track.place, str(error), "see docs/problem-format.md") from error
+    solids = track.raw.get("solids") or []
+    if not isinstance(solids, (list, tuple)):
+        raise InputError(track.source, "tracking.solids", "is not a list", "write a list of WKT polygons")
+    limits, before = track.raw.get("limits"), track.raw.get("before")
+    at = None if before is None else track.child("before")
+    return Tracking(
+        helm=helm, floor_m=track.number("floor_m"), reach_m=track.number("reach_m", 0.0),
+        solids=tuple(_polygon(w, track.source, f"tracking.solids[{i}]") for i, w in enumerate(solids)),
+        limits=None if limits is None else _polygon(limits, track.source, "tracking.limits"),
+        before_en=None if at is None else (at.number("x"), at.number("y")),
+        correlation_s=track.number("correlation_s", 60.0), is_known=track.flag("known", True))

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import shapely
 
+from companion.planner.problem.json_read import HELM_KEYS
 from companion.planner.problem.value import LEG_SAVING, Problem
 
 if TYPE_CHECKING:
+    from companion.planner.problem.tracking import Tracking
     from companion.traffic.occupancy import Spread
 
 
@@ -93,4 +95,16 @@ def to_dict(p: Problem) -> dict[str, Any]:
     if p.beat is not None:
         out["beat"] = {"no_go_half_deg": deg(p.beat.no_go_half_rad), "corridor_m": p.beat.corridor_m,
                        "clearance_m": p.beat.clearance_m, "tack_s": p.beat.tack_s}
+    if p.tracking is not None:
+        out["tracking"] = _tracking_dict(p.tracking)
     return out | dict(p.extra)
+
+
+def _tracking_dict(t: Tracking) -> dict[str, Any]:
+    return {
+        **{name: getattr(t.helm, name) for name in HELM_KEYS},
+        "no_go_half_deg": math.degrees(t.helm.no_go_half_rad), "floor_m": t.floor_m, "reach_m": t.reach_m,
+        "solids": [_wkt(g) for g in t.solids], "limits": None if t.limits is None else _wkt(t.limits),
+        "before": None if t.before_en is None else {"x": t.before_en[0], "y": t.before_en[1]},
+        "correlation_s": t.correlation_s, "known": t.is_known,
+    }

@@ -14,13 +14,16 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 
 from companion.planner.problem.json_read import read_fields
 from companion.planner.problem.parts import NO_CURRENT, TOUCH_M, Beat, BoatLimits, Current, RiskLimit, Target, Wind
+
+if TYPE_CHECKING:
+    from companion.planner.problem.tracking import Tracking
 
 BEAT_CLEAR_SHARE = 0.98
 """Of a beaten leg's clearance that is checked: the arcs of a grown obstacle are polygons inside the circle."""
@@ -34,6 +37,7 @@ class Problem:
     """One planning problem (see the module's text). Times count from the start of the plan, t = 0.
 
     ``vessels_part`` is what uncertain targets get of 1 - delta_s, at each instant and together; None: a tenth of it.
+    ``tracking`` says how the plan will be sailed, and what that track keeps clear of; without it the legs alone count.
     ``leg_saving`` is what a leg must save, as a share of the path's time, for ``auto`` to keep it.
     """
 
@@ -56,6 +60,7 @@ class Problem:
     clearance_floor_m: float = 0.0
     leg_saving: float = LEG_SAVING
     beat: Beat | None = None
+    tracking: Tracking | None = None
     notes: str = ""
     extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 

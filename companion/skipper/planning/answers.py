@@ -13,6 +13,7 @@ from companion.skipper.board.uploads import upload
 from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
 from companion.skipper.planning.errands import Kind, errand
 from companion.skipper.planning.not_found import asks_again, not_found
+from companion.skipper.planning.track import of_way, said
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step.actions import Change, ReplanReason, Severity
 from companion.skipper.step.missions import Tail, splice
@@ -100,6 +101,10 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     gain = old.time_s - plan.cost_s
     if not old.is_feasible:
         return False
+    before_en = None if pending.from_index is None else route.leg_from_en_m[pending.from_index]
+    seen = of_way(problem, [pending.start_en_m, *points], heading_rad=problem.start_heading_rad, before_en=before_en)
+    if not seen.is_kept:
+        return False
     if problem.targets:
         tail = [(float(e), float(n)) for e, n in plan.waypoints_en]
         way = [*route.points_en_m[turn.state.index:first], *tail]
@@ -124,16 +129,27 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
 
 def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
     """Splice a plan into the route and ask for its upload."""
-    points = simplified(pending.problem, _apart([(float(e), float(n)) for e, n in plan.waypoints_en]))[1:]
+    planned = _apart([(float(e), float(n)) for e, n in plan.waypoints_en])
+    is_tracked = pending.problem.tracking is not None   # then the planner has made its corners few and followable
+    points = (planned if is_tracked else simplified(pending.problem, planned))[1:]
     start = pending.start_en_m
     if pending.lead_in and turn.boat_en is not None:
         start = turn.boat_en
-    points = _followed(turn, pending, [start, *pending.lead_in, *points])[1:]
+    if not is_tracked:
+        points = _followed(turn, pending, [start, *pending.lead_in, *points])[1:]
+    else:
+        points = [*pending.lead_in, *points]
+    expected_m = plan.expected_clearance_m
     if tacks_fail(turn):
         # Tacks have failed: turn the other way round where there is room.
         points = list(gybe_round(
             start, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
             area=turn.voyage.area, floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m)))
+        seen = of_way(pending.problem, [start, *points], heading_rad=pending.problem.start_heading_rad, before_en=None)
+        if not seen.is_kept:
+            points = [*pending.lead_in, *planned[1:]]   # rather a tack that may fail than a loop onto something
+        elif expected_m is not None:
+            expected_m = min(expected_m, seen.clearance_m)
         turn.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
     bound = errand(turn)
     tail = Tail(
@@ -141,7 +157,7 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
         is_place=bound is not None and bound.kind is Kind.BOX and bound.name == pending.facts.bound_for)
     facts = replace(
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
-        why=plan.why.text or plan.reason)
+        expected_clearance_m=expected_m, why=plan.why.text or plan.reason)
     old = turn.state.route
     if keep + len(tail.points_en) + 1 > turn.config.max_items and old is not None:
         # Start the numbering again with what is still ahead of the boat.
@@ -160,7 +176,8 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     met = meetings(turn)
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
     change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
-    upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}", change=change)
+    clear = said(expected_m, turn.config.margin_floor_m)
+    upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change)
 
 
 def _followed(turn: Turn, pending: PendingPlan, path: list[PointEn]) -> list[PointEn]:

@@ -10,8 +10,9 @@ from companion.messages import Mode
 from companion.planner import Problem
 from companion.skipper.planning.autopilot_beats import problem_beat
 from companion.skipper.planning.errands import Errand, errand, gate_for, homeward
-from companion.skipper.planning.ladder import Rung, rungs
+from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
+from companion.skipper.planning.track import problem_tracking, steps
 from companion.skipper.planning.vessels import shares
 from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan, Severity
 from companion.skipper.step.missions import path_length_m
@@ -34,8 +35,8 @@ def request(
     It is planned for where she is bound for on an errand, else for the gate after the one that item ``from_index``
     completes or leads to, and behind the last one home where the mission ends there. ``lacks`` says why not.
     """
-    steps = rungs(turn.config)
-    step = steps[min(rung, len(steps) - 1)]
+    ladder = steps(turn)
+    step = ladder[min(rung, len(ladder) - 1)]
     forecast, start, aimed = turn.snapshot.wind.forecast, _start(turn, from_index), _target(turn, from_index)
     if forecast is None or start is None or aimed is None:
         return False
@@ -53,6 +54,9 @@ def request(
             turn.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
             delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
             beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk,
+            tracking=problem_tracking(
+                turn, start, from_index, floor_m=min(turn.config.margin_floor_m, turn.config.margin_m),
+                forecast=forecast),
         ))
     except (ValueError, InputError) as error:
         turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")

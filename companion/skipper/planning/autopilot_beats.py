@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
+from companion.boat import AutopilotLimits
+from companion.boat.tracking import Helm, beat_band_m
 from companion.geo.angles import difference_rad
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, cross_track_m
@@ -13,7 +16,6 @@ from companion.skipper.way.voyage import PointEn
 IRONS_MEMORY_S = 600.0
 TACKS_FAIL_AFTER = 2    # times in irons within IRONS_MEMORY_S before tacks are no longer tried
 WIDEST_M = 50.0         # a wider corridor is no corridor
-OVERSHOOT_S = 1.2       # 2 m beyond the edge where the boat crosses it at right angles (0.9 m at 45 degrees)
 OFF_LINE_M = 2.0        # so near the line a leg that begins anew is the same leg
 FOLLOWS_RAD = math.radians(10.0)   # this far outside its no-go zone the autopilot keeps to the line
 
@@ -27,14 +29,18 @@ def tacks_fail(turn: Turn) -> bool:
 def corridor_room_m(turn: Turn) -> float | None:
     """Return how far from everything solid a closed leg must be for the autopilot's beat about it [m].
 
-    SAIL_XTRACK_MAX, what a tack at its edge swings wide, and the margin's floor beyond that. None without a corridor:
-    the autopilot then sails to the layline, wherever that is.
+    What its boards keep within, the overshoot of a tack at the corridor's edge included; the hull's reach; the margin's
+    floor beyond that. None without a corridor: the autopilot then sails to the layline, wherever that is. Whether each
+    board keeps the floor in the wind's spread is the planner's to say (``companion.planner.track``).
     """
     corridor, wind = turn.tack_corridor_m, turn.wind_mean
     if wind is None or not 0.0 < corridor <= WIDEST_M or not turn.config.sails:
         return None
-    speed = turn.voyage.boat.polar.speed_mps(turn.no_go_half_rad, wind[1])
-    return corridor + OVERSHOOT_S * speed + turn.config.margin_floor_m
+    boat = turn.voyage.boat
+    limits = turn.snapshot.limits or AutopilotLimits(sail_xtrack_max_m=corridor)
+    helm = replace(Helm.of(limits), corridor_m=corridor, no_go_half_rad=turn.no_go_half_rad)
+    band_m = beat_band_m(helm, boat.polar, tws_mps=wind[1])
+    return band_m + boat.hull.reach_m + turn.config.margin_floor_m
 
 
 def room_m(turn: Turn) -> float | None:

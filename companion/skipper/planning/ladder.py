@@ -26,18 +26,23 @@ class Rung:
     planner: Choice = AUTO
 
 
-def rungs(config: SkipperConfig) -> tuple[Rung, ...]:
-    """Return the steps in order; the first is what was asked for, none is below the margin's floor.
+def rungs(config: SkipperConfig, *, track_m: float = 0.0) -> tuple[Rung, ...]:
+    """Return the steps in order; the first is what was asked for, none is below the margin's floor and ``track_m``.
 
+    ``track_m`` is what the boat may be beside a straight leg: a margin that leaves less would be planned for nothing,
+    and where the mission's own leaves less, the first thing is a wider one.
     With delta_s the limit on the whole path's risk is given up.
     """
     limit = config.max_path_risk
-    floor = min(config.margin_floor_m, config.margin_m)
+    floor = min(config.margin_floor_m + track_m, config.margin_m)
     room = config.margin_m - floor
     out = [Rung(name="", margin_m=config.margin_m, delta_s=config.delta_s, max_path_risk=limit,
                 planner=config.planner)]
     if config.planner.algorithm != AUTO.algorithm:
         out.append(replace(out[0], name=f"planner {AUTO.algorithm}", planner=AUTO))
+    needed = min(config.margin_floor_m, config.margin_m) + track_m
+    if needed > config.margin_m:
+        out.append(replace(out[-1], name=f"margin {needed:.1f} m for her track", margin_m=needed))
     for share in (*config.margin_ladder, 0.0):
         margin = floor + share * room
         if margin < out[-1].margin_m - 1e-9:

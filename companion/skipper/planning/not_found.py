@@ -8,7 +8,7 @@ from companion.messages import Command, waypoint
 from companion.skipper.board.uploads import upload
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import room_m
-from companion.skipper.planning.ladder import rungs
+from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.missions import loiter_place
@@ -44,6 +44,14 @@ def is_old_plan_sound(turn: Turn) -> bool:
     return boat is not None and bool(ahead) and _is_sound(turn, [boat, *ahead])
 
 
+def _keeps_floor(turn: Turn, pending: PendingPlan) -> bool:
+    """Return whether the track of what is left of the mission keeps the floor."""
+    boat, vehicle, leg, ahead = turn.boat_en, turn.snapshot.vehicle, turn.leg(), turn.ahead()
+    if boat is None or vehicle is None or leg is None or not ahead:
+        return True
+    return of_way(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad, before_en=None).is_kept
+
+
 def _is_sound(turn: Turn, way: list[PointEn]) -> bool:
     """Return whether a way is good for the mean wind and for the present one, and keeps the margin's floor.
 
@@ -61,18 +69,21 @@ def _is_sound(turn: Turn, way: list[PointEn]) -> bool:
 
 def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
     """Keep the old plan while it is sound, else take the next step of the ladder, at last hold."""
-    steps = rungs(turn.config)
+    ladder = steps(turn)
     state = turn.state
-    where = steps[min(pending.rung, len(steps) - 1)].name or "as configured"
+    where = ladder[min(pending.rung, len(ladder) - 1)].name or "as configured"
     met = meetings(turn) if state.route is not None else ()
-    if pending.rung == 0 and state.route is not None and not met and is_old_plan_sound(turn):
+    if (
+        pending.rung == 0 and state.route is not None and not met and is_old_plan_sound(turn)
+        and _keeps_floor(turn, pending)
+    ):
         turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
         turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
         return
     # Only the boat's own place helps when the way from a waypoint ahead is closed: the rungs start at the boat.
     from_index = pending.from_index if pending.rung == 0 and state.route is not None and _tail_only(turn) else None
-    if pending.rung + 1 < len(steps):
-        following = steps[pending.rung + 1].name
+    if pending.rung + 1 < len(ladder):
+        following = ladder[pending.rung + 1].name
         text = f"no plan {where} ({reason}): trying {following}"
         turn.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
         if request(turn, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):

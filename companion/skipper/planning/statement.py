@@ -184,7 +184,7 @@ def problem_dict(
     voyage: Voyage, gate: Gate, *, start: Start, aim: Aim, forecast: WindForecast,
     margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
     extra_obstacles: Sequence[str] = (), title: str = "", beat: dict[str, Any] | None = None,
-    max_path_risk: float | None = None,
+    max_path_risk: float | None = None, tracking: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
 
@@ -221,6 +221,7 @@ def problem_dict(
         "delta_s": delta_s,
         "leg_saving": LEG_SAVING,
         "beat": beat,
+        "tracking": tracking,
         "risk": None if max_path_risk is None else {
             "max_path_risk": max_path_risk, "correlation_time_s": forecast.correlation_time_s},
     }

@@ -31,6 +31,7 @@ class Route:
     risk: float | None = None          # of the whole path, wind and vessels
     vessel_risk: float = 0.0           # the vessels' part of it
     vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
+    expected_clearance_m: float | None = None   # of the hull on the predicted track, the prediction's error taken off
     cost_s: float | None = None
     why: str = ""
     bound_for: str = ""                # the errand that its end serves; empty: the goals

@@ -20,10 +20,10 @@ MAX_POINTS = 20_000    # of the track of a search
 MAX_QUARTERS = 10**6   # turns round one buoy
 _NUMBERS = ("plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s",
             "vessel_risk", "vessels_part")
-_MAYBE = ("risk", "cost_s")
+_MAYBE = ("risk", "cost_s", "expected_clearance_m")
 _WORDS = ("rung", "why", "bound_for")
 # of states that were saved before there were any
-_DEFAULTS: dict[str, Any] = {"vessel_risk": 0.0, "vessels_part": 0.0, "bound_for": ""}
+_DEFAULTS: dict[str, Any] = {"vessel_risk": 0.0, "vessels_part": 0.0, "bound_for": "", "expected_clearance_m": None}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,7 +184,7 @@ def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
     values = {**_DEFAULTS, **data}
     figures: dict[str, Any] = {
         **{name: _number(values[name]) for name in _NUMBERS},
-        **{name: None if data[name] is None else _number(data[name]) for name in _MAYBE},
+        **{name: None if values[name] is None else _number(values[name]) for name in _MAYBE},
         **{name: _words(values[name]) for name in _WORDS},
     }
     return Route(items=items, points_en_m=points, leg_from_en_m=starts, gate_of=gates,

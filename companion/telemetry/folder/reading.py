@@ -114,6 +114,7 @@ class Summary(Struct, frozen=True, kw_only=True):
     goals_reached: int | None = None
     goals: int | None = None
     min_clearance_m: float | None = None
+    promised_clearance_m: float | None = None
     promised_risk: float | None = None
     path_risk: float | None = None
     alerts: dict[str, int] = {}

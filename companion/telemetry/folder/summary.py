@@ -29,6 +29,7 @@ class VoyageFigures:
     for as long as the boat is watched. ``promised_risk`` is the largest probability, at any instant of any plan that
     was sailed, of being forced into the no-go zone or too near to a vessel (1 - delta_s); ``path_risk`` the largest of
     a whole plan's, as if nobody replanned on the way. What vessels have of both is beside them.
+    ``promised_clearance_m`` is the least clearance that a plan expected which was sailed, beside what was kept.
     """
 
     first_s: float | None = None
@@ -42,6 +43,7 @@ class VoyageFigures:
     contacts: int = 0
     no_go_entries: int = 0
     min_clearance_m: float = math.inf
+    promised_clearance_m: float | None = None
     promised_risk: float | None = None
     promised_risk_vessels: float = 0.0
     path_risk: float | None = None
@@ -77,6 +79,10 @@ class VoyageFigures:
             self.promised_risk = max(self.promised_risk or 0.0, 1.0 - route.delta_s)
             self.promised_risk_vessels = max(self.promised_risk_vessels, route.vessels_part)
             self.path_risk_vessels = max(self.path_risk_vessels, route.vessel_risk)
+            if route.expected_clearance_m is not None:
+                self.promised_clearance_m = min(
+                    route.expected_clearance_m,
+                    math.inf if self.promised_clearance_m is None else self.promised_clearance_m)
             if route.risk is not None:
                 self.path_risk = max(self.path_risk or 0.0, route.risk)
         autopilot = snapshot.autopilot
@@ -152,6 +158,7 @@ class VoyageFigures:
             "replans": self.replans,
             "uploads": self.uploads,
             "min_clearance_m": self.min_clearance_m if math.isfinite(self.min_clearance_m) else None,
+            "promised_clearance_m": self.promised_clearance_m,
             "promised_risk": self.promised_risk,
             "promised_risk_vessels": self.promised_risk_vessels,
             "path_risk": self.path_risk,

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 from shapely.geometry import box
 
+from companion.boat.tracking import Helm, beat_band_m
 from companion.skipper.planning.autopilot_beats import (
-    OVERSHOOT_S,
     is_left_to_beat,
     may_restart_leg,
     problem_beat,
@@ -38,10 +38,12 @@ def turn(*obstacles, at=(0.0, 0.0), xtrack_m=10.0, irons=(), **config) -> Turn:
     return out
 
 
-def test_the_room_is_corridor_overshoot_and_floor():
+def test_the_room_is_the_boards_band_the_hull_and_the_floor():
     now = turn()
-    speed = now.voyage.boat.polar.speed_mps(now.no_go_half_rad, 5.0)
-    assert room_m(now) == pytest.approx(10.0 + OVERSHOOT_S * speed + now.config.margin_floor_m)
+    helm = replace(Helm.of(now.snapshot.limits), corridor_m=10.0)
+    band = beat_band_m(helm, now.voyage.boat.polar, tws_mps=5.0)
+    assert 11.0 < band < 13.0
+    assert room_m(now) == pytest.approx(band + now.voyage.boat.hull.reach_m + now.config.margin_floor_m)
     part = problem_beat(now, 15.0)
     assert part is not None
     assert part["clearance_m"] == pytest.approx(room_m(now) - 15.0)

@@ -1,0 +1,54 @@
+"""What a problem says of the track: how the autopilot follows legs, and what the track keeps clear of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from companion.boat.tracking import Helm
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tracking:
+    """How a plan is sailed, and the clearance that the predicted track's band keeps (``companion.planner.track``).
+
+    Attributes:
+        helm: How the legs are followed.
+        floor_m: What hull and band keep clear of everything solid, 0 or more [m].
+        reach_m: How far the hull reaches from its place [m].
+        solids: What is solid, as it is: the problem's obstacles are grown by a margin.
+        limits: What is around her, as it is; None: nothing.
+        before_en: Where the leg begins that ends at the start; None: she begins there.
+        correlation_s: How long the wind's direction remembers [s].
+        is_known: The autopilot's parameters were read; without, the greater of the two stated errors holds everywhere.
+
+    """
+
+    helm: Helm
+    floor_m: float
+    reach_m: float = 0.0
+    solids: tuple[shapely.Geometry, ...] = ()
+    limits: shapely.Geometry | None = None
+    before_en: tuple[float, float] | None = None
+    correlation_s: float = 60.0
+    is_known: bool = True
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether every number is one, and in range."""
+        before = self.before_en or (0.0, 0.0)
+        return (
+            all(math.isfinite(x) for x in (self.floor_m, self.reach_m, self.correlation_s, *before))
+            and min(self.floor_m, self.reach_m, self.correlation_s) >= 0.0)
+
+    @cached_property
+    def tree(self) -> shapely.STRtree:
+        """Everything solid, the limits' line included."""
+        shapes = [g if g.is_valid else shapely.make_valid(g) for g in self.solids if not g.is_empty]
+        if self.limits is not None and not self.limits.is_empty:
+            shapes.append(self.limits.boundary)
+        return shapely.STRtree(np.asarray(shapes, dtype=object))

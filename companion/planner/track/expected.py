@@ -1,0 +1,204 @@
+"""What is expected of a path: the least clearance of the hull on the track that the autopilot will sail along it.
+
+Of a leg that is sailed it is the distance of the predicted track from what is solid, less the prediction's own stated
+error and the hull's reach. Of one that is left to the autopilot to beat it is what is kept, at each board, with the
+problem's probability: the leg is sailed in winds drawn from the forecast's spread.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from companion.boat.tracking import (
+    CURVE_NODES,
+    Predicted,
+    are_near_short,
+    drawn_winds,
+    predict,
+    stated_error_m,
+)
+from companion.planner.plan import Leg
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.tracking import Tracking
+from companion.planner.problem.value import Problem
+
+RUN_UP_M = 40.0      # of the leg before the start: she is on it, and rounds the corner between
+BESIDE_M = 15.0      # of that leg's end the corner is the plan's; within this of her own place the error grows
+SPARE_M = 0.3        # a start that is nearer than the floor need come no nearer than this more
+SIGMA_AT_S = 60.0    # horizon at which the spread is taken for boards
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Expected:
+    """What is expected of a path.
+
+    Attributes:
+        clearance_m: Least clearance of the hull, inf where nothing is solid [m].
+        at_en: Where, and ``leg`` on which leg of the path.
+        is_kept: Whether the floor is, everywhere; at a start that is nearer she only comes no nearer.
+        lack_m: How far the worst place is below what it needs [m], 0 where none is.
+        worst_en: Where that is, and ``near_en`` the place of something solid that it is near to.
+        worst_leg: On which leg.
+        is_beat: The worst place is on a leg that is left to the autopilot.
+
+    """
+
+    clearance_m: float = math.inf
+    at_en: tuple[float, float] | None = None
+    leg: int = 0
+    is_kept: bool = True
+    lack_m: float = 0.0
+    worst_en: tuple[float, float] | None = None
+    near_en: tuple[float, float] | None = None
+    worst_leg: int = 0
+    is_beat: bool = False
+
+
+@lru_cache(maxsize=8)   # by identity
+def curve_mps(problem: Problem) -> NDArray[np.float64]:
+    """Return the problem's polar as the prediction takes it."""
+    boat = problem.boat
+    return np.interp(np.linspace(0.0, math.pi, CURVE_NODES), boat.polar_twa_rad, boat.polar_mps)
+
+
+def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray[np.float64],
+             legs: Sequence[Leg] | None = None, *, has_boards: bool = True) -> Expected:
+    """Return what is expected of a path of a problem that has ``tracking``.
+
+    Args:
+        problem: With its tracking.
+        waypoints_en: (n, 2), the start first.
+        legs: What the scorer says of the path; None: it is asked.
+        has_boards: Look at the boards of legs that are left to the autopilot, which takes its time.
+
+    """
+    tracking = problem.tracking
+    assert tracking is not None
+    path = np.asarray(waypoints_en, dtype=np.float64).reshape(-1, 2)
+    path = path[np.concatenate([[True], np.hypot(*np.diff(path, axis=0).T) > 1e-6])]
+    if len(path) < 2 or len(tracking.tree.geometries) == 0:
+        return Expected()
+    if legs is None:
+        legs = evaluate(problem, path).legs
+    beats = np.array([leg.is_beat for leg in legs]) if len(legs) == len(path) - 1 else np.zeros(len(path) - 1, bool)
+    whole, first = _with_run_up(tracking, path)
+    curve = curve_mps(problem)
+    heading = None if first else problem.start_heading_rad
+    track = predict(whole, tracking.helm, curve_mps=curve, twd_from_rad=problem.wind.twd_from_rad, heading_rad=heading)
+    leg = track.leg - first
+    mine = (leg >= 0) | (np.hypot(*(track.en_m - path[0]).T) < BESIDE_M)
+    en, leg = track.en_m[mine], np.maximum(leg[mine], 0)
+    distance = _distance_m(tracking, en)
+    best = float(np.max(curve))
+    near = are_near_short(np.hypot(*np.diff(whole, axis=0).T), best)[first:]
+    errors = np.array([stated_error_m(best, has_short=bool(short) or not tracking.is_known) for short in near])
+    error = errors[leg]
+    if not first:
+        error = error * np.minimum(1.0, np.hypot(*(en - path[0]).T) / BESIDE_M)   # where she begins is known
+    room = distance - error - tracking.reach_m
+    need = np.full(len(room), tracking.floor_m)
+    clear = np.flatnonzero(room >= need)
+    begin = int(clear[0]) if len(clear) else len(room)
+    need[:begin] = np.minimum(need[:begin], room[0] - SPARE_M)   # nearer already, where she begins
+    is_beaten = beats[leg]
+    judged = np.where(is_beaten, math.inf, room)
+    lack = np.where(is_beaten, 0.0, np.maximum(0.0, need - room))
+    worst, least = int(np.argmax(lack)), int(np.argmin(judged))
+    found = Expected(
+        clearance_m=float(judged[least]), at_en=_point(en[least]), leg=int(leg[least]), is_kept=not lack[worst] > 0.0,
+        lack_m=float(lack[worst]), worst_en=_point(en[worst]), near_en=_nearest(tracking, en[worst]),
+        worst_leg=int(leg[worst]))
+    return _with_boards(problem, tracking, whole, first, beats, found) if has_boards and bool(beats.any()) else found
+
+
+def _with_run_up(tracking: Tracking, path: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    """Return the path behind a run-up on the leg before its start, and how many legs that is."""
+    if tracking.before_en is None:
+        return path, 0
+    back = np.asarray(tracking.before_en) - path[0]
+    length = float(np.hypot(*back))
+    if length < 1.0:
+        return path, 0
+    return np.vstack([path[0] + back * min(1.0, RUN_UP_M / length), path]), 1
+
+
+def _with_boards(
+    problem: Problem, tracking: Tracking, whole: NDArray[np.float64], first: int, beats: NDArray[np.bool_],
+    found: Expected,
+) -> Expected:
+    """Return what is expected with the legs that are beaten: at each board, with probability delta_s."""
+    sigma = problem.wind.sigma.at(SIGMA_AT_S)
+    curve = curve_mps(problem)
+    length_s = 4.0 * float(np.sum(np.hypot(*np.diff(whole, axis=0).T))) / max(float(np.max(curve)), 0.1) + 60.0
+    twd = problem.wind.twd_from_rad
+    winds = drawn_winds(twd, sigma_rad=sigma, tau_s=tracking.correlation_s, length_s=length_s) if sigma > 0.0 else (
+        np.array([[twd]]))
+    tracks = [predict(whole, tracking.helm, curve_mps=curve, twd_from_rad=wind,
+                      heading_rad=None if first else problem.start_heading_rad) for wind in winds]
+    board_m = 2.0 * max(tracking.helm.corridor_m, 1.0)
+    out = found
+    for n in np.flatnonzero(beats):
+        a, b = whole[n + first], whole[n + first + 1]
+        along = (b - a) / max(float(np.hypot(*(b - a))), 1e-6)
+        least: dict[int, list[tuple[float, tuple[float, float]]]] = {}
+        for track in tracks:
+            for board, room, place in _boards(tracking, track, int(n) + first, a, along, board_m):
+                least.setdefault(board, []).append((room, place))
+        for rows in least.values():
+            if len(rows) < 0.25 * len(tracks):
+                continue   # few winds bring her there at all
+            rows.sort()
+            room, place = rows[math.floor((1.0 - problem.delta_s) * len(rows) + 1e-9)]
+            if room < out.clearance_m:
+                out = _changed(out, clearance_m=room, at_en=place, leg=int(n))
+            lack = tracking.floor_m - room
+            if lack > max(out.lack_m, 1e-9):
+                out = _changed(out, is_kept=False, lack_m=lack, worst_en=place, worst_leg=int(n), is_beat=True,
+                               near_en=_nearest(tracking, np.asarray(place)))
+    return out
+
+
+def _boards(
+    tracking: Tracking, track: Predicted, leg: int, a: NDArray[np.float64], along: NDArray[np.float64], board_m: float,
+) -> list[tuple[int, float, tuple[float, float]]]:
+    """Return of each board's length of a leg: which, the least clearance there, and where."""
+    en = track.en_m[track.leg == leg]
+    if not len(en):
+        return []
+    room = _distance_m(tracking, en) - tracking.reach_m
+    board = np.floor(((en - a) @ along) / board_m).astype(np.int64)
+    out = []
+    for each in np.unique(board):
+        which = np.flatnonzero(board == each)
+        i = int(which[np.argmin(room[which])])
+        out.append((int(each), float(room[i]), _point(en[i])))
+    return out
+
+
+def _distance_m(tracking: Tracking, en: NDArray[np.float64]) -> NDArray[np.float64]:
+    points = shapely.points(en)
+    (which, _), distance = tracking.tree.query_nearest(points, return_distance=True, all_matches=False)
+    out = np.full(len(en), math.inf)
+    out[which] = distance
+    return out
+
+
+def _nearest(tracking: Tracking, en: NDArray[np.float64]) -> tuple[float, float]:
+    shape = tracking.tree.geometries[int(tracking.tree.nearest(shapely.Point(en)))]
+    line = shapely.shortest_line(shape, shapely.Point(en))
+    return _point(np.asarray(line.coords[0]))
+
+
+def _point(en: NDArray[np.float64]) -> tuple[float, float]:
+    return float(en[0]), float(en[1])
+
+
+def _changed(value: Expected, **changes: object) -> Expected:
+    return replace(value, **changes)  # type: ignore[arg-type]

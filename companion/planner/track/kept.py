@@ -1,0 +1,191 @@
+"""A search whose paths keep their clearance when they are sailed, with as few corners as that needs.
+
+The search plans lines. Here its path is laid again: legs that are too short to be followed go, two corners become one
+where the legs around them meet, waypoints that nothing needs are left out. Where the predicted track still comes nearer
+than the floor, the corners near that place are pushed away from what is solid. A path that cannot be made to keep it is
+no answer: then the reason says where, and how near it would come.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.boat.tracking import SHORT_S
+from companion.planner.effort import Effort, Outcome, Search
+from companion.planner.plan import PlanStatus
+from companion.planner.problem.evaluate import Evaluation, evaluate
+from companion.planner.problem.sharing import resolved
+from companion.planner.problem.value import Problem
+from companion.planner.track.expected import Expected, curve_mps, expected
+
+Path = list[tuple[float, float]]
+
+AT_MOST = 40                # changes to one path: each costs a check and a prediction
+LARGEST = 60                # waypoints: a longer path is looked at as it is
+SHORTER_SHARE, SHORTER_S = 0.006, 0.4   # what a waypoint less may cost
+SHORT_SHARE, SHORT_EXTRA_S = 0.03, 2.0  # ... and a leg less that cannot be followed
+PUSH_M = (1.0, 2.5, 5.0)    # a corner is pushed by as much
+BEAT_MORE_M = 1.0           # of room for a beat whose boards come too near
+MEET_M = 60.0               # legs that meet farther from their corners do not meet
+
+
+def with_track(search: Search) -> Search:
+    """Return the search whose paths are laid so that their track keeps the floor."""
+    def tracked(problem: Problem, effort: Effort, seed: int) -> Outcome:
+        outcome = search(problem, effort, seed)
+        if outcome.waypoints_en is None:
+            return outcome
+        path, seen = laid(problem, [(float(x), float(y)) for x, y in outcome.waypoints_en])
+        if seen.is_beat and problem.beat is not None:
+            # More water about what is beaten; what has none is sailed.
+            wider = replace(problem, beat=replace(
+                problem.beat, clearance_m=problem.beat.clearance_m + seen.lack_m + BEAT_MORE_M))
+            again = search(wider, effort, seed)
+            if again.waypoints_en is not None:
+                outcome = again
+                path, seen = laid(problem, [(float(x), float(y)) for x, y in again.waypoints_en])
+        if seen.is_kept:
+            return replace(outcome, waypoints_en=np.asarray(path))
+        return replace(outcome, waypoints_en=None, status=PlanStatus.TIMEOUT, reason=lacking(problem, seen))
+
+    return tracked
+
+
+def lacking(problem: Problem, seen: Expected) -> str:
+    """Return in words how near the track would come."""
+    assert problem.tracking is not None
+    floor = problem.tracking.floor_m
+    east, north = seen.worst_en or (0.0, 0.0)
+    what = "a beat left to the autopilot" if seen.is_beat else "the track that would be sailed"
+    return (f"{what} comes to {floor - seen.lack_m:.1f} m of something solid at {east:.0f} east, {north:.0f} north; "
+            f"the floor is {floor:.1f} m")
+
+
+def laid(problem: Problem, path: Path) -> tuple[Path, Expected]:
+    """Return the path with few corners, all of which can be followed and keep the floor, as far as that is possible."""
+    exact = resolved(problem)
+    judged = evaluate(exact, np.asarray(path))
+    seen = expected(problem, path, judged.legs)
+    if len(path) > LARGEST or not judged.is_feasible:
+        return path, seen
+    path, seen = _fewer(problem, exact, path, judged, seen)
+    return _pushed(problem, exact, path, seen)
+
+
+def _fewer(
+    problem: Problem, exact: Problem, path: Path, judged: Evaluation, seen: Expected,
+) -> tuple[Path, Expected]:
+    """Leave out corners, the shortest legs' first, while that costs little and brings her nearer to nothing."""
+    tried: set[tuple[int, ...]] = set()
+    least_m = SHORT_S * float(np.max(curve_mps(problem)))
+    limit_s = judged.time_s * (1.0 + SHORT_SHARE) + SHORT_EXTRA_S
+    count = 0
+    while count < AT_MOST:
+        best: tuple[Path, Evaluation, Expected] | None = None
+        lengths = [math.dist(a, b) for a, b in itertools.pairwise(path)]
+        for n in sorted(range(len(lengths)), key=lengths.__getitem__):
+            for option in _without(path, n):
+                key = tuple(round(10.0 * c) for point in option for c in point)
+                if key in tried or count >= AT_MOST:
+                    continue
+                tried.add(key)
+                count += 1
+                found = evaluate(exact, np.asarray(option))
+                allowed_s = limit_s if lengths[n] < least_m else min(
+                    limit_s, judged.time_s * (1.0 + SHORTER_SHARE) + SHORTER_S)
+                if not found.is_feasible or found.time_s > allowed_s:
+                    continue
+                then = expected(problem, option, found.legs)
+                if then.lack_m > seen.lack_m + 1e-9:
+                    continue
+                if best is None or (then.lack_m, found.time_s) < (best[2].lack_m, best[1].time_s):
+                    best = option, found, then
+            if best is not None:
+                break
+        if best is None:
+            break
+        path, judged, seen = best
+    return path, seen
+
+
+def _pushed(
+    problem: Problem, exact: Problem, path: Path, seen: Expected,
+) -> tuple[Path, Expected]:
+    """Push corners away from what the track comes too near to, until it keeps the floor or nothing helps."""
+    count = 0
+    while not seen.is_kept and count < AT_MOST:
+        best: tuple[float, float, Path, Expected] | None = None
+        for option in _pushes(problem, path, seen):
+            count += 1
+            found = evaluate(exact, np.asarray(option))
+            if not found.is_feasible:
+                continue
+            then = expected(problem, option, found.legs)
+            if then.lack_m < seen.lack_m - 0.05 and (best is None or (then.lack_m, found.time_s) < best[:2]):
+                best = then.lack_m, found.time_s, option, then
+        if best is None:
+            break
+        _, _, path, seen = best
+    return path, seen
+
+
+def _pushes(problem: Problem, path: Path, seen: Expected) -> Iterator[Path]:
+    if seen.worst_en is None or seen.near_en is None:
+        return
+    away: NDArray[np.float64] = np.asarray(seen.worst_en) - np.asarray(seen.near_en)
+    length = float(np.hypot(*away))
+    if length < 1e-6:
+        return
+    unit = away / length
+    goal = np.asarray(problem.goal_en)
+    leg = min(seen.worst_leg, len(path) - 2)
+    for corners in ((leg,), (leg + 1,), (leg, leg + 1), (leg - 1, leg)):
+        if min(corners) < 1 or max(corners) > len(path) - 1:
+            continue
+        for push in sorted({*PUSH_M, round(seen.lack_m + 0.2, 1)}):
+            option = list(path)
+            for corner in corners:
+                place = np.asarray(path[corner]) + push * unit
+                option[corner] = (float(place[0]), float(place[1]))
+            if float(np.hypot(*(np.asarray(option[-1]) - goal))) <= problem.goal_radius_m:
+                yield option
+    middle = np.asarray(path[leg]) + 0.5 * (np.asarray(path[leg + 1]) - np.asarray(path[leg]))
+    for push in PUSH_M:
+        place = middle + push * unit
+        yield [*path[:leg + 1], (float(place[0]), float(place[1])), *path[leg + 1:]]
+
+
+def _without(path: Path, n: int) -> Iterator[Path]:
+    """Yield the path without the leg from corner n to the next: the legs around it meet, or one end of it goes."""
+    last = len(path) - 1
+    if n > 0 and n + 1 < last:
+        meet = meeting(path[n - 1], path[n], path[n + 1], path[n + 2])
+        if meet is not None:
+            yield [*path[:n], meet, *path[n + 2:]]
+    if n > 0:
+        yield [*path[:n], *path[n + 1:]]
+    if n + 1 < last:
+        yield [*path[:n + 1], *path[n + 2:]]
+
+
+def meeting(
+    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float],
+) -> tuple[float, float] | None:
+    """Return where the leg from a to b, sailed on, meets the leg from c to d, sailed back; None where they do not."""
+    ux, uy = b[0] - a[0], b[1] - a[1]
+    vx, vy = c[0] - d[0], c[1] - d[1]
+    cross = ux * vy - uy * vx
+    if abs(cross) < 1e-6 * max(1.0, math.hypot(ux, uy) * math.hypot(vx, vy)):
+        return None
+    wx, wy = c[0] - b[0], c[1] - b[1]
+    along, back = (wx * vy - wy * vx) / cross, (wx * uy - wy * ux) / cross
+    if along < 0.0 or back < 0.0:
+        return None
+    meet = (b[0] + along * ux, b[1] + along * uy)
+    return meet if max(math.dist(b, meet), math.dist(c, meet)) <= MEET_M else None

@@ -1,0 +1,76 @@
+"""The track of a plan as the skipper sees it: what a problem says of it, and whether a way's track keeps the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from companion.boat import AutopilotLimits
+from companion.boat.tracking import Helm, stated_error_m
+from companion.messages import WindForecast
+from companion.planner import Problem
+from companion.planner.track import Expected, expected
+from companion.skipper.planning.ladder import Rung, rungs
+from companion.skipper.planning.statement import Start
+from companion.skipper.step.turn import Turn
+from companion.skipper.way.voyage import PointEn
+
+# What a straight leg's track may need, in steps: water that is grown by a margin is kept, and made before sailing.
+TRACKS_M = (2.0, 2.5, 4.0, 8.0)
+
+
+def problem_tracking(
+    turn: Turn, start: Start, from_index: int | None, *, floor_m: float, forecast: WindForecast,
+) -> dict[str, Any]:
+    """Return the ``tracking`` of a problem: the autopilot's parameters, the hull, and what is solid as it is."""
+    limits, area, route = turn.snapshot.limits, turn.voyage.area, turn.state.route
+    helm = Helm.of(limits or AutopilotLimits(sail_xtrack_max_m=turn.tack_corridor_m))
+    before = None
+    if from_index is not None and route is not None:
+        before = route.leg_from_en_m[from_index]
+    elif start.lead_in:
+        before = turn.boat_en
+    return {
+        "wp_radius_m": helm.wp_radius_m, "turn_radius_m": helm.turn_radius_m, "wp_speed_mps": helm.wp_speed_mps,
+        "accel_mps2": helm.accel_mps2, "jerk_mps3": helm.jerk_mps3, "corridor_m": helm.corridor_m,
+        "no_go_half_deg": float(np.degrees(turn.no_go_half_rad)),
+        "floor_m": floor_m, "reach_m": turn.voyage.boat.hull.reach_m,
+        "solids": area.obstacles_wkt(0.0), "limits": area.fence_wkt(0.0, start.en_m),
+        "before": None if before is None else {"x": before[0], "y": before[1]},
+        "correlation_s": forecast.correlation_time_s, "known": _is_known(turn),
+    }
+
+
+def steps(turn: Turn) -> tuple[Rung, ...]:
+    """Return the ladder: its margins end where the floor is what is left beside a straight leg's track."""
+    wind = turn.wind_mean
+    if wind is None:
+        return rungs(turn.config)
+    best = turn.voyage.boat.polar.max_speed_mps(wind[1])
+    error_m = stated_error_m(best, has_short=not _is_known(turn))
+    track_m = error_m + turn.voyage.boat.hull.reach_m
+    return rungs(turn.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m))
+
+
+def _is_known(turn: Turn) -> bool:
+    """Return whether the parameters that shape the track were read."""
+    limits = turn.snapshot.limits
+    return limits is not None and limits.wp_speed_mps is not None
+
+
+def of_way(problem: Problem, way: Sequence[PointEn], *, heading_rad: float, before_en: PointEn | None) -> Expected:
+    """Return what is expected of a way that begins elsewhere than the problem, its beats left aside."""
+    tracking = problem.tracking
+    if tracking is None or len(way) < 2:
+        return Expected()
+    from_here = replace(problem, start_en=way[0], start_heading_rad=heading_rad,
+                        tracking=replace(tracking, before_en=before_en))
+    return expected(from_here, np.asarray(way), has_boards=False)
+
+
+def said(clearance_m: float | None, floor_m: float) -> str:
+    """Return an expected clearance in words, behind a plan's reason."""
+    return "" if clearance_m is None else f"; passes {clearance_m:.1f} m clear or more (floor {floor_m:g} m)"

@@ -1,0 +1,162 @@
+"""Plans by the track that would be sailed: corners, floors, boards, and what is said of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from companion.boat import ardurover_sitl
+from companion.boat.boat import Boat
+from companion.boat.tracking import predict
+from companion.errors import InputError
+from companion.planner import Plan, PlanStatus, Problem, plan
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.track import expected
+from companion.planner.track.expected import curve_mps
+
+MARGIN_M, FLOOR_M = 12.0, 6.0
+WALLS = [shapely.box(*(-150.0, y, 40.0, y + 0.8) if n % 2 == 0 else (-40.0, y, 150.0, y + 0.8))
+         for n, y in enumerate((60.0, 90.0, 120.0))]
+
+
+def problem(walls=WALLS, *, wind_deg=180.0, tws=6.0, margin=MARGIN_M, goal=(0.0, 190.0), tracking=None, **more):
+    boat = Boat(polar=ardurover_sitl()).problem_boat(tws)
+    track = {"floor_m": FLOOR_M, "reach_m": 0.5, "wp_radius_m": 3.0, "wp_speed_mps": 5.0,
+             "solids": [shapely.to_wkt(w) for w in walls], "limits": None, **(tracking or {})}
+    return Problem.from_json({
+        "id": "walls", "start": {"x": 0.0, "y": 0.0, "heading_deg": 0.0},
+        "goal": {"x": goal[0], "y": goal[1], "radius": 8.0},
+        "obstacles": [shapely.to_wkt(shapely.buffer(w, margin, quad_segs=8)) for w in walls], "fence": None,
+        "wind": {"from_deg": wind_deg, "speed_mps": tws,
+                 "sigma": {"model": "ar1", "sigma0_deg": 3.0, "sigma_inf_deg": 9.0, "rho_hz": 0.036}},
+        "boat": {**boat, "no_go_half_deg": 47.0}, "delta_s": 0.9, "leg_saving": 8e-5, "tracking": track, **more})
+
+
+def test_round_the_ends_of_walls_the_floor_is_kept_with_fewer_waypoints():
+    tracked = problem()
+    lines = plan(replace(tracked, tracking=None), expansions=15_000, seed=1)
+    found = plan(tracked, expansions=15_000, seed=1)
+    assert found.has_path
+    assert not expected(tracked, lines.waypoints_en).is_kept
+    assert expected(tracked, found.waypoints_en).is_kept
+    assert len(found.waypoints_en) <= 0.7 * len(lines.waypoints_en)
+    assert found.cost_s <= 1.03 * lines.cost_s + 2.0
+    assert evaluate(tracked, found.waypoints_en).is_feasible
+    assert lines.expected_clearance_m is None
+    assert found.expected_clearance_m >= FLOOR_M
+    sailed = predict(found.waypoints_en, tracked.tracking.helm, curve_mps=curve_mps(tracked),
+                     twd_from_rad=tracked.wind.twd_from_rad, heading_rad=0.0)
+    near = min(shapely.distance(shapely.LineString(sailed.en_m), w) for w in WALLS)
+    assert near > found.expected_clearance_m + 0.5   # the hull and the prediction's error are taken off
+    again = plan(tracked, expansions=15_000, seed=1)
+    assert np.array_equal(again.waypoints_en, found.waypoints_en)
+
+
+def test_a_plan_says_it_in_its_json_and_reads_it_back():
+    found = plan(problem(), expansions=15_000, seed=1)
+    again = Plan.from_dict(found.to_dict())
+    assert (again.expected_clearance_m, again.expected_at_en) == (found.expected_clearance_m, found.expected_at_en)
+    assert "expected_clearance_m" not in plan(replace(problem(), tracking=None), expansions=5_000).to_dict()
+
+
+def test_a_floor_that_cannot_be_kept_is_no_plan_and_says_where():
+    found = plan(problem(tracking={"floor_m": 14.0}), expansions=15_000, seed=1)
+    assert found.status is PlanStatus.TIMEOUT
+    assert "the floor is 14.0 m" in found.reason
+    assert "east" in found.reason
+
+
+def test_open_water_has_nothing_to_be_clear_of():
+    found = plan(problem([]), expansions=5_000)
+    assert found.has_path
+    assert found.expected_clearance_m is None
+
+
+def test_unread_parameters_widen_what_is_kept():
+    path = [(0.0, 0.0), (60.0, 0.0), (60.0, 150.0)]
+    known, unread = (expected(problem(tracking={"known": k}), path).clearance_m for k in (True, False))
+    assert unread < known - 1.0
+
+
+def test_a_start_that_is_nearer_than_the_floor_need_only_come_no_nearer():
+    wall = [shapely.box(-60.0, -4.0, 60.0, -3.5)]     # astern of her
+    away, along = [(0.0, 0.0), (0.0, 150.0)], [(0.0, 0.0), (55.0, -1.5), (55.0, 150.0)]
+    here = problem(wall, wind_deg=270.0)
+    assert expected(here, away).is_kept
+    assert expected(here, away).clearance_m < FLOOR_M
+    assert not expected(here, along).is_kept
+
+
+def test_the_corner_at_the_start_counts_where_the_leg_before_is_known():
+    inside = [shapely.box(-22.0, 13.0, -13.0, 22.0)]    # within the corner that a wide radius cuts
+    path = [(0.0, 0.0), (0.0, 150.0)]
+    wide = {"wp_radius_m": 10.0}
+    before = {**wide, "before": {"x": -100.0, "y": 0.0}}
+    from_rest = expected(problem(inside, wind_deg=300.0, tracking=wide), path).clearance_m
+    rounding = expected(problem(inside, wind_deg=300.0, tracking=before), path).clearance_m
+    assert rounding < from_rest - 1.5
+
+
+# ---------------------------------------------------------------------------------------------- boards
+BEAT = {"no_go_half_deg": 45.0, "corridor_m": 10.0, "clearance_m": 8.0, "tack_s": 2.0}
+
+
+def channel(half_m, **more):
+    walls = [shapely.box(half_m, -30.0, half_m + 5.0, 330.0), shapely.box(-half_m - 5.0, -30.0, -half_m, 330.0)]
+    return problem(walls, wind_deg=0.0, tws=5.0, margin=FLOOR_M, goal=(0.0, 300.0), beat=BEAT, **more)
+
+
+def test_boards_that_come_too_near_are_seen_and_those_with_room_are_kept():
+    path = [(0.0, 0.0), (0.0, 298.0)]
+    narrow, roomy = channel(18.0), channel(22.0)
+    assert evaluate(narrow, path).legs[0].is_beat
+    seen = expected(narrow, path)
+    assert seen.is_beat
+    assert not seen.is_kept
+    assert expected(roomy, path).is_kept
+    assert expected(narrow, path, has_boards=False).is_kept    # the boards are what comes near
+
+
+def test_more_is_asked_of_boards_where_the_mission_asks_for_more():
+    path = [(0.0, 0.0), (0.0, 298.0)]
+    rough = {"model": "ar1", "sigma0_deg": 12.0, "sigma_inf_deg": 18.6, "rho_hz": 0.036}
+    at = [expected(replace(channel(20.0), delta_s=d, wind=replace(channel(20.0).wind, sigma=replace(
+        channel(20.0).wind.sigma, sigma_inf_rad=math.radians(rough["sigma_inf_deg"])))), path).clearance_m
+        for d in (0.6, 0.98)]
+    assert at[1] < at[0]
+
+
+# ------------------------------------------------------------------------------------------- the format
+def test_the_tracking_is_written_and_read_back():
+    before = problem(tracking={"before": {"x": -40.0, "y": 3.0}, "known": False, "correlation_s": 28.0,
+                               "limits": "POLYGON ((-200 -50, 200 -50, 200 250, -200 250, -200 -50))"})
+    again = Problem.from_json(before.to_dict() if hasattr(before, "to_dict") else _written(before))
+    assert again.tracking.helm == before.tracking.helm
+    for name in ("floor_m", "reach_m", "before_en", "correlation_s", "is_known"):
+        assert getattr(again.tracking, name) == getattr(before.tracking, name)
+    assert shapely.equals(again.tracking.limits, before.tracking.limits)
+    assert [shapely.equals(a, b) for a, b in zip(again.tracking.solids, before.tracking.solids, strict=True)]
+
+
+def _written(value):
+    from companion.planner.problem.json_write import to_dict
+
+    return to_dict(value)
+
+
+@pytest.mark.parametrize(("wrong", "word"), [
+    ({"wp_speed_mps": 0.0}, "wp_speed_mps"), ({"solids": "POLYGON"}, "solids"), ({"solids": ["POINT (1 2)"]}, "Point"),
+    ({"floor_m": "six"}, "floor_m"), ({"before": {"x": 1.0}}, "before.y")])
+def test_what_cannot_be_read_is_named(wrong, word):
+    with pytest.raises(InputError, match=word):
+        problem(tracking=wrong)
+
+
+def test_a_floor_that_is_no_number_cannot_be_planned():
+    found = plan(problem(tracking={"floor_m": math.nan}), expansions=1000)
+    assert found.status is PlanStatus.INVALID
+    assert "tracking" in found.reason

@@ -1,0 +1,86 @@
+"""What the skipper makes of the track: its ladder, its problems, the way that it would keep, what it says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from shapely.geometry import box
+
+from companion.boat import AutopilotLimits
+from companion.planner import Problem
+from companion.skipper.planning.ladder import rungs
+from companion.skipper.planning.statement import Start, problem_dict
+from companion.skipper.planning.track import of_way, problem_tracking, said, steps
+from companion.skipper.step.config import SkipperConfig
+from tests.skipper.planning.test_beating import turn
+
+WALL = box(-4.0, 60.0, 60.0, 61.0)
+
+
+def tracking(now, **more):
+    return problem_tracking(now, Start(en_m=(0.0, 0.0), heading_rad=0.0), None, floor_m=6.0,
+                            forecast=now.snapshot.wind.forecast, **more)
+
+
+def test_the_ladder_ends_where_the_floor_is_left_beside_the_track():
+    plain, track = rungs(SkipperConfig(margin_m=12.0, margin_floor_m=6.0)), rungs(
+        SkipperConfig(margin_m=12.0, margin_floor_m=6.0), track_m=2.5)
+    assert min(step.margin_m for step in plain) == 6.0
+    assert min(step.margin_m for step in track) == 8.5
+    assert track[0] == plain[0]
+
+
+def test_a_margin_that_leaves_too_little_is_widened_by_name_before_it_shrinks():
+    ladder = rungs(SkipperConfig(margin_m=8.0, margin_floor_m=6.0), track_m=4.0)
+    assert [step.margin_m for step in ladder[:2]] == [8.0, 10.0]
+    assert ladder[1].name == "margin 10.0 m for her track"
+    assert all(step.margin_m >= 8.0 for step in ladder)
+
+
+def test_unread_parameters_leave_more_beside_the_track():
+    now = turn()
+    read = replace(now.snapshot, limits=AutopilotLimits(wp_speed_mps=5.0))
+    unread = replace(now.snapshot, limits=AutopilotLimits())
+    lowest = []
+    for snapshot in (read, unread):
+        now.snapshot = snapshot
+        lowest.append(min(step.margin_m for step in steps(now)))
+    assert lowest[0] < lowest[1]
+
+
+def test_a_problem_says_how_it_is_sailed_and_what_is_solid_as_it_is():
+    now = turn(WALL)
+    now.snapshot = replace(now.snapshot, limits=AutopilotLimits(wp_radius_m=7.0, wp_speed_mps=5.0))
+    part = tracking(now)
+    assert (part["wp_radius_m"], part["wp_speed_mps"], part["floor_m"]) == (7.0, 5.0, 6.0)
+    assert part["known"] is True
+    assert len(part["solids"]) == 1
+    assert part["reach_m"] == now.voyage.boat.hull.reach_m
+    now.snapshot = replace(now.snapshot, limits=None)
+    assert tracking(now)["known"] is False
+
+
+def test_a_way_whose_track_comes_too_near_is_seen():
+    now = turn(WALL)
+    problem = Problem.from_json(problem_dict(
+        now.voyage, now.gates[0], start=Start(en_m=(0.0, 0.0), heading_rad=0.0),
+        aim=_aim(), forecast=now.snapshot.wind.forecast, margin_m=12.0, delta_s=0.9, no_go_half_rad=0.8,
+        tracking=tracking(now)))
+    wide = of_way(problem, [(-60.0, 40.0), (-25.0, 60.0), (40.0, 110.0)], heading_rad=1.0, before_en=None)
+    near = of_way(problem, [(-60.0, 40.0), (-8.0, 62.0), (40.0, 110.0)], heading_rad=1.0, before_en=None)
+    assert wide.is_kept
+    assert not near.is_kept
+    assert of_way(replace(problem, tracking=None), [(0.0, 0.0), (0.0, 60.5)], heading_rad=0.0, before_en=None).is_kept
+
+
+def _aim():
+    from companion.skipper.planning.statement import Aim
+
+    return Aim(en_m=(0.0, 400.0), radius_m=6.0, gate=0)
+
+
+@pytest.mark.parametrize(("clearance", "words"), [
+    (None, ""), (8.44, "; passes 8.4 m clear or more (floor 6 m)")])
+def test_what_is_expected_is_said(clearance, words):
+    assert said(clearance, 6.0) == words
