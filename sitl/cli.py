@@ -21,6 +21,7 @@ PROGRAM = Program(
         "mismatch": "boats, seas and sensors that are not the plan's, by the hundred",
         "ablate": "what each part is worth: the same weather with one thing taken away",
         "baselines": "the companion against ArduRover alone and with its own path planning",
+        "results": "what campaigns left: shown, joined, held against each other by seed",
         "hostile": "forge what the companion reads, and see what comes of it",
         "fetch": "download the official ArduRover simulator",
     },
