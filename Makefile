@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test test-long check docs slowest campaign bench figures deb release clean
+.PHONY: env demo test test-long check docs slowest campaign nightly nightly-reference bench figures deb release clean
 env: $(ENV)
 
 # What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
@@ -81,6 +81,18 @@ slowest: $(ENV)
 
 campaign: $(ENV)
 	$(BIN)/sitl campaign sitl/scenarios/demo.toml --runs 50
+
+# A fixed set of voyages held against those of the reference, seed by seed; fails where one fails, or all are worse by more than
+# luck. make nightly-reference puts tonight's in its place: look at what nightly says first.
+NIGHTLY := $(addprefix sitl/scenarios/,demo.toml upwind.toml two-channels.toml lee-shore.toml figures/slalom.toml)
+nightly: $(ENV)
+	@mkdir -p build && rm -f build/nightly.jsonl build/nightly.facts.jsonl
+	@$(BIN)/sitl campaign $(NIGHTLY) --runs 8 --out build/nightly.jsonl --table build/nightly.parquet > build/nightly.log; \
+	  sailed=$$?; grep -v '^{' build/nightly.log; [ -s build/nightly.jsonl ] && \
+	  $(BIN)/sitl results compare bench/nightly.parquet build/nightly.parquet --fail-on-worse && exit $$sailed
+
+nightly-reference:
+	cp build/nightly.parquet bench/nightly.parquet
 
 # The planners on the problem set (OMPL too, after make env EXTRAS=bench), and risk against winds.
 bench: $(ENV)

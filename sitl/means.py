@@ -20,12 +20,14 @@ class Means:
     """Processes here (``workers``, None: one per core) or a cluster (``dask``); part I of N of the jobs (``array``).
 
     Results are appended to ``out`` as they come, and what it holds is not done again; None keeps them in memory.
+    In the end all are written to ``table`` as Parquet.
     """
 
     workers: int | None = None
     dask: str | None = None
     array: tuple[int, int] = (1, 1)
     out: Path | None = None
+    table: Path | None = None
 
     def part(self, jobs: Sequence[JobT]) -> Sequence[JobT]:
         """Return this part of the jobs: every N-th, so that parts take about as long."""
@@ -56,13 +58,15 @@ def add_options(
     group.add_argument("--out", type=_results, default=out, metavar="FILE.jsonl",
                        help="append each result as it comes; what it holds already is not sailed again"
                             + (f" (default: {out})" if out else ""))
+    group.add_argument("--table", type=_table, metavar="FILE.parquet",
+                       help="write all results as a table, for 'sitl results'; needs the extra [results]")
 
 
 def means_of(args: argparse.Namespace) -> Means:
     """Return what the options say."""
     if args.array[1] > 1 and args.out is None:
         raise InputError("--array", "", "says a part, and nothing says where to keep it", "add --out FILE.jsonl")
-    return Means(workers=args.workers, dask=args.dask, array=args.array, out=args.out)
+    return Means(workers=args.workers, dask=args.dask, array=args.array, out=args.out, table=args.table)
 
 
 def _address(text: str) -> str:
@@ -75,6 +79,13 @@ def _results(text: str) -> Path:
     path = out_file(text)
     if path.suffix != ".jsonl":
         raise ArgumentTypeError(f"{text}: results are lines of JSON; end the name in .jsonl")
+    return path
+
+
+def _table(text: str) -> Path:
+    path = out_file(text)
+    if path.suffix != ".parquet":
+        raise ArgumentTypeError(f"{text}: tables are Parquet; end the name in .parquet")
     return path
 
 

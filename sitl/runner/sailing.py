@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,6 +19,7 @@ from sitl.runner.cluster import LOCAL, settled_on
 from sitl.runner.identity import made_by, processor
 from sitl.runner.ledger import Held, Key, Ledger, text_of
 from sitl.runner.processes import settled
+from sitl.runner.table import table_of, write_table
 from sitl.runner.work import Done, NoRoomError, Task, UnfitError, perform
 
 JobT = TypeVar("JobT")
@@ -67,6 +69,8 @@ def sail(
         JobError: the disk is full, no cluster answers, workers are another program or die at once. What was done is
             in the file.
     """
+    if means.table is not None:
+        import_module("pyarrow")   # missed now, and not when all is sailed
     mine = means.part(jobs)
     names = [text_of(key(job)) for job in mine]
     began_s, cpu_s, lost = time.monotonic(), 0.0, []
@@ -94,6 +98,8 @@ def sail(
                 on_record(done.result)
             progress.add(is_failed=is_failed(done.result))
         progress.end()
+    if means.table is not None:
+        write_table(table_of(held), means.table)
     return Sailed(
         records=[held.results[name] for name in names if name in held.results], held=held, lost=lost,
         now=len(left) - len(lost), wall_s=time.monotonic() - began_s, cpu_s=cpu_s)

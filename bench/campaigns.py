@@ -1,0 +1,123 @@
+"""What the runner of campaigns costs: empty jobs and real voyages, by processes and by a local Dask cluster.
+
+    python -m bench.campaigns                       # a few minutes on a quiet machine
+    python -m bench.campaigns --empty 2000 --voyages 32 --workers 1 2 4 8
+
+Seconds of a processor count, not of the wall: workers beyond the cores share them, and so may others. "bare" is as many
+processes, each with its share of the seeds in a loop and nothing else. What the runner adds to a job is told by jobs
+that do nothing: the processor's time of all its processes, less what they take to begin.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import resource
+import statistics
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from sitl.campaigns.campaign import Job, key_of, sail_one
+from sitl.means import Means
+from sitl.run.compiled import compile_ahead
+from sitl.runner import sail
+
+DEMO = Path(__file__).parents[1] / "sitl" / "scenarios" / "demo.toml"
+MACHINES, CORES, VOYAGES = 100, 2, 10_000
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What a run took: seconds of the wall and of all processors, and of the largest worker [MB]."""
+
+    jobs: int
+    wall_s: float
+    cpu_s: float
+
+
+def nothing(seed):
+    return {"seed": seed, "passed": True}
+
+
+def share(seeds):
+    for seed in seeds:
+        sail_one(Job(scenario=DEMO, seed=seed, keep=None))
+
+
+def cpu_s():
+    spent_by = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(by.ru_utime + by.ru_stime for by in spent_by)
+
+
+def spent(jobs, run):
+    began_s, worked_s = time.monotonic(), cpu_s()
+    run()
+    return Spent(jobs=jobs, wall_s=time.monotonic() - began_s, cpu_s=cpu_s() - worked_s)
+
+
+def bare(seeds, workers):
+    context = multiprocessing.get_context("spawn")
+    crew = [context.Process(target=share, args=(seeds[n::workers],)) for n in range(workers)]
+    for process in crew:
+        process.start()
+    for process in crew:
+        process.join()
+
+
+def voyages(seeds, means):
+    return sail("campaign", sail_one, [Job(scenario=DEMO, seed=n, keep=None) for n in seeds], means, key=key_of)
+
+
+def empty(count, means):
+    return sail("empty", nothing, range(count), means, key=lambda seed: {"seed": seed})
+
+
+def main(argv=None):
+    parser = argparse.ArgumentParser(prog="python -m bench.campaigns", description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--empty", type=int, default=1000, help="jobs that do nothing (default 1000)")
+    parser.add_argument("--voyages", type=int, default=8, help="demo voyages of each row (default 8)")
+    parser.add_argument("--workers", type=int, nargs="+", default=[1, 2, 4, 8])
+    args = parser.parse_args(argv)
+    compile_ahead()
+    with tempfile.TemporaryDirectory() as folder:
+        ways = [(f"{w} workers", Means(workers=w)) for w in args.workers if w > 1]
+        ways += [(f"{w} workers, dask", Means(workers=w, dask="local")) for w in args.workers]
+        print(f"{args.empty} jobs that do nothing")
+        added_s = {}
+        for name, means in ways:
+            few = spent(10, lambda means=means: empty(10, means))
+            out = Means(workers=means.workers, dask=means.dask, out=Path(folder) / f"{name}.jsonl")
+            many = spent(args.empty, lambda out=out: empty(args.empty, out))
+            added_s[name] = (many.cpu_s - few.cpu_s) / (args.empty - 10)
+            print(f"  {name:18} {1000 * added_s[name]:6.2f} ms CPU a job, {few.cpu_s:5.1f} s CPU to begin and end")
+        seeds = range(args.voyages)
+        print(f"{args.voyages} demo voyages")
+        rows = [(f"bare, {w}", spent(len(seeds), lambda w=w: bare(seeds, w))) for w in args.workers]
+        peaks, inner = [], []
+        for name, means in ways:
+            out = Path(folder) / f"v-{name}.jsonl"
+            whole = Means(workers=means.workers, dask=means.dask, out=out)
+            rows.append((name, spent(len(seeds), lambda whole=whole: voyages(seeds, whole))))
+            facts = [json.loads(line) for line in out.with_suffix(".facts.jsonl").read_text().splitlines()]
+            peaks.append((name, max(fact["peak_mb"] for fact in facts)))
+            inner += [fact["cpu_s"] for fact in facts]
+        for name, row in rows:
+            print(f"  {name:18} {row.jobs / row.wall_s:5.2f} a second, {row.cpu_s / row.jobs:5.2f} s CPU each, with "
+                  "their beginning")
+        print("largest worker: " + ", ".join(f"{name} {mb:.0f} MB" for name, mb in peaks))
+        each_s = statistics.median(inner)
+        print(f"a voyage: {each_s:.2f} s CPU (median); the runner adds " + ", ".join(
+            f"{name} {100 * s / each_s:.2f} %" for name, s in added_s.items()))
+        last = [s for name, s in added_s.items() if "dask" in name][-1]
+        print(f"on paper: {VOYAGES} voyages by {MACHINES} machines of {CORES} cores like these: "
+              f"{VOYAGES * each_s / MACHINES / CORES / 60.0:.1f} min, of which one scheduler and client are busy "
+              f"{VOYAGES * last / 60.0:.1f} min of one core")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
