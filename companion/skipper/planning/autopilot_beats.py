@@ -52,12 +52,13 @@ def room_m(turn: Turn) -> float | None:
 
 def problem_beat(turn: Turn, margin_m: float) -> dict[str, Any] | None:
     """Return the ``beat`` of a problem whose obstacles are grown by ``margin_m``, None without one."""
-    room, wind = room_m(turn), turn.wind_mean
-    if room is None or wind is None:
+    room = room_m(turn)
+    if room is None:
         return None
     boat = turn.voyage.boat
     return {
-        "no_go_half_deg": math.degrees(boat.made_good_rad(turn.no_go_half_rad, wind[1])),
+        # the angle that her bow is held at, with leeway too: a leg at her course's angle she would be held below
+        "no_go_half_deg": math.degrees(turn.no_go_half_rad),
         "corridor_m": turn.tack_corridor_m,
         "clearance_m": max(0.0, room - margin_m),
         "tack_s": 2.0 * turn.no_go_half_rad / boat.turn_rate_radps + boat.tack_loss_s,

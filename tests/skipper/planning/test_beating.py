@@ -51,6 +51,13 @@ def test_the_room_is_the_boards_band_the_hull_and_the_floor():
     assert part["corridor_m"] == 10.0
 
 
+def test_a_beat_is_at_the_angle_of_her_bow_whatever_leeway_she_makes():
+    """At her course's angle the leg would be outside the zone, and she be steered along it, not as near as she can."""
+    now = turn()
+    slips = replace(now.voyage, boat=replace(now.voyage.boat, leeway_rad=math.radians(5.0)))
+    assert problem_beat(Turn(slips, now.config, now.state, now.snapshot), 15.0) == problem_beat(now, 15.0)
+
+
 def test_no_corridor_no_permission_or_failed_tacks_leave_no_beat():
     assert room_m(turn(xtrack_m=0.0)) is None
     assert room_m(turn(xtrack_m=80.0)) is None
