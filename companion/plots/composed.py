@@ -69,6 +69,7 @@ def field_figure(
     words.axis("off")
     words.legend(handles=[*handles, *_handles(seen, has_fans=has_fans)], loc="upper left", fontsize=9, frameon=False,
                  borderaxespad=0.0)
+    figure.get_layout_engine().set(h_pad=0.12)  # type: ignore[union-attr, call-arg]
     figure.suptitle(title, fontsize=11, x=0.02, ha="left")
     return figure
 
