@@ -117,7 +117,7 @@ def test_what_is_written_is_read_again():
     ("for_s = 600.0", "for_s = 0.0", "[[goal]] 1 for_s"),
     (SQUARE, "water.wkt", "[[goal]] 1 polygon water.wkt: there is no such file"),
     (SQUARE, SQUARE.replace("-1.3114", "-1.4114"), "is 7.2 km across; 3 km are the most"),
-    ("lon = -1.3100\nradius_m", "lon = 50.8\nradius_m", "km from [[goal]] 1, which is sailed by it; are lat and lon sw"),
+    ("lon = -1.3100\nradius_m", "lon = 50.8\nradius_m", "km from [[goal]] 1, which is sailed by it; are lat and"),
     ("guided = true", "guided = false", "a field is steered in GUIDED, which nobody allows; write guided = true in ["),
     ("[field.ring]\n", "[field]\nring = 3\n[field.other]\n", "[field.ring]: 3 is no table"),
     ("lat = 50.8178", "lat = nan", "[[goal]] 1 lat"),
