@@ -77,12 +77,28 @@ def atoms_of(mission: Mission, frame: LocalFrame) -> dict[str, Atom]:
     return out
 
 
-def _near(mission: Mission, name: str, en_m: tuple[float, float]) -> tuple[float, float]:
-    """Return a place of an atom, which is not on another sea."""
-    if not math.hypot(*en_m) <= RANGE_M:
-        raise InputError(str(mission.path), f"[field.{name}]", f"is {math.hypot(*en_m) / 1000.0:.0f} km from the start",
-                         "are lat and lon swapped? a field is sailed within 50 km")
-    return en_m
+def require_fields(mission: Mission) -> None:
+    """Raise InputError for atoms and fields that cannot be sailed, and for those on another sea than their goal.
+
+    Under way, in a frame that moves along, they are made again and not looked at again.
+    """
+    atoms_of(mission, mission.frame())
+    for name, atom in mission.options.field.items():
+        if isinstance(atom, LineAtomOptions | RepulsiveLineAtomOptions):
+            length_m = math.hypot(*_en(atom.end, LocalFrame(_geo(atom.start))))
+            if length_m < LEAST_LINE_M:
+                raise InputError(str(mission.path), f"[field.{name}]", f"start and end are {length_m:.1f} m apart",
+                                 "a line has two places")
+    for number, goal in enumerate(mission.goals, start=1):
+        if goal.field is None:
+            continue
+        for name, made in composed_of(mission, number, goal.field, LocalFrame(goal.point)).tree.atoms:
+            places = (getattr(made, key, None) for key in ("at_en", "from_en", "to_en"))
+            far_m = max((math.hypot(*place) for place in places if place is not None), default=0.0)
+            if not far_m <= RANGE_M:
+                raise InputError(str(mission.path), f"[field.{name}]",
+                                 f"is {far_m / 1000.0:.0f} km from [[goal]] {number}, which is sailed by it",
+                                 "are lat and lon swapped? a field is sailed within 50 km")
 
 
 def told_of(mission: Mission) -> tuple[str, ...]:
@@ -98,10 +114,11 @@ def told_of(mission: Mission) -> tuple[str, ...]:
 
 def findings_of(mission: Mission) -> tuple[Finding, ...]:
     """Return what is worth knowing of a mission's fields: atoms that nobody sails by, a field without a value."""
-    frame, out, told = mission.frame(), [], set()
+    out, told = [], set()
     for number, goal in enumerate(mission.goals, start=1):
         if goal.field is None:
             continue
+        frame = LocalFrame(goal.point)
         tree = composed_of(mission, number, goal.field, frame).tree
         told |= {name for name, _ in tree.atoms}
         place = frame.en_from_geo(goal.point)
@@ -138,14 +155,11 @@ def _atom(mission: Mission, name: str, atom: AtomOptions, frame: LocalFrame) -> 
     if isinstance(atom, LeaveAtomOptions):
         return OutOf(water_en=polygon_en(mission.waters[name], frame, cover=False))
     if isinstance(atom, LineAtomOptions | RepulsiveLineAtomOptions):
-        ends = [_near(mission, name, _en(mark, frame)) for mark in (atom.start, atom.end)]
-        if math.dist(*ends) < LEAST_LINE_M:
-            raise InputError(str(mission.path), f"[field.{name}]", f"start and end are {math.dist(*ends):.1f} m apart",
-                             "a line has two places")
+        ends = [_en(mark, frame) for mark in (atom.start, atom.end)]
         if isinstance(atom, LineAtomOptions):
             return Along(from_en=ends[0], to_en=ends[1], zone_m=atom.zone_m)
         return AwayFromLine(from_en=ends[0], to_en=ends[1], range_m=atom.range_m)
-    at_en = _near(mission, name, _en(atom, frame))
+    at_en = _en(atom, frame)
     if isinstance(atom, PointAtomOptions):
         return PointTo(at_en=at_en, zone_m=atom.zone_m)
     if isinstance(atom, StationAtomOptions):
@@ -159,4 +173,10 @@ def _en(
     place: MarkOptions | PointAtomOptions | StationAtomOptions | CircleAtomOptions | RepulsivePointAtomOptions,
     frame: LocalFrame,
 ) -> tuple[float, float]:
-    return frame.en_from_geo(GeoPoint(lat_deg=place.lat, lon_deg=place.lon))
+    return frame.en_from_geo(_geo(place))
+
+
+def _geo(
+    place: MarkOptions | PointAtomOptions | StationAtomOptions | CircleAtomOptions | RepulsivePointAtomOptions,
+) -> GeoPoint:
+    return GeoPoint(lat_deg=place.lat, lon_deg=place.lon)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.commands.output import patience
-from companion.program.arguments import picture, whole, wind
+from companion.program.arguments import out_file, picture, whole, wind
 
 if TYPE_CHECKING:
     from companion.geofence import Mission
@@ -18,6 +19,7 @@ examples:
   companion field missions/field-ring.toml
   companion field missions/field-square.toml --goal 2 --plot leave.png
   companion field missions/field-lane.toml --wind 5@40 --fans --plot lane.png
+  companion field missions/field-ring.toml --page ring.html      (turn the wind, drag the boat)
 
 FILE is a mission with a goal of kind = "field", or one of [skipper] guidance = "field". The wind is steady, there
 are no vessels and no current; the boat is at the start, or where the goal before was.
@@ -36,6 +38,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
                         help="[m/s, degrees] (else what the mission's previews assume)")
     parser.add_argument("--plot", type=picture, metavar="P.png", help="draw it with the boat's fan, wind and obstacles")
     parser.add_argument("--fans", action="store_true", help="in the picture: Schmitt's fan at every arrow, too")
+    parser.add_argument("--page", type=out_file, metavar="P.html",
+                        help="write one file for a browser: turn the wind, drag the boat; it asks for nothing")
     parser.set_defaults(run=run)
 
 
@@ -48,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     mission = require_sailable(load_mission(args.file))
     seen = previewed(mission, number=args.goal, wind=args.wind)
     fan, track = fan_of(seen), sailed(seen)
-    print("\n".join(_words(mission, seen)))
+    print("\n".join([*_words(mission, seen), *_in_the_wind(seen)]))
     end = math.dist(track[-1, 1:3], seen.place_en)
     print(f"the boat at {seen.here_en[0]:.0f} m east, {seen.here_en[1]:.0f} m north: the field says "
           f"{_heading(fan.wanted_rad)}, she is steered {_heading(fan.chosen_rad)}")
@@ -60,13 +64,26 @@ def run(args: argparse.Namespace) -> int:
             save_field(seen, fan, track, args.plot, has_fans=args.fans,
                        title=f"{mission.name}, goal {seen.number}: {seen.tree.text}")
         print(f"{args.plot}: written")
+    if args.page:
+        _write_page(args.page, mission, seen)
     return 0
+
+
+def _write_page(path: Path, mission: Mission, seen: Previewed) -> None:
+    from companion.disk import Disk, reason
+    from companion.errors import InputError
+    from companion.page.fields import field_page
+
+    try:
+        Disk().replace(path, field_page(mission, seen, _words(mission, seen)))
+    except OSError as error:
+        raise InputError("--page", str(path), f"cannot be written ({reason(error)})", "name another place") from error
+    print(f"{path}: written; open it in a browser, no server is needed")
 
 
 def _words(mission: Mission, seen: Previewed) -> list[str]:
     """Return what the field is made of."""
     from companion.field.tree import Along, AwayFrom, AwayFromLine, Heading, OutOf, PointTo, Round, StayAt
-    from companion.sailable.fields import without_value
 
     def place(at: tuple[float, float]) -> str:
         return f"{at[0]:.0f} m east, {at[1]:.0f} m north"
@@ -91,7 +108,14 @@ def _words(mission: Mission, seen: Previewed) -> list[str]:
             assert isinstance(atom, OutOf)
             words = f"out of {atom.water_en.area / 1e4:.1f} ha of water by the heading that is soonest out"
         out.append(f"  {name}: {words}")
-    twd = seen.conditions.twd_from_rad
+    return out
+
+
+def _in_the_wind(seen: Previewed) -> list[str]:
+    """Return in which wind it is looked at, and how much of the water it says nothing of."""
+    from companion.sailable.fields import without_value
+
+    twd, out = seen.conditions.twd_from_rad, []
     out.append("a motorboat: no wind is needed" if twd is None else
                f"wind {seen.conditions.seen.tws_mps:g} m/s from {_heading(twd)}, no-go zone "
                f"{math.degrees(seen.conditions.habits.no_go_half_rad):.0f}° to either side")

@@ -42,9 +42,9 @@ def field_figure(
     seen: Previewed, fan: Fan, track: NDArray[np.float64], *, title: str, has_fans: bool = False,
 ) -> Figure:
     """Return the picture."""
-    figure = plt.figure(figsize=(12.4, 9.3), layout="constrained")
-    parts = figure.add_gridspec(2, 2, width_ratios=(1.0, 0.34), height_ratios=(0.42, 0.58))
-    axes, rose, words = (figure.add_subplot(part) for part in (parts[:, 0], parts[0, 1], parts[1, 1]))
+    figure = plt.figure(figsize=(12.4, 9.2))
+    axes, rose, words = (figure.add_axes(part) for part in (
+        (0.055, 0.06, 0.662, 0.892), (0.745, 0.6, 0.235, 0.317), (0.738, 0.06, 0.25, 0.5)))
     handles = draw_area(axes, seen.area, 0.0)
     _draw_arrows(axes, seen, has_fans=has_fans)
     _draw_trajectory(axes, seen)

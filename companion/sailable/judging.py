@@ -17,7 +17,7 @@ from companion.compose import (
     voyage_of,
 )
 from companion.errors import InputError
-from companion.fields import atoms_of, findings_of
+from companion.fields import findings_of, require_fields
 from companion.geofence import Code, Finding, Mission, Severity
 from companion.geofence.check import Conditions, check_area
 from companion.geofence.mission import AreaOptions, kind_of, place_troubles, read_mission
@@ -77,7 +77,7 @@ def require_sailable(mission: Mission) -> Mission:
         permissions_of(mission)
         target_limits_of(mission)
         config_of(mission)
-        atoms_of(mission, mission.frame())
+        require_fields(mission)
         voyage_of(mission)
     except ValueError as error:
         raise InputError(source, "", str(error)) from error

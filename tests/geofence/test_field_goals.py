@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.cli import main
-from companion.compose import voyage_of
+from companion.compose import voyage_of, waters_of
 from companion.errors import InputError
 from companion.field.tree import Along, AwayFrom, AwayFromLine, Heading, OutOf, PointTo, Round, StayAt
 from companion.geofence import load_mission
@@ -117,7 +117,7 @@ def test_what_is_written_is_read_again():
     ("for_s = 600.0", "for_s = 0.0", "[[goal]] 1 for_s"),
     (SQUARE, "water.wkt", "[[goal]] 1 polygon water.wkt: there is no such file"),
     (SQUARE, SQUARE.replace("-1.3114", "-1.4114"), "is 7.2 km across; 3 km are the most"),
-    ("lon = -1.3100\nradius_m", "lon = 50.8\nradius_m", "[field.ring]: is 3"),
+    ("lon = -1.3100\nradius_m", "lon = 50.8\nradius_m", "km from [[goal]] 1, which is sailed by it; are lat and"),
     ("guided = true", "guided = false", "a field is steered in GUIDED, which nobody allows; write guided = true in ["),
     ("[field.ring]\n", "[field]\nring = 3\n[field.other]\n", "[field.ring]: 3 is no table"),
     ("lat = 50.8178", "lat = nan", "[[goal]] 1 lat"),
@@ -168,6 +168,17 @@ def test_whatever_stands_for_an_atom_raises_input_error_alone(value, kind):
     else:
         said = ""
     assert "\n" not in said
+
+
+def test_a_field_is_made_in_any_frame_of_a_passage(tmp_path):
+    """A goal 300 km off has its atoms beside it: the frame comes along, and nothing is refused for being far."""
+    far = RING.replace("lat = 50.8178", "lat = 48.1178").replace("lat = 50.8185", "lat = 48.1185").replace(
+        'until = "vessel"', 'until = "told"').replace(f'polygon = "{SQUARE}"', "") + "[passage]\nleg_m = 400000.0\n"
+    mission = load(tmp_path, far)
+    there = waters_of(mission)(mission.goals[0].point).goals[0]
+    assert there.field.tree.atom("ring").at_en == pytest.approx((0.0, 77.8), abs=0.5)
+    with pytest.raises(InputError, match=r"\[field.ring\]: is 300 km from \[\[goal\]\] 1"):
+        load(tmp_path, far.replace("lat = 48.1178", "lat = 50.8178"))
 
 
 def test_a_motor_boat_has_a_speed_and_no_polar(tmp_path):
