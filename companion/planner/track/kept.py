@@ -1,7 +1,7 @@
 """A search whose paths keep their clearance when they are sailed, with as few corners as that needs.
 
-The search plans lines. Here its path is laid again: legs that are too short to be followed go, two corners become one
-where the legs around them meet, waypoints that nothing needs are left out. Where the predicted track still comes nearer
+The search plans lines. Here its path is laid again: legs that are too short to be followed go, an arc of them becomes
+one corner or two where the legs around it meet, waypoints that nothing needs are left out. Where the predicted track still comes nearer
 than the floor, the corners near that place are pushed away from what is solid. A path that cannot be made to keep it is
 no answer: then the reason says where, and how near it would come.
 """
@@ -90,7 +90,7 @@ def _fewer(
         best: tuple[Path, Evaluation, Expected] | None = None
         lengths = [math.dist(a, b) for a, b in itertools.pairwise(path)]
         for n in sorted(range(len(lengths)), key=lengths.__getitem__):
-            for option in _without(path, n):
+            for option in (*(_rounded(path, n, lengths, least_m) if lengths[n] < least_m else ()), *_without(path, n)):
                 key = tuple(round(10.0 * c) for point in option for c in point)
                 if key in tried or count >= AT_MOST:
                     continue
@@ -159,6 +159,25 @@ def _pushes(problem: Problem, path: Path, seen: Expected) -> Iterator[Path]:
     for push in PUSH_M:
         place = middle + push * unit
         yield [*path[:leg + 1], (float(place[0]), float(place[1])), *path[leg + 1:]]
+
+
+def _rounded(path: Path, n: int, lengths: list[float], least_m: float) -> Iterator[Path]:
+    """Yield the path with the whole arc of short legs about leg n as one corner, or as two."""
+    first, last = n, n
+    while first > 0 and lengths[first - 1] < least_m:
+        first -= 1
+    while last + 1 < len(lengths) and lengths[last + 1] < least_m:
+        last += 1
+    if first == 0 or last + 2 > len(path) - 1 or first == last:
+        return
+    before, after = (path[first - 1], path[first]), (path[last + 1], path[last + 2])
+    one = meeting(*before, *after)
+    if one is not None:
+        yield [*path[:first], one, *path[last + 2:]]
+    for middle in range(first, last + 1):
+        a, b = meeting(*before, path[middle], path[middle + 1]), meeting(path[middle], path[middle + 1], *after)
+        if a is not None and b is not None:
+            yield [*path[:first], a, b, *path[last + 2:]]
 
 
 def _without(path: Path, n: int) -> Iterator[Path]:

@@ -43,7 +43,7 @@ def test_round_the_ends_of_walls_the_floor_is_kept_with_fewer_waypoints():
     assert found.has_path
     assert not expected(tracked, lines.waypoints_en).is_kept
     assert expected(tracked, found.waypoints_en).is_kept
-    assert len(found.waypoints_en) <= 0.7 * len(lines.waypoints_en)
+    assert len(found.waypoints_en) <= 0.5 * len(lines.waypoints_en)
     assert found.cost_s <= 1.03 * lines.cost_s + 2.0
     assert evaluate(tracked, found.waypoints_en).is_feasible
     assert lines.expected_clearance_m is None
