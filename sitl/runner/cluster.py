@@ -24,6 +24,7 @@ ResultT = TypeVar("ResultT")
 LOCAL = "local"
 ANSWER_S = 10.0      # within which a scheduler answers that is there
 PATIENCE_S = 120.0   # until which one that went is waited for
+LONELY_S = 20.0      # without a result, after which it is asked whether any worker is left
 RETRIES = 1          # of a job that raised: a card or a link may be better elsewhere
 
 
@@ -55,7 +56,7 @@ def settled_on(
                 require_same(client, address)
                 say(f"{address}: {_count(client)}; dashboard: {client.dashboard_link}")
                 try:
-                    for number, result in _round(client, work, left):
+                    for number, result in _round(client, work, left, lambda told: say(f"{address}: {told}")):
                         del left[number]
                         yield number, result
                 except _GoneError:
@@ -95,7 +96,7 @@ def _told() -> dict[str, Any]:
 
 def _count(client: Any) -> str:
     number = len(client.scheduler_info()["workers"])
-    return f"{number} worker{'s' if number != 1 else ''}" if number else "no worker yet, waiting for one"
+    return f"{number} worker{'s' if number != 1 else ''}" if number else "no worker, waiting for one"
 
 
 @contextlib.contextmanager
@@ -137,9 +138,12 @@ def _close(client: Any) -> None:
 
 
 def _round(
-    client: Any, work: Callable[[JobT], ResultT], jobs: Mapping[int, JobT],
+    client: Any, work: Callable[[JobT], ResultT], jobs: Mapping[int, JobT], tell: Callable[[str], None],
 ) -> Iterator[tuple[int, ResultT | Exception]]:
-    """Yield what comes of the jobs until all are done; raise _GoneError when the scheduler goes."""
+    """Yield what comes of the jobs until all are done; raise _GoneError when the scheduler goes.
+
+    ``tell`` is told when no worker is left.
+    """
     from distributed import CancelledError, KilledWorker
 
     landed: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -149,13 +153,20 @@ def _round(
             future = client.submit(work, job, pure=False, retries=RETRIES)
             flying[future.key] = (number, future)
             future.add_done_callback(landed.put)
+        heard_s, is_told = time.monotonic(), False
         while flying:
             try:
                 future = landed.get(timeout=1.0)
             except queue.Empty:
                 if client.status != "running":
                     raise _GoneError from None
+                if time.monotonic() - heard_s > LONELY_S:
+                    heard_s, is_alone = time.monotonic(), not client.scheduler_info()["workers"]
+                    if is_alone and not is_told:
+                        tell(_count(client))
+                    is_told = is_alone
                 continue
+            heard_s = time.monotonic()
             number = flying[future.key][0]
             try:
                 result = future.result()
