@@ -1,9 +1,9 @@
 """A search whose paths keep their clearance when they are sailed, with as few corners as that needs.
 
 The search plans lines. Here its path is laid again: legs that are too short to be followed go, an arc of them becomes
-one corner or two where the legs around it meet, waypoints that nothing needs are left out. Where the predicted track still comes nearer
-than the floor, the corners near that place are pushed away from what is solid. A path that cannot be made to keep it is
-no answer: then the reason says where, and how near it would come.
+one corner or two where the legs around it meet, waypoints that nothing needs are left out. Where the predicted track
+still comes nearer than the floor, the corners near that place are pushed away from what is solid. A path that cannot be
+made to keep it is no answer: then the reason says where, and how near it would come.
 """
 
 from __future__ import annotations
