@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from companion.boat import AutopilotLimits
+from companion.current import STILL, CurrentEstimator, Prior, Sailing
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
@@ -68,6 +69,9 @@ _UNTRUSTED = frozenset({
 # Parameters without which the autopilot's limits are not known.
 _LIMITS = frozenset({"SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS"})
 
+# Modes in which the sheets are trimmed to sail; in HOLD they are eased, and by hand nobody knows.
+_SAILS = frozenset({Mode.AUTO, Mode.GUIDED, Mode.LOITER})
+
 Value = VehicleState | AutopilotStatus | WindSample | ApparentWind | StatusText | AisReport
 Waters = Callable[[GeoPoint], Voyage]
 """A passage's voyage in the metres of a frame about a place."""
@@ -97,9 +101,11 @@ class VoyageFold:
     def __init__(
         self, skipper: Skipper, wind: WindRoom, permissions: Permissions, persisted: Persisted | None = None,
         *, known: tuple[str, ...] = (), traffic: TargetLimits | None = None, waters: Waters | None = None,
+        water: Prior = STILL,
     ) -> None:
         self._waters = waters
         skipper, persisted = begun(skipper, persisted, waters)
+        self.current = CurrentEstimator(skipper.voyage.boat.polar.speed_mps, water)
         self.skipper, self.wind, self.permissions = skipper, wind, permissions
         self.state: SkipperState = skipper.initial(persisted, known)
         self.assembler = VehicleAssembler()
@@ -284,6 +290,8 @@ class VoyageFold:
         vehicle, autopilot = self._vehicle, self._autopilot
         if self._has_shore:
             self._shore_s = t_s
+        wind = self._wind_view(t_s)
+        self.current.update(t_s, self._utc_s(t_s), self._sailing(t_s, wind))
         return Snapshot(
             t_s=t_s,
             vehicle=vehicle,
@@ -292,7 +300,8 @@ class VoyageFold:
             autopilot=autopilot,
             autopilot_age_s=None if autopilot is None else t_s - autopilot.t_s,
             heartbeat_age_s=None if self._heartbeat_s is None else t_s - self._heartbeat_s,
-            wind=self._wind_view(t_s),
+            wind=wind,
+            current=self.current.view(),
             mission=self._mission,
             identity=replace(
                 self._identity, vehicle_type=None if autopilot is None else autopilot.vehicle_type,
@@ -307,6 +316,26 @@ class VoyageFold:
             events=tuple(self._events),
             outcomes=tuple(self._outcomes),
         )
+
+    def _utc_s(self, t_s: float) -> float | None:
+        """Return the Unix time at ``t_s`` by the autopilot's clock, None before it knows the time."""
+        status = self._autopilot
+        if status is None or status.utc_at_boot_s is None or status.boot_s is None:
+            return None
+        return status.utc_at_boot_s + status.boot_s + max(0.0, t_s - status.t_s)
+
+    def _sailing(self, t_s: float, wind: WindView) -> Sailing | None:
+        """Return what the present tells of the current, None without a position or a wind."""
+        vehicle, status = self._vehicle, self._autopilot
+        if vehicle is None or wind.present_twd_from_rad is None or wind.present_tws_mps is None:
+            return None
+        is_driven = (
+            self.skipper.config.sails and not self.state.adrift.motor and status is not None and status.is_armed
+            and status.mode in _SAILS and wind.health in {WindHealth.GOOD, WindHealth.LIGHT})
+        return Sailing(
+            t_s=vehicle.t_s, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
+            yaw_rate_radps=vehicle.yaw_rate_radps, twd_from_rad=wind.present_twd_from_rad,
+            tws_mps=wind.present_tws_mps, is_driven=is_driven, age_s=t_s - vehicle.t_s)
 
     def _wind_view(self, t_s: float) -> WindView:
         status = self.wind.status(t_s)

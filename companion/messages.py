@@ -371,6 +371,8 @@ class CompanionStatus:
     twd_sigma_rad: float | None = None
     tws_mps: float | None = None
     tws_sigma_mps: float | None = None
+    current_set_rad: float | None = None      # where the current that plans reckon with goes; None: none is known
+    current_drift_mps: float | None = None
     next_tack_s: float | None = None
     promised_risk: float | None = None
     plan_id: int | None = None
@@ -391,6 +393,7 @@ class CompanionStatus:
             t_s=self.t_s, waypoint_distance_m=self.waypoint_distance_m, goal_distance_m=self.goal_distance_m,
             cross_track_m=self.cross_track_m, clearance_m=self.clearance_m, twd_from_rad=self.twd_from_rad,
             twd_sigma_rad=self.twd_sigma_rad, tws_mps=self.tws_mps, tws_sigma_mps=self.tws_sigma_mps,
+            current_set_rad=self.current_set_rad, current_drift_mps=self.current_drift_mps,
             next_tack_s=self.next_tack_s, promised_risk=self.promised_risk, plan_age_s=self.plan_age_s,
             battery_v=self.battery_v, bytes_out_per_s=self.bytes_out_per_s, order_age_s=self.order_age_s,
         )

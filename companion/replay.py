@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from companion.compose import config_of, estimator_of, target_limits_of, voyage_of, waters_of
+from companion.compose import config_of, estimator_of, target_limits_of, voyage_of, water_of, waters_of
 from companion.errors import InputError
 from companion.fold import Step, VoyageFold
 from companion.geofence import load_mission
@@ -157,7 +157,7 @@ class Recorded:
                 self._starts, ends, _gaps(self._decisions), strict=True):
             fold = VoyageFold(
                 skipper, WindRoom(estimator=estimator_of(self.mission)), self._permissions, persisted, known=known,
-                traffic=target_limits_of(self.mission), waters=waters,
+                traffic=target_limits_of(self.mission), waters=waters, water=water_of(self.mission),
             )
             yield from self._life(fold, start_s, end_s, gap_s, fed, epoch_s)
 

@@ -27,7 +27,16 @@ from companion.app.options import Far, SailOptions
 from companion.app.page import opened
 from companion.app.showing import OnView, Showing
 from companion.clock import now_s
-from companion.compose import config_of, estimator_of, feeds_of, permissions_of, target_limits_of, voyage_of, waters_of
+from companion.compose import (
+    config_of,
+    estimator_of,
+    feeds_of,
+    permissions_of,
+    target_limits_of,
+    voyage_of,
+    water_of,
+    waters_of,
+)
 from companion.fold import Step, VoyageFold, begun
 from companion.geofence import Mission
 from companion.mavlink.autopilot import Autopilot
@@ -204,7 +213,7 @@ class _Shell:
         self.fold = VoyageFold(
             skipper, options.room(estimator_of(self.mission)),
             permissions_of(self.mission, dry_run=options.dry_run), persisted, known=known,
-            traffic=target_limits_of(self.mission), waters=waters,
+            traffic=target_limits_of(self.mission), waters=waters, water=water_of(self.mission),
         )
         # Growing a jagged coast takes seconds; under way the loop must not wait for it.
         self.fold.skipper.prepare()

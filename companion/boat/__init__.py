@@ -7,6 +7,7 @@
 
 from companion.boat.boat import Boat, Hull
 from companion.boat.library import ardurover_sitl, avalon, constant
+from companion.boat.making_way import can_hold, made_good_mps, slowest_en_mps
 from companion.boat.margins import (
     AutopilotLimits,
     Margin,
@@ -34,13 +35,16 @@ __all__ = [
     "SailingAngle",
     "ardurover_sitl",
     "avalon",
+    "can_hold",
     "constant",
     "fence_penetration",
+    "made_good_mps",
     "narrowest_corridor_m",
     "outline_en_m",
     "parse_polar",
     "proposed_margin",
     "read_polar",
     "required_margin",
+    "slowest_en_mps",
     "widest_corridor_m",
 ]

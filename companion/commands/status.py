@@ -142,6 +142,10 @@ def status_document(report: Any, autopilot: Any, is_alive: bool, bytes_in: float
             "tws_mps": _round(s.tws_mps), "tws_sigma_mps": _round(s.tws_sigma_mps), "reference": "ground",
             "age_s": None if wind_age is None else round(wind_age, 2),
         },
+        "current": None if s.current_drift_mps is None else {
+            "set_deg": None if s.current_set_rad is None else round(math.degrees(s.current_set_rad), 1),
+            "drift_mps": _round(s.current_drift_mps), "age_s": _age(report, "status"),
+        },
         "plan": {
             "id": s.plan_id, "plan_age_s": s.plan_age_s, "replans": s.replans, "tacks": s.tacks,
             "promised_risk": _round(s.promised_risk, 4), "clearance_m": _round(s.clearance_m),
@@ -236,6 +240,9 @@ def _write_text(d: dict[str, Any], units: str) -> None:
           f"  TWS {show(wind['tws_mps'], '.1f', factor)} {unit}  (age {show(wind['age_s'], '.1f')} s)"
           f" | P(safe) {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
           f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {replans}")
+    if d["current"] is not None:
+        print(f"  current sets {show(d['current']['set_deg'], '03.0f')}°"
+              f" {show(d['current']['drift_mps'], '.2f', factor)} {unit}")
     if d["order"] is not None:
         print(f"  order {d['order']['verb']}, for {show(d['order']['stands_s'], '.0f', 1.0 / 60.0)} min")
     if d["traffic"] is not None:

@@ -31,7 +31,7 @@ Values = dict[str, Any]
 def values_of(view: View, frame: LocalFrame) -> Values:
     """Return what is known by its path; places in the view are metres in ``frame``."""
     values: Values = {
-        **_motion(view), **_wind(view), **_course(view, frame), **_performance(view), **_helm(view),
+        **_motion(view), **_wind(view), **_water(view), **_course(view, frame), **_performance(view), **_helm(view),
         # the loudest come first in the view, and are the last to be written
         **{path: value for alarm in reversed(view.alarms) for path, value in _notification(alarm).items()},
     }
@@ -84,6 +84,16 @@ def _wind(view: View) -> Values:
         "environment.wind.angleTrueGround": _rad(wind.twa_deg) if moves else None,
         "environment.wind.angleApparent": _rad(wind.awa_deg) if moves else None,
         "environment.wind.speedApparent": wind.aws_mps if moves else None,
+    }
+
+
+def _water(view: View) -> Values:
+    water = view.water
+    if water is None or not water.is_planned:
+        return {}
+    return {
+        "environment.current": {"setTrue": _rad(water.set_deg), "drift": water.drift_mps},
+        "environment.wind.speedTrue": water.tws_mps,
     }
 
 

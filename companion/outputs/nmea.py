@@ -35,7 +35,7 @@ def lines_of(view: View, frame: LocalFrame, utc_s: float | None) -> Lines:
     has_arrived = view.state.has_arrived is True
     underway = () if course is None else _course(course, names[0], points[0], has_arrived=has_arrived)
     route = tuple(sentences.wpl(point, name) for point, name in zip(points, names, strict=True))
-    return Lines(now=(*_motion(view, utc_s), *_wind(view), *underway),
+    return Lines(now=(*_motion(view, utc_s), *_wind(view), *_water(view), *underway),
                  route=(*route, *sentences.rte(ROUTE, names)) if names else ())
 
 
@@ -64,6 +64,13 @@ def _wind(view: View) -> list[str]:
     if is_valid and wind.twd_from_deg is not None and wind.tws_mps is not None:
         out.append(sentences.mwd(math.radians(wind.twd_from_deg), wind.tws_mps))
     return out
+
+
+def _water(view: View) -> list[str]:
+    """Return the current that plans reckon with."""
+    water = view.water
+    return [] if water is None or not water.is_planned else [
+        sentences.vdr(math.radians(water.set_deg), water.drift_mps)]
 
 
 def _course(course: Course, name: str, point: GeoPoint, *, has_arrived: bool) -> list[str]:

@@ -61,6 +61,11 @@ def mwd(from_rad: float, speed_mps: float) -> str:
     return sentence("MWD", _degrees(from_rad), "T", "", "M", _knots(speed_mps), "N", f"{speed_mps:.1f}", "M")
 
 
+def vdr(set_rad: float, drift_mps: float) -> str:
+    """Return where the current goes, and how fast."""
+    return sentence("VDR", _degrees(set_rad), "T", "", "M", _knots(drift_mps), "N")
+
+
 def hdt(heading_rad: float) -> str:
     """Return the true heading."""
     return sentence("HDT", _degrees(heading_rad), "T")

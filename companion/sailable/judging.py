@@ -15,6 +15,7 @@ from companion.compose import (
     permissions_of,
     target_limits_of,
     voyage_of,
+    water_of,
 )
 from companion.errors import InputError
 from companion.fields import findings_of, require_fields
@@ -79,6 +80,7 @@ def require_sailable(mission: Mission) -> Mission:
         config_of(mission)
         require_fields(mission)
         voyage_of(mission)
+        water_of(mission)
     except ValueError as error:
         raise InputError(source, "", str(error)) from error
     return mission

@@ -45,6 +45,7 @@ from companion.skipper.watch.charge import follow_charge
 from companion.skipper.watch.lookout import look_out
 from companion.skipper.watch.stopped import speak_of_stop
 from companion.skipper.watch.watch import watch
+from companion.skipper.watch.water import watch_water
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.voyage import Voyage
 
@@ -97,6 +98,7 @@ class Skipper:
         look_out(turn)
         count_time(turn)
         follow_charge(turn)
+        watch_water(turn)
         fresh = watch(turn)
         take_orders(turn)
         _decide(turn, fresh)

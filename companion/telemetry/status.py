@@ -46,6 +46,8 @@ def companion_status(
         twd_sigma_rad=sigma_ahead_rad(snapshot),
         tws_mps=wind.mean_tws_mps,
         tws_sigma_mps=tws_sigma,
+        current_set_rad=snapshot.current.set_rad if snapshot.current.is_significant else None,
+        current_drift_mps=snapshot.current.drift_mps if snapshot.current.is_significant else None,
         next_tack_s=next_tack_s(step, voyage.boat.polar),
         promised_risk=None if route is None else risk_of(route),
         plan_id=None if route is None else route.plan_id,

@@ -15,7 +15,8 @@ def body_of(view: View, *, knots: bool, columns: int) -> list[Row]:
     """Return label, text and style of each line; ``columns`` wide ones say more."""
     is_wide = columns >= 40
     return [
-        _wind(view, knots=knots), _bow(view, knots=knots), _boat(view, knots=knots), _leg(view), _goal(view),
+        _wind(view, knots=knots), *_water(view, knots=knots), _bow(view, knots=knots), _boat(view, knots=knots),
+        _leg(view), _goal(view),
         _tack(view), _plan(view, is_wide=is_wide), _clear(view), _parts(view), _power(view), _speeds(view, knots=knots),
     ]
 
@@ -30,6 +31,18 @@ def _wind(view: View, *, knots: bool) -> Row:
     health = "" if wind.health == "good" else f" {wind.health}"
     return "Wind", (f"{fig.direction(wind.twd_from_deg)}{spread} {fig.speed(wind.tws_mps, knots=knots)}{gusts} "
                     f"{fig.unit(knots=knots)}{health}"), style
+
+
+def _water(view: View, *, knots: bool) -> list[Row]:
+    """Return the current's line, none where plans do not reckon with one and nothing is wrong with it."""
+    water = view.water
+    if water is None or not (water.is_planned or water.verdict):
+        return []
+    spread = "" if water.sigma_mps is None else f"±{fig.speed(water.sigma_mps, knots=knots)}"
+    said = "" if not water.verdict else f" {water.verdict}"
+    text = f"sets {fig.direction(water.set_deg)} {fig.speed(water.drift_mps, knots=knots)}{spread}"
+    style = Style.PLAIN if water.is_planned else Style.WARN
+    return [("Water", f"{text} {fig.unit(knots=knots)}{said}", style)]
 
 
 def _bow(view: View, *, knots: bool) -> Row:

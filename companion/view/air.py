@@ -49,6 +49,23 @@ class Wind:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Water:
+    """The current: where it goes and how fast, the standard deviation in its most uncertain direction.
+
+    ``is_planned``: it is strong and sure enough for plans to reckon with it; ``verdict`` says what is not known of it.
+    ``twd_from_deg`` and ``tws_mps`` are the present wind over this water, which is what she sails by.
+    """
+
+    set_deg: float
+    drift_mps: float
+    sigma_mps: float | None = None
+    is_planned: bool = False
+    verdict: str = ""
+    twd_from_deg: float | None = None
+    tws_mps: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Wedge:
     """The no-go zone at a horizon: ``half_deg`` to either side of ``from_deg``, ``widening_deg`` of it the spread."""
 

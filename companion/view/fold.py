@@ -19,7 +19,7 @@ from companion.view.company import vessels_of
 from companion.view.events import Event, happenings
 from companion.view.numbers import place, rounded, tack_of
 from companion.view.way import Chosen, plan_of, predicted_of, safe_end_of
-from companion.view.wind import laylines_of, no_go_of, polar_of, wind_of
+from companion.view.wind import laylines_of, no_go_of, polar_of, water_of, wind_of
 
 TRACK_S = 60.0        # of the track that each view brings: what a page missed while its link was lost
 TRACK_STEP_S = 3.0
@@ -117,7 +117,8 @@ class ViewFold:
             source=self._source, name=voyage.name, t_s=round(t_s, 3), unix_s=self.unix_s(t_s), area=self.area.hash,
             age_s=rounded(min(ages), 1) if ages else None,
             state=parts.state_of(step, self._phase_s), alarms=parts.alarms(step, status, self._said),
-            boat=parts.boat_of(step, status, voyage), wind=wind_of(step), no_go=no_go_of(step, voyage, config),
+            boat=parts.boat_of(step, status, voyage), wind=wind_of(step), water=water_of(step),
+            no_go=no_go_of(step, voyage, config),
             laylines=None if following is None or state.over else laylines_of(
                 step, voyage, config, following.name, following.at_en_m),
             polar=polar_of(step, voyage, config),

@@ -56,7 +56,7 @@ class HeardFold:
                 age_s=None if status is None else rounded(t_s - self._phase_s, 1),
                 mode=None if autopilot is None or autopilot.mode is None else autopilot.mode.name,
                 is_armed=None if autopilot is None else autopilot.is_armed),
-            alarms=alarms, boat=self._boat(t_s, report, vehicle), wind=_wind(report, vehicle),
+            alarms=alarms, boat=self._boat(t_s, report, vehicle), wind=_wind(report, vehicle), water=_water(report),
             plan=_plan(report), vessels=heard_vessel(
                 None if status is None else status.traffic, None if age_s is None else age_s.get("traffic")),
             orders=values.Orders(standing=None if status is None or not status.order else values.Standing(
@@ -121,6 +121,14 @@ def _wind(report: StatusReport | None, vehicle: VehicleState | None) -> air.Wind
         tws_sigma_mps=rounded(status.tws_sigma_mps),
         twa_deg=None if vehicle is None else signed(status.twd_from_rad - vehicle.heading_rad),
         age_s=rounded(min((a for n, a in report.age_s.items() if n in {"status", "wind", "co_twd"}), default=None), 1))
+
+
+def _water(report: StatusReport | None) -> air.Water | None:
+    status = None if report is None else report.status
+    if status is None or status.current_set_rad is None or status.current_drift_mps is None:
+        return None
+    return air.Water(set_deg=compass(status.current_set_rad), drift_mps=rounded(status.current_drift_mps),
+                     is_planned=True)
 
 
 def _plan(report: StatusReport | None) -> values.Plan | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from companion.view.air import Laylines, NoGo, PointEn, Polar, Tack, Wind
+from companion.view.air import Laylines, NoGo, PointEn, Polar, Tack, Water, Wind
 
 SCHEMA = "companion.view/1"
 
@@ -251,6 +251,7 @@ class View:
     alarms: tuple[Alarm, ...] = ()
     boat: Boat = Boat()
     wind: Wind | None = None
+    water: Water | None = None
     no_go: NoGo | None = None
     laylines: Laylines | None = None
     polar: Polar | None = None

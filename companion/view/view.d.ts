@@ -343,6 +343,7 @@ export interface View {
   alarms: Alarm[];
   boat: Boat;
   wind: Wind | null;
+  water: Water | null;
   no_go: NoGo | null;
   laylines: Laylines | null;
   polar: Polar | null;
@@ -357,6 +358,22 @@ export interface View {
   orders: Orders;
   figures: Figures;
   health: Part[];
+}
+
+/**
+ * The current: where it goes and how fast, the standard deviation in its most uncertain direction.
+ *
+ *     ``is_planned``: it is strong and sure enough for plans to reckon with it; ``verdict`` says what is not known of it.
+ *     ``twd_from_deg`` and ``tws_mps`` are the present wind over this water, which is what she sails by.
+ */
+export interface Water {
+  set_deg: number;
+  drift_mps: number;
+  sigma_mps: number | null;
+  is_planned: boolean;
+  verdict: string;
+  twd_from_deg: number | null;
+  tws_mps: number | null;
 }
 
 /**

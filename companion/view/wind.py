@@ -6,8 +6,9 @@ import math
 from functools import lru_cache
 
 from companion.boat import AutopilotLimits, Boat
+from companion.current import over_water
 from companion.fold import Step
-from companion.geo.angles import difference_rad, heading_of
+from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.messages import VehicleState, WindForecast
 from companion.skipper.step import SkipperConfig
 from companion.skipper.way import PointEn, Voyage, half_width_rad, mean_twd_rad
@@ -58,6 +59,19 @@ def wind_of(step: Step) -> air.Wind | None:
         levels=() if forecast is None else LEVELS, bands=() if forecast is None else bands_of(forecast))
 
 
+def water_of(step: Step) -> air.Water | None:
+    """Return the current, None before anything is known of the water."""
+    current, wind = step.snapshot.current, step.snapshot.wind
+    if current.sigma_mps == 0.0:
+        return None
+    over = None if wind.present_twd_from_rad is None or wind.present_tws_mps is None else over_water(
+        wind.present_twd_from_rad, wind.present_tws_mps, current.planned_en_mps)
+    return air.Water(
+        set_deg=compass(current.set_rad), drift_mps=rounded(current.drift_mps), sigma_mps=rounded(current.sigma_mps),
+        is_planned=current.is_significant, verdict=current.verdict,
+        twd_from_deg=None if over is None else compass(over[0]), tws_mps=None if over is None else rounded(over[1]))
+
+
 def bands_of(forecast: WindForecast) -> tuple[air.Band, ...]:
     """Return the forecast at the view's horizons, as far as it reaches."""
     last_s = float(forecast.horizon_s[-1])
@@ -103,9 +117,10 @@ def laylines_of(
     """Return the laylines of a mark; None where it is fetched on one course, or the wind is not known."""
     snapshot, boat = step.snapshot, voyage.boat
     here, wind, vehicle = snapshot.position_en_m, snapshot.wind, snapshot.vehicle
-    twd_rad, tws_mps = wind.mean_twd_from_rad, wind.mean_tws_mps
+    twd_rad, tws_mps, current = wind.mean_twd_from_rad, wind.mean_tws_mps, snapshot.current.planned_en_mps
     if here is None or vehicle is None or twd_rad is None or tws_mps is None or math.dist(here, mark_en) < 1.0:
         return None
+    twd_rad, tws_mps = over_water(twd_rad, tws_mps, current)
     no_go_rad = planned_no_go_rad(config, voyage, snapshot.limits)
     beat, run = best_angles(boat, round(tws_mps, 1), no_go_rad)
     off_rad = abs(difference_rad(twd_rad, heading_of(mark_en[0] - here[0], mark_en[1] - here[1])))
@@ -121,6 +136,8 @@ def laylines_of(
     lines = []
     for tack, side in (("starboard", 1.0), ("port", -1.0)):
         course_rad = twd_rad - side * angle_rad   # on starboard tack the wind is to the right of the bow
+        if current != (0.0, 0.0):
+            course_rad = heading_of(*(v * speed_mps + c for v, c in zip(unit_en(course_rad), current, strict=True)))
         lines.append(air.Layline(
             tack=tack, course_deg=compass(course_rad), swing_deg=degrees(swing),  # type: ignore[arg-type]
             reach_s=rounded(_meets_s(here, vehicle, mark_en, course_rad), 0)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -115,7 +116,7 @@ def _check(args: argparse.Namespace) -> int:
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
     from companion.fields import told_of
-    from companion.sailable import judge
+    from companion.sailable import judge, words_of
 
     judged = judge(Path(args.file), from_deg=args.wind[1] if args.wind else None)
     if judged.mission is None or judged.refusals:
@@ -130,6 +131,8 @@ def _check(args: argparse.Namespace) -> int:
         from companion.sailable.previews import passage_words
 
         print(passage_words(mission))
+    for line in words_of(mission, time.time()):
+        print(f"{args.file}: {line}")
     print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
           f"{counted(len(mission.area.solids), 'obstacle')}: "
           f"{'NOT in order' if bad else 'in order'}")

@@ -23,6 +23,7 @@ from companion.geofence.mission.options import (
     AreaOptions,
     AutopilotOptions,
     BoatOptions,
+    CurrentOptions,
     MissionOptions,
     OperatorOptions,
     OutputOptions,
@@ -100,6 +101,17 @@ class Mission:
     def wind(self) -> WindOptions:
         """The ``[wind]`` table."""
         return self.options.wind
+
+    @property
+    def current(self) -> CurrentOptions | None:
+        """The ``[current]`` table, None without one."""
+        return self.options.current
+
+    @property
+    def tide_path(self) -> Path | None:
+        """The tide table's file, None without one."""
+        current = self.options.current
+        return None if current is None or current.table is None else self.path.parent / current.table
 
     @property
     def autopilot(self) -> AutopilotOptions:
@@ -237,6 +249,8 @@ def assembled(
     if mission.polar_path is not None:
         _require(mission.polar_path, str(path), "[boat] polar",
                  'write a file beside the mission, "ardurover" or a speed in m/s')
+    if mission.tide_path is not None:
+        _require(mission.tide_path, str(path), "[current] table", "write a tide table beside the mission")
     return mission
 
 

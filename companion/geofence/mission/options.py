@@ -95,6 +95,18 @@ class WindOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     preview_speed_mps: Annotated[float, Meta(gt=0.0, le=50.0)] = 5.0
 
 
+class CurrentOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[current]``: what is known of it before the boat's own track tells; without the table next to nothing is."""
+
+    set_deg: Heading | None = None
+    """Where it goes [deg, true]; with ``drift_mps``."""
+    drift_mps: Annotated[float, Meta(ge=0.0, le=10.0)] | None = None
+    table: str | None = None
+    """A file beside the mission in place of both: lines of time, set_deg, drift_mps (docs/current.md)."""
+    sigma_mps: Annotated[float, Meta(ge=0.02, le=5.0)] = 0.2
+    """How far what is given here may be wrong [m/s, standard deviation in each direction]."""
+
+
 class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """``[operator]``: what the companion may do uninvited. Nothing is sent to the boat that is not allowed here."""
 
@@ -281,6 +293,7 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     risk: RiskOptions = RiskOptions()
     boat: BoatOptions = BoatOptions()
     wind: WindOptions = WindOptions()
+    current: CurrentOptions | None = None
     autopilot: AutopilotOptions = AutopilotOptions()
     operator: OperatorOptions = OperatorOptions()
     skipper: SkipperOptions = SkipperOptions()
@@ -301,4 +314,5 @@ def tables() -> dict[str, tuple[str, ...]]:
     known["field"] = tuple(dict.fromkeys(key for kind in ATOMS.values() for key in ("kind", *kind.__struct_fields__)))
     known["refuge"] = RefugeOptions.__struct_fields__
     known["start"] = StartOptions.__struct_fields__
+    known["current"] = CurrentOptions.__struct_fields__
     return known

@@ -2,7 +2,7 @@
 
 ArduPilot forwards what the companion sends to its other links. Two forms go out:
 
-- TUNNEL, broadcast: the whole value packed into 66 bytes and its words, for ``companion status``;
+- TUNNEL, broadcast: the whole value packed into 70 bytes and its words, for ``companion status``;
 - WIND_COV and NAMED_VALUE_FLOATs ``co_twd co_tws co_sig co_psafe co_tack co_xt``: the wind with its uncertainty and the
   most wanted figures, for any ground station's plots and the autopilot's log. They take turns.
 
@@ -27,13 +27,13 @@ from companion.messages import CompanionStatus, TrafficStatus
 
 # TUNNEL payload types from 32768 on are free for private use; ours is read by nobody else.
 PAYLOAD_TYPE = 0xC05A
-VERSION = 2
+VERSION = 3
 COMPANION_COMPONENT = 191
 MAX_PAYLOAD_BYTES = 128
 # Version, time [0.1 s], four distances [m] and the risk, lat and lon [deg x 1e7]; then 16 bits each: angles [0.01 deg],
-# speeds [cm/s], seconds, counts, battery [10 mV], traffic [bytes/s], an order's age [10 s]; then goals and the
+# speeds [cm/s], seconds, counts, battery [10 mV], traffic [bytes/s], an order's age [10 s], current; then goals and the
 # lengths of three words.
-_PACK = struct.Struct("<BIfffffii" + "H" * 14 + "BBBBB")
+_PACK = struct.Struct("<BIfffffii" + "H" * 16 + "BBBBB")
 _NONE16 = 0xFFFF
 _NONE8 = 0xFF
 _STATE_BYTES, _CODE_BYTES = 24, 16
@@ -88,7 +88,7 @@ def pack_status(status: CompanionStatus) -> bytes:
         _u16(status.plan_id), _u16(status.plan_age_s), _u16(status.replans), _u16(status.tacks),
         _u16(status.battery_v, 100.0),
         _u16(status.waypoint_seq), _u16(status.waypoint_count), _u16(status.bytes_out_per_s),
-        _u16(status.order_age_s, 0.1),
+        _u16(status.order_age_s, 0.1), _centidegrees(status.current_set_rad), _u16(status.current_drift_mps, 100.0),
         _u8(status.goal_index), _u8(status.goal_count), len(state), len(code), len(order),
     )
     return head + state + code + order + text
@@ -105,6 +105,7 @@ def unpack_status(payload: bytes, t_s: float | None = None) -> CompanionStatus:
     (
         _, tenths, waypoint_m, goal_m, cross_m, clearance_m, risk, lat_e7, lon_e7, twd, sigma, tws, tws_sigma, tack,
         plan, age, replans, tacks, battery, seq, count, traffic, order_age,
+        current_set, drift,
         goal, goals, state_end, code_size, order_size,
     ) = _PACK.unpack_from(payload)
     words = payload[_PACK.size:]
@@ -122,6 +123,8 @@ def unpack_status(payload: bytes, t_s: float | None = None) -> CompanionStatus:
         clearance_m=_float(clearance_m), promised_risk=_float(risk), position=geo_point(lat_e7, lon_e7),
         twd_from_rad=None if twd == _NONE16 else math.radians(twd / 100.0),
         twd_sigma_rad=None if sigma_deg is None else math.radians(sigma_deg),
+        current_set_rad=None if current_set == _NONE16 else math.radians(current_set / 100.0),
+        current_drift_mps=_scaled(drift, 100.0),
         tws_mps=_scaled(tws, 100.0), tws_sigma_mps=_scaled(tws_sigma, 100.0), next_tack_s=_scaled(tack),
         plan_id=_count(plan), plan_age_s=_scaled(age), replans=_count(replans), tacks=_count(tacks),
         battery_v=_scaled(battery, 100.0), bytes_out_per_s=_scaled(traffic),

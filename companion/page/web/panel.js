@@ -74,6 +74,7 @@ function figures(view) {
     one("TWD σ 1 min", wind?.sigma_deg == null ? NONE : `±${figure(wind.sigma_deg, 0)}°`, ""), one("clearance", distance(boat?.clearance_m), ""),
     one("next tack", duration(plan?.next_tack_s), ""), one("risk, instant", percent(plan?.promised_risk), ""),
     one("off the leg", boat?.cross_track_m == null ? NONE : `${figure(Math.abs(boat.cross_track_m), 1)} m ${boat.cross_track_m < -0.05 ? "L" : boat.cross_track_m > 0.05 ? "R" : ""}`, ""),
+    ...(view?.water?.is_planned ? [one("current", `${bearing(view.water.set_deg)} ${speed(view.water.drift_mps)}`, speedUnit())] : []),
     one("battery", figure(boat?.battery_v, 1), boat?.battery_share == null ? "V" : `V ${percent(boat.battery_share)}`));
 }
 

@@ -73,7 +73,10 @@ def defect_of(p: Problem) -> str | None:
                             and 0.0 <= p.beat.clearance_m < math.inf and 0.0 <= p.beat.tack_s < math.inf),
          "beat needs 0 < no_go_half_deg < 90, corridor_m > 0, clearance_m >= 0 and tack_s >= 0"),
         (p.tracking is None or p.tracking.is_finite, "tracking has a number that is negative or not finite"),
-        (p.beat is None or p.current.drift_mps == 0.0, "a beat left to the autopilot is not planned in a current"),
+        (p.beat is None or p.current.drift_mps == 0.0 or p.zone is not None,
+         "a beat left to the autopilot in a current needs its zone"),
+        (p.zone is None or (math.isfinite(p.zone.from_rad) and 0.0 <= p.zone.half_rad < math.pi),
+         "zone needs a finite from_deg and 0 <= half_deg < 180"),
     )
     for holds, text in checks:
         if not holds:

@@ -83,6 +83,13 @@ def ground_track(p: Problem, dx_m: float, dy_m: float, t_s: float = 0.0) -> tupl
     return solve_heading(p, course, t_s)
 
 
+def is_zoned(p: Problem, dx_m: float, dy_m: float) -> bool:
+    """Return whether the autopilot does not follow a leg of this ground direction as a line: see ``Zone``."""
+    if p.zone is None or p.current.drift_mps == 0.0:
+        return False
+    return abs(wrap_pi(math.atan2(dx_m, dy_m) - p.zone.from_rad)) < p.zone.half_rad - NO_GO_SLACK_RAD
+
+
 def evaluate(problem: Problem, waypoints_en: ArrayLike) -> Evaluation:
     """Walk the path (n, 2); agrees with the format's definition where no extension is used."""
     p = resolved(problem)
@@ -137,12 +144,17 @@ def evaluate(problem: Problem, waypoints_en: ArrayLike) -> Evaluation:
         turn_s += spent
         t1 = t + (length / v if v > 0.0 else math.inf)
         half, sigma = worst_no_go(p, t, min(t1, 1e12))
-        is_closed = abs(twa) - half < -NO_GO_SLACK_RAD
-        beat = p.beat if is_closed and p.boat.can_tack and is_clear(p, shapely.LineString([a, b])) else None
+        zoned = is_zoned(p, dx, dy)
+        is_closed = abs(twa) - half < -NO_GO_SLACK_RAD or zoned
+        may_beat = is_closed and p.boat.can_tack and (zoned or p.current.drift_mps == 0.0)
+        beat = p.beat if may_beat and is_clear(p, shapely.LineString([a, b])) else None
         if beat is not None:
             beaten_s, crossings = beat_s(p, beat, dx, dy)
             tacks += round(crossings)
             t1, v = t + beaten_s, length / beaten_s
+        elif zoned:
+            reasons.append(f"leg {i}: the autopilot would beat it, or not keep to it, in the wind that it knows, and "
+                           "there is no room for that")
         elif is_closed:
             reasons.append(f"leg {i}: |TWA| {math.degrees(abs(twa)):.2f} deg is inside the no-go zone "
                            f"{math.degrees(half):.2f} deg")

@@ -22,6 +22,7 @@ from companion.planner.problem.parts import (
     Sigma,
     Target,
     Wind,
+    Zone,
 )
 
 if TYPE_CHECKING:
@@ -165,7 +166,8 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         raise InputError(source, "targets", "is not a list", "write a list of objects")
     twa, mps = _parse_speed(boat.child("speed"))
     known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
-             "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat", "obstacle_names", "tracking"}
+             "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat", "obstacle_names", "tracking",
+             "zone"}
     fields: dict[str, Any] = dict(  # noqa: C408, the names of Problem's fields
         id=top.text("id", ""),
         title=top.text("title", ""),
@@ -202,6 +204,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         clearance_floor_m=top.number("clearance_floor_m", 0.0),
         beat=_parse_beat(top.child("beat")) if raw.get("beat") is not None else None,
         tracking=_parse_tracking(top.child("tracking")) if raw.get("tracking") is not None else None,
+        zone=_parse_zone(top.child("zone")) if raw.get("zone") is not None else None,
         extra={k: v for k, v in raw.items() if k not in known},
     )
     return fields | ({"leg_saving": top.number("leg_saving")} if "leg_saving" in raw else {})
@@ -283,6 +286,10 @@ def _parse_allocation(allocation: _Reader) -> float:
 def _parse_risk(risk: _Reader) -> RiskLimit:
     return RiskLimit(max_path_risk=risk.number("max_path_risk"),
                      correlation_time_s=risk.number("correlation_time_s", 60.0))
+
+
+def _parse_zone(zone: _Reader) -> Zone:
+    return Zone(from_rad=math.radians(zone.number("from_deg")), half_rad=math.radians(zone.number("half_deg")))
 
 
 def _parse_beat(beat: _Reader) -> Beat:

@@ -97,6 +97,8 @@ def to_dict(p: Problem) -> dict[str, Any]:
                        "clearance_m": p.beat.clearance_m, "tack_s": p.beat.tack_s}
     if p.tracking is not None:
         out["tracking"] = _tracking_dict(p.tracking)
+    if p.zone is not None:
+        out["zone"] = {"from_deg": deg(p.zone.from_rad), "half_deg": deg(p.zone.half_rad)}
     return out | dict(p.extra)
 
 

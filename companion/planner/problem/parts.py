@@ -121,6 +121,23 @@ NO_CURRENT = Current()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Zone:
+    """In a current: courses over the ground within ``half_rad`` of ``from_rad`` the autopilot does not follow as lines.
+
+    ArduRover knows the wind over the ground alone. A leg whose course lies within its no-go angle of that it beats, and
+    within 10 degrees more it steers the bearing, whatever the water does. Such a leg is allowed only as a ``Beat``, and
+    no other leg is beaten: outside the zone the autopilot keeps to the line, pinching where it has to.
+
+    With ``open_half_rad`` it is the zone of a boat that may beat: there, and where its heading is that far off the wind
+    over the water, it goes as it likes.
+    """
+
+    from_rad: float
+    half_rad: float
+    open_half_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
     """A moving disc to keep out of: at (x + vx t, y + vy t), radius ``radius_m + growth_mps t``, in its window.
 

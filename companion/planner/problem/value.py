@@ -20,7 +20,17 @@ import numpy as np
 import shapely
 
 from companion.planner.problem.json_read import read_fields
-from companion.planner.problem.parts import NO_CURRENT, TOUCH_M, Beat, BoatLimits, Current, RiskLimit, Target, Wind
+from companion.planner.problem.parts import (
+    NO_CURRENT,
+    TOUCH_M,
+    Beat,
+    BoatLimits,
+    Current,
+    RiskLimit,
+    Target,
+    Wind,
+    Zone,
+)
 
 if TYPE_CHECKING:
     from companion.planner.problem.tracking import Tracking
@@ -54,6 +64,7 @@ class Problem:
     boat: BoatLimits
     delta_s: float = 0.5
     current: Current = NO_CURRENT
+    zone: Zone | None = None
     targets: tuple[Target, ...] = ()
     vessels_part: float | None = None
     risk: RiskLimit | None = None

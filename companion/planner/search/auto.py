@@ -91,6 +91,8 @@ def _first_paths(s: Searcher) -> str | None:
     if len(s.world.grid.edges) == 0:
         return None if s.best is not None else _lattices(s)
     s.lattice(400, 2, margin=0.5, half_at_s=1.3 * s.bound.value_s)
+    if s.world.boat.zone_half > 0.0:   # the metric knows nothing of courses that the autopilot does not keep to
+        s.lattice(1_600, 2, margin=0.5, half_at_s=1.3 * s.bound.value_s)
     s.geodesic(4_000)
     return None if s.best is not None else _lattices(s)
 

@@ -21,6 +21,7 @@ from companion.planner.search.kernels import (
     Grid,
     Ints,
     is_free,
+    is_refused,
     meets_target,
     speed_at,
     track,
@@ -107,6 +108,8 @@ def drift_search(
             if not abs(a) >= worst_half(b, t1, t2) - 2e-7 or not abs(a) <= b.max_twa:
                 continue
             vx, vy = v * math.sin(a) + b.cx, v * math.cos(a) + b.cy
+            if is_refused(b, a, vx, vy):
+                continue
             x1, y1 = x + vx * (t2 - t1), y + vy * (t2 - t1)
             i, j = math.floor((x1 - box[0]) / wx), math.floor((y1 - box[1]) / wy)
             if i < 0 or j < 0 or i >= nx or j >= ny:

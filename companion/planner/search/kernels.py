@@ -37,7 +37,10 @@ class Grid(NamedTuple):
 
 
 class Boat(NamedTuple):
-    """Speed by |TWA|, turning, no-go zone in time, losses, current, targets (m, 9), what gybing round takes."""
+    """Speed by |TWA|, turning, no-go zone in time, losses, current, targets (m, 9), what gybing round takes.
+
+    ``zone_half`` above 0: in a current, courses over the ground that the autopilot does not follow (``parts.Zone``).
+    """
 
     twa: Floats
     mps: Floats
@@ -63,6 +66,9 @@ class Boat(NamedTuple):
     room: float
     most_turn: float
     round_s: float
+    zone_from: float
+    zone_half: float
+    zone_open: float
 
 
 @kernel
@@ -135,6 +141,43 @@ def _cross_track(b: Boat, h: float, dx: float, dy: float) -> float:
 
 
 @kernel
+def _root(b: Boat, lo: float, hi: float, low: float, high: float, dx: float, dy: float) -> float:
+    """Return the heading between two of opposite sides that makes the direction good (Illinois' false position)."""
+    side = 0
+    for _ in range(60):
+        if hi - lo < 1e-12 or low == high:
+            break
+        mid = (lo * high - hi * low) / (high - low)
+        value = _cross_track(b, mid, dx, dy)
+        if abs(value) < 1e-13:
+            return mid
+        if (value > 0.0) == (low > 0.0):
+            lo, low = mid, value
+            high = 0.5 * high if side == 1 else high
+            side = 1
+        else:
+            hi, high = mid, value
+            low = 0.5 * low if side == -1 else low
+            side = -1
+    return lo if abs(low) < abs(high) else hi
+
+
+@kernel
+def is_zoned(b: Boat, course: float) -> bool:
+    """Is a course over the ground one that the autopilot does not follow?"""
+    return b.zone_half > 0.0 and abs(wrap(wrap(course) - b.zone_from)) < b.zone_half
+
+
+@kernel
+def is_refused(b: Boat, a: float, vx: float, vy: float) -> bool:
+    """Is a heading that makes this velocity over the ground good none that the autopilot sails (``parts.Zone``)?"""
+    if b.zone_half <= 0.0:
+        return False
+    zoned = is_zoned(b, math.atan2(vx, vy))
+    return zoned if b.zone_open == 0.0 else not zoned and abs(a) < b.zone_open
+
+
+@kernel
 def track(b: Boat, dx: float, dy: float, t: float) -> tuple[float, float]:
     """Return (TWA of the heading, speed over ground) that makes the ground direction (dx, dy) good."""
     course = wrap(math.atan2(dx, dy))   # dead down wind is -π, as everywhere
@@ -143,22 +186,20 @@ def track(b: Boat, dx: float, dy: float, t: float) -> tuple[float, float]:
     size = math.hypot(dx, dy)
     dx, dy = dx / size, dy / size
     half = half_at(b, t)
+    if b.zone_half > 0.0:
+        zoned = is_zoned(b, course)
+        if zoned and b.zone_open == 0.0:
+            return course, 0.0
+        if not zoned:
+            half = max(half, b.zone_open)
     best_h, best, any_h, any_v = course, 0.0, course, 0.0
-    n = 180
+    n = 60      # six degrees: two roots within one are a polar's dent, which the scorer may still find
     last = _cross_track(b, course - math.pi, dx, dy)
     for i in range(1, n + 1):
         h1 = course - math.pi + 2.0 * math.pi * i / n
         now = _cross_track(b, h1, dx, dy)
         if last * now <= 0.0:
-            lo, hi, low = h1 - 2.0 * math.pi / n, h1, last
-            for _ in range(48):
-                mid = 0.5 * (lo + hi)
-                value = _cross_track(b, mid, dx, dy)
-                if (value > 0.0) == (low > 0.0):
-                    lo = mid
-                else:
-                    hi = mid
-            h = wrap(0.5 * (lo + hi))
+            h = wrap(_root(b, h1 - 2.0 * math.pi / n, h1, last, now, dx, dy))
             v = speed_at(b, h)
             along = (v * math.sin(h) + b.cx) * dx + (v * math.cos(h) + b.cy) * dy
             if along > any_v:
@@ -166,7 +207,9 @@ def track(b: Boat, dx: float, dy: float, t: float) -> tuple[float, float]:
             if along > best and abs(h) >= half - 1e-9 and abs(h) <= b.max_twa + 1e-9:
                 best_h, best = h, along
         last = now
-    return (best_h, best) if best > 0.0 else (any_h, any_v)
+    if best > 0.0:
+        return best_h, best
+    return any_h, 0.0 if b.zone_open > 0.0 else any_v
 
 
 @kernel

@@ -26,6 +26,7 @@ from companion.planner.search.kernels import (
     Ints,
     is_free,
     meets_target,
+    speed_at,
     track,
     turn_guess,
     turn_time,
@@ -35,6 +36,7 @@ from companion.planner.search.kernels import (
 from companion.planner.search.moves import corner
 from companion.planner.search.world import World
 
+LEAST_SINE = 0.1   # of the angle between a lattice's axes
 _START, _CLOCKWISE, _COUNTER, _MOVE, _ROUND = 1, 2, 3, 4, 5
 
 
@@ -324,6 +326,17 @@ def _leeward(b: Boat, axes: Floats) -> tuple[int, int]:
     return 0, 0
 
 
+def _over_ground(b: Boat, u: Floats, half_rad: float) -> Floats:
+    """Return the directions over the ground of the headings ``u``; themselves where these are no axes of a lattice."""
+    moved = speed_at(b, half_rad if u[0, 1] > 0.0 else math.pi - half_rad) * u + np.array([b.cx, b.cy])
+    size = np.hypot(moved[:, 0], moved[:, 1])
+    if float(np.min(size)) < 1e-6:
+        return u
+    unit = moved / size[:, None]
+    was, now = (w[0, 0] * w[1, 1] - w[0, 1] * w[1, 0] for w in (u, unit))
+    return unit if was * now > 0.0 and abs(now) > LEAST_SINE else u
+
+
 def run_lattice(
     world: World, gauge: Gauge, *, cells: int, reach: int, half_rad: float, box: tuple[float, float, float, float],
     bound_s: float = math.inf, max_pops: int = 1 << 60, downwind: bool = False, stretch: float = 1.0,
@@ -344,6 +357,8 @@ def run_lattice(
     u = np.array([[math.sin(half), math.cos(half)], [-math.sin(half), math.cos(half)]])
     if downwind:
         u[:, 1] *= -1.0
+    if b.cx != 0.0 or b.cy != 0.0:
+        u = _over_ground(b, u, half)
     area = max((box[2] - box[0]) * (box[3] - box[1]), 1e-6)
     step = stretch * math.sqrt(area / (cells * abs(u[0, 0] * u[1, 1] - u[0, 1] * u[1, 0])))
     inverse = np.linalg.inv(u)  # (x, y) = (a, c) @ u, so (a, c) = (x, y) @ inverse

@@ -9,6 +9,7 @@ from companion.planner.search.kernels import (
     SLACK_RAD,
     Boat,
     Floats,
+    is_refused,
     speed_at,
     track,
     turn_guess,
@@ -40,7 +41,7 @@ def corner(
     The boat is at p at time t heading h. The angles fit the times at which the two legs are sailed.
     """
     a1, a2 = edge_angle(b, k1, t, t), edge_angle(b, k2, t, t)
-    l1 = l2 = t2 = vx = vy = 0.0
+    l1 = l2 = t2 = vx = vy = wx = wy = 0.0
     rounds = 1 if b.kind == 0 else 12
     for r in range(rounds):
         if not (abs(a1) >= 0.0 and abs(a2) >= 0.0):
@@ -67,6 +68,8 @@ def corner(
             a1, a2 = n1, n2
             if settled:
                 break
+    if is_refused(b, a1, vx, vy) or is_refused(b, a2, wx, wy):
+        return 0.0, 0.0, math.inf, False
     return px + l1 * vx, py + l1 * vy, t2, True
 
 

@@ -298,7 +298,7 @@ class Searcher:
         downwind = self.world.goal[1] < 0.0 and b.down < math.pi - 1e-6
         found = run_lattice(
             self.world, self.gauge, cells=cells, reach=reach,
-            half_rad=math.pi - b.down if downwind else max(half, b.up),
+            half_rad=math.pi - b.down if downwind else max(half, b.up, b.zone_open),
             box=self.inner_box(margin), downwind=downwind, stretch=stretch,
             bound_s=self.upper_s if bound_s is None else bound_s, max_pops=int(most), side=side,
         )

@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from companion.geo.angles import wrap_pi
 from companion.planner.problem.parts import TOUCH_M
 from companion.planner.problem.value import Problem
 from companion.planner.search.kernels import Boat, Floats, Grid, rasterise
@@ -255,8 +256,15 @@ def make_boat(p: Problem) -> Boat:
         s.sigma0_rad, s.growth_rad_per_sqrt_s, s.sigma_inf_rad, s.rho_hz, p.k_delta, horizon, width,
         b.tack_loss_s, b.gybe_loss_s, p.current.drift_mps * math.sin(angle), p.current.drift_mps * math.cos(angle),
         up, down, np.asarray(rows, np.float64).reshape(-1, 9), b.can_tack, b.room_m,
-        b.most_turn_rad, _round_s(p, up),
+        b.most_turn_rad, _round_s(p, up), *_zone(p),
     )._replace(base=_constant_base(p))
+
+
+def _zone(p: Problem) -> tuple[float, float, float]:
+    """Return where the autopilot's zone is in the wind frame, its half angle and the open one; 0 without one."""
+    if p.zone is None or p.current.drift_mps == 0.0:
+        return 0.0, 0.0, 0.0
+    return wrap_pi(p.zone.from_rad - p.wind.twd_from_rad), p.zone.half_rad, p.zone.open_half_rad
 
 
 def _round_s(p: Problem, up_rad: float) -> float:

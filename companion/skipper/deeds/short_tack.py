@@ -8,6 +8,8 @@ its last tack at the earliest.
 
 from __future__ import annotations
 
+import math
+
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Mode
 from companion.skipper.deeds.helm import TACK, is_busy, tack
@@ -49,6 +51,10 @@ def short_tack(turn: Turn) -> None:
 
 
 def _clearance_m(turn: Turn, boat: PointEn, course_rad: float, span_s: float) -> float:
-    """Return how clear the water is that a course takes her through in ``span_s`` [m]."""
-    there = moved(boat, course_rad, turn.speed_mps * span_s)
+    """Return how clear the water is that a heading takes her through in ``span_s``, the current with her [m]."""
+    east, north = turn.current_en_mps
+    vehicle = turn.snapshot.vehicle
+    velocity = (0.0, 0.0) if vehicle is None else vehicle.velocity_en_mps
+    through_m = math.hypot(velocity[0] - east, velocity[1] - north) * span_s
+    there = moved((boat[0] + east * span_s, boat[1] + north * span_s), course_rad, through_m)
     return turn.voyage.area.path_clearance_m([boat, there])

@@ -196,7 +196,7 @@ def _followed(turn: Turn, pending: PendingPlan, path: list[PointEn]) -> list[Poi
                 return Quality(is_feasible=True, is_sailable=True, clearance_m=clearance_m, time_s=judged.time_s)
         seen = judge(
             way, boat=boat, no_go_half_rad=turn.planned_no_go_rad, twd_from_rad=wind[0], tws_mps=wind[1], area=area,
-            beat_room_m=room_m(turn))
+            beat_room_m=room_m(turn), current_en_mps=turn.current_en_mps)
         is_sailable = seen.spare_rad >= 0.0 and not shapely.intersects(keep_out, shapely.LineString(way))
         return Quality(is_feasible=False, is_sailable=is_sailable, clearance_m=clearance_m, time_s=seen.time_s)
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from companion.current import over_ground
 from companion.errors import InputError
 from companion.messages import Mode
 from companion.planner import Problem
-from companion.skipper.planning.autopilot_beats import problem_beat
+from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
 from companion.skipper.planning.errands import Errand, errand, gate_for, homeward
 from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
@@ -21,6 +22,7 @@ from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.judge import half_width_rad
+from companion.skipper.way.stemming import waiting_place
 
 UPLOAD_LATENCY_S = 1.5   # item protocol, a few dozen items, and the read-back
 SLOW_MPS = 0.5           # slower than this the course over ground says nothing about the heading
@@ -35,7 +37,7 @@ def request(
     It is planned for where she is bound for on an errand, else for the gate after the one that item ``from_index``
     completes or leads to, and behind the last one home where the mission ends there. ``lacks`` says why not.
     """
-    ladder = steps(turn)
+    current, ladder = turn.snapshot.current, steps(turn)
     step = ladder[min(rung, len(ladder) - 1)]
     forecast, start, aimed = turn.snapshot.wind.forecast, _start(turn, from_index), _target(turn, from_index)
     if forecast is None or start is None or aimed is None:
@@ -53,7 +55,8 @@ def request(
         problem = Problem.from_json(problem_dict(
             turn.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
             delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
-            beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk,
+            beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk, current=current,
+            zone_half_rad=turn.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
             tracking=problem_tracking(
                 turn, start, from_index, floor_m=min(turn.config.margin_floor_m, turn.config.margin_m),
                 forecast=forecast),
@@ -65,7 +68,8 @@ def request(
     problem = replace(problem, delta_s=shared.delta_s, targets=shared.targets, vessels_part=shared.part)
     facts = replace(
         turn.blank_facts(number, step.margin_m, shared.delta_s, name),
-        plan_twd_from_rad=problem.wind.twd_from_rad,
+        plan_twd_from_rad=over_ground(
+            problem.wind.twd_from_rad, problem.wind.tws_mps or 0.0, current.planned_en_mps)[0],
         plan_half_width_rad=half_width_rad(forecast, start.after_s + WIDTH_AHEAD_S, turn.config.wind_change_level),
         vessels_part=shared.part or 0.0, bound_for=bound.name if bound is not None and not step.nearer_goal else "",
     )
@@ -96,7 +100,10 @@ def _start(turn: Turn, from_index: int | None) -> Start | None:
         sailing = turn.state.sailing and vehicle.speed_mps > SLOW_MPS and not stopped
         ahead = turn.config.plan_budget_s + UPLOAD_LATENCY_S if sailing else 0.0
         heading = math.atan2(*vehicle.velocity_en_mps) if sailing else vehicle.heading_rad
-        return Start(en_m=moved(boat, heading, vehicle.speed_mps * ahead), heading_rad=heading, after_s=ahead)
+        place = moved(boat, heading, vehicle.speed_mps * ahead)
+        # In a current a plan's headings are through the water.
+        bow = vehicle.heading_rad if turn.snapshot.current.is_significant else heading
+        return Start(en_m=place, heading_rad=bow, after_s=ahead)
     if route is None or not turn.state.index <= from_index < len(route.items):
         return None
     way = [boat, *route.points_en_m[turn.state.index:from_index + 1]]
@@ -148,6 +155,11 @@ def _aim(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
 
 def _nearer(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
     """Return a safe place that is nearer than the goal: a refuge, or a roomy place on the way."""
+    water, floor_m = turn.water, min(turn.config.margin_floor_m, turn.config.margin_m)
+    if water is not None and water.trouble(start.en_m, target.en_m):
+        place = waiting_place(water, turn.voyage.area, start.en_m, floor_m)
+        if place is not None and place != start.en_m:
+            return Aim(en_m=place, radius_m=turn.config.loiter_radius_m, gate=-1)
     left = distance_m(start.en_m, target.en_m)
     if turn.voyage.is_passage:
         left = min(left, turn.config.horizon_m)

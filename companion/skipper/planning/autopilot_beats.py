@@ -16,6 +16,7 @@ from companion.skipper.way.voyage import PointEn
 IRONS_MEMORY_S = 600.0
 TACKS_FAIL_AFTER = 2    # times in irons within IRONS_MEMORY_S before tacks are no longer tried
 WIDEST_M = 50.0         # a wider corridor is no corridor
+CARRIED_S = 2.5         # of a tack, at the corridor's edge: where the water takes her meanwhile
 OFF_LINE_M = 2.0        # so near the line a leg that begins anew is the same leg
 FOLLOWS_RAD = math.radians(10.0)   # this far outside its no-go zone the autopilot keeps to the line
 
@@ -29,9 +30,10 @@ def tacks_fail(turn: Turn) -> bool:
 def corridor_room_m(turn: Turn) -> float | None:
     """Return how far from everything solid a closed leg must be for the autopilot's beat about it [m].
 
-    What its boards keep within, the overshoot of a tack at the corridor's edge included; the hull's reach; the margin's
-    floor beyond that. None without a corridor: the autopilot then sails to the layline, wherever that is. Whether each
-    board keeps the floor in the wind's spread is the planner's to say (``companion.planner.track``).
+    What its boards keep within, the overshoot of a tack at the corridor's edge included; where the current sets her
+    meanwhile; the hull's reach; the margin's floor beyond that. None without a corridor: the autopilot then sails to
+    the layline, wherever that is. Whether each board keeps the floor in the wind's spread is the planner's to say
+    (``companion.planner.track``).
     """
     corridor, wind = turn.tack_corridor_m, turn.wind_mean
     if wind is None or not 0.0 < corridor <= WIDEST_M or not turn.config.sails:
@@ -40,7 +42,7 @@ def corridor_room_m(turn: Turn) -> float | None:
     limits = turn.snapshot.limits or AutopilotLimits(sail_xtrack_max_m=corridor)
     helm = replace(Helm.of(limits), corridor_m=corridor, no_go_half_rad=turn.no_go_half_rad)
     band_m = beat_band_m(helm, boat.polar, tws_mps=wind[1])
-    return band_m + boat.hull.reach_m + turn.config.margin_floor_m
+    return band_m + boat.hull.reach_m + CARRIED_S * math.hypot(*turn.current_en_mps) + turn.config.margin_floor_m
 
 
 def room_m(turn: Turn) -> float | None:

@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from companion.planner.settings import AUTO, Choice
 from companion.skipper.step.config import SkipperConfig
 
+PINCHES = "closer to the wind than the autopilot keeps to a line"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rung:
@@ -24,13 +26,16 @@ class Rung:
     max_path_risk: float | None = None
     nearer_goal: bool = False
     planner: Choice = AUTO
+    pinches: bool = False
 
 
-def rungs(config: SkipperConfig, *, track_m: float = 0.0) -> tuple[Rung, ...]:
+def rungs(config: SkipperConfig, *, track_m: float = 0.0, in_current: bool = False) -> tuple[Rung, ...]:
     """Return the steps in order; the first is what was asked for, none is below the margin's floor and ``track_m``.
 
     ``track_m`` is what the boat may be beside a straight leg: a margin that leaves less would be planned for nothing,
     and where the mission's own leaves less, the first thing is a wider one.
+    ``in_current``: planned with one. What is given up first there are the courses that the autopilot keeps to as lines
+    (``pinches``): closer to the wind it steers for the waypoint, and the current sets her off the line by metres.
     With delta_s the limit on the whole path's risk is given up.
     """
     limit = config.max_path_risk
@@ -43,6 +48,9 @@ def rungs(config: SkipperConfig, *, track_m: float = 0.0) -> tuple[Rung, ...]:
     needed = min(config.margin_floor_m, config.margin_m) + track_m
     if needed > config.margin_m:
         out.append(replace(out[-1], name=f"margin {needed:.1f} m for her track", margin_m=needed))
+    first = len(out)
+    if in_current:
+        out.append(replace(out[-1], name=PINCHES, pinches=True))
     for share in (*config.margin_ladder, 0.0):
         margin = floor + share * room
         if margin < out[-1].margin_m - 1e-9:
@@ -55,4 +63,4 @@ def rungs(config: SkipperConfig, *, track_m: float = 0.0) -> tuple[Rung, ...]:
             out.append(Rung(name=f"margin {floor:.1f} m, delta_s {delta:g}", margin_m=floor, delta_s=delta))
     last = out[-1]
     out.append(Rung(name="a nearer safe place", margin_m=floor, delta_s=last.delta_s, nearer_goal=True))
-    return tuple(out)
+    return tuple(replace(rung, pinches=in_current and n >= first) for n, rung in enumerate(out))

@@ -15,8 +15,10 @@ from companion.skipper.step.missions import loiter_place
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.judge import judge
+from companion.skipper.way.stemming import waiting_place
 from companion.skipper.way.voyage import PointEn
 
+FOUL = "current too strong"   # the code under which it is said
 UNDER_WAY_TRIES, ASHORE_TRIES = 2, 5   # of a planner that does not answer, before the next step of the ladder
 HOLD_ROOM = 2.0   # times the loiter's radius: she may lie here for hours, and a HOLD carries her off before help comes
 
@@ -63,7 +65,7 @@ def _is_sound(turn: Turn, way: list[PointEn]) -> bool:
     floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
     return all(
         judge(part, boat=turn.voyage.boat, no_go_half_rad=turn.no_go_half_rad, twd_from_rad=wind[0], tws_mps=wind[1],
-              area=turn.voyage.area, beat_room_m=room_m(turn)).is_sound(floor_m)
+              area=turn.voyage.area, beat_room_m=room_m(turn), current_en_mps=turn.current_en_mps).is_sound(floor_m)
         for part, wind in ((way, mean), (way[:2], now)))
 
 
@@ -79,6 +81,10 @@ def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
     ):
         turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
         turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
+        return
+    foul = _foul(turn, pending)
+    if foul:
+        _wait_against(turn, pending, foul, count=len(ladder))
         return
     # Only the boat's own place helps when the way from a waypoint ahead is closed: the rungs start at the boat.
     from_index = pending.from_index if pending.rung == 0 and state.route is not None and _tail_only(turn) else None
@@ -100,6 +106,32 @@ def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
         Severity.CRITICAL, "no plan at all",
         f"no plan on any step of the ladder ({reason}): holding, trying again in {wait:.0f} s", every_s=0.0)
     hold(turn, f"no plan found: {reason}")
+
+
+def _foul(turn: Turn, pending: PendingPlan) -> str:
+    """Return why the current keeps her from where the plan leads, empty: it does not."""
+    water = turn.water
+    return "" if water is None else water.trouble(pending.start_en_m, pending.problem.goal_en)
+
+
+def _wait_against(turn: Turn, pending: PendingPlan, foul: str, *, count: int) -> None:
+    """Wait for a weaker current: here where she is carried clear, else where she will be (the ladder's last step).
+
+    No margin and no promise given up makes way against a current: the steps between are left out.
+    """
+    water, boat = turn.water, turn.boat_en
+    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
+    place = None if water is None or boat is None else waiting_place(water, turn.voyage.area, boat, floor_m)
+    is_here = place is None or place == boat
+    where = "first to water where she is carried clear" if not is_here else "waiting against it"
+    if place is None:
+        where = f"nowhere near is she carried clear, {where}"
+    turn.say(Severity.CRITICAL, FOUL, f"{foul}: {where}")
+    if not is_here and pending.rung + 1 < count and request(
+            turn, pending.reason, rung=count - 1, text=foul):
+        return
+    turn.update(plan_retry=turn.failed(turn.state.plan_retry), rung=0)
+    hold(turn, foul)
 
 
 def _tail_only(turn: Turn) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
+from companion.current import STILL_WATER, WaterCurrent, forecast_over_water
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.messages import WindForecast
 from companion.skipper.step.config import SkipperConfig
@@ -185,8 +186,12 @@ def problem_dict(
     margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
     extra_obstacles: Sequence[str] = (), title: str = "", beat: dict[str, Any] | None = None,
     max_path_risk: float | None = None, tracking: dict[str, Any] | None = None,
+    current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
+
+    A ``current`` that is significant is planned with: the wind is then that over the water. ``zone_half_rad`` is how
+    far off the wind over the ground, which is the autopilot's, a course must be there for it to be followed.
 
     Raises:
         ValueError: when no water is left inside the fence at this margin.
@@ -206,6 +211,12 @@ def problem_dict(
     speed = float(np.max(forecast.mean_tws_mps))
     length_s = 1.5 * distance_m(start.en_m, aim.en_m) / max(0.3, voyage.boat.polar.max_speed_mps(speed))
     wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s)
+    water: dict[str, Any] = {}
+    if current.is_significant:
+        water["current"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
+        water["zone"] = {"from_deg": wind["from_deg"], "half_deg": math.degrees(zone_half_rad)}
+        wind = wind_part(forecast_over_water(forecast, current), after_s=start.after_s, length_s=length_s,
+                         delta_s=delta_s)
     boat = dict(voyage.boat.problem_boat(wind["speed_mps"]))
     boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(
         max(no_go_half_rad, voyage.boat.no_go_half_rad), wind["speed_mps"]))
@@ -220,6 +231,7 @@ def problem_dict(
         "boat": boat,
         "delta_s": delta_s,
         "leg_saving": LEG_SAVING,
+        **water,
         "beat": beat,
         "tracking": tracking,
         "risk": None if max_path_risk is None else {

@@ -46,13 +46,14 @@ def problem_tracking(
 
 def steps(turn: Turn) -> tuple[Rung, ...]:
     """Return the ladder: its margins end where the floor is what is left beside a straight leg's track."""
-    wind = turn.wind_mean
+    wind, in_current = turn.wind_mean, turn.snapshot.current.is_significant
     if wind is None:
-        return rungs(turn.config)
+        return rungs(turn.config, in_current=in_current)
     best = turn.voyage.boat.polar.max_speed_mps(wind[1])
     error_m = stated_error_m(best, has_short=not _is_known(turn))
     track_m = error_m + turn.voyage.boat.hull.reach_m
-    return rungs(turn.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m))
+    return rungs(
+        turn.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m), in_current=in_current)
 
 
 def _is_known(turn: Turn) -> bool:

@@ -28,6 +28,8 @@ BEND_RAD = math.radians(6.0)     # a smaller change of course at a waypoint is n
 BEND_PLAN_AGE_S = 60.0           # ... unless the last one is this old
 FORECAST_SHARE = 0.5         # of the interval that the plan used: a smaller change of the mean does not matter
 FORECAST_RAD = math.radians(5.0)
+CURRENT_MPS, CURRENT_SHARE = 0.15, 0.25   # a current is another when it differs by so much, and so much of the plan's
+CURRENT_INTERVAL_S = 60.0    # its estimate settles within minutes, and each waypoint takes it in anyway
 FORECAST_SPEED = 0.3         # share of the wind speed
 FORECAST_WIDTH = 1.5         # times as wide, or as narrow, and ...
 FORECAST_WIDTH_RAD = math.radians(3.0)   # ... by this much
@@ -132,7 +134,8 @@ def _no_go(turn: Turn) -> Trigger | None:
     turn.update(no_go_since_s=since)
     drift = predicted_beat(
         boat, vehicle.heading_rad, leg[0], target, twd_from_rad=wind[0], no_go_half_rad=turn.no_go_half_rad,
-        corridor_m=turn.tack_corridor_m, area=turn.voyage.area)
+        corridor_m=turn.tack_corridor_m, area=turn.voyage.area, current_en_mps=turn.current_en_mps,
+        speed_mps=turn.voyage.boat.polar.speed_mps(turn.no_go_half_rad, wind[1]))
     floor = min(turn.config.margin_floor_m, turn.config.margin_m)
     straight = turn.voyage.area.path_clearance_m([boat, target])
     text = (f"TWA {math.degrees(twa):.0f}° to the waypoint is inside {math.degrees(turn.no_go_half_rad):.0f}°: "
@@ -187,6 +190,12 @@ def _wind(turn: Turn) -> Trigger | None:
         text = (f"the 90 s mean has turned {math.degrees(turned):.0f}° from the plan's wind; it allowed for "
                 f"±{math.degrees(route.plan_half_width_rad):.0f}°")
         return Trigger(reason=ReplanReason.WIND_SHIFT, text=text, interval_s=config.min_replan_interval_s)
+    planned = route.plan_current_east_mps, route.plan_current_north_mps
+    changed_mps = distance_m(turn.current_en_mps, planned)
+    if changed_mps > max(CURRENT_MPS, CURRENT_SHARE * math.hypot(*planned)):
+        text = f"{turn.snapshot.current.sentence()}: {changed_mps:.2f} m/s off the plan's"
+        return Trigger(reason=ReplanReason.CURRENT, text=text, interval_s=max(
+            CURRENT_INTERVAL_S, config.min_replan_interval_s))
     if turn.t_s - route.plan_t_s > config.plan_age_s:
         return Trigger(
             reason=ReplanReason.PLAN_AGE, text="the plan is 60 minutes old", interval_s=config.min_replan_interval_s)

@@ -18,6 +18,7 @@ class ReplanReason(enum.Enum):
     WAYPOINT = "waypoint"              # Wolsieffer: at each waypoint, from the next one
     FORECAST = "forecast"              # the forecast has changed enough to matter
     WIND_SHIFT = "wind_shift"          # Büsser: 20 deg
+    CURRENT = "current"                # the current has changed against the plan's
     PLAN_AGE = "plan_age"              # Büsser: 60 minutes
     OFF_LEG = "off_leg"                # Büsser: off the leg by more than the grid size
     NO_GO = "no_go"                    # the present wind makes the leg unsailable

@@ -29,6 +29,8 @@ class Route:
     delta_s: float
     rung: str = ""                     # the step of the ladder it was found on; empty: as configured
     risk: float | None = None          # of the whole path, wind and vessels
+    plan_current_east_mps: float = 0.0   # the current that the plan reckons with
+    plan_current_north_mps: float = 0.0
     vessel_risk: float = 0.0           # the vessels' part of it
     vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
     expected_clearance_m: float | None = None   # of the hull on the predicted track, the prediction's error taken off

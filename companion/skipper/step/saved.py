@@ -19,11 +19,13 @@ MAX_GOALS = 10**6
 MAX_POINTS = 20_000    # of the track of a search
 MAX_QUARTERS = 10**6   # turns round one buoy
 _NUMBERS = ("plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s",
-            "vessel_risk", "vessels_part")
+            "vessel_risk", "vessels_part", "plan_current_east_mps", "plan_current_north_mps")
 _MAYBE = ("risk", "cost_s", "expected_clearance_m")
 _WORDS = ("rung", "why", "bound_for")
 # of states that were saved before there were any
-_DEFAULTS: dict[str, Any] = {"vessel_risk": 0.0, "vessels_part": 0.0, "bound_for": "", "expected_clearance_m": None}
+_DEFAULTS: dict[str, Any] = {
+    "vessel_risk": 0.0, "vessels_part": 0.0, "plan_current_east_mps": 0.0, "plan_current_north_mps": 0.0,
+    "bound_for": "", "expected_clearance_m": None}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from companion.boat import AutopilotLimits
+from companion.current import STILL_WATER, WaterCurrent
 from companion.mavlink.trust import Identity
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
 from companion.orders import Order
@@ -154,6 +155,7 @@ class Snapshot:
     autopilot_age_s: float | None = None
     heartbeat_age_s: float | None = None
     wind: WindView = WindView()
+    current: WaterCurrent = STILL_WATER
     mission: MissionOnBoard = MissionOnBoard()
     identity: Identity = field(default_factory=Identity)   # as far as the autopilot has told it
     neighbours: tuple[str, ...] = ()       # other autopilots on a link on which ours was not named, in words

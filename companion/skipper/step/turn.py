@@ -35,6 +35,7 @@ from companion.skipper.step.state import Phase, Retry, SkipperState, is_given_up
 from companion.skipper.step.still_air import still_air
 from companion.skipper.way.circle import Circle, circle_of
 from companion.skipper.way.gates import Approach, Gate, gates_of
+from companion.skipper.way.stemming import Water
 from companion.skipper.way.voyage import PointEn, Voyage
 
 FRESH_S = 3.0          # a part older than this is not acted upon
@@ -219,6 +220,20 @@ class Turn:
         return wind_mean(self.snapshot)
 
     @property
+    def current_en_mps(self) -> tuple[float, float]:
+        """The current that plans reckon with [m/s, towards east and north]; 0 where none is significant."""
+        return self.snapshot.current.planned_en_mps
+
+    @property
+    def water(self) -> Water | None:
+        """The current as it is to be stemmed, None where none is planned with or the wind is not known."""
+        wind = self.wind_mean
+        if wind is None or not self.snapshot.current.is_significant:
+            return None
+        return Water(boat=self.voyage.boat, wind=wind, current_en_mps=self.current_en_mps,
+                     no_go_half_rad=self.no_go_half_rad)
+
+    @property
     def no_go_half_rad(self) -> float:
         """Where the autopilot stops following the line: SAIL_NO_GO_ANGLE; nowhere where it does not sail."""
         if not self.config.sails:
@@ -312,5 +327,6 @@ class Turn:
         wind = self.wind_mean or (0.0, 0.0)
         return Route(
             plan_id=plan_id, plan_t_s=self.t_s, plan_twd_from_rad=wind[0], plan_tws_mps=wind[1],
+            plan_current_east_mps=self.current_en_mps[0], plan_current_north_mps=self.current_en_mps[1],
             plan_half_width_rad=0.0, margin_m=margin_m, delta_s=delta_s, rung=rung,
         )

@@ -14,7 +14,8 @@ from statistics import NormalDist
 
 import numpy as np
 
-from companion.boat import Boat
+from companion.boat import Boat, made_good_mps
+from companion.current import over_water
 from companion.geo.angles import difference_rad
 from companion.messages import WindForecast
 from companion.skipper.way.geometry import bearing_rad, cross_track_m, distance_m, moved
@@ -70,13 +71,14 @@ def mean_twd_rad(forecast: WindForecast, horizon_s: float) -> float:
 def judge(
     path: Sequence[PointEn], *, boat: Boat, no_go_half_rad: float, twd_from_rad: float, tws_mps: float, area: Area,
     start_heading_rad: float | None = None, forecast: WindForecast | None = None, level: float = 0.0,
-    after_s: float = 0.0, beat_room_m: float | None = None,
+    after_s: float = 0.0, beat_room_m: float | None = None, current_en_mps: tuple[float, float] = (0.0, 0.0),
 ) -> Verdict:
     """Judge a polyline that is sailed from its first point, ``after_s`` from now.
 
     ``level`` is the central probability of the forecast's interval that each leg must be clear of; 0 asks for the
     present wind alone. A leg inside the zone is timed as the beat that it will become; with ``beat_room_m`` of clear
-    water about it, it is as good as any other.
+    water about it, it is as good as any other. Wind and angles are over the ground, as the autopilot has them; in a
+    current a leg along which she makes no way at all is as bad as one head to wind.
     """
     time_s, spare, worst = 0.0, math.inf, -1
     heading = start_heading_rad
@@ -93,7 +95,14 @@ def judge(
             twa < needed and beat_room_m is not None and area.path_clearance_m([a, b]) >= beat_room_m
         ):
             spare, worst = twa - needed, n
-        if twa >= no_go_half_rad:
+        if current_en_mps != (0.0, 0.0):
+            water = over_water(twd_from_rad, tws_mps, current_en_mps)
+            made = made_good_mps(boat, course, twd_from_rad=water[0], tws_mps=water[1], current_en_mps=current_en_mps,
+                                 no_go_half_rad=no_go_half_rad)
+            if made is None:
+                spare, worst = min(spare, -no_go_half_rad), n
+            speed = made or 0.0
+        elif twa >= no_go_half_rad:
             speed = boat.polar.speed_mps(twa, tws_mps)
         else:
             speed = boat.polar.speed_mps(no_go_half_rad, tws_mps) * math.cos(no_go_half_rad) / math.cos(twa)
@@ -116,15 +125,19 @@ class Drift:
 
 def predicted_beat(
     boat_en: PointEn, heading_rad: float, leg_from: PointEn, target: PointEn, *, twd_from_rad: float,
-    no_go_half_rad: float, corridor_m: float, area: Area,
+    no_go_half_rad: float, corridor_m: float, area: Area, speed_mps: float = 1.0,
+    current_en_mps: tuple[float, float] = (0.0, 0.0),
 ) -> Drift:
     """Predict the sailing of a leg that the wind has closed (ArduRover: the no-go angle, tack at the corridor).
 
     On the tack that the boat is on it sails at exactly the no-go angle off the wind until the corridor's edge
-    (``corridor_m``; 0: until the layline) or until it is past the target.
+    (``corridor_m``; 0: until the layline) or until it is past the target. In a current, what she makes good of that
+    heading at ``speed_mps`` through the water.
     """
     tack = 1.0 if difference_rad(twd_from_rad, heading_rad) >= 0.0 else -1.0   # +1: wind over starboard
     course = twd_from_rad - tack * no_go_half_rad
+    if current_en_mps != (0.0, 0.0):
+        course = bearing_rad((0.0, 0.0), moved(current_en_mps, course, speed_mps))
     left_m = distance_m(boat_en, target)
     step = max(1.0, left_m / 40.0)
     path, point, sailed, off = [boat_en], boat_en, 0.0, abs(cross_track_m(boat_en, leg_from, target))

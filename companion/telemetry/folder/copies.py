@@ -48,6 +48,8 @@ def write_copies(mission: Mission, recorder: Recorder) -> str:
             atom["polygon"] = copied(atom["polygon"])
     if mission.polar_path is not None:
         options["boat"]["polar"] = copied(str(mission.boat.polar))
+    if mission.current is not None and mission.current.table is not None:
+        options["current"]["table"] = copied(mission.current.table)
     try:
         for kept, path in files.items():
             recorder.whole(f"{COPIES}/{kept}", path.read_bytes())

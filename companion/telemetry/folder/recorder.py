@@ -40,6 +40,7 @@ TAIL_BYTES = 1 << 20   # looked at for the end of the last whole line: no record
 TRACK_COLUMNS = (
     "t_s", "frames", "outcomes", "lat_deg", "lon_deg", "east_m", "north_m", "heading_deg", "sog_mps", "cog_deg",
     "twd_deg", "twd_sigma_deg", "tws_mps", "mode", "phase", "waypoint", "cross_track_m", "clearance_m",
+    "current_deg", "current_mps", "current_sigma_mps",
 )
 _HEADER = (",".join(TRACK_COLUMNS) + "\n").encode()
 

@@ -9,6 +9,7 @@ import dataclasses
 import math
 from typing import Any
 
+from companion.current import plain
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.geo.frame import LocalFrame
@@ -51,6 +52,7 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
             "cross_track_m": snapshot.autopilot.cross_track_m if snapshot.autopilot else None,
             "margin_m": config.margin_m,
             **(_vessels(problem) if problem.targets else {}),
+            **({"current": plain(snapshot.current)} if problem.current.drift_mps > 0.0 else {}),
         }
     if isinstance(action, UploadMission | UploadFence):
         fields = {
@@ -157,6 +159,7 @@ def track_row(step: Step, frames: int, clearance_m: float | None, frame: LocalFr
         None if autopilot is None else autopilot.mission_seq,
         None if autopilot is None else _round(autopilot.cross_track_m, 2),
         _round(clearance_m, 2),
+        _degrees(snapshot.current.set_rad), round(snapshot.current.drift_mps, 3), round(snapshot.current.sigma_mps, 3),
     )
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from companion.current import WaterCurrent, plain
 from companion.fold import Step
 from companion.geo.angles import wrap_pi
 from companion.messages import Mode
@@ -50,6 +51,7 @@ class VoyageFigures:
     path_risk_vessels: float = 0.0
     longest_no_go_s: float = 0.0
     alerts: dict[str, int] = field(default_factory=dict)
+    current: WaterCurrent | None = None
     traffic: TrafficCounts | None = None
     servos: Servos = field(default_factory=Servos)
     _anchor: tuple[float, float] | None = None
@@ -72,6 +74,7 @@ class VoyageFigures:
                 self.uploads += 1
             elif isinstance(action, Announce):
                 self.alerts[action.code] = self.alerts.get(action.code, 0) + 1
+        self.current = snapshot.current
         if snapshot.traffic is not None:
             self.traffic = snapshot.traffic.counts
         route = step.state.route
@@ -164,6 +167,7 @@ class VoyageFigures:
             "path_risk": self.path_risk,
             "path_risk_vessels": self.path_risk_vessels,
             "no_go_entries": self.no_go_entries,
+            "current": None if self.current is None else plain(self.current),
             "servos": self.servos.to_dict(),
             "alerts": dict(sorted(self.alerts.items())),
             "traffic": None if self.traffic is None else asdict(self.traffic),

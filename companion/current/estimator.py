@@ -1,0 +1,205 @@
+"""The current from the boat's own track: where she goes against where she points and how fast she should be.
+
+    ground velocity = (1 + k) v (sin h, cos h) + v (leeway + compass) (cos h, -sin h) + current + noise           (a)
+
+with the heading h and the polar's speed v in the wind over the water. The polar may be wrong by a share k, the compass
+by an angle, and leeway sets her to leeward, to the other side on the other tack. So on one heading a current along it
+looks like a polar error and one across it like leeway: the filter carries all five numbers and says so by its
+covariance, which shrinks when she sails on headings far apart. It is a linear Kalman filter, one reading a second.
+
+The current is a departure from what the mission expects (``Prior``), and goes back to it with ``TAU_S`` where nothing
+is heard of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.current.over_water import over_water
+from companion.current.prior import STILL, Expected, Prior
+from companion.current.value import WaterCurrent
+from companion.geo.angles import difference_rad, wrap_pi
+
+Matrix = NDArray[np.float64]
+Speed = Callable[[float, float], float]
+"""Speed through the water [m/s] at a true wind angle [rad] in a wind over the water [m/s]: the boat's polar."""
+
+SCALE_SD = 0.12              # of the polar: what a polar not measured on this very boat is wrong by
+ANGLE_SD_RAD = math.radians(2.5)   # of the compass, and so of leeway
+TAU_S = 7200.0               # a tide turns within hours
+SLOW_S = 36_000.0            # polar, leeway and compass hardly change in a voyage
+ALONG_MPS, ALONG_SHARE = 0.08, 0.06   # noise of a reading along the heading: gusts that the hull has not answered
+ACROSS_MPS, ACROSS_SHARE = 0.06, 0.03
+ALIKE_S = 12.0               # readings this near in time are wrong alike: waves, a gust, the helm
+STEADY_RAD_S = math.radians(6.0)      # faster turns are manoeuvres ...
+SETTLES_S = 10.0             # ... after which she needs this long to have her speed again
+STEADY_MPS2 = 0.12           # a faster change of speed is none of the polar's
+LEAST_TWA_RAD = math.radians(38.0)    # closer to the wind the polar says little
+EVERY_S = 1.0
+LATE_S = 1.5                 # an older position is no reading
+GATE = 16.0                  # of the innovation squared over its variance, two degrees of freedom: one in 3000
+MISFIT_SAMPLES, MISFIT = 15.0, 0.5   # the mean of that figure: 0.1 at most in a steady current, noise being twelvefold
+FADE_SHARE = 0.02            # of the prior's variance, for each reading while it does not fit
+GATED_S = 60.0               # what does not fit for so long is the new truth
+STANDS_MPS, SHOULD_MPS = 0.15, 0.6    # a boat that stands where she should sail is aground, moored or in irons
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sailing:
+    """One moment of the boat: velocity over ground [m/s], heading, rate of turn, and the wind over the ground.
+
+    ``is_driven``: her sails are sheeted and nothing else drives her; ``age_s``: of the velocity and the heading.
+    """
+
+    t_s: float
+    velocity_en_mps: tuple[float, float]
+    heading_rad: float
+    yaw_rate_radps: float | None
+    twd_from_rad: float
+    tws_mps: float
+    is_driven: bool
+    age_s: float = 0.0
+
+
+class CurrentEstimator:
+    """The filter. A deterministic fold of what it is given: no clock, no file.
+
+    Args:
+        speed: the boat's polar.
+        prior: what the mission expects.
+    """
+
+    def __init__(self, speed: Speed, prior: Prior = STILL) -> None:
+        self._speed, self._prior = speed, prior
+        self._x = np.zeros(5)      # departure east, north [m/s]; share k; leeway, compass [rad]
+        self._expected: Expected | None = None
+        self._p = np.zeros((5, 5))
+        self._t_s: float | None = None
+        self._unsteady_s = -math.inf
+        self._last: Sailing | None = None
+        self._taken_s = -math.inf
+        self._samples_s = 0.0
+        self._rejected_s = 0.0
+        self._misfit = 0.0
+        self._seen: dict[int, float] = {}     # headings by sectors of 20 degrees: when they were sailed last
+        self._is_significant = False
+
+    # ------------------------------------------------------------------------------------------- feed
+    def update(self, t_s: float, utc_s: float | None, now: Sailing | None) -> None:
+        """Take one moment; ``utc_s`` is the Unix time, None where it is not known; None: nothing new is known."""
+        self._predict(t_s, utc_s)
+        if now is None:
+            return
+        last, self._last = self._last, now
+        if last is not None and now.t_s - last.t_s > 0.0:
+            turned = abs(difference_rad(now.heading_rad, last.heading_rad)) / (now.t_s - last.t_s)
+            if max(turned, abs(now.yaw_rate_radps or 0.0)) > STEADY_RAD_S or not now.is_driven:
+                self._unsteady_s = t_s
+        if last is None or not now.is_driven or now.age_s > LATE_S:
+            self._unsteady_s = t_s
+            return
+        if t_s - self._taken_s < 0.9 * EVERY_S or t_s - self._unsteady_s < SETTLES_S:
+            return
+        dt_s = max(0.2, now.t_s - last.t_s)
+        if abs(math.hypot(*now.velocity_en_mps) - math.hypot(*last.velocity_en_mps)) / dt_s > STEADY_MPS2:
+            return
+        self._take(t_s, now)
+
+    def _predict(self, t_s: float, utc_s: float | None) -> None:
+        expected = self._prior.at(utc_s)
+        if self._t_s is None or self._expected is None:
+            self._p = np.diag([expected.sigma_mps**2] * 2 + [SCALE_SD**2] + [ANGLE_SD_RAD**2] * 2)
+        else:
+            dt_s = max(0.0, t_s - self._t_s)
+            keep = np.exp(-dt_s / np.array([TAU_S, TAU_S, SLOW_S, SLOW_S, SLOW_S]))
+            was = self._expected
+            limit = np.array([expected.sigma_mps**2] * 2 + [SCALE_SD**2] + [ANGLE_SD_RAD**2] * 2)
+            self._x *= keep
+            self._p = self._p * np.outer(keep, keep) + np.diag(limit * (1.0 - keep**2))
+            if expected.sigma_mps > was.sigma_mps:      # a table that ends: what is doubted more is at once
+                more = expected.sigma_mps**2 - was.sigma_mps**2
+                self._p[0, 0] += more
+                self._p[1, 1] += more
+            if was.verdict and not expected.verdict:    # a row can be chosen at last: what it says is one more reading
+                self._x[:2] += (was.east_mps - expected.east_mps, was.north_mps - expected.north_mps)
+                self._correct(np.eye(2, 5), -self._x[:2], np.eye(2) * expected.sigma_mps**2)
+        self._t_s, self._expected = t_s, expected
+
+    def _correct(self, h: Matrix, residual: Matrix, noise: Matrix) -> None:
+        """Take a reading whose departure from what was predicted is ``residual`` (Kalman's correction)."""
+        gain = self._p @ h.T @ np.linalg.inv(h @ self._p @ h.T + noise)
+        self._x = self._x + gain @ residual
+        rest = np.eye(5) - gain @ h
+        self._p = rest @ self._p @ rest.T + gain @ noise @ gain.T          # Joseph's form keeps it a covariance
+
+    def _take(self, t_s: float, now: Sailing) -> None:
+        assert self._expected is not None
+        x = self._x
+        base = np.array([self._expected.east_mps, self._expected.north_mps])
+        current = base + x[:2]
+        from_rad, tws_mps = over_water(now.twd_from_rad, now.tws_mps, (float(current[0]), float(current[1])))
+        twa = difference_rad(from_rad, now.heading_rad)     # positive: wind over starboard
+        v = self._speed(twa, tws_mps)
+        sog = math.hypot(*now.velocity_en_mps)
+        if abs(twa) < LEAST_TWA_RAD or (sog < STANDS_MPS and v > SHOULD_MPS):
+            return
+        sin, cos = math.sin(now.heading_rad), math.cos(now.heading_rad)
+        along, across = np.array([sin, cos]), np.array([cos, -sin])     # across: to starboard
+        side = -1.0 if twa > 0.0 else 1.0                               # leeway goes to leeward
+        h = np.column_stack([np.eye(2), v * along, side * v * across, v * across])           # (a)
+        z = np.asarray(now.velocity_en_mps) - base - v * along
+        noise = ((ALONG_MPS + ALONG_SHARE * v)**2 * np.outer(along, along)
+                 + (ACROSS_MPS + ACROSS_SHARE * v)**2 * np.outer(across, across)) * ALIKE_S / EVERY_S
+        self._taken_s = t_s
+        r = z - h @ x
+        misfit = float(r @ np.linalg.inv(h @ self._p @ h.T + noise) @ r)
+        self._misfit += (min(misfit, GATE) - self._misfit) / MISFIT_SAMPLES
+        if self._misfit > MISFIT:      # the water has changed faster than a tide: believe the past less
+            self._p[:2, :2] += np.eye(2) * FADE_SHARE * self._expected.sigma_mps**2
+        if misfit > GATE:
+            self._rejected_s += EVERY_S
+            if self._rejected_s < GATED_S:
+                return
+            self._p[:2, :2] += np.eye(2) * self._expected.sigma_mps**2     # it has changed: look again
+        self._rejected_s = 0.0
+        self._correct(h, r, noise)
+        self._samples_s += EVERY_S
+        self._seen[int(wrap_pi(now.heading_rad) // math.radians(20.0))] = t_s
+
+    # ------------------------------------------------------------------------------------------- read
+    def view(self) -> WaterCurrent:
+        """Return the current as it is known now; whether it is planned for is decided here, with its hysteresis."""
+        expected = self._expected
+        if expected is None:
+            return WaterCurrent(verdict="nothing is known of the water yet")
+        found = WaterCurrent(
+            east_mps=float(expected.east_mps + self._x[0]), north_mps=float(expected.north_mps + self._x[1]),
+            var_ee=float(self._p[0, 0]), var_en=float(self._p[0, 1]), var_nn=float(self._p[1, 1]),
+            headings_rad=self._headings_rad(), samples_s=self._samples_s, verdict=expected.verdict)
+        self._is_significant = found.is_worth_planning(was=self._is_significant)
+        return replace(found, is_significant=self._is_significant)
+
+    @property
+    def scale(self) -> float:
+        """How fast she is against her polar, as a share: 1 as it says."""
+        return 1.0 + float(self._x[2])
+
+    def _headings_rad(self) -> float:
+        """Return how far apart the headings sailed within the current's memory are [rad, 0..π]."""
+        if self._t_s is None:
+            return 0.0
+        recent = [math.radians(20.0) * n for n, t_s in self._seen.items() if self._t_s - t_s < TAU_S]
+        return max((abs(difference_rad(a, b)) for a in recent for b in recent), default=0.0)
+
+
+def plain(current: WaterCurrent) -> dict[str, float | str | bool]:
+    """Return the figures of a current for a record: set [deg], drift and sigma [m/s]."""
+    return {
+        "set_deg": round(math.degrees(current.set_rad), 1), "drift_mps": round(current.drift_mps, 3),
+        "sigma_mps": round(current.sigma_mps, 3), "planned": current.is_significant, "verdict": current.verdict,
+    }

@@ -1,0 +1,1 @@
+"""The current: told by the track, expected by the mission, and the wind over the water."""

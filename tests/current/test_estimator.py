@@ -1,0 +1,157 @@
+"""The estimate of the current against a boat whose water, polar, leeway and compass are known."""
+
+import math
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.boat import ardurover_sitl
+from companion.current import STILL, CurrentEstimator, Prior, Sailing, TableRow, over_water
+
+POLAR = ardurover_sitl()
+TWD, TWS = 0.0, 5.0
+
+
+def reading(t_s, heading_deg, current, *, scale=1.0, leeway_deg=0.0, noise=0.0, rng=None, is_driven=True):
+    """Return what a boat of this polar tells on a heading."""
+    heading = math.radians(heading_deg)
+    from_rad, tws = over_water(TWD, TWS, current)
+    twa = (from_rad - heading + math.pi) % (2.0 * math.pi) - math.pi
+    v = scale * POLAR.speed_mps(twa, tws)
+    course = heading - math.copysign(math.radians(leeway_deg), twa)
+    jolt = (rng.gauss(0.0, noise), rng.gauss(0.0, noise)) if rng else (0.0, 0.0)
+    return Sailing(
+        t_s=t_s, velocity_en_mps=(v * math.sin(course) + current[0] + jolt[0],
+                                  v * math.cos(course) + current[1] + jolt[1]),
+        heading_rad=heading, yaw_rate_radps=0.0, twd_from_rad=TWD, tws_mps=TWS, is_driven=is_driven)
+
+
+def sailed(headings_deg, current, *, leg_s=100.0, prior=STILL, **boat):
+    """Return the estimator after a leg on each heading."""
+    estimator, rng, t_s = CurrentEstimator(POLAR.speed_mps, prior), random.Random(1), 0.0
+    for heading_deg in headings_deg:
+        for _ in range(int(leg_s)):
+            t_s += 1.0
+            estimator.update(t_s, None, reading(t_s, heading_deg, current, rng=rng, **boat))
+    return estimator
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.0, 6.28), st.floats(0.2, 0.9))
+def test_on_both_tacks_and_a_reach_it_is_found_whichever_way_it_sets(set_rad, drift_mps):
+    current = drift_mps * math.sin(set_rad), drift_mps * math.cos(set_rad)
+    found = sailed((55.0, -55.0, 100.0, -100.0), current, noise=0.05).view()
+    assert math.dist(found.en_mps, current) < 0.12
+    assert found.sigma_mps < 0.16
+
+
+def test_on_one_tack_it_is_wide_and_says_so():
+    one, both = sailed((50.0,), (0.0, 0.3)).view(), sailed((50.0, -50.0), (0.0, 0.3)).view()
+    assert one.sigma_mps > 1.5 * both.sigma_mps
+    assert not one.is_significant, "along one heading a polar's error looks the same"
+    assert "one heading" in one.sentence()
+    assert "one heading" not in both.sentence()
+
+
+@pytest.mark.parametrize("boat", [{"scale": 0.85}, {"scale": 1.15}, {"leeway_deg": 5.0}])
+def test_in_still_water_no_error_of_the_boat_is_taken_for_a_current(boat):
+    for headings in ((50.0,), (50.0, -50.0), (60.0, -60.0, 120.0)):
+        assert not sailed(headings, (0.0, 0.0), noise=0.05, **boat).view().is_significant
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.88, 1.12), st.floats(-3.0, 3.0), st.floats(0.0, 6.28), st.integers(0, 999))
+def test_the_stated_spread_holds_what_it_should(scale, leeway_deg, set_rad, seed):
+    current = 0.4 * math.sin(set_rad), 0.4 * math.cos(set_rad)
+    estimator, rng, t_s = CurrentEstimator(POLAR.speed_mps), random.Random(seed), 0.0
+    for heading_deg in (48.0, -48.0, 48.0):
+        for _ in range(80):
+            t_s += 1.0
+            estimator.update(t_s, None, reading(
+                t_s, heading_deg, current, scale=scale, leeway_deg=leeway_deg, noise=0.08, rng=rng))
+    found = estimator.view()
+    assert math.dist(found.en_mps, current) < 3.0 * found.sigma_mps
+
+
+def test_it_is_the_same_however_often_it_is_looked_at_and_asked_for_nothing_new():
+    a, b = sailed((55.0, -55.0), (0.3, 0.1)), sailed((55.0, -55.0), (0.3, 0.1))
+    for _ in range(5):
+        a.view()
+    assert a.view() == b.view()
+
+
+def test_turns_stops_and_sails_that_are_eased_teach_nothing():
+    estimator = CurrentEstimator(POLAR.speed_mps)
+    for t in range(120):
+        estimator.update(float(t), None, reading(float(t), 12.0 * t, (0.5, 0.0)))
+    assert estimator.view().samples_s == 0.0, "she turns all the time"
+    for t in range(120, 240):
+        estimator.update(float(t), None, reading(float(t), 60.0, (0.5, 0.0), is_driven=False))
+    assert estimator.view().samples_s == 0.0
+    aground = reading(0.0, 60.0, (0.0, 0.0))
+    for t in range(240, 400):
+        estimator.update(float(t), None, Sailing(
+            t_s=float(t), velocity_en_mps=(0.01, 0.0), heading_rad=aground.heading_rad, yaw_rate_radps=0.0,
+            twd_from_rad=TWD, tws_mps=TWS, is_driven=True))
+    assert estimator.view().samples_s == 0.0, "a boat that stands is not carried by its own speed backwards"
+
+
+def test_a_current_that_turns_is_followed():
+    estimator, t_s = CurrentEstimator(POLAR.speed_mps), 0.0
+    for current in ((0.4, 0.0), (-0.4, 0.0)):
+        for _ in range(8):
+            for heading_deg in (55.0, -55.0):
+                for _ in range(90):
+                    t_s += 1.0
+                    estimator.update(t_s, None, reading(t_s, heading_deg, current))
+        assert math.dist(estimator.view().en_mps, current) < 0.12
+
+
+def test_a_tide_that_ends_within_a_minute_is_believed_within_three():
+    estimator, t_s = CurrentEstimator(POLAR.speed_mps), 0.0
+    for current, legs in (((0.0, -1.0), 6), ((0.0, 0.0), 2)):
+        for n in range(legs):
+            for _ in range(90):
+                t_s += 1.0
+                estimator.update(t_s, None, reading(t_s, (55.0, -55.0)[n % 2], current))
+    assert estimator.view().drift_mps < 0.35
+    assert estimator.view().sigma_mps > 0.1, "and is not yet sure of it"
+
+
+def test_what_the_mission_expects_is_believed_until_the_track_tells_otherwise():
+    prior = Prior(east_mps=0.5, sigma_mps=0.1)
+    estimator = CurrentEstimator(POLAR.speed_mps, prior)
+    estimator.update(0.0, None, None)
+    assert estimator.view().en_mps == pytest.approx((0.5, 0.0))
+    assert estimator.view().is_significant
+    wrong = sailed((55.0, -55.0, 100.0), (0.0, 0.0), leg_s=300.0, prior=prior).view()
+    assert wrong.drift_mps < 0.15
+
+
+def test_a_table_is_followed_and_its_end_widens():
+    rows = (TableRow(utc_s=0.0, east_mps=0.6, north_mps=0.0), TableRow(utc_s=3600.0, east_mps=0.0, north_mps=0.0))
+    estimator = CurrentEstimator(POLAR.speed_mps, Prior(rows=rows, sigma_mps=0.1, name="tide.csv"))
+    seen = {}
+    for t in range(0, 9000, 10):
+        estimator.update(float(t), float(t), None)
+        seen[t] = estimator.view()
+    assert seen[1800].en_mps == pytest.approx((0.3, 0.0))
+    assert seen[3590].sigma_mps < 0.11
+    assert seen[7500].sigma_mps > 0.5
+    assert "ended" in seen[7500].verdict
+
+
+def test_a_table_without_the_time_is_said_and_taken_up_when_the_time_is_known():
+    rows = (TableRow(utc_s=0.0, east_mps=0.6, north_mps=0.0), TableRow(utc_s=7200.0, east_mps=0.6, north_mps=0.0))
+    estimator = CurrentEstimator(POLAR.speed_mps, Prior(rows=rows, sigma_mps=0.1, name="tide.csv"))
+    for t in range(60):
+        estimator.update(float(t), None, None)
+    assert "before the time is known" in estimator.view().verdict
+    assert estimator.view().sigma_mps > 0.5
+    for t in range(60, 70):
+        estimator.update(float(t), 100.0 + t, None)
+    assert estimator.view().en_mps == pytest.approx((0.6, 0.0), abs=0.05)
+    assert estimator.view().sigma_mps < 0.12
+    assert not estimator.view().verdict
