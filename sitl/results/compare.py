@@ -10,7 +10,7 @@ worse one time in twenty at most. The groups show where a change comes from.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -107,7 +107,7 @@ def compare(before: Table, after: Table) -> Comparison:
     pairs = sorted((_pair(job, first[job], second[job]) for job in both), key=lambda p: p.worse, reverse=True)
     return Comparison(
         changes=tuple(_judged(c, LEVEL / asked) if c.group == judged else c for c in changes), pairs=tuple(pairs),
-        same=sum(_told(pair.before) == _told(pair.after) for pair in pairs),
+        same=sum(_is_same(pair.before, pair.after) for pair in pairs),
         only=(len(first) - len(both), len(second) - len(both)),
         other_water=tuple(dict.fromkeys(str(first[job].get("scenario")) for job in both
                                         if first[job].get("hash") != second[job].get("hash"))))
@@ -118,8 +118,9 @@ def _by_job(table: Table) -> dict[tuple[Any, ...], Row]:
     return {tuple(row.get(name) for name in names): row for row in table.rows}
 
 
-def _told(row: Row) -> Mapping[str, Any]:
-    return {name: value for name, value in row.items() if value is not None and name != "hash"}
+def _is_same(before: Row, after: Row) -> bool:
+    """Return whether all that both tell is the same; a program of another day may count other things, too."""
+    return all(before[name] == after[name] for name in before.keys() & after.keys() - {"hash"})
 
 
 def _pair(job: tuple[Any, ...], before: Row, after: Row) -> Pair:

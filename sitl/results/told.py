@@ -46,7 +46,7 @@ def told(comparison: Comparison, *, most: int = 10) -> str:
     rows = [("", "figure", "pairs", "first", "second", "change (95 %)", "by luck", "")]
     rows += [(c.group, c.measure.name, str(c.pairs), *_values(c), f"{c.p_worse:.2g}" if c.measure.worse else "-",
               "WORSE" if c.is_worse else "") for c in comparison.changes if c.change != (c.measure.kind == "ratio")]
-    lines.append(_columns(rows).rstrip() if len(rows) > 1 else "no figure changed")
+    lines.append(_columns(rows).rstrip() if len(rows) > 1 else "no figure that is measured here changed")
     worst = [pair for pair in comparison.pairs if any(x > 0.0 for x in pair.worse)][:most]
     if worst:
         lines.append("worse, the worst first:")

@@ -38,8 +38,10 @@ def change_of(comparison, name, group="demo"):
 def test_the_same_is_the_same():
     found = compare(table(noisy(range(8), 1)), table(noisy(range(8), 1)))
     assert (found.same, len(found.pairs), found.worse) == (8, 8, ())
+    assert compare(table(noisy(range(8), 1)), table(noisy(range(8), 1, gybes=3))).same == 8   # counted since
+    assert compare(table(noisy(range(8), 1, gybes=2)), table(noisy(range(8), 1, gybes=3))).same == 0
     text = told(found)
-    assert "8 pairs, 8 of them the same in every figure\nno figure changed\nnot worse" in text
+    assert "8 pairs, 8 of them the same in every figure\nno figure that is measured here changed\nnot worse" in text
 
 
 def test_a_ratio_is_of_pairs_and_its_interval_holds_it():
