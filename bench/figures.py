@@ -7,6 +7,8 @@
   other winds.
 - field-atoms, field-trees: Schmitt's figures 6.1 to 6.5, and her trees 4.2 and 4.3; wrsc2013-field: her task;
   field-composed: missions/field-ring.toml, as `companion field --plot` draws it.
+- wind-filter: Wolsieffer's filter by its noise R and window N over simulated wind; wind-filter-recorded: over the
+  records in $COMPANION_WIND_DATA, left as it is without them.
 - risk: the promise of a path against simulated winds, as its limit is tightened.
 
 The problems are in ``bench.papers``.
@@ -15,6 +17,7 @@ The problems are in ``bench.papers``.
 from __future__ import annotations
 
 import io
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +33,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
+from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.planner import Problem, plan
 from companion.planner.effort import Effort
@@ -39,8 +43,11 @@ from companion.planner.risk import simulate_entries
 from companion.planner.settings import AstarSettings
 from companion.plots.composed import field_figure
 from companion.plots.field import atoms_figure, encounter_figure, trees_figure
+from companion.plots.filter import filter_figure
 from companion.plots.plan import draw_plan
 from companion.sailable.fields import fan_of, previewed, sailed
+from companion.wind.study import characterise, parse_csv
+from companion.wind.study.records import weather
 from sitl.tasks.wrsc2013 import HALF_M
 from sitl.tasks.wrsc2013 import run as run_wrsc2013
 
@@ -140,6 +147,24 @@ def busser_5_4():
     save(figure, "busser-5-4")
 
 
+def wind_filter():
+    found = characterise([weather(1), weather(2, speed_mps=8.0)])
+    title = "Wolsieffer's filter over simulated wind, by R and N: two records of 2 h at 1 Hz, noise of a reading 2.9°"
+    save(filter_figure(found, title=title), "wind-filter")
+
+
+def wind_filter_recorded():
+    folder = os.environ.get("COMPANION_WIND_DATA", "")
+    if not folder:
+        print("docs/figures/wind-filter-recorded.png stays: no recorded wind, COMPANION_WIND_DATA names no folder")
+        return
+    paths = sorted(Path(folder).glob("*.csv"))
+    if not paths:
+        raise InputError("COMPANION_WIND_DATA", folder, "no CSV records in the folder", "name another or none")
+    found = characterise([parse_csv(path.read_text().splitlines(), path.name) for path in paths])
+    save(filter_figure(found), "wind-filter-recorded")
+
+
 # ------------------------------------------------------------------------------------------- risk
 def risk():
     base = Problem.from_json(Path(__file__).resolve().parent / "problems" / "trap-beat.json")
@@ -197,8 +222,9 @@ WRSC_SEED = 9
 
 FIGURES = {
     "wolsieffer-6": wolsieffer_6, "wolsieffer-7": wolsieffer_7, "busser-5-1": busser_5_1, "busser-5-2": busser_5_2,
-    "busser-5-3": busser_5_3, "busser-5-4": busser_5_4, "risk": risk, "field-atoms": field_atoms,
-    "field-trees": field_trees, "field-composed": field_composed, "wrsc2013-field": wrsc2013,
+    "busser-5-3": busser_5_3, "busser-5-4": busser_5_4, "risk": risk, "wind-filter": wind_filter,
+    "wind-filter-recorded": wind_filter_recorded, "field-atoms": field_atoms, "field-trees": field_trees,
+    "field-composed": field_composed, "wrsc2013-field": wrsc2013,
 }
 
 
@@ -208,8 +234,12 @@ def main(argv=None):
     if unknown:
         print(f"bench.figures: unknown figure {unknown[0]!r}; choose from {', '.join(FIGURES)}", file=sys.stderr)
         return 2
-    for name in names or FIGURES:
-        FIGURES[name]()
+    try:
+        for name in names or FIGURES:
+            FIGURES[name]()
+    except InputError as error:
+        print(f"bench.figures: {error}", file=sys.stderr)
+        return error.exit_code
     return 0
 
 

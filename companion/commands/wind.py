@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from companion.commands.characterising import characterised, draw, grid_document, print_grid
 from companion.errors import InputError
 from companion.program.arguments import out_file, picture
 
@@ -27,6 +28,7 @@ examples:
   companion wind 2026-07-14.tlog                  WIND as ArduRover sent it; or an ArduPilot .bin
   companion wind records/ --estimator all         every CSV in the folder, and the averages
   companion wind afternoon.csv --cost             microseconds per update and forecast
+  companion wind records/ --filter filter.png     Wolsieffer's filter by its noise R and window N
 
 A CSV record has a header and the columns t_s,wind_from_deg,wind_speed_ms (where the true wind comes from, degrees
 clockwise from true north); turning (1 in manoeuvres), heading_deg and awa_deg are used when they are there. Every
@@ -49,10 +51,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         "record", metavar="RECORD", nargs="+", type=Path, help="CSV, tlog, ArduPilot .bin, or a folder of CSV")
     parser.add_argument(
         "--estimator", default="default", metavar="NAME", help="its name, or all; an unknown one is told the names")
-    parser.add_argument(
+    instead = parser.add_mutually_exclusive_group()
+    instead.add_argument(
         "--plot", type=picture, metavar="P.png", help="draw the (first) record, its forecasts and their scores")
+    instead.add_argument("--cost", action="store_true", help="time update and forecast instead of scoring")
+    instead.add_argument(
+        "--filter", type=picture, metavar="P.png",
+        help="score and draw Wolsieffer's filter for a grid of R and N instead (half a minute for an hour at 1 Hz)")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the figures")
-    parser.add_argument("--cost", action="store_true", help="time update and forecast instead of scoring")
     parser.set_defaults(run=run)
 
 
@@ -62,11 +68,23 @@ def run(args: argparse.Namespace) -> int:
     from companion.wind.study import fit_ar1
 
     names = list(NAMES) if args.estimator == "all" else [args.estimator]
+    if args.filter is not None and names != ["default"]:
+        raise InputError("--estimator", args.estimator, "--filter scores Wolsieffer's alone", "leave one of them out")
     for name in names:
         make(name)                      # an unknown name is refused before anything is read
     records = [read_record(path) for path in _files(args.record)]
     if args.cost:
         _print_cost(records[0], names)
+        return 0
+    if args.filter is not None:
+        from companion.wind.study import runs
+
+        with _progress(runs() * sum(len(r) for r in records)) as advance:
+            grid = characterised(records, advance)
+        print_grid(grid)
+        if args.json is not None:
+            args.json.write_text(json.dumps(grid_document(grid), indent=1) + "\n")
+        draw(grid, args.filter)
         return 0
     wanted = names + [n for n in _REFERENCES if args.plot is not None and n not in names]
     scores: list[list[Score]] = []

@@ -22,13 +22,15 @@ from numpy.typing import NDArray
 from companion.geo.angles import wrap_pi
 from companion.wind.estimators.estimator import Base
 
+WINDOW, R_DEG, R_MPS = 100, 3.0, 0.5     # of a mission that says nothing; the paper gives none of them
+
 
 class AdaptiveKalman(Base):
     """The filter with window ``n`` [samples], direction noise ``r_deg`` [deg] and speed noise ``r_mps`` [m/s]."""
 
     name = "kalman"
 
-    def __init__(self, *, n: int = 100, r_deg: float = 3.0, r_mps: float = 0.5) -> None:
+    def __init__(self, *, n: int = WINDOW, r_deg: float = R_DEG, r_mps: float = R_MPS) -> None:
         super().__init__()
         # filterpy brings scipy.stats: 60 MB that only this estimator needs
         from filterpy.kalman import KalmanFilter
