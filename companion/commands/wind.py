@@ -196,8 +196,8 @@ def _read_log(path: Path) -> Record:
             elif kind == "NAMED_VALUE_FLOAT":
                 if message.name == "AppWndDir":
                     felt.append((t_s, math.radians(float(message.value))))
-            elif hasattr(message, "DrTrue"):
-                rows.append((t_s, float(message.DrTrue), float(message.SpdTru)))
+            elif hasattr(message, "DrTru"):
+                rows.append((t_s, float(message.DrTru), float(message.SpdTru)))
                 felt.append((t_s, math.radians(float(message.DrApp))))
             else:
                 rows.append((t_s, float(message.direction), float(message.speed)))

@@ -17,13 +17,13 @@ from companion.planner.settings import AstarSettings
 
 SAMPLES = 6000   # as they are drawn
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "figures"
-PAPERS = ("wolsieffer-", "busser-", "field-", "wrsc2013-")
+PAPERS = ("wolsieffer-", "wind-filter", "busser-", "field-", "wrsc2013-")
 
 
 def test_make_figures_draws_every_picture_of_the_papers():
     pictures = {path.stem for path in PICTURES.glob("*.png") if path.stem.startswith(PAPERS)}
     assert pictures == {name for name in FIGURES if name.startswith(PAPERS)}
-    assert len(pictures) == 9
+    assert len(pictures) == 12
 
 
 # ------------------------------------------------------------------------------------- Wolsieffer

@@ -123,7 +123,7 @@ def dataflash(path, rows):
         packed = struct.pack("<BB4s16s64s", number, length, name, form, columns)
         return head + bytes([128]) + packed
 
-    columns = b"TimeUS,DrRaw,DrApp,DrTrue,SpdRaw,SpdApp,SpdTru"
+    columns = b"TimeUS,DrRaw,DrApp,DrTru,SpdRaw,SpdApp,SpdTru"
     data = fmt(128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
     data += fmt(kind, 3 + 8 + 24, b"WIND", b"Qffffff", columns)
     for time_us, direction, speed in rows:
