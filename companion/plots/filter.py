@@ -19,7 +19,6 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 from companion.plots.chart import save
-from companion.wind.estimators.kalman import R_DEG, WINDOW
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,11 +72,10 @@ def _draw(axes: Axes, found: Characterisation, horizon_s: float, value: Callable
         share = i / max(1, len(windows) - 1)
         axes.plot(*zip(*of, strict=True), marker="o", ms=3, lw=1.4, label=f"N = {n}",
                   color=colours(_FIRST + (_LAST - _FIRST) * share))
-    chosen = next((s for cell in found.cells if (cell.r_deg, cell.window) == (R_DEG, WINDOW)
-                   if (s := cell.at(horizon_s))), None)
-    if chosen is not None:
-        axes.plot([R_DEG], [value(chosen)], marker="*", ms=15, mfc="#f2c14e", mec="black", ls="none", zorder=5,
-                  label=f"the mission's default: R = {R_DEG:g}°, N = {WINDOW}")
+    chosen = found.chosen
+    if chosen is not None and (there := chosen.at(horizon_s)) is not None:
+        axes.plot([chosen.r_deg], [value(there)], marker="*", ms=15, mfc="#f2c14e", mec="black", ls="none", zorder=5,
+                  label=f"the mission's default: R = {chosen.r_deg:g}°, N = {chosen.window}")
     reference = next(s for s in found.default if s.horizon_s == horizon_s)
     axes.axhline(value(reference), color=_REFERENCE, ls="--", lw=1.6, label="default forecaster")
     axes.set_xscale("log")

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from companion.wind.estimators.catalogue import make
+from companion.wind.estimators.kalman import R_DEG, WINDOW
 from companion.wind.study.records import Record
 from companion.wind.study.score import HorizonScore, Score, average, score
 
@@ -52,6 +53,11 @@ class Characterisation:
     def horizons_s(self) -> tuple[float, ...]:
         """Return the horizons that were scored [s]."""
         return tuple(h.horizon_s for h in self.default)
+
+    @property
+    def chosen(self) -> Cell | None:
+        """Return the cell of a mission that says neither R nor N, None where the grid has none."""
+        return next((cell for cell in self.cells if (cell.r_deg, cell.window) == (R_DEG, WINDOW)), None)
 
     def best(self, horizon_s: float) -> Cell:
         """Return the cell of the least CRPS at a horizon of ``horizons_s``."""
