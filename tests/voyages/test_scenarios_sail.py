@@ -74,7 +74,7 @@ def leaves_when_entered(folder):
 # What the record of one must show besides.
 RECORDED = {"field-ring": goes_round, "field-square": leaves_when_entered,
             "foreign-mission": is_said_once_in_a_while, "out-of-time": ends_by_itself,
-            "by-astar": plans_by("astar"), "by-rrtstar": plans_by("rrtstar")}
+            "by-astar": plans_by("astar"), "by-astar-flat": plans_by("astar"), "by-rrtstar": plans_by("rrtstar")}
 
 
 # Where a file lets her wait for long and nothing more happens, the wait is shorter; -m campaign sails it as it is.
