@@ -178,7 +178,7 @@ def config_of(mission: Mission) -> SkipperConfig:
 
 # The keys of [planner] by planner, and what they are called among its settings.
 _ASTAR = frozenset({"grid_m", "turn_s_per_rad", "tack_s", "gybe_s", "tunnel", "tunnel_width_m", "heuristic_kn",
-                    "min_twa_deg", "max_twa_deg", "max_turn_deg", "ship_match_s"})
+                    "min_twa_deg", "max_twa_deg", "max_turn_deg", "ship_match_s", "projection"})
 _RRTSTAR = frozenset({"goal_bias", "range_m", "rewiring", "risk_weight_s", "state_risk_weight_s"})
 _NUMBERS = {"tunnel": "is_tunnel_abrupt", "heuristic_kn": "heuristic_mps", "min_twa_deg": "min_twa_rad",
             "max_twa_deg": "max_twa_rad", "max_turn_deg": "max_turn_rad", "rewiring": "is_rewired"}

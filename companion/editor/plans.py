@@ -46,7 +46,7 @@ class Previews:
         if mission.start is None:
             return {"error": "a plan begins somewhere: put the start on the chart", "legs": []}
         async with self._turn:
-            by = planner_of(mission)
+            by = planner_of(mission).about(mission.frame().origin)
             words, walk = leg_names(mission), legs(mission, wind)
             made: list[dict[str, Any]] = []
             error = ""

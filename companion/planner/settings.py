@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.geo.units import MPS_PER_KNOT
+from companion.messages import GeoPoint
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +29,8 @@ class AstarSettings:
             unless the wind blows along the grid and the no-go zone is not widened: it gybes round.
         ship_match_s: Tolerance of eq. 4.7 [s].
         memory_bytes: What the grid may take.
+        projection: ``local``: planned in the problem's metres; ``flat``: in those of eq. 4.2 (docs/frames.md).
+        origin: Where the problem's metres count from; the flat projection needs it (``Choice.about``).
 
     """
 
@@ -43,6 +46,8 @@ class AstarSettings:
     max_turn_rad: float = 0.5 * math.pi
     ship_match_s: float = 20.0
     memory_bytes: int = 256_000_000
+    projection: str = "local"
+    origin: GeoPoint | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +84,12 @@ class Choice:
     algorithm: str = "auto"
     settings: Settings | None = None
     expansions: int | None = None
+
+    def about(self, origin: GeoPoint) -> Choice:
+        """Return the same for a problem whose metres count from there: a projection of somebody's choice needs it."""
+        if not isinstance(self.settings, AstarSettings) or self.settings.projection == "local":
+            return self
+        return replace(self, settings=replace(self.settings, origin=origin))
 
 
 AUTO = Choice()

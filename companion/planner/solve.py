@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -106,19 +106,23 @@ def _solved(problem: Problem, effort: Effort, empty: Plan, settings: Settings | 
     search: Search = found if settings is None else partial(found, settings=settings)
     from companion.planner.risk.wind import keep_limit, search_within, with_risk
 
+    if empty.algorithm == "rrtstar" and problem.is_shared:
+        from companion.planner.reference.vessels import carried, judge_of, keep_share
+
+        found_vessels = carried(problem)
+        if found_vessels is not None:  # the tree has the vessels, and what is promised of them is judged of its path
+            free, vessels = found_vessels
+            numbers = {} if settings is None else {"settings": settings}
+            tree: Search = partial(found, vessels=vessels, **numbers)
+            outcome = _whole(tree, free, judge_of(problem, free))(free, effort, empty.seed)
+            return keep_limit(problem, keep_share(problem, _judged(free, outcome, effort, empty)))
+
     if problem.beat is not None and problem.boat.can_tack and empty.algorithm == "auto":
         from companion.planner.beat_search import with_beats
 
         search = with_beats(search, problem.beat)
 
-    def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
-        return search(resolved(problem), effort, seed)
-
-    whole: Search = search_resolved
-    if problem.tracking is not None:
-        from companion.planner.track import with_track
-
-        whole = with_track(search_resolved)
+    whole = _whole(search, problem)
     if problem.risk is None:
         return with_risk(problem, _judged(problem, whole(problem, effort, empty.seed), effort, empty))
     if empty.algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)
@@ -126,6 +130,20 @@ def _solved(problem: Problem, effort: Effort, empty: Plan, settings: Settings | 
     else:
         outcome = search_within(whole, problem, effort, empty.seed)
     return keep_limit(problem, _judged(problem, outcome, effort, empty))
+
+
+def _whole(
+    search: Search, problem: Problem, judge: Callable[[list[tuple[float, float]]], Evaluation] | None = None,
+) -> Search:
+    """Return the search in terms of discs, and laid as the autopilot can follow it where the problem says how."""
+    def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
+        return search(resolved(problem), effort, seed)
+
+    if problem.tracking is None:
+        return search_resolved
+    from companion.planner.track import with_track
+
+    return with_track(search_resolved, judge)
 
 
 def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> Plan:

@@ -92,7 +92,7 @@ TASK_KEYS = {
 # The numbers of one planner or estimator: in a mission that asks for it.
 ASTAR = {"expansions": 5000, "grid_m": 5.0, "turn_s_per_rad": 4.0, "tack_s": 9.0, "gybe_s": 9.0, "tunnel": "abrupt",
          "tunnel_width_m": 80.0, "heuristic_kn": 0.0, "min_twa_deg": 50.0, "max_twa_deg": 150.0, "max_turn_deg": 120.0,
-         "ship_match_s": 30.0}
+         "ship_match_s": 30.0, "projection": "flat"}
 RRTSTAR = {"goal_bias": 0.1, "range_m": 70.0, "rewiring": False, "risk_weight_s": 20.0, "state_risk_weight_s": 30.0}
 KALMAN = {"kalman_window": 50, "kalman_r_deg": 5.0, "kalman_r_mps": 1.0}
 

@@ -32,6 +32,8 @@ BAD = [
     ("effort", "[planner]\nexpansions = 5\n", "[planner] expansions: is for"),
     ("tunnel", '[skipper]\nplanner = "astar"\n[planner]\ntunnel = "abrupt"\n',
      "[planner] tunnel: a tunnel has a width"),
+    ("projection", '[planner]\nprojection = "flat"\n',
+     "[planner] projection: is a number of 'astar', and this mission plans by 'auto'"),
     ("filter", "[wind]\nkalman_window = 50\n", "[wind] kalman_window: is for the estimator"),
     ("polar", '[boat]\npolar = "ardurovr"\n', "[boat] polar: there is no polar 'ardurovr'"),
 ]

@@ -50,6 +50,13 @@ def plans_by(algorithm):
     return check
 
 
+def risks_a_vessel(folder):
+    """The ship was in RRT*'s own tree: a plan of its own by it carries her share of the risk."""
+    decisions = [json.loads(line) for line in (folder / "decisions.jsonl").read_text().splitlines()]
+    plans = [d["plan"] for d in decisions if d["kind"] == "plan"]
+    assert any(p["algorithm"] == "rrtstar" and p["status"] == "found" and p["vessel_risk"] > 0.0 for p in plans)
+
+
 def goes_round(folder):
     """More than once and a half round the islet, and near the ring but where she beats."""
     frame = LocalFrame(GeoPoint(lat_deg=50.8185, lon_deg=-1.3085))
@@ -74,7 +81,8 @@ def leaves_when_entered(folder):
 # What the record of one must show besides.
 RECORDED = {"field-ring": goes_round, "field-square": leaves_when_entered,
             "foreign-mission": is_said_once_in_a_while, "out-of-time": ends_by_itself,
-            "by-astar": plans_by("astar"), "by-rrtstar": plans_by("rrtstar")}
+            "by-astar": plans_by("astar"), "by-astar-flat": plans_by("astar"), "by-rrtstar": plans_by("rrtstar"),
+            "crossing-by-rrtstar": risks_a_vessel}
 
 
 # Where a file lets her wait for long and nothing more happens, the wait is shorter; -m campaign sails it as it is.

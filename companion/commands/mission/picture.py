@@ -50,7 +50,7 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
     from companion.planner import plan
     from companion.sailable.previews import Wind, legs, walked
 
-    by = planner_of(mission)
+    by = planner_of(mission).about(mission.frame().origin)
     return walked(
         legs(mission, Wind(from_deg=math.degrees(twd_from_rad), speed_mps=tws_mps)),
         lambda problem: plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0, algorithm=by.algorithm,

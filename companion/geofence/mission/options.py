@@ -149,6 +149,8 @@ class PlannerOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """A*: the greatest change of heading from step to step; with his 90 it gybes round where a tack turns farther."""
     ship_match_s: Positive | None = None
     """A*: the tolerance of eq. 4.7."""
+    projection: Literal["local", "flat"] | None = None
+    """A*: plan in the metres of the local frame, or in those of his flat earth (eq. 4.2)."""
     goal_bias: Annotated[float, Meta(ge=0.0, lt=1.0)] | None = None
     """RRT*: the share of its samples that are the goal."""
     range_m: Positive | None = None

@@ -19,7 +19,7 @@ References:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ from companion.planner.problem.evaluate import endpoint_error, ground_track
 from companion.planner.problem.parts import Target
 from companion.planner.problem.value import Problem
 from companion.planner.reference import astar_kernels as kernels
+from companion.planner.reference.flat import FlatPlane
 from companion.planner.reference.rrtstar import simple_bound_s
 from companion.planner.reference.world import bounds_of, world_of
 from companion.planner.settings import AstarSettings
@@ -153,8 +154,11 @@ def search(
 ) -> Outcome:
     """Search one grid until the goal is reached, the heap is empty or the effort is over; the seed is not used.
 
-    An expansion is one state taken from the heap.
+    An expansion is one state taken from the heap. With ``settings.projection`` "flat" the grid is laid in Büsser's own
+    plane.
     """
+    if settings.projection == "flat":
+        return _by_flat(problem, effort, settings)
     error = endpoint_error(problem)
     if error is not None:
         return Outcome(waypoints_en=None, status=PlanStatus.INVALID, reason=error)
@@ -171,6 +175,24 @@ def search(
                   f"{settings.memory_bytes / 1e6:.0f} MB allowed; one of {fits:.3g} m would fit")
         return Outcome(waypoints_en=None, status=PlanStatus.TIMEOUT, reason=reason, trace=trace)
     return _run(problem, effort, settings, grid, trace)
+
+
+def _by_flat(problem: Problem, effort: Effort, settings: AstarSettings) -> Outcome:
+    """Search in the metres of eq. 4.2 and bring the path back."""
+    if settings.origin is None:
+        reason = "the flat projection needs to know where the problem's metres count from"
+        return Outcome(waypoints_en=None, status=PlanStatus.INVALID, reason=reason)
+    error = endpoint_error(problem)
+    if error is not None:
+        return Outcome(waypoints_en=None, status=PlanStatus.INVALID, reason=error)
+    plane = FlatPlane(settings.origin)
+    outcome = search(plane.problem(problem), effort, 0, replace(settings, projection="local"))
+    if outcome.waypoints_en is None:
+        return outcome
+    way = plane.back(outcome.waypoints_en)
+    way[0] = problem.start_en
+    return replace(outcome, waypoints_en=way, lower_bound_s=simple_bound_s(problem),
+                   trace={**outcome.trace, "flat_en": outcome.waypoints_en})
 
 
 def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: Grid, trace: dict[str, Any]) -> Outcome:

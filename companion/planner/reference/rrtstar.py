@@ -11,6 +11,9 @@ its path has accumulated, states above the limit are refused, and the cost is ti
 of risk, plus ``state_risk_weight_s`` times the greatest risk of any one state. ``risk.leg_risk`` says how a leg's
 share is bounded. ``companion.planner.settings`` has the numbers.
 
+Uncertain vessels are under the tree's bound, too (``companion.planner.reference.vessels``): an edge on which one may be
+too near with more than its part of the promise is refused, and what it adds to the path's risk is a state's to carry.
+
 References:
     [1] B. Wolsieffer, Safe Navigation for Autonomous Sailboats under Uncertain Wind Conditions, 2020.
     [2] S. Karaman, E. Frazzoli, Sampling-based algorithms for optimal motion planning, 2011,
@@ -32,6 +35,7 @@ from companion.planner.plan import PlanStatus
 from companion.planner.problem.evaluate import endpoint_error
 from companion.planner.problem.value import Problem
 from companion.planner.reference import rrtstar_kernels as kernels
+from companion.planner.reference.vessels import NO_VESSELS, TreeVessels
 from companion.planner.reference.world import World, bounds_of, world_of
 from companion.planner.risk.wind import PROMISE_FACTOR, process_of
 from companion.planner.settings import RrtstarSettings
@@ -46,8 +50,12 @@ MOST_NODES = 2_000_000  # 200 bytes each
 class Tree:
     """The growing tree: the kernel's arrays and nothing else."""
 
-    def __init__(self, problem: Problem, world: World, seed: int, settings: RrtstarSettings = DEFAULTS) -> None:
+    def __init__(
+        self, problem: Problem, world: World, seed: int, settings: RrtstarSettings = DEFAULTS,
+        vessels: TreeVessels = NO_VESSELS,
+    ) -> None:
         self.world = world
+        self._vessels = vessels
         box = bounds_of(problem)
         self._box = np.array(box)
         self._goal = np.array([*problem.goal_en, max(problem.goal_radius_m, 1e-6)])
@@ -91,7 +99,7 @@ class Tree:
             samples, self.node, self.link, self._goal_node, self.count, self._random, self._box, self._goal,
             self._reach_m, self._settings.goal_bias, self._near, self._near_d, self._stack, self._fresh, w.edge,
             w.cell_first, w.cell_edge, w.grid, w.shape, w.number, w.no_go_model, w.table, w.polar, w.course, w.target,
-            self._risk_number, self._risk_table,
+            self._risk_number, self._risk_table, self._vessels.window, self._vessels.disc,
         )
 
     @property
@@ -120,15 +128,21 @@ class Tree:
         return np.column_stack([self.node[parent, :2], self.node[which, :2]])
 
 
-def search(problem: Problem, effort: Effort, seed: int, settings: RrtstarSettings = DEFAULTS) -> Outcome:
-    """Grow the tree until the effort is over; an expansion is one sample drawn."""
+def search(
+    problem: Problem, effort: Effort, seed: int, settings: RrtstarSettings = DEFAULTS,
+    vessels: TreeVessels = NO_VESSELS,
+) -> Outcome:
+    """Grow the tree until the effort is over; an expansion is one sample drawn.
+
+    ``vessels`` come under the tree's own bound, beside the problem's targets, which are closed to it.
+    """
     error = endpoint_error(problem)
     if error is not None:
         return Outcome(waypoints_en=None, status=PlanStatus.INVALID, reason=error)
     if math.dist(problem.start_en, problem.goal_en) <= problem.goal_radius_m:
         effort.found()
         return Outcome(waypoints_en=np.array([problem.start_en]))
-    tree = Tree(problem, world_of(problem), seed, settings)
+    tree = Tree(problem, world_of(problem), seed, settings, vessels)
     while not effort.is_over and tree.size < MOST_NODES:
         samples = effort.remaining(CHUNK)
         if samples <= 0:

@@ -9,11 +9,13 @@ import numpy as np
 from companion.kernels.jit import kernel
 from companion.kernels.xorshift import uniform
 from companion.planner.reference.kernels import HALF, TWD, TWO_PI, first_hit, meets_target, steer, straight, wrap
+from companion.planner.reference.vessel_kernels import passing
 from companion.planner.risk.wind_kernels import leg_risk, sigma_at, tail
 
-# Columns of ``node``: place, heading of arrival, time, accumulated risk, cost, the greatest risk of a state so far.
-X, Y, H, T, R, C, M = range(7)
-COLUMNS = 7
+# Columns of ``node``: place, heading of arrival, time, accumulated risk, cost, the greatest risk of a state so far,
+# course of arrival over the ground.
+X, Y, H, T, R, C, M, G = range(8)
+COLUMNS = 8
 # Places in ``risk_number``: a limit is set, the wind process (model, s0, s1, rho, tau), that limit, weight of the
 # accumulated risk [s], of the greatest risk of a state [s], whether states are rewired.
 LIMITED, MODEL, S0, S1, RHO, TAU, LIMIT, WEIGHT, STATE_WEIGHT, REWIRES = range(10)
@@ -61,11 +63,13 @@ def _cost(t, risk, most, risk_number):  # type: ignore[no-untyped-def]
 
 @kernel
 def _reach(  # type: ignore[no-untyped-def]
-    node, i, tx, ty, before_twa, before_t, number, model, table, polar, course, target, risk_number, risk_table,
+    node, i, tx, ty, before_twa, before_t, most_cost, number, model, table, polar, course, target, risk_number,
+    risk_table, vessel, disc,
 ):
     """Return (ok, heading, time, risk, greatest risk of a state) at (tx, ty) sailed straight from node i.
 
-    No test against the solids. The risk of a leg's states is that at its ends: in between the spread is in between.
+    No test against the solids. What costs more than ``most_cost`` is of no use, and not held against the vessels. The
+    risk of a leg's states is that at its ends: in between the spread is in between.
     """
     ok, h, t0, t1 = straight(
         node[i, X], node[i, Y], node[i, H], node[i, T], tx, ty, number, model, table, polar, course)
@@ -82,6 +86,18 @@ def _reach(  # type: ignore[no-untyped-def]
     if risk_number[STATE_WEIGHT] > 0.0:
         most = max(most, _state_risk(twa, t0, number, risk_number, risk_table),
                    _state_risk(twa, t1, number, risk_number, risk_table))
+    if vessel.shape[0] > 0:
+        if _cost(t1, risk, most, risk_number) > most_cost:
+            return False, h, t1, risk, most
+        is_summed = risk_number[LIMITED] > 0.5
+        ok, entries = passing(
+            node[i, X], node[i, Y], tx, ty, node[i, T], t0, t1, node[i, G], before_t >= 0.0, is_summed, vessel, disc)
+        if not ok:
+            return False, h, t1, risk, most
+        if is_summed:
+            risk += entries
+            if risk > risk_number[LIMIT]:
+                return False, h, t1, risk, most
     return True, h, t1, risk, most
 
 
@@ -96,12 +112,13 @@ def _twa_before(node, link, i, number):  # type: ignore[no-untyped-def]
 @kernel
 def _adopt(  # type: ignore[no-untyped-def]
     node, link, new, j, h, t, risk, most, stack, fresh, number, model, table, polar, course, target, risk_number,
-    risk_table,
+    risk_table, vessel, disc,
 ):
     """Give node j the parent ``new`` if it and everything below it stays feasible and no cost rises."""
     top, n = 0, 0
     stack[0] = j
     fresh[0, H], fresh[0, T], fresh[0, R], fresh[0, M] = h, t, risk, most
+    fresh[0, G] = math.atan2(node[j, X] - node[new, X], node[j, Y] - node[new, Y])
     fresh[0, C] = _cost(t, risk, most, risk_number)
     # A breadth-first copy of the subtree; fresh[k] belongs to stack[k].
     n = 1
@@ -115,13 +132,15 @@ def _adopt(  # type: ignore[no-untyped-def]
                 return False
             fresh[n, X], fresh[n, Y] = node[i, X], node[i, Y]
             fresh[n, H], fresh[n, T], fresh[n, R] = fresh[top, H], fresh[top, T], fresh[top, R]
-            fresh[n, M] = fresh[top, M]
+            fresh[n, M], fresh[n, G] = fresh[top, M], fresh[top, G]
             ok, ch, ct, cr, cm = _reach(
                 fresh, n, node[child, X], node[child, Y], wrap(fresh[top, H] - number[TWD]), fresh[top, T],
-                number, model, table, polar, course, target, risk_number, risk_table)
+                node[child, C] + 1e-9, number, model, table, polar, course, target, risk_number, risk_table, vessel,
+                disc)
             if not ok:
                 return False
             fresh[n, H], fresh[n, T], fresh[n, R], fresh[n, M] = ch, ct, cr, cm
+            fresh[n, G] = math.atan2(node[child, X] - node[i, X], node[child, Y] - node[i, Y])
             fresh[n, C] = _cost(ct, cr, cm, risk_number)
             stack[n] = child
             n += 1
@@ -132,7 +151,7 @@ def _adopt(  # type: ignore[no-untyped-def]
     for k in range(n):
         i = stack[k]
         node[i, H], node[i, T], node[i, R], node[i, C] = fresh[k, H], fresh[k, T], fresh[k, R], fresh[k, C]
-        node[i, M] = fresh[k, M]
+        node[i, M], node[i, G] = fresh[k, M], fresh[k, G]
     return True
 
 
@@ -140,6 +159,7 @@ def _adopt(  # type: ignore[no-untyped-def]
 def grow(  # type: ignore[no-untyped-def]
     samples, node, link, goal_node, count, random, box, goal, reach, goal_bias, near, near_d, stack, fresh,
     edge, cell_first, cell_edge, grid, shape, number, model, table, polar, course, target, risk_number, risk_table,
+    vessel, disc,
 ):
     """Draw ``samples`` states and let the tree grow by RRT* (Karaman and Frazzoli 2011, algorithm 6, k-nearest).
 
@@ -207,8 +227,8 @@ def grow(  # type: ignore[no-untyped-def]
                 continue
             before_twa, before_t = _twa_before(node, link, i, number)
             ok, h, t, risk, most = _reach(
-                node, i, x, y, before_twa, before_t, number, model, table, polar, course, target, risk_number,
-                risk_table)
+                node, i, x, y, before_twa, before_t, best_c, number, model, table, polar, course, target, risk_number,
+                risk_table, vessel, disc)
             cost = _cost(t, risk, most, risk_number)
             if not ok or cost >= best_c:
                 continue
@@ -221,6 +241,7 @@ def grow(  # type: ignore[no-untyped-def]
         new = n
         node[new, X], node[new, Y], node[new, H] = x, y, best_h
         node[new, T], node[new, R], node[new, C], node[new, M] = best_t, best_r, best_c, best_m
+        node[new, G] = math.atan2(x - node[best, X], y - node[best, Y])
         link[new, CHILD] = -1
         _hang(link, new, best)
         count[N] += 1
@@ -233,14 +254,14 @@ def grow(  # type: ignore[no-untyped-def]
             if j == best or link[j, PARENT] < 0:
                 continue
             ok, h, t, risk, most = _reach(
-                node, new, node[j, X], node[j, Y], before_twa, before_t, number, model, table, polar, course, target,
-                risk_number, risk_table)
+                node, new, node[j, X], node[j, Y], before_twa, before_t, node[j, C], number, model, table, polar,
+                course, target, risk_number, risk_table, vessel, disc)
             if not ok or _cost(t, risk, most, risk_number) >= node[j, C] - 1e-9:
                 continue
             if first_hit(x, y, node[j, X], node[j, Y], edge, cell_first, cell_edge, grid, shape) <= 1.0:
                 continue
             if _adopt(node, link, new, j, h, t, risk, most, stack, fresh, number, model, table, polar, course, target,
-                      risk_number, risk_table):
+                      risk_number, risk_table, vessel, disc):
                 count[REWIRED] += 1
         best_goal, best_cost = -1, np.inf
         for g in range(count[GOALS]):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,8 @@ from companion.planner.problem.value import Problem
 from companion.planner.track.expected import Expected, curve_mps, expected
 
 Path = list[tuple[float, float]]
+Judge = Callable[[Path], Evaluation]
+"""Says of a path whether it is feasible, and how long it takes."""
 
 AT_MOST = 40                # changes to one path: each costs a check and a prediction
 LARGEST = 60                # waypoints: a longer path is looked at as it is
@@ -35,13 +37,16 @@ BEAT_MORE_M = 1.0           # of room for a beat whose boards come too near
 MEET_M = 60.0               # legs that meet farther from their corners do not meet
 
 
-def with_track(search: Search) -> Search:
-    """Return the search whose paths are laid so that their track keeps the floor."""
+def with_track(search: Search, judge: Judge | None = None) -> Search:
+    """Return the search whose paths are laid so that their track keeps the floor.
+
+    ``judge``: what the changes to a path have to pass; None: the exact scorer.
+    """
     def tracked(problem: Problem, effort: Effort, seed: int) -> Outcome:
         outcome = search(problem, effort, seed)
         if outcome.waypoints_en is None:
             return outcome
-        path, seen = laid(problem, [(float(x), float(y)) for x, y in outcome.waypoints_en])
+        path, seen = laid(problem, [(float(x), float(y)) for x, y in outcome.waypoints_en], judge)
         if seen.is_beat and problem.beat is not None:
             # More water about what is beaten; what has none is sailed.
             wider = replace(problem, beat=replace(
@@ -49,7 +54,7 @@ def with_track(search: Search) -> Search:
             again = search(wider, effort, seed)
             if again.waypoints_en is not None:
                 outcome = again
-                path, seen = laid(problem, [(float(x), float(y)) for x, y in again.waypoints_en])
+                path, seen = laid(problem, [(float(x), float(y)) for x, y in again.waypoints_en], judge)
         if seen.is_kept:
             return replace(outcome, waypoints_en=np.asarray(path))
         return replace(outcome, waypoints_en=None, status=PlanStatus.TIMEOUT, reason=lacking(problem, seen))
@@ -67,19 +72,24 @@ def lacking(problem: Problem, seen: Expected) -> str:
             f"the floor is {floor:.1f} m")
 
 
-def laid(problem: Problem, path: Path) -> tuple[Path, Expected]:
+def laid(problem: Problem, path: Path, judge: Judge | None = None) -> tuple[Path, Expected]:
     """Return the path with few corners, all of which can be followed and keep the floor, as far as that is possible."""
-    exact = resolved(problem)
-    judged = evaluate(exact, np.asarray(path))
+    judge = _scorer(problem) if judge is None else judge
+    judged = judge(path)
     seen = expected(problem, path, judged.legs)
     if len(path) > LARGEST or not judged.is_feasible:
         return path, seen
-    path, seen = _fewer(problem, exact, path, judged, seen)
-    return _pushed(problem, exact, path, seen)
+    path, seen = _fewer(problem, judge, path, judged, seen)
+    return _pushed(problem, judge, path, seen)
+
+
+def _scorer(problem: Problem) -> Judge:
+    exact = resolved(problem)
+    return lambda path: evaluate(exact, np.asarray(path))
 
 
 def _fewer(
-    problem: Problem, exact: Problem, path: Path, judged: Evaluation, seen: Expected,
+    problem: Problem, judge: Judge, path: Path, judged: Evaluation, seen: Expected,
 ) -> tuple[Path, Expected]:
     """Leave out corners, the shortest legs' first, while that costs little and brings her nearer to nothing."""
     tried: set[tuple[int, ...]] = set()
@@ -96,7 +106,7 @@ def _fewer(
                     continue
                 tried.add(key)
                 count += 1
-                found = evaluate(exact, np.asarray(option))
+                found = judge(option)
                 allowed_s = limit_s if lengths[n] < least_m else min(
                     limit_s, judged.time_s * (1.0 + SHORTER_SHARE) + SHORTER_S)
                 if not found.is_feasible or found.time_s > allowed_s:
@@ -115,7 +125,7 @@ def _fewer(
 
 
 def _pushed(
-    problem: Problem, exact: Problem, path: Path, seen: Expected,
+    problem: Problem, judge: Judge, path: Path, seen: Expected,
 ) -> tuple[Path, Expected]:
     """Push corners away from what the track comes too near to, until it keeps the floor or nothing helps."""
     count = 0
@@ -123,7 +133,7 @@ def _pushed(
         best: tuple[float, float, Path, Expected] | None = None
         for option in _pushes(problem, path, seen):
             count += 1
-            found = evaluate(exact, np.asarray(option))
+            found = judge(option)
             if not found.is_feasible:
                 continue
             then = expected(problem, option, found.legs)

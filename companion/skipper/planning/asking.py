@@ -85,7 +85,8 @@ def request(
     why = "; ".join(part for part in (text, start.text, f"step: {name}" if name else "") if part)
     turn.act(RequestPlan(
         request_id=number, problem=problem, reason=reason, budget_s=budget, seed=number,
-        from_seq=None if from_index is None else from_index + 1, planner=step.planner, rung=name, text=why,
+        from_seq=None if from_index is None else from_index + 1,
+        planner=step.planner.about(turn.voyage.frame.origin), rung=name, text=why,
     ))
     return True
 
