@@ -200,7 +200,8 @@ def _goal(goal: SketchedGoal, number: int, before: MissionOptions) -> GoalOption
     if goal.kind == "point":
         if goal.at is None:
             raise ValueError(f"[[goal]] {number} has no place")
-        made = PointOptions(lat=goal.at[0], lon=goal.at[1], name=goal.name, rounding=goal.rounding)
+        made = PointOptions(lat=goal.at[0], lon=goal.at[1], name=goal.name, rounding=goal.rounding,
+                            bandwidth_m=old.bandwidth_m if isinstance(old, PointOptions) else None)
         return _with(made, radius_m=goal.radius_m)
     if goal.kind == "gate":
         if goal.port_mark is None or goal.starboard_mark is None:

@@ -23,6 +23,7 @@ from companion.compose import (
     permissions_of,
     target_limits_of,
     voyage_of,
+    water_of,
 )
 from companion.geofence import load_mission
 from companion.geofence.mission.atom_options import ATOMS
@@ -114,6 +115,7 @@ OTHER = {
              "gybe_loss_s": 3.0, "can_tack": False, "gybe_room_m": 40.0, "length_m": 3.0, "beam_m": 1.5, "motor": True,
              "leeway_deg": 4.0},
     "autopilot": {"system": 7, "frame": "motor"},
+    "current": {"set_deg": 40.0, "drift_mps": 0.5, "sigma_mps": 0.3, "table": "tide.csv"},
     "wind": {"estimator": "mean90", "preview_from_deg": 40.0, "preview_speed_mps": 8.0, **KALMAN},
     "operator": {"arm": False, "set_auto": True, "guided": True, "upload_fence": True, "replace_foreign": True,
                  "orders": ["hold"], "local_orders": ["stop"], "far_orders": ["home"]},
@@ -149,6 +151,9 @@ def mission(path, table="", key="", value=None):
     raw = tomllib.loads(MISSION)
     if key == "signalk_token":
         raw["output"] = {"signalk": ["ws://127.0.0.1:3000"]}
+    if table == "current":
+        raw["current"] = {} if key == "table" else {"set_deg": 10.0, "drift_mps": 0.2}
+        (path / "tide.csv").write_text("2026-11-21T12:00:00Z,90,0.6\n2026-11-21T13:00:00Z,90,0.2\n")
     if table == "area" and key in {"axis", "point_radius_m"}:
         raw["area"]["obstacles"] = ["point.wkt"]
     if (table, key) == ("area", "axis"):
@@ -199,6 +204,8 @@ def atom_with(key):
 
 
 def base_for(path, table, key):
+    if table == "current" and key != "table":
+        return mission(path, "current", "sigma_mps", 0.2)
     if table == "field":
         return mission(path, "field", key)
     if table == "goal" and key in {"field", "until"}:
@@ -234,6 +241,7 @@ def sailed(m):
         gates_of(voyage),
         voyage.area.obstacles_wkt(0.0), voyage.area.fence_wkt(0.0), speeds, rest, config_of(m), permissions_of(m),
         target_limits_of(m), feeds_of(m), displays_of(m), type(estimator).__name__, wind, needs_of(m),
+        water_of(m).at(None), water_of(m).at(1795262400.0),
     ))
 
 

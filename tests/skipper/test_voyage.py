@@ -9,6 +9,7 @@ import pytest
 import shapely
 from shapely.geometry import box
 
+from companion.boat import AutopilotLimits
 from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, Mode, StatusText
 from companion.planner import PlanStatus
@@ -526,9 +527,11 @@ def test_a_closed_way_ends_in_a_named_hold():
 
 
 def test_a_way_that_opens_only_at_the_floor_is_sailed_with_less_margin():
-    gate = (box(-300, 150, -12, 200), box(12, 150, 300, 200))
+    gate = (box(-300, 150, -13, 200), box(13, 150, 300, 200))    # the floor, and her track beside the line
     world = make(Goal(en_m=(0.0, 300.0), radius_m=6.0), obstacles=gate, wind=lambda t: (math.pi / 2, 5.0),
                  voyage={"limits": box(-280, -100, 280, 500)})
+    world.extra["limits"] = AutopilotLimits(
+        sail_no_go_angle_rad=world.no_go, sail_xtrack_max_m=world.corridor, wp_speed_mps=2.0)
     assert world.run(900, is_done)
     assert world.clearance() > 8.0
     assert any("margin" in entry[2] for entry in world.log)

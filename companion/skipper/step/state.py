@@ -282,7 +282,7 @@ class SkipperState:
     steering_heading_rad: float | None = None
     by_field: ByField = ByField()
     adrift: Adrift = Adrift()
-    water_told: tuple[float, float] | None = None  # the current that was said last [m/s east, north]; None: still water
+    water_told_en_mps: tuple[float, float] | None = None  # the current that was said last; None: still water
     irons_s: tuple[float, ...] = ()                # when the boat was in irons
     watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
     watch_told: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of those said lately, when

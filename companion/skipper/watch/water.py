@@ -16,17 +16,17 @@ REMIND_S = 1800.0
 
 def watch_water(turn: Turn) -> None:
     """Say what is new of the current."""
-    current, told = turn.snapshot.current, turn.state.water_told
+    current, told = turn.snapshot.current, turn.state.water_told_en_mps
     if not turn.state.sailing:
         return
     if current.verdict:
         turn.say(Severity.WARNING, "tide table", current.verdict, every_s=REMIND_S)
     if not current.is_significant:
         if told is not None:
-            turn.update(water_told=None)
+            turn.update(water_told_en_mps=None)
             turn.say(Severity.INFO, "current", "the current is no longer told from still water: plans leave it out",
                      every_s=0.0)
         return
     if told is None or math.dist(told, current.en_mps) >= ANOTHER_MPS:
-        turn.update(water_told=current.en_mps)
+        turn.update(water_told_en_mps=current.en_mps)
         turn.say(Severity.INFO, "current", f"{current.sentence()}: plans reckon with it", every_s=0.0)
