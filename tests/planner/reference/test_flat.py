@@ -30,7 +30,7 @@ def test_the_plane_is_within_what_the_docs_say(reach_m, lat, lon, bearing, share
     at = share * reach_m * np.array([math.sin(bearing), math.cos(bearing)])
     there = plane.to([at])
     assert math.dist(there[0], at) <= WITHIN[reach_m][0]
-    assert plane.back(there)[0] == pytest.approx(at, abs=1e-4)          # a corner loses nothing on its way back
+    assert plane.back(there)[0] == pytest.approx(at, abs=1e-3)          # a corner is back where it was, to the mm
     ahead = plane.back(there + 10.0 * np.array([math.sin(course), math.cos(course)]))[0] - at
     off = (math.atan2(*ahead) - course + math.pi) % (2.0 * math.pi) - math.pi
     assert abs(math.degrees(off)) <= WITHIN[reach_m][1]
