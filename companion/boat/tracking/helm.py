@@ -25,7 +25,7 @@ class Helm:
         wp_speed_mps: WP_SPEED: a boat's speed does not obey it, the point that she follows does.
         accel_mps2: WP_ACCEL or ATC_ACCEL_MAX, of that point.
         jerk_mps3: WP_JERK, of that point; 0 there means the acceleration's figure.
-    pos_p: PSC_POS_P [1/s].
+        pos_p: PSC_POS_P [1/s].
         vel_p: PSC_VEL_P [1/s].
         lateral_mps2: ATC_TURN_MAX_G, as an acceleration.
         no_go_half_rad: SAIL_NO_GO_ANGLE.

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import shapely
 
-from companion.planner import Plan, PlanStatus, Problem
+from companion.planner import Plan, PlanStatus
 from companion.planner.problem import evaluate, resolved
 from companion.skipper.board.uploads import upload
-from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
+from companion.skipper.planning.autopilot_beats import tacks_fail
 from companion.skipper.planning.errands import Kind, errand
 from companion.skipper.planning.not_found import asks_again, not_found
 from companion.skipper.planning.track import of_way, said
@@ -21,17 +20,12 @@ from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import PendingPlan, Phase, Retry
 from companion.skipper.step.turn import Turn
-from companion.skipper.way.corners import LEAST_LEG_S, Quality, spread
 from companion.skipper.way.geometry import distance_m
-from companion.skipper.way.judge import judge
 from companion.skipper.way.manoeuvre import gybe_round
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
 
 SAME_M = 1.0             # a new waypoint this near to the old one is the old one
-SPARE_SHARE = 0.001      # a path may get this much slower ...
-SPARE_S = 0.3            # ... and this much more, to have a waypoint less
-SIMPLIFIED_AT_MOST = 60  # waypoints: each costs a check of the whole path
 GYBE_RADIUS_M = 8.0      # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
 
 
@@ -130,15 +124,10 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
 def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
     """Splice a plan into the route and ask for its upload."""
     planned = _apart([(float(e), float(n)) for e, n in plan.waypoints_en])
-    is_tracked = pending.problem.tracking is not None   # then the planner has made its corners few and followable
-    points = (planned if is_tracked else simplified(pending.problem, planned))[1:]
+    points = [*pending.lead_in, *planned[1:]]
     start = pending.start_en_m
     if pending.lead_in and turn.boat_en is not None:
         start = turn.boat_en
-    if not is_tracked:
-        points = _followed(turn, pending, [start, *pending.lead_in, *points])[1:]
-    else:
-        points = [*pending.lead_in, *points]
     expected_m = plan.expected_clearance_m
     if tacks_fail(turn):
         # Tacks have failed: turn the other way round where there is room.
@@ -180,30 +169,6 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change)
 
 
-def _followed(turn: Turn, pending: PendingPlan, path: list[PointEn]) -> list[PointEn]:
-    """Return the path with corners that the autopilot can follow (``companion.skipper.way.corners``)."""
-    wind, area, boat = turn.wind_mean, turn.voyage.area, turn.voyage.boat
-    if wind is None:
-        return path
-    keep_out = shapely.union_all([shapely.from_wkt(w) for w in (
-        turn.gates[pending.gate].keep_out if pending.gate >= 0 else ())])
-
-    def quality(way: list[PointEn]) -> Quality:
-        clearance_m = area.path_clearance_m(way)
-        if not pending.lead_in:
-            judged = evaluate(pending.problem, np.asarray(way))
-            if judged.is_feasible:
-                return Quality(is_feasible=True, is_sailable=True, clearance_m=clearance_m, time_s=judged.time_s)
-        seen = judge(
-            way, boat=boat, no_go_half_rad=turn.planned_no_go_rad, twd_from_rad=wind[0], tws_mps=wind[1], area=area,
-            beat_room_m=room_m(turn), current_en_mps=turn.current_en_mps)
-        is_sailable = seen.spare_rad >= 0.0 and not shapely.intersects(keep_out, shapely.LineString(way))
-        return Quality(is_feasible=False, is_sailable=is_sailable, clearance_m=clearance_m, time_s=seen.time_s)
-
-    floor_m = min(turn.config.margin_floor_m, pending.facts.margin_m)
-    return spread(path, least_m=LEAST_LEG_S * boat.polar.max_speed_mps(wind[1]), floor_m=floor_m, quality=quality)
-
-
 def _apart(points: list[PointEn]) -> list[PointEn]:
     """Return the points without those that stand on the one before: the autopilot cannot sail a leg of no length."""
     out = points[:1]
@@ -215,31 +180,6 @@ def _apart(points: list[PointEn]) -> list[PointEn]:
         elif n == len(points) - 1:
             out.append(point)
     return out
-
-
-def simplified(problem: Problem, points: list[PointEn]) -> list[PointEn]:
-    """Return the path without the waypoints that it does not need.
-
-    A planner bends a leg a little as the no-go zone widens with time; each bend is an upload's item and a replan.
-    A waypoint goes when the path without it passes the planner's own check and is not slower than by
-    ``SPARE_SHARE`` and ``SPARE_S``.
-    """
-    if len(points) < 3 or len(points) > SIMPLIFIED_AT_MOST:
-        return points
-    whole = evaluate(problem, np.asarray(points))
-    if not whole.is_feasible:
-        return points
-    allowed_s = whole.time_s * (1.0 + SPARE_SHARE) + SPARE_S
-    kept = list(points)
-    n = 1
-    while n < len(kept) - 1:
-        shorter = kept[:n] + kept[n + 1:]
-        judged = evaluate(problem, np.asarray(shorter))
-        if judged.is_feasible and judged.time_s <= allowed_s:
-            kept = shorter
-        else:
-            n += 1
-    return kept
 
 
 def _is_same(a: Route, b: Route) -> bool:
