@@ -73,7 +73,9 @@ def sail(
     e, n, yaw, v = state[0], state[1], state[2], state[3]
     rate, want_rate, integral = 0.0, 0.0, 0.0
     dt = STEP_S
-    leg, last = 0, points.shape[0] - 2
+    leg, last, looked_at = 0, points.shape[0] - 2, -1
+    oe, on, de, dn, ue, un, length, v_this, whole = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    ge, gn, after, v_next, whole_next = 0.0, 0.0, 0.0, 0.0, 0.0
     accel, jerk, fastest = h[H_ACCEL], h[H_JERK], h[H_WP_SPEED]
     t_prev, t_this, t_next = 0.0, 0.0, 0.0      # along the curves of the leg before, this one, the next
     l_prev, v_prev, pe, pn = 0.0, 1.0, 0.0, 0.0
@@ -94,14 +96,16 @@ def sail(
         # what the autopilot believes of its place is a little old
         ve, vn = v * math.sin(yaw), v * math.cos(yaw)
         be, bn = e - ve * h[H_LATENCY_S], n - vn * h[H_LATENCY_S]
-        oe, on, de, dn = points[leg, 0], points[leg, 1], points[leg + 1, 0], points[leg + 1, 1]
-        xe, xn = (points[leg + 2, 0], points[leg + 2, 1]) if leg < last else (de, dn)
-        length = math.hypot(de - oe, dn - on)
-        ue, un = ((de - oe) / length, (dn - on) / length) if length > 1e-6 else (math.sin(yaw), math.cos(yaw))
-        after = max(math.hypot(xe - de, xn - dn), 1e-6)
-        ge, gn = (xe - de) / after, (xn - dn) / after
-        v_this, v_next = top_speed_mps(length, fastest, accel, jerk), top_speed_mps(after, fastest, accel, jerk)
-        whole, whole_next = leg_s(length, v_this, accel, jerk), leg_s(after, v_next, accel, jerk)
+        if leg != looked_at:
+            oe, on, de, dn = points[leg, 0], points[leg, 1], points[leg + 1, 0], points[leg + 1, 1]
+            xe, xn = (points[leg + 2, 0], points[leg + 2, 1]) if leg < last else (de, dn)
+            length = math.hypot(de - oe, dn - on)
+            ue, un = ((de - oe) / length, (dn - on) / length) if length > 1e-6 else (math.sin(yaw), math.cos(yaw))
+            after = max(math.hypot(xe - de, xn - dn), 1e-6)
+            ge, gn = (xe - de) / after, (xn - dn) / after
+            v_this, v_next = top_speed_mps(length, fastest, accel, jerk), top_speed_mps(after, fastest, accel, jerk)
+            whole, whole_next = leg_s(length, v_this, accel, jerk), leg_s(after, v_next, accel, jerk)
+            looked_at = leg
         # --- the point on the legs waits for the boat, or hurries with her
         want = 1.0
         if pace > 1e-6:

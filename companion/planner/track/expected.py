@@ -33,6 +33,7 @@ RUN_UP_M = 40.0      # of the leg before the start: she is on it, and rounds the
 BESIDE_M = 15.0      # of that leg's end the corner is the plan's; within this of her own place the error grows
 SPARE_M = 0.3        # a start that is nearer than the floor need come no nearer than this more
 SIGMA_AT_S = 60.0    # horizon at which the spread is taken for boards
+STRIDE = 10          # places of a track, a fifth of a second apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +88,15 @@ def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray
         return Expected()
     if legs is None:
         legs = evaluate(problem, path).legs
-    beats = np.array([leg.is_beat for leg in legs]) if len(legs) == len(path) - 1 else np.zeros(len(path) - 1, bool)
+    beats = tuple(leg.is_beat for leg in legs) if len(legs) == len(path) - 1 else (False,) * (len(path) - 1)
+    return _expected(problem, path.tobytes(), beats, has_boards)
+
+
+@lru_cache(maxsize=8)   # by identity: a search's best path is asked for again when the plan is written
+def _expected(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...], has_boards: bool) -> Expected:
+    tracking = problem.tracking
+    assert tracking is not None
+    path, beats = np.frombuffer(path_bytes).reshape(-1, 2), np.array(is_beat)
     whole, first = _with_run_up(tracking, path)
     curve = curve_mps(problem)
     heading = None if first else problem.start_heading_rad
@@ -140,18 +149,12 @@ def _with_boards(
     twd = problem.wind.twd_from_rad
     winds = drawn_winds(twd, sigma_rad=sigma, tau_s=tracking.correlation_s, length_s=length_s) if sigma > 0.0 else (
         np.array([[twd]]))
+    whole = whole[:first + int(np.flatnonzero(beats)[-1]) + 3]   # what comes later is nothing to it
     tracks = [predict(whole, tracking.helm, curve_mps=curve, twd_from_rad=wind,
                       heading_rad=None if first else problem.start_heading_rad) for wind in winds]
-    board_m = 2.0 * max(tracking.helm.corridor_m, 1.0)
     out = found
     for n in np.flatnonzero(beats):
-        a, b = whole[n + first], whole[n + first + 1]
-        along = (b - a) / max(float(np.hypot(*(b - a))), 1e-6)
-        least: dict[int, list[tuple[float, tuple[float, float]]]] = {}
-        for track in tracks:
-            for board, room, place in _boards(tracking, track, int(n) + first, a, along, board_m):
-                least.setdefault(board, []).append((room, place))
-        for rows in least.values():
+        for rows in _boards(tracking, tracks, whole, int(n) + first):
             if len(rows) < 0.25 * len(tracks):
                 continue   # few winds bring her there at all
             rows.sort()
@@ -166,20 +169,44 @@ def _with_boards(
 
 
 def _boards(
-    tracking: Tracking, track: Predicted, leg: int, a: NDArray[np.float64], along: NDArray[np.float64], board_m: float,
-) -> list[tuple[int, float, tuple[float, float]]]:
-    """Return of each board's length of a leg: which, the least clearance there, and where."""
-    en = track.en_m[track.leg == leg]
+    tracking: Tracking, tracks: Sequence[Predicted], whole: NDArray[np.float64], leg: int,
+) -> list[list[tuple[float, tuple[float, float]]]]:
+    """Return of each board's length of a leg, for each track that comes there: the least clearance, and where."""
+    on_leg = [track.en_m[track.leg == leg] for track in tracks]
+    en = np.concatenate(on_leg)
     if not len(en):
         return []
-    room = _distance_m(tracking, en) - tracking.reach_m
-    board = np.floor(((en - a) @ along) / board_m).astype(np.int64)
-    out = []
-    for each in np.unique(board):
-        which = np.flatnonzero(board == each)
-        i = int(which[np.argmin(room[which])])
-        out.append((int(each), float(room[i]), _point(en[i])))
-    return out
+    a, b = whole[leg], whole[leg + 1]
+    along = (b - a) / max(float(np.hypot(*(b - a))), 1e-6)
+    board = np.floor(((en - a) @ along) / (2.0 * max(tracking.helm.corridor_m, 1.0))).astype(np.int64)
+    track = np.repeat(np.arange(len(tracks)), [len(each) for each in on_leg])
+    _, group = np.unique(track * (int(np.ptp(board)) + 1) + board, return_inverse=True)
+    rows: dict[int, list[tuple[float, tuple[float, float]]]] = {}
+    for i, distance in _nearest_of_each(tracking, en, group):
+        rows.setdefault(int(board[i]), []).append((distance - tracking.reach_m, _point(en[i])))
+    return list(rows.values())
+
+
+def _nearest_of_each(
+    tracking: Tracking, en: NDArray[np.float64], group: NDArray[np.int64],
+) -> list[tuple[int, float]]:
+    """Return of each group of places, numbered from 0, which comes nearest to anything solid, and how near.
+
+    Distance changes by no more than one moves: of the places between every ``STRIDE``-th only those are measured that
+    could be nearer than what their group has already.
+    """
+    coarse = np.arange(0, len(en), STRIDE)
+    distance = np.full(len(en), math.inf)
+    distance[coarse] = _distance_m(tracking, en[coarse])
+    least = np.full(int(group.max()) + 1, math.inf)
+    np.minimum.at(least, group, distance)
+    before = np.arange(len(en)) // STRIDE * STRIDE
+    could = distance[before] - np.hypot(*(en - en[before]).T) < least[group]
+    could[coarse] = False
+    distance[could] = _distance_m(tracking, en[could])
+    order = np.lexsort((distance, group))
+    firsts = order[np.searchsorted(group[order], np.arange(len(least)))]
+    return [(int(i), float(distance[i])) for i in firsts]
 
 
 def _distance_m(tracking: Tracking, en: NDArray[np.float64]) -> NDArray[np.float64]:
