@@ -87,6 +87,9 @@ def boat_of(mission: Mission) -> Boat:
         hull=Hull(length_m=mission.boat.length_m, beam_m=mission.boat.beam_m),
         has_motor=mission.boat.motor,
         leeway_rad=math.radians(mission.boat.leeway_deg),
+        max_tws_mps=mission.boat.max_tws_mps,
+        min_tws_mps=mission.boat.min_tws_mps,
+        tack_fails=mission.boat.tack_fails if mission.boat.can_tack else 0.0,
     )
 
 
@@ -188,7 +191,8 @@ def _ends(mission: Mission) -> Ends:
     safety = mission.safety
     return Ends(
         battery=End(safety.battery), battery_v=safety.battery_v, leak=End(safety.leak),
-        out_of_time=End(safety.out_of_time), dark=End(safety.dark),
+        out_of_time=End(safety.out_of_time), strong_wind=End(safety.strong_wind),
+        light_wind=End(safety.light_wind), dark=End(safety.dark),
         dark_below_rad=math.radians(safety.dark_below_deg), shore_lost=End(safety.shore_lost),
         shore_lost_s=safety.shore_lost_s, battery_reserve=safety.battery_reserve,
         failsafes=tuple((name, CHOICES[word]) for name, word in (

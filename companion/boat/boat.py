@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 
 from companion.boat.leeway import coefficient_of, leeway_at
 from companion.boat.polar import Polar
+
+SPEED_ANGLES = 73   # of ``Boat.problem_speeds``: 2.5 degrees apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +51,9 @@ class Boat:
         gybe_room_m: Leg to leeward that gybing round needs [m]; None: five turning radii at full speed.
         hull: Its size.
         has_motor: It has an auxiliary motor that the autopilot can run.
+        max_tws_mps: More wind than this she is not to be out in [m/s]; None: there is no such limit.
+        min_tws_mps: In less than this she makes no way [m/s].
+        tack_fails: The chance that a tack fails [0..1), before any was seen; 0: they are not reckoned to fail.
         leeway_rad: On a beat, the apparent wind 30 degrees off her bow and three times as fast as she; see ``leeway``.
     """
 
@@ -62,6 +68,9 @@ class Boat:
     hull: Hull = field(default_factory=Hull)
     has_motor: bool = False
     leeway_rad: float = 0.0
+    max_tws_mps: float | None = None
+    min_tws_mps: float | None = None
+    tack_fails: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.no_go_half_rad < math.pi:
@@ -76,6 +85,8 @@ class Boat:
                 raise ValueError(f"{name} is {value}; it must be 0 s or more")
         if not 0.0 <= self.leeway_rad < math.pi / 4.0:
             raise ValueError(f"leeway of {math.degrees(self.leeway_rad):.1f}° is outside 0..45°")
+        if not 0.0 <= self.tack_fails < 1.0:
+            raise ValueError(f"tack_fails is {self.tack_fails}; it must be a chance from 0 to below 1")
         if self.gybe_room_m is not None and not (math.isfinite(self.gybe_room_m) and self.gybe_room_m >= 0.0):
             raise ValueError(f"gybe_room_m is {self.gybe_room_m}; it must be 0 m or more")
 
@@ -128,6 +139,24 @@ class Boat:
             out["gybe_loss_s"] = self.gybe_loss_s
         if not self.can_tack:
             out["can_tack"] = False
-        if self.gybe_room_m is not None:
-            out["gybe_room_m"] = self.gybe_room_m
+        for name in ("gybe_room_m", "max_tws_mps", "min_tws_mps"):
+            if getattr(self, name) is not None:
+                out[name] = getattr(self, name)
         return out
+
+    def problem_speeds(self) -> dict[str, Any]:
+        """Return the ``boat.speeds`` of a planning problem: her speed in every wind, as her polar's columns have it."""
+        return _speeds_of(self)
+
+
+@lru_cache(maxsize=4)
+def _speeds_of(boat: Boat) -> dict[str, Any]:
+    angles = np.linspace(0.0, math.pi, SPEED_ANGLES)
+    rows = []
+    for tws_mps in boat.polar.tws_mps.tolist():
+        twa_rad, speed_mps = boat.polar.curve(tws_mps)
+        if boat.leeway_rad > 0.0:
+            twa_rad, speed_mps = boat._made_good(twa_rad, speed_mps, tws_mps)  # noqa: SLF001 - the value's own module
+        rows.append([round(float(v), 4) for v in np.interp(angles, twa_rad, speed_mps)])
+    return {"tws_mps": boat.polar.tws_mps.tolist(), "twa_deg": [round(float(a), 6) for a in np.degrees(angles)],
+            "v_mps": rows}

@@ -38,7 +38,8 @@ def avalon() -> Polar:
     twa = np.radians(np.arange(181.0))
     per_wind = np.clip(np.polyval(AVALON_COEFFICIENTS, twa), 0.0, None)
     tws = AVALON_TESTED_KNOTS * MPS_PER_KNOT
-    return Polar(twa_rad=twa, tws_mps=np.array([tws]), speed_mps_table=(per_wind * tws)[:, None], name="AVALON")
+    table = np.column_stack([np.zeros_like(twa), per_wind * tws])
+    return Polar(twa_rad=twa, tws_mps=np.array([0.0, tws]), speed_mps_table=table, name="AVALON")
 
 
 def ardurover_sitl() -> Polar:

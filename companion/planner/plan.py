@@ -73,16 +73,50 @@ class Why:
     data: Mapping[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrival:
+    """When a plan arrives in the wind's spread [s]; inf: not within five times its own time.
+
+    Attributes:
+        early_s, median_s, late_s: it arrives so early in one wind of ten, in half of them, in nine of ten.
+        over_max, under_min: the chance of more wind than the boat's limit, and of less, at the worst instant until
+            then; None: the boat has no such limit.
+        doubts: what is not known of it, in words.
+
+    """
+
+    early_s: float
+    median_s: float
+    late_s: float
+    over_max: float | None = None
+    under_min: float | None = None
+    doubts: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form; None for what is never."""
+        return {"p10_s": _finite(self.early_s), "p50_s": _finite(self.median_s), "p90_s": _finite(self.late_s),
+                "over_max": self.over_max, "under_min": self.under_min, "doubts": list(self.doubts)}
+
+    @classmethod
+    def from_dict(cls, raw: Mapping[str, Any]) -> Arrival:
+        """Return the value of ``to_dict``'s form."""
+        early, median, late = (math.inf if raw[key] is None else float(raw[key]) for key in ("p10_s", "p50_s", "p90_s"))
+        return cls(early_s=early, median_s=median, late_s=late, over_max=raw["over_max"], under_min=raw["under_min"],
+                   doubts=tuple(raw["doubts"]))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plan:
     """A plan. ``waypoints_en`` is (n, 2), starts at the start, and is empty (0, 2) without a path.
 
     ``cost_s`` is the time of the path (inf without one), ``lower_bound_s`` a proved bound from below (inf when
     INFEASIBLE). ``expansions`` is the effort spent, ``elapsed_s`` the computing time, ``first_s`` the computing
-    time to the first path (None without one). ``risk`` is what is promised of the whole path, wind and vessels added;
-    ``vessel_risk`` is the vessels' part of it (0 where none is uncertain). ``expected_clearance_m`` is the least
-    distance from what is solid that is expected of the hull on the predicted track, that prediction's error taken off,
-    and ``expected_at_en`` where (None: the problem says nothing of the track, or nothing is solid).
+    time to the first path (None without one). ``risk`` is what is promised of the whole path, wind, vessels and tacks
+    that fail added; ``vessel_risk`` is the vessels' part of it (0 where none is uncertain), ``tack_risk`` that of
+    tacks. ``expected_clearance_m`` is the least distance from what is solid that is expected of the hull on the
+    predicted track, that prediction's error taken off, and ``expected_at_en`` where (None: the problem says nothing of
+    the track, or nothing is solid). ``arrival`` has the quantiles of its time (None: the problem says nothing of the
+    wind's strength).
     """
 
     status: PlanStatus
@@ -98,8 +132,10 @@ class Plan:
     first_s: float | None = None
     risk: float | None = None
     vessel_risk: float = 0.0
+    tack_risk: float = 0.0
     expected_clearance_m: float | None = None
     expected_at_en: tuple[float, float] | None = None
+    arrival: Arrival | None = None
     why: Why = Why()
     trace: Mapping[str, Any] = field(default_factory=dict)
 
@@ -131,6 +167,8 @@ class Plan:
             "first_s": self.first_s,
             "risk": self.risk,
             "vessel_risk": self.vessel_risk,
+            **({"tack_risk": self.tack_risk} if self.tack_risk else {}),
+            **({} if self.arrival is None else {"arrival": self.arrival.to_dict()}),
             **({} if self.expected_clearance_m is None else {
                 "expected_clearance_m": self.expected_clearance_m,
                 "expected_at": None if self.expected_at_en is None else list(self.expected_at_en)}),
@@ -158,6 +196,8 @@ class Plan:
             first_s=raw["first_s"],
             risk=raw["risk"],
             vessel_risk=float(raw.get("vessel_risk", 0.0)),
+            tack_risk=float(raw.get("tack_risk", 0.0)),
+            arrival=None if raw.get("arrival") is None else Arrival.from_dict(raw["arrival"]),
             expected_clearance_m=raw.get("expected_clearance_m"),
             expected_at_en=None if raw.get("expected_at") is None else (raw["expected_at"][0], raw["expected_at"][1]),
             why=Why(text=raw["why"]["text"], data=raw["why"]["data"]),

@@ -135,15 +135,21 @@ def _solved(problem: Problem, effort: Effort, empty: Plan, settings: Settings | 
 def _whole(
     search: Search, problem: Problem, judge: Callable[[list[tuple[float, float]]], Evaluation] | None = None,
 ) -> Search:
-    """Return the search in terms of discs, and laid as the autopilot can follow it where the problem says how."""
+    """Return the search in terms of discs, laid as the autopilot can follow it and with room for tacks that fail,
+    where the problem says how."""  # noqa: D205, D209
     def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
         return search(resolved(problem), effort, seed)
 
-    if problem.tracking is None:
-        return search_resolved
-    from companion.planner.track import with_track
+    whole: Search = search_resolved
+    if problem.tracking is not None:
+        from companion.planner.track import with_track
 
-    return with_track(search_resolved, judge)
+        whole = with_track(search_resolved, judge)
+    if problem.boat.tack_fails > 0.0 and problem.boat.can_tack:
+        from companion.planner.contingency import with_contingency
+
+        whole = with_contingency(whole)
+    return whole
 
 
 def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> Plan:
@@ -166,16 +172,22 @@ def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> 
     return replace(
         spent, status=status, reason=reason, waypoints_en=np.array(outcome.waypoints_en, dtype=np.float64),
         legs=clearances(problem, judged.legs), cost_s=judged.time_s, lower_bound_s=bound, first_s=effort.first_s,
-        elapsed_s=effort.elapsed_s, **_expected(problem, outcome.waypoints_en, judged),
+        elapsed_s=effort.elapsed_s,
+        **_expected(problem, outcome.waypoints_en, judged),
     )
 
 
 def _expected(problem: Problem, waypoints_en: NDArray[np.float64], judged: Evaluation) -> dict[str, Any]:
-    """Return what a plan says of its track, by its fields."""
+    """Return what a plan says of its time and its track, by its fields."""
+    found: dict[str, Any] = {}
+    if problem.wind.strength is not None:
+        from companion.planner.risk.arrival import arrival
+
+        found["arrival"] = arrival(problem, judged.legs)
     if problem.tracking is None:
-        return {}
+        return found
     from companion.planner.track import expected
 
     seen = expected(problem, waypoints_en, judged.legs)
     is_near = math.isfinite(seen.clearance_m)
-    return {"expected_clearance_m": seen.clearance_m if is_near else None, "expected_at_en": seen.at_en}
+    return found | {"expected_clearance_m": seen.clearance_m if is_near else None, "expected_at_en": seen.at_en}

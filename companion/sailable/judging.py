@@ -92,6 +92,15 @@ def _require_consistent(mission: Mission, source: str) -> None:
         raise InputError(source, "[area] margin_floor_m",
                          f"{area.margin_floor_m:g} m is more than margin_m, {area.margin_m:g} m",
                          "the margin is reduced down to the floor: write a smaller floor or a larger margin")
+    boat = mission.boat
+    if boat.max_tws_mps is not None and boat.min_tws_mps is not None and boat.min_tws_mps >= boat.max_tws_mps:
+        raise InputError(source, "[boat] min_tws_mps",
+                         f"{boat.min_tws_mps:g} m/s is not below max_tws_mps, {boat.max_tws_mps:g} m/s",
+                         "no wind is both: write a smaller min_tws_mps or a larger max_tws_mps")
+    limit = next((key for key in ("max_tws_mps", "min_tws_mps") if getattr(boat, key) is not None), None)
+    if limit is not None and mission.autopilot.frame == "motor":
+        raise InputError(source, f"[boat] {limit}", "is for a boat that sails: no wind is looked at for a motor boat",
+                         'leave it out, or write frame = "sailboat" in [autopilot]')
     missing = [key for key in ("guided", "set_auto") if not getattr(operator, key)]
     if skipper.guidance != "plan" and missing:
         raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" steers in GUIDED, which nobody allows',

@@ -39,11 +39,13 @@ from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import Snapshot
 from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState, saved_of, standing_saved
+from companion.skipper.step.tacking import Tacking
 from companion.skipper.step.turn import Turn
 from companion.skipper.step.water import in_water
 from companion.skipper.watch.charge import follow_charge
 from companion.skipper.watch.lookout import look_out
 from companion.skipper.watch.stopped import speak_of_stop
+from companion.skipper.watch.tacks import watch_tacks
 from companion.skipper.watch.watch import watch
 from companion.skipper.watch.water import watch_water
 from companion.skipper.way.gates import gates_of
@@ -72,7 +74,8 @@ class Skipper:
         return SkipperState(
             adoptable=persisted, known=known, under_way_s=persisted.under_way_s, arrived=persisted.arrived,
             uid=persisted.uid, system=persisted.system, standing=persisted.standing, skipped=persisted.skipped,
-            set_sail_utc_s=persisted.set_sail_utc_s)
+            set_sail_utc_s=persisted.set_sail_utc_s,
+            tacking=Tacking(tried=persisted.tacks[0], failed=persisted.tacks[1]))
 
     def fits(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage."""
@@ -99,6 +102,7 @@ class Skipper:
         count_time(turn)
         follow_charge(turn)
         watch_water(turn)
+        watch_tacks(turn)
         fresh = watch(turn)
         take_orders(turn)
         _decide(turn, fresh)

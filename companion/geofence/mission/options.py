@@ -78,6 +78,12 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """The hull: what touches, and what vessels are kept clear of. The position is taken to be amidships."""
     leeway_deg: Annotated[float, Meta(ge=0.0, le=30.0)] = 0.0
     """How far to leeward of her bow she goes on a beat: apparent wind 30 degrees off it, three times as fast as she."""
+    max_tws_mps: Positive | None = None
+    """She is not to be out in more wind than this, with probability ``[risk] delta_s`` at each instant."""
+    min_tws_mps: Positive | None = None
+    """In less wind than this she makes no way; with the same probability."""
+    tack_fails: Annotated[float, Meta(ge=0.0, le=0.9)] = 0.03
+    """The chance that a tack fails; the voyage's own tacks add to it. 0: tacks are not reckoned to fail."""
     motor: bool = False
     """The boat has an auxiliary motor that the autopilot can run: used when she drifts onto something."""
 
@@ -238,6 +244,10 @@ class SafetyOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """The autopilot tells NAMED_VALUE_FLOAT ``LEAK`` 1 (a script of its own reads the switch)."""
     out_of_time: End = "refuge"
     """``[skipper] voyage_timeout_s`` is over: the goals are given up."""
+    strong_wind: End = "refuge"
+    """The forecast has more than ``[boat] max_tws_mps`` within the plan's time, by more than ``1 - delta_s``."""
+    light_wind: End = "say"
+    """The same of less than ``[boat] min_tws_mps``."""
     dark: End = "say"
     """The sun is lower than ``dark_below_deg``, by the autopilot's time; it is over when it rises."""
     dark_below_deg: Annotated[float, Meta(ge=-18.0, le=45.0)] = -6.0

@@ -24,6 +24,7 @@ from companion.planner.problem.parts import (
     Wind,
     Zone,
 )
+from companion.planner.problem.strength import Speeds, Strength
 
 if TYPE_CHECKING:
     from companion.planner.problem.tracking import Tracking
@@ -61,6 +62,10 @@ class _Reader:
         """Return a float (may be NaN: that is for ``defect`` to say)."""
         return self._get(key, default, _as_float)
 
+    def maybe(self, key: str) -> float | None:
+        """Return a float, None where it is missing or null."""
+        return None if self.raw.get(key) is None else self.number(key)
+
     def whole(self, key: str) -> int:
         """Return an integer."""
         return self._get(key, ..., _as_int)
@@ -68,6 +73,10 @@ class _Reader:
     def numbers(self, key: str, default: Any = ...) -> tuple[float, ...]:
         """Return a list of floats."""
         return self._get(key, default, lambda v: tuple(_as_float(x) for x in _as_list(v)))
+
+    def rows(self, key: str) -> tuple[tuple[float, ...], ...]:
+        """Return a list of lists of floats."""
+        return self._get(key, ..., lambda v: tuple(tuple(_as_float(x) for x in _as_list(row)) for row in _as_list(v)))
 
     def flag(self, key: str, default: Any = ...) -> bool:
         """Return true or false."""
@@ -181,8 +190,9 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         fence=None if fence is None else _polygon(fence, source, "fence"),
         wind=Wind(
             twd_from_rad=math.radians(wind.number("from_deg")),
-            tws_mps=wind.number("speed_mps", None) if wind.raw.get("speed_mps") is not None else None,
+            tws_mps=wind.maybe("speed_mps"),
             sigma=_parse_sigma(wind.child("sigma")) if wind.raw.get("sigma") is not None else Sigma(),
+            strength=_parse_strength(wind.child("strength")) if wind.raw.get("strength") is not None else None,
         ),
         boat=BoatLimits(
             no_go_half_rad=math.radians(boat.number("no_go_half_deg")),
@@ -193,7 +203,11 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
             tack_loss_s=boat.number("tack_loss_s", 0.0),
             gybe_loss_s=boat.number("gybe_loss_s", 0.0),
             can_tack=boat.flag("can_tack", True),
-            gybe_room_m=boat.number("gybe_room_m") if boat.raw.get("gybe_room_m") is not None else None,
+            gybe_room_m=boat.maybe("gybe_room_m"),
+            speeds=_parse_speeds(boat.child("speeds")) if boat.raw.get("speeds") is not None else None,
+            max_tws_mps=boat.maybe("max_tws_mps"),
+            min_tws_mps=boat.maybe("min_tws_mps"),
+            tack_fails=boat.number("tack_fails", 0.0),
         ),
         delta_s=top.number("delta_s"),
         current=Current(set_rad=math.radians(current.number("set_deg", 0.0)),
@@ -247,13 +261,32 @@ def _parse_sigma(sigma: _Reader) -> Sigma:
     horizon = sigma.numbers("horizon_s")
     degrees = sigma.numbers("sigma_deg")
     half = sigma.numbers("half_width_deg") if sigma.raw.get("half_width_deg") is not None else None
-    if not horizon or len(degrees) != len(horizon) or (half is not None and len(half) != len(horizon)):
-        raise InputError(sigma.source, sigma.place, "the columns differ in length or are empty",
-                         "give one sigma for each horizon")
-    if any(not b > a for a, b in itertools.pairwise(horizon)):
-        raise InputError(sigma.source, f"{sigma.place}.horizon_s", "does not increase", "sort the table by horizon")
+    _require_table(sigma, "horizon_s", horizon, degrees, *(() if half is None else (half,)))
     return Sigma(model=model, horizon_s=horizon, sigma_rad=tuple(map(_spread, degrees)),
                  half_width_rad=None if half is None else tuple(map(_spread, half)))
+
+
+def _parse_strength(strength: _Reader) -> Strength:
+    horizon, mean, sigma = (strength.numbers(key) for key in ("horizon_s", "mean_mps", "sigma_mps"))
+    _require_table(strength, "horizon_s", horizon, mean, sigma)
+    return Strength(horizon_s=horizon, mean_mps=mean, sigma_mps=sigma,
+                    correlation_s=strength.number("correlation_s", 60.0), is_known=strength.flag("known", True))
+
+
+def _parse_speeds(speeds: _Reader) -> Speeds:
+    tws, twa = speeds.numbers("tws_mps"), speeds.numbers("twa_deg")
+    rows = speeds.rows("v_mps")
+    _require_table(speeds, "tws_mps", tws, rows)
+    _require_table(speeds, "twa_deg", twa, *rows)
+    return Speeds(tws_mps=tws, twa_rad=tuple(math.radians(a) for a in twa), v_mps=rows)
+
+
+def _require_table(table: _Reader, key: str, nodes: Sequence[float], *columns: Sequence[Any]) -> None:
+    if not nodes or any(len(column) != len(nodes) for column in columns):
+        raise InputError(table.source, table.place, "the columns differ in length or are empty",
+                         f"give one value for each of {key}")
+    if any(not b > a for a, b in itertools.pairwise(nodes)):
+        raise InputError(table.source, f"{table.place}.{key}", "does not increase", "sort the table by it")
 
 
 def _parse_target(target: _Reader) -> Target:

@@ -11,6 +11,7 @@ from companion.planner.problem.json_read import HELM_KEYS
 from companion.planner.problem.value import LEG_SAVING, Problem
 
 if TYPE_CHECKING:
+    from companion.planner.problem.strength import Strength
     from companion.planner.problem.tracking import Tracking
     from companion.traffic.occupancy import Spread
 
@@ -57,7 +58,8 @@ def to_dict(p: Problem) -> dict[str, Any]:
         "goal": {"x": p.goal_en[0], "y": p.goal_en[1], "radius": p.goal_radius_m},
         "obstacles": [_wkt(g) for g in p.obstacles],
         "fence": None if p.fence is None else _wkt(p.fence),
-        "wind": {"from_deg": deg(p.wind.twd_from_rad), "speed_mps": p.wind.tws_mps, "sigma": sigma},
+        "wind": {"from_deg": deg(p.wind.twd_from_rad), "speed_mps": p.wind.tws_mps, "sigma": sigma,
+                 **({} if p.wind.strength is None else {"strength": strength_dict(p.wind.strength)})},
         "boat": {
             "no_go_half_deg": deg(p.boat.no_go_half_rad), "max_twa_deg": deg(p.boat.max_twa_rad),
             "turn_rate_rad_s": p.boat.turn_rate_radps,
@@ -66,7 +68,12 @@ def to_dict(p: Problem) -> dict[str, Any]:
             **({"tack_loss_s": p.boat.tack_loss_s} if p.boat.tack_loss_s else {}),
             **({"gybe_loss_s": p.boat.gybe_loss_s} if p.boat.gybe_loss_s else {}),
             **({} if p.boat.can_tack else {"can_tack": False}),
-            **({} if p.boat.gybe_room_m is None else {"gybe_room_m": p.boat.gybe_room_m}),
+            **{name: value for name in ("gybe_room_m", "max_tws_mps", "min_tws_mps")
+               if (value := getattr(p.boat, name)) is not None},
+            **({"tack_fails": p.boat.tack_fails} if p.boat.tack_fails else {}),
+            **({} if p.boat.speeds is None else {"speeds": {
+                "tws_mps": list(p.boat.speeds.tws_mps), "twa_deg": [deg(a) for a in p.boat.speeds.twa_rad],
+                "v_mps": [list(row) for row in p.boat.speeds.v_mps]}}),
         },
         "delta_s": p.delta_s,
     }
@@ -100,6 +107,12 @@ def to_dict(p: Problem) -> dict[str, Any]:
     if p.zone is not None:
         out["zone"] = {"from_deg": deg(p.zone.from_rad), "half_deg": deg(p.zone.half_rad)}
     return out | dict(p.extra)
+
+
+def strength_dict(s: Strength) -> dict[str, Any]:
+    """Return the JSON object of a wind's strength."""
+    return {"horizon_s": list(s.horizon_s), "mean_mps": list(s.mean_mps), "sigma_mps": list(s.sigma_mps),
+            "correlation_s": s.correlation_s, "known": s.is_known}
 
 
 def _tracking_dict(t: Tracking) -> dict[str, Any]:

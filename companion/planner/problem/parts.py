@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from companion.planner.problem.strength import Speeds, Strength
     from companion.traffic.occupancy import Spread
 
 TOUCH_M = 1e-3
@@ -59,11 +60,15 @@ class Sigma:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wind:
-    """The wind: from where [rad, true], how fast [m/s or None], how sure. A polar is already at this speed."""
+    """The wind: from where [rad, true], how fast [m/s or None], how sure. A polar is already at this speed.
+
+    ``strength``: how sure that speed is; None: nothing is said of it.
+    """
 
     twd_from_rad: float
     tws_mps: float | None = None
     sigma: Sigma = Sigma()
+    strength: Strength | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +76,9 @@ class BoatLimits:
     """What the boat can do: no-go half angle, deepest angle, turn rate, speed by |TWA| (linear between nodes).
 
     ``can_tack`` False: no turn goes through the wind's eye, so the boat gybes round. ``gybe_room_m`` is the leg that
-    turning round the long way needs; None: five turning radii at full speed.
+    turning round the long way needs; None: five turning radii at full speed. ``speeds`` is the polar in other winds.
+    More wind than ``max_tws_mps``, or less than ``min_tws_mps``, she is not to be out in (None: no limit).
+    ``tack_fails`` is the chance that a tack fails, below 1; 0: what then comes is not looked at.
     """
 
     no_go_half_rad: float
@@ -83,6 +90,10 @@ class BoatLimits:
     gybe_loss_s: float = 0.0
     can_tack: bool = True
     gybe_room_m: float | None = None
+    speeds: Speeds | None = None
+    max_tws_mps: float | None = None
+    min_tws_mps: float | None = None
+    tack_fails: float = 0.0
 
     @property
     def room_m(self) -> float:

@@ -7,7 +7,7 @@ among them, and what is solid about a leg depends only on what is near it: in a 
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import shapely
@@ -36,6 +36,14 @@ class Shore:
         for shape in (self._fence, self._line):
             if shape is not None:
                 shapely.prepare(shape)
+
+    @cached_property
+    def tree(self) -> shapely.STRtree:
+        """Everything solid, the fence's line included, without the clearance floor."""
+        shapes = list(self._parts)
+        if self._problem.fence is not None:
+            shapes.append(self._problem.fence.boundary)
+        return shapely.STRtree(np.asarray(shapes, dtype=object))
 
     def hits(self, shape: shapely.Geometry) -> bool:
         """Does a leg or point collide: is it deeper than the slack in an obstacle or outside the fence?"""

@@ -38,6 +38,7 @@ from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.sharing import LEAST_PART, sigmas_for, vessel_count
 from companion.planner.problem.value import Problem
 from companion.planner.risk import wind_kernels as kernels
+from companion.planner.risk.tacks import Tack, tack_risks, tacks_at_risk
 from companion.planner.risk.vessels import VesselRisk, vessel_risk
 
 PROMISE_FACTOR = 1.15
@@ -92,7 +93,8 @@ class PathRisk:
         computed: First-passage probability of the whole path, by the wind.
         wind: What is promised of the wind: ``computed`` times ``PROMISE_FACTOR``, at most 1.
         vessels: What vessels add (``companion.planner.risk.vessels``).
-        total: What is promised: wind and vessels together by the union bound, at most 1.
+        tacks: Those that may fail onto something (``companion.planner.risk.tacks``).
+        total: What is promised: wind, vessels and tacks together by the union bound, at most 1.
         boole: The union bound over entries and up-crossings, at most 1.
         assumption: What is assumed of the wind, in words.
         correlation_time_s: Of the wind [s].
@@ -102,10 +104,16 @@ class PathRisk:
     computed: float
     wind: float
     vessels: VesselRisk
+    tacks: tuple[Tack, ...]
     total: float
     boole: float
     assumption: str
     correlation_time_s: float
+
+    @property
+    def of_tacks(self) -> float:
+        """What tacks that fail add, at most 1."""
+        return min(1.0, sum(tack.risk for tack in self.tacks))
 
 
 def process_of(problem: Problem) -> WindProcess:
@@ -149,8 +157,10 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
         out.append(LegRisk(first_entry=float(first[i]), worst_instant=worst))
     computed = float(min(1.0, first.sum()))
     wind, vessels = min(1.0, PROMISE_FACTOR * computed), vessel_risk(problem, legs)
+    tacks = tacks_at_risk(problem, legs)
     return PathRisk(
-        legs=tuple(out), computed=computed, wind=wind, vessels=vessels, total=min(1.0, wind + vessels.total),
+        legs=tuple(out), computed=computed, wind=wind, vessels=vessels, tacks=tacks,
+        total=min(1.0, wind + vessels.total + sum(tack.risk for tack in tacks)),
         boole=float(min(1.0, boole)),
         assumption=ASSUMPTION[process.model], correlation_time_s=process.correlation_time_s,
     )
@@ -189,10 +199,11 @@ def with_risk(problem: Problem, plan: Plan) -> Plan:
     if not plan.has_path:
         return plan
     risk = path_risk(problem, plan)
+    of_tacks = tack_risks(plan.legs, risk.tacks)
     legs = tuple(
-        replace(leg, risk=min(1.0, wind.first_entry + vessels))
-        for leg, wind, vessels in zip(plan.legs, risk.legs, risk.vessels.legs, strict=True))
-    plan = replace(plan, legs=legs, risk=risk.total, vessel_risk=risk.vessels.total)
+        replace(leg, risk=min(1.0, wind.first_entry + vessels + tacks))
+        for leg, wind, vessels, tacks in zip(plan.legs, risk.legs, risk.vessels.legs, of_tacks, strict=True))
+    plan = replace(plan, legs=legs, risk=risk.total, vessel_risk=risk.vessels.total, tack_risk=risk.of_tacks)
     return replace(plan, why=with_parts(plan.why, problem, risk)) if problem.is_shared else plan
 
 

@@ -12,6 +12,7 @@ from companion.skipper.deeds.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.ends import announcement
 from companion.skipper.planning.errands import fenced_off, home_trouble
+from companion.skipper.planning.wind_limits import winds_wanted
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import SafeEnd
 from companion.skipper.step.snapshot import WindHealth
@@ -56,6 +57,7 @@ def start(turn: Turn) -> None:
         wants.append(f"a wind that can be believed ({wind.verdict or 'sensor untrusted'})")
     elif wind.record_s < turn.config.wind_settle_s:
         wants.append(f"{turn.config.wind_settle_s - wind.record_s:.0f} s more of wind")
+    wants += winds_wanted(turn)
     wait_s = max(state.plan_retry.not_before_s, state.upload_retry.not_before_s) - turn.t_s
     if wait_s > 0.0:
         wrong = _misplaced(turn)
@@ -109,7 +111,12 @@ def launch(turn: Turn) -> None:
         return
     if repair(turn):
         return
-    turn.say(Severity.INFO, "safe ends", announcement(turn.config), every_s=math.inf)
+    turn.say(Severity.INFO, "safe ends", announcement(turn.config, turn.voyage.boat), every_s=math.inf)
+    wanted = winds_wanted(turn)
+    if wanted and not (status.mode is Mode.AUTO and status.is_armed):
+        turn.update(sailing=False)
+        turn.phase(Phase.WAITING, f"not setting sail: waiting for {' and '.join(wanted)}")
+        return
     stale = _stale(turn)
     if state.pending_upload is not None or state.pending_plan is not None:
         what = "a new plan" if state.pending_plan is not None else "a new plan's upload"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -146,6 +147,7 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
         is_place=bound is not None and bound.kind is Kind.BOX and bound.name == pending.facts.bound_for)
     facts = replace(
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
+        median_s=_time(plan, "median_s"), late_s=_time(plan, "late_s"),
         expected_clearance_m=expected_m, why=plan.why.text or plan.reason)
     old = turn.state.route
     if keep + len(tail.points_en) + 1 > turn.config.max_items and old is not None:
@@ -167,6 +169,12 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
     clear = said(expected_m, turn.config.margin_floor_m)
     upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change)
+
+
+def _time(plan: Plan, quantile: str) -> float | None:
+    """Return a quantile of a plan's time [s], None: it is not told, or not in any time."""
+    value = math.inf if plan.arrival is None else getattr(plan.arrival, quantile)
+    return float(value) if math.isfinite(value) else None
 
 
 def _apart(points: list[PointEn]) -> list[PointEn]:

@@ -17,6 +17,7 @@ from companion.skipper.planning.track import problem_tracking, steps
 from companion.skipper.planning.vessels import shares
 from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan, Severity
 from companion.skipper.step.missions import path_length_m
+from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.state import PendingPlan
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
@@ -56,6 +57,8 @@ def request(
             turn.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
             delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
             beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk, current=current,
+            tack_fails=turn.state.tacking.chance(turn.voyage.boat.tack_fails),
+            is_wind_known=turn.snapshot.wind.health is not WindHealth.UNTRUSTED,
             zone_half_rad=turn.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
             tracking=problem_tracking(
                 turn, start, from_index, floor_m=min(turn.config.margin_floor_m, turn.config.margin_m),

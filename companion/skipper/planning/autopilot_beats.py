@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from companion.boat import AutopilotLimits
+from companion.boat.failed_tack import TRIES
 from companion.boat.tracking import Helm, beat_band_m
 from companion.geo.angles import difference_rad
 from companion.skipper.step.turn import Turn
@@ -14,7 +15,7 @@ from companion.skipper.way.geometry import bearing_rad, cross_track_m
 from companion.skipper.way.voyage import PointEn
 
 IRONS_MEMORY_S = 600.0
-TACKS_FAIL_AFTER = 2    # times in irons within IRONS_MEMORY_S before tacks are no longer tried
+TACKS_FAIL_AFTER = TRIES    # failures in a row, or times in irons within IRONS_MEMORY_S, before tacks are left
 WIDEST_M = 50.0         # a wider corridor is no corridor
 CARRIED_S = 2.5         # of a tack, at the corridor's edge: where the water takes her meanwhile
 OFF_LINE_M = 2.0        # so near the line a leg that begins anew is the same leg
@@ -22,9 +23,11 @@ FOLLOWS_RAD = math.radians(10.0)   # this far outside its no-go zone the autopil
 
 
 def tacks_fail(turn: Turn) -> bool:
-    """Return whether the boat has been in irons so often of late that tacks are not tried."""
+    """Return whether tacks failed, or she was in irons, so often of late that they are not tried."""
     recent = [t for t in turn.state.irons_s if turn.t_s - t < IRONS_MEMORY_S]
-    return len(recent) >= TACKS_FAIL_AFTER
+    tacking = turn.state.tacking
+    in_a_row = tacking.in_a_row if turn.t_s - tacking.failed_s < IRONS_MEMORY_S else 0
+    return max(len(recent), in_a_row) >= TACKS_FAIL_AFTER
 
 
 def corridor_room_m(turn: Turn) -> float | None:

@@ -11,7 +11,17 @@ import math
 from dataclasses import dataclass, replace
 
 from companion.orders import Verb
-from companion.skipper.planning.ends import BATTERY, DARK, LEAK, OUT_OF_TIME, SHORE_LOST, WHY, end_of
+from companion.skipper.planning.ends import (
+    BATTERY,
+    DARK,
+    LEAK,
+    LIGHT_WIND,
+    OUT_OF_TIME,
+    SHORE_LOST,
+    STRONG_WIND,
+    WHY,
+    end_of,
+)
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step.causes import SHORE, Answer
 from companion.skipper.step.config import End, SafeEnd
@@ -157,9 +167,10 @@ def _ordered(turn: Turn) -> Errand | None:
 
 
 def _at_the_end(turn: Turn) -> Errand | None:
-    """Return where she is bound for when time, light or shore are gone, the goals reached, or she is off her place."""
+    """Return where she is bound for when time, light, shore or a wind for her are gone, or the goals are reached, or
+    she is off her place."""  # noqa: D205, D209
     state = turn.state
-    for name in (OUT_OF_TIME, SHORE_LOST, DARK):
+    for name in (OUT_OF_TIME, STRONG_WIND, SHORE_LOST, DARK, LIGHT_WIND):
         end = end_of(turn.config, name)
         if turn.is_raised(name) and end is not End.SAY and not state.over:
             return _found(turn, end, WHY[name]) or _stay(turn, WHY[name])

@@ -156,6 +156,7 @@ def hold(turn: Turn, why: str, *, anew: bool = False) -> None:
     route = replace(
         state.route, items=(*state.route.items[:keep], end), points_en_m=(*state.route.points_en_m[:keep], place),
         leg_from_en_m=(*state.route.leg_from_en_m[:keep], boat), gate_of=(*state.route.gate_of[:keep], -1),
-        rung="hold", risk=None, cost_s=None, bound_for="", why=f"{why}; loitering with {room:.0f} m of room",
+        rung="hold", risk=None, cost_s=None, median_s=None, late_s=None,
+        bound_for="", why=f"{why}; loitering with {room:.0f} m of room",
     )
     upload(turn, route, keep + 1, route.why)

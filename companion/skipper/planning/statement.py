@@ -18,6 +18,8 @@ from shapely.geometry import LineString, Polygon
 from companion.current import STILL_WATER, WaterCurrent, forecast_over_water
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.messages import WindForecast
+from companion.planner.problem.json_write import strength_dict
+from companion.planner.problem.strength import ASSUMED_SHARE, Strength
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
@@ -31,6 +33,7 @@ REPAIR_RINGS_M = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 140.0, 210
 REPAIR_DIRECTIONS = 24
 NOTCH = 2.0     # radius of the notch as a multiple of what the start lacks: room to turn out of it
 LEG_SAVING = 8e-5   # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
+LEAST_SHARE = 0.03  # of the mean strength: what a cup anemometer errs by
 HAIR_M = 0.2    # a repaired point stands this far clear of the margin it was repaired for
 
 
@@ -58,7 +61,25 @@ class Aim:
     gate: int
 
 
-def wind_part(forecast: WindForecast, *, after_s: float, length_s: float, delta_s: float) -> dict[str, Any]:
+def strength_of(forecast: WindForecast, *, after_s: float = 0.0, is_known: bool = True) -> Strength:
+    """Return how strong the wind will be, from ``after_s`` of the forecast on.
+
+    Never surer than an anemometer is (``LEAST_SHARE``); where the wind is not believed (``is_known``), no surer than
+    one of which only the mean is known.
+    """
+    times = np.unique(np.concatenate([[0.0], np.clip(forecast.horizon_s - after_s, 0.0, None)]))
+    mean = np.interp(after_s + times, forecast.horizon_s, forecast.mean_tws_mps)
+    sigma = np.interp(after_s + times, forecast.horizon_s, forecast.sigma_tws_mps)
+    least = (LEAST_SHARE if is_known else ASSUMED_SHARE) * mean
+    return Strength(
+        horizon_s=tuple(times.tolist()), mean_mps=tuple(mean.tolist()),
+        sigma_mps=tuple(np.maximum(sigma, least).tolist()), correlation_s=forecast.correlation_time_s,
+        is_known=is_known)
+
+
+def wind_part(
+    forecast: WindForecast, *, after_s: float, length_s: float, delta_s: float, is_known: bool = True,
+) -> dict[str, Any]:
     """Return the ``wind`` of a problem that starts ``after_s`` from the forecast's moment.
 
     The planner takes one mean direction: the forecast's, averaged over the plan's length. How far the forecast's
@@ -84,6 +105,7 @@ def wind_part(forecast: WindForecast, *, after_s: float, length_s: float, delta_
             "sigma_deg": [float(x) for x in np.degrees(np.hypot(sigma, offset))],
             "half_width_deg": [float(x) for x in np.degrees(half + offset)],
         },
+        "strength": strength_dict(strength_of(forecast, after_s=after_s, is_known=is_known)),
     }
 
 
@@ -186,12 +208,14 @@ def problem_dict(
     margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
     extra_obstacles: Sequence[str] = (), title: str = "", beat: dict[str, Any] | None = None,
     max_path_risk: float | None = None, tracking: dict[str, Any] | None = None,
-    current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0,
+    current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0, tack_fails: float = 0.0,
+    is_wind_known: bool = True,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
 
     A ``current`` that is significant is planned with: the wind is then that over the water. ``zone_half_rad`` is how
     far off the wind over the ground, which is the autopilot's, a course must be there for it to be followed.
+    ``tack_fails`` is the chance that a tack does.
 
     Raises:
         ValueError: when no water is left inside the fence at this margin.
@@ -210,14 +234,16 @@ def problem_dict(
         fence = shapely.to_wkt(min(pieces, key=lambda p: (float(p.distance(here)), -p.area)), rounding_precision=4)
     speed = float(np.max(forecast.mean_tws_mps))
     length_s = 1.5 * distance_m(start.en_m, aim.en_m) / max(0.3, voyage.boat.polar.max_speed_mps(speed))
-    wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s)
+    wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s, is_known=is_wind_known)
     water: dict[str, Any] = {}
     if current.is_significant:
         water["current"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
         water["zone"] = {"from_deg": wind["from_deg"], "half_deg": math.degrees(zone_half_rad)}
         wind = wind_part(forecast_over_water(forecast, current), after_s=start.after_s, length_s=length_s,
-                         delta_s=delta_s)
+                         delta_s=delta_s, is_known=is_wind_known)
     boat = dict(voyage.boat.problem_boat(wind["speed_mps"]))
+    boat["speeds"] = voyage.boat.problem_speeds()
+    boat["tack_fails"] = tack_fails
     boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(
         max(no_go_half_rad, voyage.boat.no_go_half_rad), wind["speed_mps"]))
     return {

@@ -54,6 +54,8 @@ class Ends:
     battery_v: float | None = None     # critical at this voltage too; None: by charge and the autopilot's limits alone
     leak: End = End.REFUGE
     out_of_time: End = End.REFUGE
+    strong_wind: End = End.REFUGE
+    light_wind: End = End.SAY
     dark: End = End.SAY
     dark_below_rad: float = -0.104720  # the sun 6 deg under the horizon: the end of civil twilight
     shore_lost: End = End.SAY

@@ -35,5 +35,7 @@ class Route:
     vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
     expected_clearance_m: float | None = None   # of the hull on the predicted track, the prediction's error taken off
     cost_s: float | None = None
+    median_s: float | None = None               # when half the winds of the forecast's spread are there ...
+    late_s: float | None = None                 # ... and nine of ten; None: not told, or not in any time
     why: str = ""
     bound_for: str = ""                # the errand that its end serves; empty: the goals

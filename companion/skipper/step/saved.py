@@ -17,15 +17,16 @@ FORMAT = 1
 MAX_ITEMS = 2000       # no autopilot holds more
 MAX_GOALS = 10**6
 MAX_POINTS = 20_000    # of the track of a search
+MAX_TACKS = 10**6
 MAX_QUARTERS = 10**6   # turns round one buoy
 _NUMBERS = ("plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s",
             "vessel_risk", "vessels_part", "plan_current_east_mps", "plan_current_north_mps")
-_MAYBE = ("risk", "cost_s", "expected_clearance_m")
+_MAYBE = ("risk", "cost_s", "median_s", "late_s", "expected_clearance_m")
 _WORDS = ("rung", "why", "bound_for")
 # of states that were saved before there were any
 _DEFAULTS: dict[str, Any] = {
     "vessel_risk": 0.0, "vessels_part": 0.0, "plan_current_east_mps": 0.0, "plan_current_north_mps": 0.0,
-    "bound_for": "", "expected_clearance_m": None}
+    "bound_for": "", "expected_clearance_m": None, "median_s": None, "late_s": None}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +57,7 @@ class Persisted:
     inside: tuple[int, float] | None = None   # the goal whose box she stays in, Unix time of entry
     searched: tuple[tuple[float, float], ...] = ()   # the track of the search that is next
     covered: tuple[tuple[int, float], ...] = ()      # goals searched, and the share that was seen
+    tacks: tuple[int, int] = (0, 0)    # tried, and of these failed
     water: GeoPoint | None = None      # the origin of all metres here; None: the mission's
 
     @property
@@ -80,6 +82,7 @@ class Persisted:
             "standing": _standing_to_dict(self.standing), "skipped": self.skipped,
             "set_sail_utc_s": self.set_sail_utc_s, "inside": None if self.inside is None else list(self.inside),
             "searched": [list(p) for p in self.searched], "covered": [list(c) for c in self.covered],
+            "tacks": list(self.tacks),
             **({} if self.water is None else {"water": [self.water.lat_deg, self.water.lon_deg]}),
         }
 
@@ -111,6 +114,7 @@ class Persisted:
                     _whole(data["inside"][0], 0, MAX_GOALS), _number(data["inside"][1])),
                 searched=tuple((_number(e), _number(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
                 covered=tuple((_whole(g, 0, MAX_GOALS), _number(s)) for g, s in data.get("covered", ())[:MAX_GOALS]),
+                tacks=_tacks(data.get("tacks", (0, 0))),
                 water=None if data.get("water") is None else GeoPoint(
                     lat_deg=_number(data["water"][0]), lon_deg=_number(data["water"][1])),
             )
@@ -191,6 +195,11 @@ def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
     }
     return Route(items=items, points_en_m=points, leg_from_en_m=starts, gate_of=gates,
                  plan_id=_whole(data["plan_id"], -1, 10**12), **figures)
+
+
+def _tacks(data: Any) -> tuple[int, int]:
+    tried = _whole(data[0], 0, MAX_TACKS)
+    return tried, _whole(data[1], 0, tried)
 
 
 def _number(value: Any) -> float:

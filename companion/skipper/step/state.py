@@ -16,6 +16,7 @@ from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.standing import Standing
+from companion.skipper.step.tacking import NO_TACKS, Tacking
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Assessment
@@ -284,6 +285,7 @@ class SkipperState:
     adrift: Adrift = Adrift()
     water_told_en_mps: tuple[float, float] | None = None  # the current that was said last; None: still water
     irons_s: tuple[float, ...] = ()                # when the boat was in irons
+    tacking: Tacking = NO_TACKS                    # what her tacks have told
     watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
     watch_told: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of those said lately, when
     encounters: tuple[Held, ...] = ()              # with vessels, under the policy "rules"
@@ -318,4 +320,5 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         standing=standing_saved(state), skipped=state.skipped, set_sail_utc_s=state.set_sail_utc_s,
         inside=None if state.inside is None or state.inside.utc_s is None else (state.inside.goal, state.inside.utc_s),
         searched=state.searched[:-1], covered=state.covered,   # the last point moves with her
+        tacks=(state.tacking.tried, state.tacking.failed),
     )

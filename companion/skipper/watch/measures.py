@@ -11,6 +11,7 @@ from companion.messages import VehicleState
 from companion.skipper.deeds.adrift import meets_in_s, sails
 from companion.skipper.deeds.by_field import meets_in
 from companion.skipper.planning.errands import Kind, errand, is_composed
+from companion.skipper.planning.wind_limits import too_light, too_strong
 from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.turn import Turn
@@ -211,6 +212,7 @@ def _planner(turn: Turn) -> float | None:
 
 _MEASURES: dict[str, Callable[[Turn], float | None]] = {
     "link silent": _link, "position lost": _position_lost, "position jump": _jump, "wind untrusted": _wind,
+    "strong wind": too_strong, "light wind": too_light,
     "becalmed": _becalmed, "drifting": meets_in_s, "in irons": _irons, "vessel too near": _too_near,
     "no progress": _progress,
     "heading against course": _heading, "off the corridor": _corridor, "stuck waypoint": _stuck,

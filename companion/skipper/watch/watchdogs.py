@@ -132,6 +132,14 @@ TABLE: tuple[Watchdog, ...] = (
     W(name="planner dead", watches="the planner's worker process", enter=1.0, exit=0.5, unit="", enter_s=5.0,
       exit_s=1.0, severity=S.ERROR, response=Response.SAY, at_rest=True,
       why="it is killed and replaced by itself; until then the plan in place sails"),
+    W(name="strong wind", enter=1.0, exit=0.5, unit="of what is allowed",
+      watches="the chance of more wind than `max_tws_mps` within the plan's time against `1 - delta_s`",
+      enter_s=20.0, exit_s=120.0, severity=S.CRITICAL, response=Response.AS_SET,
+      why="a gust that she is not built for may lay her flat"),
+    W(name="light wind", enter=1.0, exit=0.5, unit="of what is allowed",
+      watches="the chance of less wind than `min_tws_mps` within the plan's time against `1 - delta_s`",
+      enter_s=20.0, exit_s=120.0, severity=S.WARNING, response=Response.AS_SET,
+      why="what does not make way is carried by the water"),
 )
 
 BY_NAME = {w.name: w for w in TABLE}

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from companion.boat import Boat, constant
 from companion.geo.angles import difference_rad
 from companion.skipper.planning.ends import announcement
 from companion.skipper.planning.manners import bow_discs, regions, stands_on
@@ -190,5 +191,9 @@ def test_standing_on_no_routine_plan_is_asked_for():
 
 
 def test_the_policy_is_said_before_setting_sail():
-    assert announcement(SkipperConfig()).endswith("vessels: kept clear of, whoever must give way")
-    assert "rules of the road" in announcement(SkipperConfig(traffic_policy=Policy.RULES))
+    boat = Boat(polar=constant(2.0))
+    assert announcement(SkipperConfig(), boat).endswith("vessels: kept clear of, whoever must give way")
+    assert "rules of the road" in announcement(SkipperConfig(traffic_policy=Policy.RULES), boat)
+    limited = announcement(SkipperConfig(), replace(boat, max_tws_mps=12.0))
+    assert "strong wind: to the nearest refuge" in limited
+    assert "wind:" not in announcement(SkipperConfig(), boat)

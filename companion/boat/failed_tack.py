@@ -1,0 +1,47 @@
+"""Where a tack that fails carries the boat: she shoots up into the wind, lies there, falls off to the old tack.
+
+Measured on the simulator's hull (winds of 3 to 9 m/s, 4 to 14 s in irons): she shoots 1.9 to 2.1 s of her speed, half
+way between the old course and the wind, and has sailed 0.3 to 0.6 s of it on the old course when she tries again, at
+half the speed; ``tests/boat/test_failed_tack.py`` holds these figures against it. That hull hardly goes astern. One
+with a rig does: what she is blown back is reckoned from its windage, beside the track without it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.geo.angles import wrap_pi
+
+SHOOT_S = 2.1        # of her speed, before she lies
+FILL_S = 0.8         # of her speed, on the old course until she tries again
+AGAIN_SHARE = 0.6    # of her speed, at the next try
+TRIES = 2            # then she gybes round where there is room
+IRONS_S = 10.0       # she lies head to wind: the skipper bears away after 8 s (``in irons``), and that takes her two
+# Of the wind's speed: hull and flogging sails. A skiff under bare poles is blown at 3 to 6 % of it.
+BLOWN_SHARE = 0.04
+
+Track = NDArray[np.float64]
+
+
+def failed_tack(
+    corner_en: tuple[float, float], *, course_rad: float, speed_mps: float, twd_from_rad: float, tws_mps: float,
+    current_en_mps: tuple[float, float] = (0.0, 0.0),
+) -> tuple[Track, Track]:
+    """Return two tracks (n, 2) [m] of one failed tack: blown back while she lies, and not.
+
+    Both end where she tries again, on the old course. ``course_rad`` and ``speed_mps`` are hers before the corner.
+    """
+    up = course_rad + 0.5 * wrap_pi(twd_from_rad - course_rad)
+    shot = _moved(np.asarray(corner_en, dtype=np.float64), up, SHOOT_S * speed_mps)
+    blown = _moved(shot, twd_from_rad + math.pi, BLOWN_SHARE * tws_mps * IRONS_S)
+    carried = IRONS_S * np.asarray(current_en_mps)
+    ends = [_moved(place, course_rad, FILL_S * speed_mps) for place in (blown + carried, shot + carried)]
+    corner = np.asarray(corner_en, dtype=np.float64)
+    return np.array([corner, shot, blown + carried, ends[0]]), np.array([corner, shot, shot + carried, ends[1]])
+
+
+def _moved(place: NDArray[np.float64], course_rad: float, length_m: float) -> NDArray[np.float64]:
+    return place + length_m * np.array([math.sin(course_rad), math.cos(course_rad)])

@@ -1,0 +1,69 @@
+"""A search whose tacks have room to fail: a path with one that has not gives way to another within a tenth of its time.
+
+The search plans as ever. Where a tack's failure would touch (``companion.planner.risk.tacks``) it looks again in water
+that is narrower by the room that is missing, and by half of that: she then tacks earlier; and as a boat that does not
+tack. Of what is within ``DEARER`` of the first path's time the least risky is handed out. What no such path avoids
+stays, and is counted in the path's risk. Only a path with such a tack costs more than the search itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from companion.planner.effort import Effort, Outcome, Search
+from companion.planner.problem.defects import defect_of
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.value import Problem
+from companion.planner.risk.tacks import Tack, tacks_at_risk
+
+DEARER = 1.10          # the issue of time: what another path may take of the first one's
+AGAIN_SHARE = 0.25     # of the search's effort, for each of the others
+SPARE_M = 0.5
+
+
+def with_contingency(search: Search) -> Search:
+    """Return the search whose tacks have room to fail, where there is such a path."""
+    def careful(problem: Problem, effort: Effort, seed: int) -> Outcome:
+        outcome = search(problem, effort, seed)
+        if outcome.waypoints_en is None:
+            return outcome
+        judged = evaluate(problem, outcome.waypoints_en)
+        tacks = tacks_at_risk(problem, judged.legs)
+        if not any(tack.is_risky for tack in tacks):
+            return outcome
+        best, best_key, limit_s = outcome, (_risk(tacks), judged.time_s), DEARER * judged.time_s
+        for other in _others(problem, tacks):
+            again = Effort(None if math.isinf(effort.budget_s) else AGAIN_SHARE * effort.budget_s,
+                           None if effort.limit is None else max(1, int(AGAIN_SHARE * effort.limit)))
+            found = search(other, again, seed)
+            effort.spend(again.used)
+            if found.waypoints_en is None:
+                continue
+            # in the problem itself: what is narrower for the search is not narrower for the path
+            seen = evaluate(problem, found.waypoints_en)
+            if not seen.is_feasible or seen.time_s > limit_s:
+                continue
+            key = (_risk(tacks_at_risk(problem, seen.legs)), seen.time_s)
+            if key < best_key:
+                best, best_key = found, key
+            if key[0] == 0.0:
+                break
+        return replace(best, lower_bound_s=outcome.lower_bound_s)
+
+    return careful
+
+
+def _risk(tacks: tuple[Tack, ...]) -> float:
+    return round(sum(tack.risk for tack in tacks if tack.is_risky), 6)
+
+
+def _others(problem: Problem, tacks: tuple[Tack, ...]) -> Iterator[Problem]:
+    """Yield the problem with more room about its tacks, and without tacks."""
+    lack = max(tack.lack_m for tack in tacks if tack.is_risky) + SPARE_M
+    for more in (lack, 0.5 * lack):
+        wider = replace(problem, clearance_floor_m=problem.clearance_floor_m + more)
+        if defect_of(wider) is None:
+            yield wider
+    yield replace(problem, beat=None, boat=replace(problem.boat, can_tack=False))

@@ -1,0 +1,185 @@
+"""What comes of tacks that fail: how often in a row one may before she touches, and what that adds to a path's risk.
+
+At each failure she is carried on along the old course, and tries again. After ``TRIES`` of them she gybes round where
+there is room (``companion.boat.failed_tack``): so the skipper does. A tack that cannot fail so often, or is to be tried
+on for want of that room, is a risk: the chance of one failure to the power of how many it takes to touch. Tacks add up
+by the union bound. A beat that is left to the autopilot has its tacks anywhere along the edges of its corridor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from companion.boat.failed_tack import AGAIN_SHARE, TRIES, failed_tack
+from companion.boat.tracking import stated_error_m
+from companion.geo.angles import wrap_pi
+from companion.planner.plan import Leg
+from companion.planner.problem.beat import beat_s
+from companion.planner.problem.shore import shore_of
+from companion.planner.problem.value import Problem
+
+MOST_FAILURES = 5      # in a row that are looked at
+RISKY = 0.01           # a tack is avoided where one failure touches, or several do with more than this probability
+EDGE_STEP_M = 10.0     # between the places of a corridor's edge at which a tack is looked at
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tack:
+    """A planned tack near something solid.
+
+    Attributes:
+        leg: that it leads into; of a beat that is left to the autopilot the leg itself.
+        at_en: where.
+        failures: in a row until she touches.
+        risk: the probability of it.
+        lack_m: the room that is missing for one failure more.
+
+    """
+
+    leg: int
+    at_en: Place
+    failures: int
+    risk: float
+    lack_m: float
+
+    @property
+    def is_risky(self) -> bool:
+        """Whether it is to be avoided."""
+        return self.failures == 1 or self.risk > RISKY
+
+
+def tacks_at_risk(problem: Problem, legs: Sequence[Leg]) -> tuple[Tack, ...]:
+    """Return the tacks of a path whose failures would bring her onto something, the riskiest of each leg."""
+    chance = problem.boat.tack_fails
+    if chance <= 0.0 or not problem.boat.can_tack or not legs:
+        return ()
+    solids = _Solids(problem)
+    found = []
+    for n, leg in enumerate(legs):
+        if leg.manoeuvre == "tack" and not leg.is_beat:
+            before = legs[n - 1] if n else None
+            course = before.heading_rad if before is not None else problem.start_heading_rad
+            speed = before.speed_mps if before is not None else leg.speed_mps
+            tack = solids.tack(problem, n, leg.from_en, course, speed, chance)
+            if tack is not None:
+                found.append(tack)
+        if leg.is_beat:
+            tack = _beaten(problem, solids, n, leg, chance)
+            if tack is not None:
+                found.append(tack)
+    return tuple(found)
+
+
+def tack_risks(legs: Sequence[Leg], tacks: Sequence[Tack]) -> tuple[float, ...]:
+    """Return what tacks that fail add to the risk of each leg."""
+    out = [0.0] * len(legs)
+    for tack in tacks:
+        out[tack.leg] += tack.risk
+    return tuple(out)
+
+
+def _beaten(problem: Problem, solids: _Solids, n: int, leg: Leg, chance: float) -> Tack | None:
+    """Return the worst of a beaten leg's tacks, with the risk of all of them: each is as likely anywhere."""
+    beat = problem.beat
+    if beat is None:
+        return None
+    dx, dy = leg.to_en[0] - leg.from_en[0], leg.to_en[1] - leg.from_en[1]
+    _, tacks = beat_s(problem, beat, dx, dy)
+    ux, uy = dx / leg.length_m, dy / leg.length_m
+    line = shapely.LineString([leg.from_en, leg.to_en])
+    speed = problem.boat.speed_mps(beat.no_go_half_rad)
+    reach_m = beat.corridor_m + solids.far_m(speed, problem.wind.tws_mps or 0.0)
+    if solids.distance_m(line) > reach_m:
+        return None   # the whole beat is far from everything
+    steps = max(1, math.ceil(leg.length_m / EDGE_STEP_M))
+    worst: Tack | None = None
+    risk = 0.0
+    for k in range(steps):
+        along = (k + 0.5) / steps * leg.length_m
+        for side in (-1.0, 1.0):
+            # to the right of the line she comes on port tack, whose course is to the right of the wind
+            at = (leg.from_en[0] + along * ux + side * beat.corridor_m * uy,
+                  leg.from_en[1] + along * uy - side * beat.corridor_m * ux)
+            course = problem.wind.twd_from_rad + side * beat.no_go_half_rad
+            tack = solids.tack(problem, n, at, course, speed, chance)
+            if tack is not None:
+                risk += tack.risk / (2.0 * steps)
+                worst = tack if worst is None or tack.failures < worst.failures or (
+                    tack.failures == worst.failures and tack.lack_m > worst.lack_m) else worst
+    if worst is None:
+        return None
+    return Tack(leg=n, at_en=worst.at_en, failures=worst.failures, risk=min(1.0, tacks * risk), lack_m=worst.lack_m)
+
+
+class _Solids:
+    """What is solid, as it is where the problem says so, and what the hull and the track's error need beside it."""
+
+    def __init__(self, problem: Problem) -> None:
+        tracking = problem.tracking
+        self.need_m = 0.0
+        if tracking is not None:
+            best = max(problem.boat.polar_mps)
+            self.need_m = tracking.reach_m + stated_error_m(best, has_short=not tracking.is_known)
+        self._tree = tracking.tree if tracking is not None else shore_of(problem).tree
+
+    def distance_m(self, shape: shapely.Geometry) -> float:
+        """Return how far something is from everything solid, inf where nothing is."""
+        if not len(self._tree.geometries):
+            return math.inf
+        _, distance = self._tree.query_nearest(shape, return_distance=True, all_matches=False)
+        return float(distance[0]) if len(distance) else math.inf
+
+    def far_m(self, speed_mps: float, tws_mps: float) -> float:
+        """Return how far from a corner the failures of a tack can lead, and need room."""
+        first = np.concatenate(failed_tack((0.0, 0.0), course_rad=0.0, speed_mps=speed_mps, twd_from_rad=0.0,
+                                           tws_mps=tws_mps))
+        return MOST_FAILURES * float(np.max(np.hypot(*first.T))) + self.need_m
+
+    def tack(
+        self, problem: Problem, leg: int, at: Place, course_rad: float, speed_mps: float, chance: float,
+    ) -> Tack | None:
+        """Return what a tack there comes to when it fails, None: she has room for what she does then."""
+        tws = problem.wind.tws_mps or 0.0
+        if self.distance_m(shapely.Point(at)) > self.far_m(speed_mps, tws):
+            return None
+        speed, place = speed_mps, at
+        drift = problem.current.drift_mps
+        current = (drift * math.sin(problem.current.set_rad), drift * math.cos(problem.current.set_rad))
+        for failures in range(1, MOST_FAILURES + 1):
+            tracks = failed_tack(place, course_rad=course_rad, speed_mps=speed,
+                                 twd_from_rad=problem.wind.twd_from_rad, tws_mps=tws, current_en_mps=current)
+            room = min(self.distance_m(shapely.LineString(track)) for track in tracks) - self.need_m
+            if room < 0.0:
+                return Tack(leg=leg, at_en=at, failures=failures, risk=chance**failures, lack_m=-room)
+            speed, place = AGAIN_SHARE * speed_mps, _point(tracks)
+            if failures == TRIES and self._may_gybe(problem, place, course_rad, speed_mps):
+                return None
+        return None
+
+    def _may_gybe(self, problem: Problem, place: Place, course_rad: float, speed_mps: float) -> bool:
+        """Return whether there is room to gybe round to leeward of a place."""
+        radius = speed_mps / problem.boat.turn_rate_radps
+        side = -1.0 if wrap_pi(problem.wind.twd_from_rad - course_rad) > 0.0 else 1.0
+        abeam = course_rad + side * 0.5 * math.pi
+        centre = shapely.Point(place[0] + radius * math.sin(abeam), place[1] + radius * math.cos(abeam))
+        return self.distance_m(centre) - radius >= self.need_m
+
+
+def _point(tracks: Sequence[np.ndarray]) -> Place:
+    """Return where she tries again: the farther on of the two."""
+    return float(tracks[1][-1][0]), float(tracks[1][-1][1])
+
+
+def in_words(problem: Problem, tacks: Sequence[Tack]) -> Iterator[str]:
+    """Yield a sentence for each tack that may bring her onto something."""
+    for tack in tacks:
+        where = f"{tack.at_en[0]:.0f} E, {tack.at_en[1]:.0f} N"
+        often = "once" if tack.failures == 1 else f"{tack.failures} times in a row"
+        yield (f"A tack that fails {often} at {where} would bring her onto something: {100.0 * tack.risk:.2g} % "
+               f"at {100.0 * problem.boat.tack_fails:.2g} % for one.")

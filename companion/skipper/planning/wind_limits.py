@@ -1,0 +1,72 @@
+"""The boat's limits of wind as chance constraints: how likely the forecast is to break one within the plan's time.
+
+At each instant ``delta_s`` is promised, as of the no-go zone: so a limit is broken where the wind is beyond it with
+more than ``1 - delta_s`` at the worst instant from now until nine of ten winds have brought her there. Before setting
+sail that is a reason to wait; under way ``[safety] strong_wind`` and ``light_wind`` say what is done.
+"""
+
+from __future__ import annotations
+
+from companion.planner.problem.strength import Strength
+from companion.skipper.planning.statement import strength_of
+from companion.skipper.step.snapshot import WindHealth
+from companion.skipper.step.turn import Turn
+
+LEAST_S = 60.0       # ahead, however near the end of the plan is
+AHEAD_S = 600.0      # while there is no plan
+
+
+def too_strong(turn: Turn) -> float | None:
+    """Return the chance of more wind than the boat's limit, as a multiple of what is allowed; None: no limit."""
+    return _share(turn, _strong(turn))
+
+
+def too_light(turn: Turn) -> float | None:
+    """Return the same of less wind than she makes way in."""
+    return _share(turn, _light(turn))
+
+
+def winds_wanted(turn: Turn) -> list[str]:
+    """Return what she waits for before setting sail, in words; empty: the wind will do."""
+    boat, allowed, out = turn.voyage.boat, _allowed(turn), []
+    for chance, name, limit in ((_strong(turn), "less wind: above", boat.max_tws_mps),
+                                (_light(turn), "more wind: below", boat.min_tws_mps)):
+        if chance is not None and chance > allowed:
+            out.append(f"{name} {limit:g} m/s with {100.0 * chance:.0f} % within {_until_s(turn):.0f} s, "
+                       f"{100.0 * allowed:.0f} % is allowed")
+    return out
+
+
+def _strong(turn: Turn) -> float | None:
+    limit, strength = turn.voyage.boat.max_tws_mps, _strength(turn)
+    return None if limit is None or strength is None else strength.over(limit, _until_s(turn))[0]
+
+
+def _light(turn: Turn) -> float | None:
+    limit, strength = turn.voyage.boat.min_tws_mps, _strength(turn)
+    return None if limit is None or strength is None else strength.under(limit, _until_s(turn))[0]
+
+
+def _share(turn: Turn, chance: float | None) -> float | None:
+    return None if chance is None else chance / _allowed(turn)
+
+
+def _strength(turn: Turn) -> Strength | None:
+    forecast = turn.snapshot.wind.forecast
+    if forecast is None or not turn.config.sails:
+        return None
+    return strength_of(forecast, is_known=turn.snapshot.wind.health is not WindHealth.UNTRUSTED)
+
+
+def _until_s(turn: Turn) -> float:
+    """Return how far ahead is looked: the rest of the plan."""
+    route = turn.state.route
+    whole_s = None if route is None else route.late_s or route.cost_s
+    if route is None or whole_s is None:
+        return AHEAD_S
+    began_s = route.plan_t_s if turn.state.sailing else turn.t_s
+    return max(LEAST_S, began_s + whole_s - turn.t_s)
+
+
+def _allowed(turn: Turn) -> float:
+    return 1.0 - turn.config.delta_s

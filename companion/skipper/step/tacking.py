@@ -1,0 +1,50 @@
+"""What the voyage's own tacks tell: how many were tried, how many failed, and the chance that the next one does.
+
+The mission's chance counts as ``PRIOR_TACKS`` tacks that were seen: a Beta distribution, to which each tack adds. Its
+mean is the probability that the next tack fails.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+PRIOR_TACKS = 10.0    # a dozen of the voyage's own say as much as the mission
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tacking:
+    """Tacks seen, and the one that is under way.
+
+    Attributes:
+        tried, failed: of this voyage.
+        in_a_row: failures since the last that came off.
+        failed_s: when the last failed.
+        side: of the wind when she was last settled on a tack: 1 starboard, -1 port, 0 never.
+        settled_rad: her heading then, and ``settled_s`` when.
+        began_s: since when a tack is being tried, None: none is.
+        is_counted: that one was counted as failed: she lies in irons.
+
+    """
+
+    tried: int = 0
+    failed: int = 0
+    in_a_row: int = 0
+    failed_s: float = -math.inf
+    side: int = 0
+    settled_rad: float = 0.0
+    settled_s: float = -math.inf
+    began_s: float | None = None
+    is_counted: bool = False
+
+    def chance(self, given: float) -> float:
+        """Return the chance that the next tack fails; ``given`` is the mission's, and 0 asks for none."""
+        return 0.0 if given <= 0.0 else (given * PRIOR_TACKS + self.failed) / (PRIOR_TACKS + self.tried)
+
+    def spread(self, given: float) -> float:
+        """Return the standard deviation of that chance."""
+        mean = self.chance(given)
+        return math.sqrt(mean * (1.0 - mean) / (PRIOR_TACKS + self.tried + 1.0))
+
+
+NO_TACKS = Tacking()

@@ -1,0 +1,88 @@
+"""Watches tacks: which come off, which fail; what is done about one that failed.
+
+A tack is tried when her heading, and not the wind, has brought the bow near the wind. It has come off when she is
+settled on the other tack, and failed when she is back on the old one or lies near head to wind for ``LIES_S``. A wind
+that heads her and makes her bear away is no tack: her heading has turned the other way.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from companion.geo.angles import difference_rad
+from companion.messages import Mode
+from companion.skipper.planning.autopilot_beats import TACKS_FAIL_AFTER
+from companion.skipper.step.actions import Severity
+from companion.skipper.step.tacking import Tacking
+from companion.skipper.step.turn import Turn
+
+SETTLED_RAD = math.radians(30.0)
+NEAR_RAD = math.radians(20.0)      # of the wind, of which the mean of 5 s is known
+TURNED_RAD = math.radians(15.0)    # towards it, since she was settled
+LIES_S = 8.0                       # as the watchdog "in irons" has it
+FORGET_S = 20.0                    # settled longer ago than this, whatever follows is no tack from there
+LEAST_TWS_MPS = 1.5                # in less she does as she likes
+NEAR_SOLID_M = 60.0                # a tack that failed so near something asks for a new plan
+TACK_FAILED = "a tack failed"
+
+
+def watch_tacks(turn: Turn) -> None:
+    """Follow her tacks for one step."""
+    now, vehicle, wind, status = turn.state.tacking, turn.snapshot.vehicle, turn.wind_now, turn.autopilot
+    sails = turn.state.sailing and turn.config.sails and status is not None and (
+        status.is_armed and status.mode in {Mode.AUTO, Mode.GUIDED})
+    if not sails or vehicle is None or wind is None or wind[1] < LEAST_TWS_MPS:
+        if now.side or now.began_s is not None:
+            turn.update(tacking=replace(now, side=0, began_s=None, is_counted=False))
+        return
+    then = followed(now, turn.t_s, vehicle.heading_rad, wind[0])
+    if then != now:
+        turn.update(tacking=then)
+    if then.failed > now.failed:
+        _failed(turn, then)
+
+
+def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float) -> Tacking:
+    """Return what is known of her tacks with one more look at her heading."""
+    off = difference_rad(twd_from_rad, heading_rad)
+    side = 1 if off > 0.0 else -1
+    fresh = now.side != 0 and t_s - now.settled_s <= FORGET_S
+    if now.began_s is not None and not now.is_counted and t_s - now.began_s >= LIES_S and abs(off) < SETTLED_RAD:
+        now = _counted(replace(now, is_counted=True, settled_s=t_s), t_s, failed=True)
+    if abs(off) >= SETTLED_RAD:
+        if now.began_s is not None and not now.is_counted:
+            now = _counted(now, t_s, failed=side == now.side)
+        elif fresh and now.began_s is None and side != now.side and _through_the_eye(now, heading_rad, off):
+            now = _counted(now, t_s, failed=False)   # between two looks
+        return replace(now, side=side, settled_rad=heading_rad, settled_s=t_s, began_s=None, is_counted=False)
+    turned = now.side * difference_rad(heading_rad, now.settled_rad)
+    if fresh and now.began_s is None and abs(off) < NEAR_RAD and turned >= TURNED_RAD:
+        return replace(now, began_s=t_s)
+    return now
+
+
+def _counted(now: Tacking, t_s: float, *, failed: bool) -> Tacking:
+    return replace(now, tried=now.tried + 1, failed=now.failed + failed, in_a_row=now.in_a_row + 1 if failed else 0,
+                   failed_s=t_s if failed else now.failed_s)
+
+
+def _through_the_eye(now: Tacking, heading_rad: float, off_rad: float) -> bool:
+    """Return whether she has come to this side with the bow through the wind, by her own turn."""
+    turned = now.side * difference_rad(heading_rad, now.settled_rad)
+    return turned >= 2.0 * TURNED_RAD and abs(off_rad) < 0.5 * math.pi
+
+
+def _failed(turn: Turn, tacking: Tacking) -> None:
+    """Say so, and ask for a plan from here where she has little room, or has tried often enough."""
+    given, boat = turn.voyage.boat.tack_fails, turn.boat_en
+    told = "" if given <= 0.0 else (
+        f": the next one does by {100.0 * tacking.chance(given):.0f} %, "
+        f"give or take {100.0 * tacking.spread(given):.0f} %")
+    turn.say(Severity.NOTICE, "tack failed",
+             f"{TACK_FAILED}, {tacking.failed} of {tacking.tried} so far{told}", every_s=0.0)
+    if given <= 0.0 or boat is None:
+        return
+    is_near = float(turn.voyage.area.clearance_m([boat])[0]) < NEAR_SOLID_M
+    if tacking.in_a_row >= TACKS_FAIL_AFTER or is_near:
+        turn.update(asked=TACK_FAILED)
