@@ -31,7 +31,8 @@ examples:
 
 The problem's format is described in docs/problem-format.md. PLAN.json holds "waypoints" as [[x, y], ...] in metres;
 of a mission with several goals it is a list of plans.
-Exit codes: 0 a path was found, 1 there is none (the reason is printed), 2 the problem cannot be read or planned.
+Exit codes: 0 a path was found, 1 there is none, or it breaks the boat's limits of wind (the reason is printed), 2 the
+problem cannot be read or planned.
 """
 
 
@@ -94,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
                 print(f"written: {path}")
     if any(answer.status is PlanStatus.INVALID for _, answer in answers):
         return 2
-    return 0 if all(answer.has_path for _, answer in answers) else 1
+    return 0 if all(answer.has_path and not _broken(problem, answer) for problem, answer in answers) else 1
 
 
 def _answer(problem: Problem, args: argparse.Namespace) -> tuple[Problem, Plan]:
@@ -173,6 +174,7 @@ def describe(problem: Problem, answer: Plan) -> str:
         ", ".join((f"{length:.0f} m in {counted(len(courses(answer.legs)), 'course')}{_of_legs(answer)}",
                    counted(judged.tacks, "tack"), counted(judged.gybes, "gybe"))),
         _risk_text(problem, answer),
+        *_of_wind(problem, answer),
         effort,
         "",
         *_table(answer),
@@ -180,6 +182,25 @@ def describe(problem: Problem, answer: Plan) -> str:
     if answer.why.text:
         lines += ["", answer.why.text]
     return "\n".join(lines)
+
+
+def _of_wind(problem: Problem, answer: Plan) -> list[str]:
+    """Return what the wind's strength makes of the plan; that is said with the explanation, too."""
+    if answer.arrival is None or answer.why.data.get("arrival") is not None:
+        return []
+    from companion.planner.risk.arrival import in_words
+
+    broken = _broken(problem, answer)
+    return [in_words(answer.arrival, answer.cost_s), *([f"NOT to be sailed: {broken}"] if broken else [])]
+
+
+def _broken(problem: Problem, answer: Plan) -> str:
+    """Return which of the boat's limits of wind a plan breaks, in words; empty: none."""
+    if answer.arrival is None:
+        return ""
+    from companion.planner.risk.arrival import limits_in_words
+
+    return limits_in_words(problem, answer.arrival)
 
 
 def _of_legs(answer: Plan) -> str:

@@ -14,6 +14,9 @@ import shapely
 from companion.planner.courses import courses
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
+from companion.planner.risk.arrival import in_words, limits_in_words
+from companion.planner.risk.tacks import in_words as tacks_in_words
+from companion.planner.risk.tacks import tacks_at_risk
 from companion.planner.risk.wind import path_risk, with_parts
 from companion.planner.what_if import Replanner, decisive_side, other_side, what_would_help
 from companion.words import counted
@@ -47,6 +50,8 @@ def explain(problem: Problem, plan: Plan, budget_s: float = 5.0, *, expansions: 
     if side is not None:
         more, other = other_side(problem, plan, side, again)
         text, data = f"{text} {more}", data | {"other_side": other}
+    for more, about in (_clearance_in_words(problem, plan), _arrival_in_words(problem, plan)):
+        text, data = f"{text} {more}".strip(), data | about
     why = Why(text=text, data=data | {"replans": again.count})
     return replace(plan, why=with_parts(why, problem, path_risk(problem, plan)) if problem.is_shared else why)
 
@@ -54,6 +59,31 @@ def explain(problem: Problem, plan: Plan, budget_s: float = 5.0, *, expansions: 
 def bounds_in_words(problem: Problem, plan: Plan) -> str:
     """Return what holds the plan where it is, in words; no replanning, so that it costs milliseconds."""
     return _courses_in_words(problem, plan, [leg_bounds(problem, leg) for leg in plan.legs])
+
+
+def _clearance_in_words(problem: Problem, plan: Plan) -> tuple[str, dict[str, Any]]:
+    """Return what is expected of the clearance, and of tacks that fail."""
+    text = ""
+    data: dict[str, Any] = {}
+    if plan.expected_clearance_m is not None and plan.expected_at_en is not None and problem.tracking is not None:
+        east, north = plan.expected_at_en
+        text = (f"On the track that is expected the hull passes {plan.expected_clearance_m:.1f} m clear or more, least "
+                f"at {east:.0f} E, {north:.0f} N (floor {problem.tracking.floor_m:g} m).")
+        data["expected_clearance_m"] = plan.expected_clearance_m
+    tacks = tacks_at_risk(problem, plan.legs)
+    if tacks:
+        data["tacks"] = [{"leg": tack.leg + 1, "at": list(tack.at_en), "failures": tack.failures, "risk": tack.risk}
+                         for tack in tacks]
+    return " ".join([text, *tacks_in_words(problem, tacks)]).strip(), data
+
+
+def _arrival_in_words(problem: Problem, plan: Plan) -> tuple[str, dict[str, Any]]:
+    """Return when the plan arrives in the wind's spread, and which of the boat's limits of wind it breaks."""
+    if plan.arrival is None:
+        return "", {}
+    broken = limits_in_words(problem, plan.arrival)
+    text = in_words(plan.arrival, plan.cost_s) + (f" Not to be sailed: {broken}." if broken else "")
+    return text, {"arrival": plan.arrival.to_dict()}
 
 
 # -------------------------------------------------------------------------------------- each leg

@@ -11,6 +11,8 @@ from companion.compose import RECENTRE_M, boat_of, voyage_of
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission
 from companion.planner import Plan, Problem
+from companion.planner.problem.json_write import strength_dict
+from companion.planner.problem.strength import assumed
 from companion.skipper.planning import HOME_RADIUS_M
 
 PROBE_M = 100.0
@@ -37,14 +39,17 @@ def leg_problem(
 ) -> Problem:
     """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady."""
     local = mission.water() if local is None else local
+    boat, sails = boat_of(mission), mission.autopilot.frame == "sailboat"
     return Problem.from_json({
         "id": mission.name, "title": title,
         "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
         "goal": {"x": goal_en[0], "y": goal_en[1], "radius": radius_m},
         "obstacles": local.obstacles_wkt(mission.margin_m),
         "obstacle_names": local.obstacle_names(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here_en),
-        "wind": {"from_deg": wind.from_deg, "speed_mps": wind.speed_mps, "sigma": wind.sigma()},
-        "boat": boat_of(mission).problem_boat(wind.speed_mps), "delta_s": mission.risk.delta_s,
+        "wind": {"from_deg": wind.from_deg, "speed_mps": wind.speed_mps, "sigma": wind.sigma(),
+                 **({"strength": strength_dict(assumed(wind.speed_mps))} if sails else {})},
+        "boat": {**boat.problem_boat(wind.speed_mps), **({"speeds": boat.problem_speeds()} if sails else {})},
+        "delta_s": mission.risk.delta_s,
     })
 
 
@@ -100,6 +105,19 @@ def passage_words(mission: Mission) -> str:
     return (f"a passage of {sum(lengths_km):.0f} km, the longest leg {max(lengths_km):.0f} km, {band}; "
             f"plans for {mission.skipper.horizon_m / 1000.0:g} km at a time, the frame moves along every "
             f"{(mission.passage.recentre_m or RECENTRE_M) / 1000.0:g} km")
+
+
+def wind_limit_words(mission: Mission) -> str:
+    """Return in words the winds that she sets sail in, empty: in any."""
+    boat = mission.boat
+    limits = [f"{word} {limit:g} m/s" for word, limit in (
+        ("more than", boat.max_tws_mps), ("less than", boat.min_tws_mps)) if limit is not None]
+    if not limits:
+        return ""
+    allowed = 100.0 * (1.0 - mission.risk.delta_s)
+    return (f"she does not set sail where {' or '.join(limits)} of wind is forecast with over {allowed:.0f} % at any "
+            f"instant of the plan; under way [safety] has {mission.safety.strong_wind!r} for strong wind and "
+            f"{mission.safety.light_wind!r} for light")
 
 
 def walked(walk: Generator[Problem, Plan, None], answer: Callable[[Problem], Plan]) -> list[Plan]:

@@ -117,6 +117,9 @@ def _plan(outcome: PlanOutcome, why: str) -> Happening:
         title = "no plan" if plan is None else f"no plan: {plan.status.value}"
         return Happening(kind="plan", title=title, text=outcome.text, level="warning")
     facts = [("time", f"{plan.cost_s:.0f} s")]
+    if plan.arrival is not None and math.isfinite(plan.arrival.late_s):
+        facts.append(
+            ("in the wind's spread", f"{plan.arrival.median_s:.0f} s, nine of ten {plan.arrival.late_s:.0f} s"))
     if math.isfinite(plan.lower_bound_s) and plan.lower_bound_s > 0.0:
         facts.append(("no faster than", f"{plan.lower_bound_s:.0f} s"))
     facts += [("legs", str(len(plan.legs))), ("looked at", counted(plan.expansions, "expansion")),
@@ -126,6 +129,10 @@ def _plan(outcome: PlanOutcome, why: str) -> Happening:
         facts.append(("tacks", str(tacks)))
     if plan.risk is not None:
         facts.append(("risk of the whole way", f"{100.0 * plan.risk:.0f} %"))
+    if plan.tack_risk:
+        facts.append(("of tacks that fail", f"{100.0 * plan.tack_risk:.2g} %"))
+    if plan.expected_clearance_m is not None:
+        facts.append(("clearance expected", f"{plan.expected_clearance_m:.1f} m"))
     clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
     if clear:
         facts.append(("nearest beyond the margin", f"{min(clear):.1f} m"))

@@ -151,6 +151,7 @@ def figures_of(step: Step, figures: VoyageFigures, voyage: Voyage) -> values.Fig
         distance_m=rounded(figures.distance_m, 1), tacks=figures.tacks, gybes=figures.gybes, plans=figures.plans,
         replans=figures.replans, contacts=figures.contacts, no_go_entries=figures.no_go_entries,
         min_clearance_m=rounded(figures.min_clearance_m, 1),
+        promised_clearance_m=rounded(figures.promised_clearance_m, 1),
         goals_reached=min(len(step.state.reached), len(voyage.legs)), goals=len(voyage.legs))
 
 

@@ -110,6 +110,9 @@ class Plan:
     vessel_risk: float | None = None
     margin_m: float | None = None
     cost_s: float | None = None
+    median_s: float | None = None        # there by then in half the winds of the forecast's spread ...
+    late_s: float | None = None          # ... and in nine of ten
+    expected_clearance_m: float | None = None   # of the hull on the track that is expected
     bound_s: float | None = None         # no plan is faster than that
     replans: int | None = None
     next_tack_s: float | None = None
@@ -219,6 +222,7 @@ class Figures:
     contacts: int | None = None
     no_go_entries: int | None = None
     min_clearance_m: float | None = None
+    promised_clearance_m: float | None = None   # the least that a plan expected which was sailed
     goals_reached: int | None = None
     goals: int | None = None
 

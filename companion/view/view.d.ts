@@ -103,6 +103,7 @@ export interface Figures {
   contacts: number | null;
   no_go_entries: number | null;
   min_clearance_m: number | null;
+  promised_clearance_m: number | null;
   goals_reached: number | null;
   goals: number | null;
 }
@@ -243,6 +244,9 @@ export interface Plan {
   vessel_risk: number | null;
   margin_m: number | null;
   cost_s: number | null;
+  median_s: number | null;
+  late_s: number | null;
+  expected_clearance_m: number | null;
   bound_s: number | null;
   replans: number | null;
   next_tack_s: number | null;

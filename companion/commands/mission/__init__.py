@@ -117,6 +117,7 @@ def _check(args: argparse.Namespace) -> int:
         return 0
     from companion.fields import told_of
     from companion.sailable import judge, words_of
+    from companion.sailable.previews import wind_limit_words
 
     judged = judge(Path(args.file), from_deg=args.wind[1] if args.wind else None)
     if judged.mission is None or judged.refusals:
@@ -131,6 +132,11 @@ def _check(args: argparse.Namespace) -> int:
         from companion.sailable.previews import passage_words
 
         print(passage_words(mission))
+        print(f"{args.file}: note: a passage needs FENCE_TYPE 4 on the autopilot, its polygons alone: with bit 2 the "
+              "circle round home would end it (companion doctor looks)")
+    limits = wind_limit_words(mission)
+    if limits:
+        print(f"{args.file}: {limits}")
     for line in words_of(mission, time.time()):
         print(f"{args.file}: {line}")
     print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "

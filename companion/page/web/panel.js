@@ -86,8 +86,9 @@ function plan(view) {
     ["plan", `${p.number ?? NONE}${p.reason ? `, for ${p.reason.replaceAll("_", " ")}` : ""}`], ["age", duration(p.age_s)],
     ["made for", p.twd_from_deg === null ? NONE : `${bearing(p.twd_from_deg)} ${speed(p.tws_mps)} ${speedUnit()}`],
     ["time", p.cost_s === null ? NONE : `${duration(p.cost_s)}${p.bound_s ? `, no less than ${duration(p.bound_s)}` : ""}`],
+    ["in the wind's spread", p.median_s === null ? NONE : `${duration(p.median_s)}, nine of ten ${p.late_s === null ? "not in any time" : duration(p.late_s)}`],
     ["risk each instant", percent(p.promised_risk)], ["risk of it all", percent(p.path_risk)],
-    ["margin", distance(p.margin_m)], ["leg", `${p.leg ?? NONE} of ${p.count ?? NONE}`],
+    ["margin", distance(p.margin_m)], ["clearance expected", distance(p.expected_clearance_m)], ["leg", `${p.leg ?? NONE} of ${p.count ?? NONE}`],
     ...(p.rung ? [["found by", p.rung]] : []), ...(p.bound_for ? [["bound for", p.bound_for]] : [])];
   get("planfacts").replaceChildren(...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
   const legs = p?.legs ?? [];
@@ -127,7 +128,7 @@ function tables(view, beside) {
   /** @type {[string, (f: import("../../view/view").Figures) => string][]} */
   const rows = [
     ["time under way", (f) => duration(f.time_s)], ["distance", (f) => distance(f.distance_m)], ["tacks, gybes", (f) => `${f.tacks ?? NONE}, ${f.gybes ?? NONE}`],
-    ["plans, replans", (f) => `${f.plans ?? NONE}, ${f.replans ?? NONE}`], ["least clearance", (f) => distance(f.min_clearance_m)], ["contacts", (f) => figure(f.contacts)],
+    ["plans, replans", (f) => `${f.plans ?? NONE}, ${f.replans ?? NONE}`], ["least clearance, expected", (f) => `${distance(f.min_clearance_m)}, ${distance(f.promised_clearance_m)}`], ["contacts", (f) => figure(f.contacts)],
     ["no-go entries", (f) => figure(f.no_go_entries)], ["goals reached", (f) => `${f.goals_reached ?? NONE} of ${f.goals ?? NONE}`]];
   keep("voyagetable", table("The voyage so far", ["figure", "value", ...(beside ? [`beside: ${beside.name}, at its end`] : [])],
     view ? rows.map(([name, show]) => [name, ...all.map((f) => f === null ? NONE : show(f))]) : []));

@@ -167,8 +167,22 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     met = meetings(turn)
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
     change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
+    _look_at_time(turn, route)
     clear = said(expected_m, turn.config.margin_floor_m)
     upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change)
+
+
+def _look_at_time(turn: Turn, route: Route) -> None:
+    """Say so when the time that the voyage has may be over before the plan is sailed."""
+    limit_s = turn.config.voyage_timeout_s
+    if limit_s is None or errand(turn) is not None or route.cost_s is None:
+        return
+    left_s = limit_s - turn.state.under_way_s
+    if route.late_s is None or route.late_s > left_s:
+        late = "not told" if route.late_s is None else f"{route.late_s:.0f} s"
+        turn.say(Severity.WARNING, "may be late",
+                 f"{left_s:.0f} s are left of the voyage's time, and she is there in {route.cost_s:.0f} s; in nine "
+                 f"winds of ten: {late}")
 
 
 def _time(plan: Plan, quantile: str) -> float | None:

@@ -30,7 +30,9 @@ class VoyageFigures:
     for as long as the boat is watched. ``promised_risk`` is the largest probability, at any instant of any plan that
     was sailed, of being forced into the no-go zone or too near to a vessel (1 - delta_s); ``path_risk`` the largest of
     a whole plan's, as if nobody replanned on the way. What vessels have of both is beside them.
-    ``promised_clearance_m`` is the least clearance that a plan expected which was sailed, beside what was kept.
+    ``promised_clearance_m`` is the least clearance that a plan expected which was sailed, beside what was kept;
+    ``promised_s``, ``median_s`` and ``late_s`` are the first plan's time, and when half and nine of ten of the winds of
+    its spread would have brought her to its end.
     """
 
     first_s: float | None = None
@@ -45,6 +47,9 @@ class VoyageFigures:
     no_go_entries: int = 0
     min_clearance_m: float = math.inf
     promised_clearance_m: float | None = None
+    promised_s: float | None = None
+    median_s: float | None = None
+    late_s: float | None = None
     promised_risk: float | None = None
     promised_risk_vessels: float = 0.0
     path_risk: float | None = None
@@ -86,6 +91,8 @@ class VoyageFigures:
                 self.promised_clearance_m = min(
                     route.expected_clearance_m,
                     math.inf if self.promised_clearance_m is None else self.promised_clearance_m)
+            if self.promised_s is None:
+                self.promised_s, self.median_s, self.late_s = route.cost_s, route.median_s, route.late_s
             if route.risk is not None:
                 self.path_risk = max(self.path_risk or 0.0, route.risk)
         autopilot = snapshot.autopilot
@@ -162,6 +169,9 @@ class VoyageFigures:
             "uploads": self.uploads,
             "min_clearance_m": self.min_clearance_m if math.isfinite(self.min_clearance_m) else None,
             "promised_clearance_m": self.promised_clearance_m,
+            "promised_s": self.promised_s,
+            "median_s": self.median_s,
+            "late_s": self.late_s,
             "promised_risk": self.promised_risk,
             "promised_risk_vessels": self.promised_risk_vessels,
             "path_risk": self.path_risk,
