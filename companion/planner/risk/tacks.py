@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from companion.boat.failed_tack import AGAIN_SHARE, TRIES, failed_tack
 from companion.boat.tracking import stated_error_m
@@ -38,7 +39,7 @@ class Tack:
         at_en: where.
         failures: in a row until she touches.
         risk: the probability of it.
-        lack_m: the room that is missing for one failure more.
+        lack_m: the room that is missing for so many.
 
     """
 
@@ -155,12 +156,23 @@ class _Solids:
             tracks = failed_tack(place, course_rad=course_rad, speed_mps=speed,
                                  twd_from_rad=problem.wind.twd_from_rad, tws_mps=tws, current_en_mps=current)
             room = min(self.distance_m(shapely.LineString(track)) for track in tracks) - self.need_m
-            if room < 0.0:
-                return Tack(leg=leg, at_en=at, failures=failures, risk=chance**failures, lack_m=-room)
+            if room <= 0.0:
+                lack = max(-room, self._lack_m(at, np.concatenate(tracks)))
+                return Tack(leg=leg, at_en=at, failures=failures, risk=chance**failures, lack_m=lack)
             speed, place = AGAIN_SHARE * speed_mps, _point(tracks)
             if failures == TRIES and self._may_gybe(problem, place, course_rad, speed_mps):
                 return None
         return None
+
+    def _lack_m(self, at: Place, track: NDArray[np.float64]) -> float:
+        """Return how much farther from what is nearest a corner must be for the track to clear that, were it a wall."""
+        corner = shapely.Point(at)
+        near = self._tree.geometries[int(self._tree.nearest(corner))]
+        wall = np.asarray(shapely.shortest_line(corner, near).coords[1]) - np.asarray(at)
+        gap = float(np.hypot(*wall))
+        if gap < 1e-6:
+            return self.need_m
+        return self.need_m + float(np.max((track - np.asarray(at)) @ wall)) / gap - gap
 
     def _may_gybe(self, problem: Problem, place: Place, course_rad: float, speed_mps: float) -> bool:
         """Return whether there is room to gybe round to leeward of a place."""
@@ -171,7 +183,7 @@ class _Solids:
         return self.distance_m(centre) - radius >= self.need_m
 
 
-def _point(tracks: Sequence[np.ndarray]) -> Place:
+def _point(tracks: Sequence[NDArray[np.float64]]) -> Place:
     """Return where she tries again: the farther on of the two."""
     return float(tracks[1][-1][0]), float(tracks[1][-1][1])
 

@@ -20,6 +20,8 @@ from sitl.autopilot import Autopilot, MemoryLink
 
 # A plan's waypoint and the autopilot's are one where they are this near: degrees x 1e7 are a centimetre.
 _SAME_M = 0.5
+# What a plan says of its arrival, and the probability of being there by then.
+QUANTILES = {"p10_s": 0.1, "p50_s": 0.5, "p90_s": 0.9}
 _SHORT_M = 10.0       # a leg that is shorter is the middle of a turn
 
 
@@ -94,9 +96,20 @@ def legs_promised(folder: Path, sailed: list[Sailed], half_rad: float) -> list[d
 
 def promised_s(folder: Path) -> float | None:
     """Return the time that the first plan promised; None without one."""
-    first = next((d["plan"] for d in decisions(folder) if d["kind"] == "plan" and d.get("plan")
-                  and d["plan"].get("cost_s") is not None), None)
+    first = _first_plan(folder)
     return None if first is None else float(first["cost_s"])
+
+
+def arrival_promised(folder: Path) -> dict[str, float | None] | None:
+    """Return by when the first plan arrives with each probability, by its name (None: in no time); None: it says not."""
+    first = _first_plan(folder)
+    arrival = None if first is None else first.get("arrival")
+    return None if arrival is None else {name: arrival[name] for name in QUANTILES}
+
+
+def _first_plan(folder: Path) -> dict[str, Any] | None:
+    return next((d["plan"] for d in decisions(folder) if d["kind"] == "plan" and d.get("plan")
+                 and d["plan"].get("cost_s") is not None), None)
 
 
 def decisions(folder: Path) -> list[dict[str, Any]]:

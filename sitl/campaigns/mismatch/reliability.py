@@ -1,8 +1,8 @@
 """Reliability: what was promised with a probability, and how often it came, over the voyages of a campaign.
 
 Of each leg that a plan sails itself: the chance that the true wind puts its heading into the no-go zone. Of each
-voyage: whether it came below the margin's floor, by how much was not the plan's; and its time as a share of what the
-first plan promised (a plan states its expected time, no quantiles of it).
+voyage: whether it came below the margin's floor, by how much was not the plan's; its time as a share of what the first
+plan promised; and whether it was later than each quantile of that plan's arrival.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sitl.campaigns.mismatch.promises import QUANTILES
 from sitl.campaigns.mismatch.table import share_interval
 
 EDGES = (0.0, 0.001, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)     # of what is promised; the last of a bin belongs to it
@@ -69,6 +70,14 @@ def floor_curve(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
     return bins
 
 
+def late_curve(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
+    """Return how often arrivals were later than each quantile that the first plan stated; what is never is not late."""
+    sailed = [r for r in records if r.get("arrived") and r.get("arrival")]
+    return [Bin(promised=1.0 - p, name=f"after {name[1:3]} %", of=len(sailed),
+                came=sum(r["arrival"][name] is not None and r["time_s"] > r["arrival"][name] for r in sailed))
+            for name, p in QUANTILES.items() if sailed]
+
+
 def time_shares(records: Sequence[Mapping[str, Any]]) -> list[float]:
     """Return the times of arrivals as shares of what the first plan promised, in order."""
     return sorted(r["time_s"] / r["promised_s"] for r in records if r.get("arrived") and r.get("promised_s"))
@@ -79,7 +88,8 @@ def told(records: Sequence[Mapping[str, Any]]) -> str:
     lines = [f"{len(records)} voyages"]
     for title, bins in (("in the no-go zone half way along a leg that the plan sails itself, by what was promised",
                          no_go_curve(records)),
-                        ("below the margin's floor, by how many things were not the plan's", floor_curve(records))):
+                        ("below the margin's floor, by how many things were not the plan's", floor_curve(records)),
+                        ("later than the plan's quantiles of arrival", late_curve(records))):
         lines.append(title)
         for b in bins:
             low, high = b.interval
@@ -102,4 +112,4 @@ def to_dict(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
                 for b in bins]
 
     return {"voyages": len(records), "no_go": plain(no_go_curve(records)), "floor": plain(floor_curve(records)),
-            "time_shares": time_shares(records)}
+            "late": plain(late_curve(records)), "time_shares": time_shares(records)}

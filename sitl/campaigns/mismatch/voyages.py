@@ -16,7 +16,7 @@ from typing import Any
 
 from companion.errors import InputError
 from sitl.campaigns.mismatch.draw import draw
-from sitl.campaigns.mismatch.promises import Legs, legs_promised, promised_s
+from sitl.campaigns.mismatch.promises import Legs, arrival_promised, legs_promised, promised_s
 from sitl.campaigns.mismatch.table import figures_of, told
 from sitl.means import Means
 from sitl.run.variation import Variation
@@ -65,6 +65,7 @@ def sail_one(job: Job) -> dict[str, Any]:
         summary = json.loads((folder / "summary.json").read_bytes())
         promised = legs_promised(folder, legs.sailed, NO_GO_RAD)
         time_s = promised_s(folder) if len(mission.goals) == ONE_GOAL else None
+        arrival = arrival_promised(folder) if len(mission.goals) == ONE_GOAL else None
     figures = verdict.figures
     clear_m = figures["min_clearance_m"]
     is_low = clear_m is not None and clear_m < mission.margin_floor_m
@@ -75,7 +76,7 @@ def sail_one(job: Job) -> dict[str, Any]:
     return record | {
         "passed": not faults, "faults": faults, "below_floor": is_low, **{name: figures[name] for name in names},
         "path_risk": summary.get("path_risk"), "alerts": summary.get("alerts", {}), "promised_s": time_s,
-        "legs": promised}
+        "arrival": arrival, "legs": promised}
 
 
 def key_of(job: Job) -> Key:

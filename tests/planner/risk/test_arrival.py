@@ -1,0 +1,161 @@
+"""Quantiles of arrival: against an independent simulation, in order, and honest about what is not known."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.boat import Boat, ardurover_sitl, avalon
+from companion.errors import InputError
+from companion.planner import Problem, plan
+from companion.planner.explain import explain
+from companion.planner.plan import Plan
+from companion.planner.problem import defect_of, evaluate
+from companion.planner.problem.json_write import to_dict
+from companion.planner.risk.arrival import arrival, in_words, limits_in_words
+
+BOAT = Boat(polar=ardurover_sitl())
+
+
+def problem(tws=5.0, sigma=1.0, tau=60.0, goal=(600.0, 0.0), *, known=True, boat=BOAT, sigma_deg=0.0, **more):
+    spread = {"model": "kalman", "sigma0_deg": sigma_deg, "growth_deg_per_sqrt_s": 0.0} if sigma_deg else {
+        "model": "none"}
+    return Problem.from_json({
+        "start": {"x": 0, "y": 0, "heading_deg": 90}, "goal": {"x": goal[0], "y": goal[1], "radius": 1},
+        "obstacles": [], "delta_s": 0.9,
+        "wind": {"from_deg": 0, "speed_mps": tws, "sigma": spread, "strength": {
+            "horizon_s": [0.0, 600.0], "mean_mps": [tws, tws], "sigma_mps": [sigma, sigma], "correlation_s": tau,
+            "known": known}},
+        "boat": boat.problem_boat(tws) | {"speeds": boat.problem_speeds()} | more})
+
+
+def reach(p):
+    """Return the legs of a straight reach."""
+    return evaluate(p, [p.start_en, p.goal_en]).legs
+
+
+def simulated(tws, sigma, tau, length_m, planned_s, count=4000, step_s=0.5):
+    """Return the arrival in drawn winds, second by second, by the polar itself."""
+    polar, rng = ardurover_sitl(), np.random.default_rng(1)
+    speeds = np.array([polar.speed_mps(math.pi / 2.0, w) for w in np.linspace(0.0, 15.0, 601)])
+    x, phi = rng.standard_normal(count), math.exp(-step_s / tau)
+    done, out, t = np.zeros(count), np.full(count, math.inf), 0.0
+    while t < 5.0 * planned_s and not np.all(np.isfinite(out)):
+        wind = np.clip(tws + sigma * x, 0.0, 15.0)
+        v = np.interp(wind, np.linspace(0.0, 15.0, 601), speeds)
+        v = np.where(wind < 3.0, v * wind / 3.0, v)     # the polar begins at 3 m/s
+        ends = np.isinf(out) & (done + v * step_s >= length_m)
+        out[ends] = t + (length_m - done[ends]) / v[ends]
+        done += v * step_s
+        x = phi * x + math.sqrt(1.0 - phi * phi) * rng.standard_normal(count)
+        t += step_s
+    return np.quantile(out, [0.1, 0.5, 0.9])
+
+
+@pytest.mark.parametrize(("tws", "sigma", "tau"), [(5.0, 1.0, 5.0), (5.0, 1.5, 60.0), (4.0, 1.0, 600.0), (8.0, 2.0, 20.0)])
+def test_the_quantiles_are_those_of_an_independent_simulation(tws, sigma, tau):
+    p = problem(tws, sigma, tau)
+    found = arrival(p, reach(p))
+    truth = simulated(tws, sigma, tau, 600.0, reach(p)[-1].end_s)
+    stated = [found.early_s, found.median_s, found.late_s]
+    assert stated == pytest.approx(list(truth), rel=0.05)
+
+
+def test_less_wind_costs_more_than_more_wind_gains():
+    p = problem(4.0, 1.5, 600.0)
+    found, planned = arrival(p, reach(p)), reach(p)[-1].end_s
+    assert found.late_s - found.median_s > 1.5 * (found.median_s - found.early_s)
+    assert found.late_s > planned > found.early_s
+
+
+@settings(max_examples=25, deadline=None)
+@given(tws=st.floats(1.0, 12.0), share=st.floats(0.0, 0.6), tau=st.floats(1.0, 3000.0), turn=st.floats(0.0, 20.0),
+       fails=st.floats(0.0, 0.5))
+def test_quantiles_are_in_order_and_the_same_when_asked_again(tws, share, tau, turn, fails):
+    p = problem(tws, share * tws, tau, goal=(300.0, 300.0), sigma_deg=turn, tack_fails=fails)
+    legs = evaluate(p, [p.start_en, (200.0, 0.0), p.goal_en]).legs
+    found = arrival(p, legs)
+    assert 0.0 < found.early_s <= found.median_s <= found.late_s
+    assert arrival(p, legs) == found
+
+
+def test_no_spread_no_turn_is_the_plans_own_time_and_tacks_that_fail_take_longer():
+    sure = problem(sigma=0.0)
+    found = arrival(sure, reach(sure))
+    assert [found.early_s, found.late_s] == pytest.approx([reach(sure)[-1].end_s] * 2, rel=0.01)
+    beat = problem(sigma=0.0, goal=(0.0, 300.0))
+    failing = replace(beat, boat=replace(beat.boat, tack_fails=0.3))
+    legs = plan(beat, expansions=5000).legs
+    assert arrival(failing, legs).late_s > arrival(beat, legs).late_s + 10.0
+
+
+def test_a_problem_that_says_nothing_of_the_strength_promises_nothing_of_the_time():
+    p = problem()
+    silent = replace(p, wind=replace(p.wind, strength=None))
+    assert arrival(silent, reach(silent)) is None
+    assert "arrival" not in plan(silent, expansions=2000).to_dict()
+
+
+def test_what_is_not_known_is_said_and_makes_late_later():
+    p = problem(5.0, 1.2, 60.0)
+    assert [d[:24] for d in arrival(p, reach(p)).doubts] == ["her polar begins at 3.0 "]
+    whole = problem(5.0, 1.2, 60.0, boat=Boat(polar=avalon()))     # from no wind at all
+    assert arrival(whole, reach(whole)).doubts == ()
+    assumed = problem(5.0, 1.2, 60.0, boat=Boat(polar=avalon()), known=False)
+    assert "assumed" in in_words(arrival(assumed, reach(assumed)), 100.0)
+    low = problem(2.5, 0.8, 300.0)
+    linear = replace(low.boat.speeds, tws_mps=(0.0, *low.boat.speeds.tws_mps),
+                     v_mps=((0.0,) * 73, *low.boat.speeds.v_mps))
+    as_if = replace(low, boat=replace(low.boat, speeds=linear))
+    assert arrival(low, reach(low)).late_s > 1.05 * arrival(as_if, reach(as_if)).late_s
+    bare = replace(p, boat=replace(p.boat, speeds=None))
+    assert any("goes with" in d or "go with" in d for d in arrival(bare, reach(bare)).doubts)
+
+
+def test_a_wind_that_dies_may_never_bring_her_there():
+    p = problem(0.6, 0.6, 1e5)
+    found = arrival(p, reach(p))
+    assert math.isinf(found.late_s)
+    plan_of = Plan.from_dict(plan(p, expansions=2000).to_dict())
+    assert math.isinf(plan_of.arrival.late_s)
+    assert "later than" in in_words(found, 100.0)
+
+
+def test_the_boats_limits_are_chance_constraints():
+    calm, windy = problem(7.0, 0.5, max_tws_mps=10.0, min_tws_mps=2.0), problem(9.5, 1.0, max_tws_mps=10.0)
+    assert limits_in_words(calm, arrival(calm, reach(calm))) == ""
+    assert arrival(windy, reach(windy)).over_max == pytest.approx(0.3085, abs=1e-3)    # half a sigma
+    said = explain(windy, plan(windy, expansions=2000), expansions=500).why.text
+    assert "Not to be sailed: more wind than 10 m/s with 31 %" in said
+    light = problem(1.5, 0.5, min_tws_mps=2.0)
+    assert "less wind than 2 m/s" in limits_in_words(light, arrival(light, reach(light)))
+
+
+def test_a_problem_is_written_and_read_the_same():
+    p = problem(max_tws_mps=10.0, min_tws_mps=2.0, tack_fails=0.1)
+    again = Problem.from_json(to_dict(p))
+    assert again.wind.strength == p.wind.strength
+    assert again.boat.speeds.v_mps == p.boat.speeds.v_mps
+    assert (again.boat.max_tws_mps, again.boat.min_tws_mps, again.boat.tack_fails) == (10.0, 2.0, 0.1)
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"tack_fails": 1.0}, "tack_fails"), ({"max_tws_mps": 0.0}, "limit of wind"),
+    ({"max_tws_mps": 3.0, "min_tws_mps": 4.0}, "min_tws_mps"),
+])
+def test_nonsense_is_a_defect(change, said):
+    assert said in defect_of(problem(**change))
+
+
+def test_a_table_of_the_wrong_shape_is_one_clear_line():
+    raw = to_dict(problem())
+    raw["wind"]["strength"]["sigma_mps"] = [1.0]
+    with pytest.raises(InputError, match=r"wind.strength.*differ in length"):
+        Problem.from_json(raw)
+    raw = to_dict(problem())
+    raw["boat"]["speeds"]["v_mps"] = [[1.0, 2.0]]
+    with pytest.raises(InputError, match=r"boat.speeds"):
+        Problem.from_json(raw)

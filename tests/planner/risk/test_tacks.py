@@ -1,0 +1,105 @@
+"""Tacks that fail: a tack near a wall is avoided where that costs little, is counted where it is not, by the definition."""
+
+import math
+from dataclasses import replace
+
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.planner import Problem, plan
+from companion.planner.contingency import DEARER
+from companion.planner.problem import evaluate
+from companion.planner.risk.tacks import RISKY, tacks_at_risk
+from companion.planner.risk.wind import path_risk
+
+BOAT = {"no_go_half_deg": 45.0, "max_twa_deg": 180.0, "turn_rate_rad_s": 0.5, "tack_loss_s": 3.0,
+        "speed": {"model": "constant", "v_mps": 2.0}}
+
+
+def channel(fails=0.3, width_m=60.0, length_m=300.0, **extra):
+    """Return a beat up a channel: walls on both sides, plans may go up to them."""
+    half = 0.5 * width_m
+    walls = [f"POLYGON (({x} -50, {x + s * 40} -50, {x + s * 40} {length_m + 50}, {x} {length_m + 50}, {x} -50))"
+             for x, s in ((-half, -1), (half, 1))]
+    return Problem.from_json({
+        "start": {"x": 0, "y": 0, "heading_deg": 45}, "goal": {"x": 0, "y": length_m, "radius": 5},
+        "obstacles": walls, "fence": None, "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}},
+        "boat": BOAT | {"tack_fails": fails}, "delta_s": 0.9, **extra})
+
+
+def test_without_a_chance_of_failure_a_plan_is_what_it_was():
+    never = plan(channel(0.0), expansions=20_000)
+    bare = plan(replace(channel(), boat=replace(channel().boat, tack_fails=0.0)), expansions=20_000)
+    assert never.waypoints_en.tolist() == bare.waypoints_en.tolist()
+    assert never.tack_risk == 0.0
+    assert "tack_risk" not in never.to_dict()
+
+
+def test_a_boat_whose_tacks_fail_tacks_earlier_within_a_tenth_of_the_time():
+    careless, careful = plan(channel(0.0), expansions=20_000), plan(channel(), expansions=20_000)
+    at_risk = tacks_at_risk(channel(), careless.legs)
+    assert any(tack.failures == 1 for tack in at_risk)     # up to the walls, which is the fastest
+    assert not any(tack.failures == 1 for tack in tacks_at_risk(channel(), careful.legs))
+    assert careless.cost_s <= careful.cost_s <= DEARER * careless.cost_s
+    assert careful.tack_risk < path_risk(channel(), careless).of_tacks
+    assert evaluate(channel(), careful.waypoints_en).is_feasible
+    again = type(careful).from_dict(careful.to_dict())
+    assert again.tack_risk == careful.tack_risk > 0.0
+
+
+def test_where_nothing_else_is_within_a_tenth_the_risk_is_counted_and_limited():
+    narrow = channel(0.2, width_m=16.0, length_m=120.0)
+    found = plan(narrow, expansions=20_000)
+    assert found.has_path
+    assert found.tack_risk > 0.2
+    assert found.risk == pytest.approx(min(1.0, found.tack_risk))
+    assert found.risk == pytest.approx(min(1.0, sum(leg.risk for leg in found.legs)), abs=1e-6)
+    from companion.planner.problem import RiskLimit
+
+    limited = plan(replace(narrow, risk=RiskLimit(max_path_risk=0.05)), expansions=20_000)
+    assert not limited.has_path
+    assert "risk" in limited.reason
+
+
+@settings(max_examples=30, deadline=None)
+@given(gap=st.floats(0.5, 60.0), chance=st.floats(0.01, 0.6))
+def test_a_tack_is_the_riskier_the_nearer_the_wall(gap, chance):
+    def to_wall(gap_m):
+        wall = shapely.box(40.0 + gap_m, -200.0, 90.0 + gap_m, 200.0).wkt
+        p = Problem.from_json({
+            "start": {"x": 0, "y": 0, "heading_deg": 45}, "goal": {"x": 0, "y": 80, "radius": 1},
+            "obstacles": [wall], "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}},
+            "boat": BOAT | {"tack_fails": chance, "turn_rate_rad_s": 0.02}, "delta_s": 0.9})
+        return tacks_at_risk(p, evaluate(p, [(0, 0), (40, 40), (0, 80)]).legs)
+
+    near, far = to_wall(gap), to_wall(gap + 5.0)
+    for tacks in (near, far):
+        for tack in tacks:
+            assert tack.risk == pytest.approx(chance**tack.failures)
+            assert tack.is_risky == (tack.failures == 1 or chance**tack.failures > RISKY)
+            assert tack.lack_m > 0.0
+    assert sum(t.risk for t in far) <= sum(t.risk for t in near)
+    assert bool(near) or gap > 3.0
+
+
+def test_room_to_gybe_ends_the_row_of_failures():
+    wide = channel(0.3, width_m=200.0)
+    legs = evaluate(wide, [(0, 0), (93, 93), (-12, 198), (0, 300)]).legs
+    slow = replace(wide, boat=replace(wide.boat, turn_rate_radps=0.02))    # 100 m of radius: she cannot
+    assert [t.failures for t in tacks_at_risk(slow, legs)][:1] == [4]
+    quick = replace(wide, boat=replace(wide.boat, turn_rate_radps=3.0))
+    assert tacks_at_risk(quick, legs) == ()
+
+
+def test_tacks_of_a_beat_left_to_the_autopilot_count():
+    p = channel(0.3, width_m=50.0, beat={"no_go_half_deg": 45, "corridor_m": 20, "clearance_m": 20, "tack_s": 4})
+    judged = evaluate(p, [(0, 0), (0, 300)])
+    [tack] = tacks_at_risk(p, judged.legs)
+    assert judged.legs[0].is_beat
+    assert abs(tack.at_en[0]) == pytest.approx(20.0)
+    assert tack.failures > 1
+    far = channel(0.3, width_m=400.0, beat={"no_go_half_deg": 45, "corridor_m": 15, "clearance_m": 20, "tack_s": 4})
+    assert tacks_at_risk(far, evaluate(far, [(0, 0), (0, 300)]).legs) == ()
+    assert math.isclose(path_risk(p, judged.legs).of_tacks, tack.risk)

@@ -1,0 +1,82 @@
+"""Tacks watched: what comes off and what fails is counted once, gusts and shifts are no tacks, the chance is learned."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.skipper.step.tacking import NO_TACKS, PRIOR_TACKS, Tacking
+from companion.skipper.watch.tacks import followed
+
+D = math.radians
+
+
+def seen(headings_deg, twd_deg=0.0, step_s=1.0, begin=NO_TACKS):
+    """Return what is known after headings, one a step."""
+    now = begin
+    for n, heading in enumerate(headings_deg):
+        twd = twd_deg(n) if callable(twd_deg) else twd_deg
+        now = followed(now, step_s * n, D(heading), D(twd))
+    return now
+
+
+GOOD = [45, 45, 45, 25, -5, -35, -45, -45]
+FAILED = [45, 45, 45, 25, 12, 14, 15, 15, 30, 50, 50]
+
+
+@pytest.mark.parametrize(("headings", "tried", "failed"), [
+    (GOOD, 1, 0), ([45, 45, -45, -45], 1, 0), ([45, 20, -40], 1, 0), (FAILED, 1, 1),
+    (FAILED + GOOD, 2, 1), ([45, 45, 12] + [14] * 15 + [50, 50], 1, 1), ([45, 45, 12] + [14] * 15 + [-40, -45], 1, 1),
+    ([150, 150, 180, -150, -150], 0, 0), ([45, 60, 90, 120, 150], 0, 0), ([90, 60, 45, 60], 0, 0), ([], 0, 0),
+])
+def test_each_tack_is_counted_once_and_gybes_and_bearing_away_are_none(headings, tried, failed):
+    for side in (1, -1):
+        now = seen([side * h for h in headings])
+        assert (now.tried, now.failed) == (tried, failed)
+
+
+def test_a_wind_that_heads_her_is_no_tack_and_one_that_she_follows_is_none():
+    heads = seen([-45] * 6 + [-52, -60, -65, -65], lambda n: 0.0 if n < 3 else -28.0)
+    assert heads.tried == 0
+    lifts = seen([-45, -40, -30, -20, -10, -5], lambda n: 0.0 + 8.0 * n)
+    assert lifts.tried == 0
+
+
+@given(turn=st.floats(-180.0, 180.0), headings=st.sampled_from([GOOD, FAILED, FAILED + GOOD]))
+def test_what_is_counted_does_not_hang_on_where_the_wind_is_from(turn, headings):
+    assert seen([h + turn for h in headings], turn).tried == seen(headings).tried
+    assert seen([h + turn for h in headings], turn).failed == seen(headings).failed
+
+
+def test_a_row_of_failures_ends_with_a_tack_that_comes_off():
+    assert seen(FAILED + FAILED).in_a_row == 2
+    assert seen(FAILED + FAILED + GOOD).in_a_row == 0
+
+
+@given(given_p=st.floats(0.01, 0.9), tried=st.integers(0, 500), failed=st.integers(0, 500))
+def test_the_chance_is_between_the_missions_and_what_was_seen_and_surer_the_more_was(given_p, tried, failed):
+    failed = min(failed, tried)
+    now = Tacking(tried=tried, failed=failed)
+    chance = now.chance(given_p)
+    low, high = sorted((given_p, failed / tried if tried else given_p))
+    assert low - 1e-9 <= chance <= high + 1e-9
+    assert 0.0 < chance < 1.0
+    more = Tacking(tried=10 * tried, failed=10 * failed)
+    assert more.spread(given_p) <= now.spread(given_p) + 0.06
+    assert now.chance(0.0) == 0.0
+    assert Tacking().chance(given_p) == pytest.approx(given_p)
+
+
+def test_the_posterior_is_that_of_bayes():
+    """Beta(a, b) with the mission's share of PRIOR_TACKS, after 3 failures in 10: its mean, by integration."""
+    import numpy as np
+
+    a, b = 0.1 * PRIOR_TACKS, 0.9 * PRIOR_TACKS
+    p = np.linspace(1e-6, 1.0 - 1e-6, 200_001)
+    weight = p ** (a - 1.0 + 3.0) * (1.0 - p) ** (b - 1.0 + 7.0)
+    mean = float(np.sum(p * weight) / np.sum(weight))
+    spread = math.sqrt(float(np.sum((p - mean) ** 2 * weight) / np.sum(weight)))
+    now = Tacking(tried=10, failed=3)
+    assert now.chance(0.1) == pytest.approx(mean, abs=1e-4)
+    assert now.spread(0.1) == pytest.approx(spread, abs=1e-4)
