@@ -1,4 +1,4 @@
-"""A tack that fails: the reckoned track holds what the simulator's hull does, in every wind and for any time in irons."""
+"""A tack that fails: the reckoned track holds what the simulator's hull does, in every wind, for any time in irons."""
 
 import math
 from dataclasses import replace

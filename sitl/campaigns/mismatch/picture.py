@@ -13,7 +13,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 from companion.plots.chart import save
-from sitl.campaigns.mismatch.reliability import Bin, floor_curve, no_go_curve, time_shares
+from sitl.campaigns.mismatch.reliability import Bin, floor_curve, late_curve, no_go_curve, time_shares
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,13 +38,17 @@ def reliability_figure(records: Sequence[Mapping[str, Any]]) -> Figure:
         label = f"{name}: {len(mine)} voyages"
         bins = no_go_curve(mine)
         _bars(left, [max(b.promised or 0.0, _LEAST) for b in bins], bins, colour, mark, label)
+        late = late_curve(mine)
+        if late:
+            left.plot([b.promised or _LEAST for b in late], [max(b.share, _LEAST) for b in late], color=colour,
+                      marker="^", ls="none", mfc="none", label=f"{name}: later than a quantile")
         shares = time_shares(mine)
         if shares:
             right.step(shares, [(n + 1) / len(shares) for n in range(len(shares))], where="post", color=colour,
                        label=f"{name}: {len(shares)} arrivals")
     left.plot([_LEAST, 1.0], [_LEAST, 1.0], color="black", lw=0.8, ls=":", label="as promised")
     left.set(xscale="log", yscale="log", xlim=(0.7 * _LEAST, 1.3), ylim=(0.7 * _LEAST, 1.3), xlabel="promised",
-             ylabel="came", title="A leg's heading in the no-go zone, half way")
+             ylabel="came", title="In the no-go zone, half way along a leg; late")
     floors = floor_curve(records)
     _bars(middle, list(range(len(floors))), floors, GROUPS[1][1], GROUPS[1][2], "")
     middle.axhline(0.01, color="black", lw=0.8, ls=":")

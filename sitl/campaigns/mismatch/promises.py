@@ -101,7 +101,7 @@ def promised_s(folder: Path) -> float | None:
 
 
 def arrival_promised(folder: Path) -> dict[str, float | None] | None:
-    """Return by when the first plan arrives with each probability, by its name (None: in no time); None: it says not."""
+    """Return when the first plan arrives by its quantiles' names (None: in no time); None: it does not say."""
     first = _first_plan(folder)
     arrival = None if first is None else first.get("arrival")
     return None if arrival is None else {name: arrival[name] for name in QUANTILES}

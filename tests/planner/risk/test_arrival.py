@@ -55,7 +55,8 @@ def simulated(tws, sigma, tau, length_m, planned_s, count=4000, step_s=0.5):
     return np.quantile(out, [0.1, 0.5, 0.9])
 
 
-@pytest.mark.parametrize(("tws", "sigma", "tau"), [(5.0, 1.0, 5.0), (5.0, 1.5, 60.0), (4.0, 1.0, 600.0), (8.0, 2.0, 20.0)])
+@pytest.mark.parametrize(("tws", "sigma", "tau"), [
+    (5.0, 1.0, 5.0), (5.0, 1.5, 60.0), (4.0, 1.0, 600.0), (8.0, 2.0, 20.0)])
 def test_the_quantiles_are_those_of_an_independent_simulation(tws, sigma, tau):
     p = problem(tws, sigma, tau)
     found = arrival(p, reach(p))

@@ -1,4 +1,4 @@
-"""Tacks that fail: a tack near a wall is avoided where that costs little, is counted where it is not, by the definition."""
+"""Tacks that fail: one near a wall is avoided where that costs little, and is counted where it is not."""
 
 import math
 from dataclasses import replace

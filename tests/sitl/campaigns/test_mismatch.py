@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sitl import cli
 from sitl.campaigns.mismatch.draw import LIMIT_S, WATERS, draw
-from sitl.campaigns.mismatch.promises import Sailed, chance_of_no_go, legs_promised, promised_s
+from sitl.campaigns.mismatch.promises import Sailed, arrival_promised, chance_of_no_go, legs_promised, promised_s
 from sitl.campaigns.mismatch.table import figures_of, share_interval, told
 from sitl.campaigns.mismatch.voyages import Job, key_of, sail_one
 from sitl.runner import Ledger
@@ -144,6 +144,7 @@ def test_a_leg_is_held_against_the_newest_plan_that_has_it(tmp_path):
     assert found[1]["promised"] == pytest.approx(0.5, abs=1e-3)
     assert promised_s(tmp_path) == 91.0
     assert promised_s(tmp_path / "none") is None
+    assert arrival_promised(tmp_path) is None     # a record from before plans said so
 
 
 @given(st.integers(0, 500), st.integers(1, 500))

@@ -6,7 +6,7 @@ import random
 import pytest
 
 from sitl import cli
-from sitl.campaigns.mismatch.reliability import floor_curve, no_go_curve, time_shares, told
+from sitl.campaigns.mismatch.reliability import floor_curve, late_curve, no_go_curve, time_shares, told
 from sitl.runner import Ledger
 
 
@@ -51,6 +51,16 @@ def test_times_are_of_arrivals_only():
     assert time_shares([voyage(0, []), voyage(1, [], time_s=90.0), voyage(2, [], arrived=False),
                         voyage(3, [], promised_s=None)]) == [0.9, 1.1]
     assert "later than the expected time: 1 of 2" in told([voyage(0, []), voyage(1, [], time_s=90.0)])
+
+
+def test_arrivals_are_held_against_each_quantile_that_was_stated():
+    stated = {"p10_s": 80.0, "p50_s": 100.0, "p90_s": None}
+    records = [voyage(n, [], time_s=t, arrival=stated) for n, t in enumerate((70.0, 90.0, 120.0))]
+    records += [voyage(3, [], arrived=False, arrival=stated), voyage(4, [])]
+    bins = late_curve(records)
+    assert [(b.name, b.promised, b.came, b.of) for b in bins] == [
+        ("after 10 %", 0.9, 2, 3), ("after 50 %", 0.5, 1, 3), ("after 90 %", pytest.approx(0.1), 0, 3)]
+    assert "later than the plan's quantiles of arrival" in told(records)
 
 
 def test_the_command_tells_draws_and_writes(tmp_path, capsys):

@@ -1,4 +1,4 @@
-"""Tacks watched: what comes off and what fails is counted once, gusts and shifts are no tacks, the chance is learned."""
+"""Tacks watched: what comes off and what fails is counted once, shifts are no tacks, the chance is learned."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The boat's limits of wind: waited for before setting sail, answered under way as the mission says, over when it is."""
+"""The boat's limits of wind: waited for before setting sail, answered under way as the mission says."""
 
 from dataclasses import replace
 
