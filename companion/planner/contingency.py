@@ -1,9 +1,9 @@
 """A search whose tacks have room to fail: a path with one that has not gives way to another within a tenth of its time.
 
 The search plans as ever. Where a tack's failure would touch (``companion.planner.risk.tacks``) it looks again in water
-that is narrower by the room that is missing, and by half of that: she then tacks earlier; and as a boat that does not
-tack. Of what is within ``DEARER`` of the first path's time the least risky is handed out. What no such path avoids
-stays, and is counted in the path's risk. Only a path with such a tack costs more than the search itself.
+that is narrower by the room that is missing, and by other shares of that: she then tacks earlier; and as a boat that
+does not tack. Of what is within ``DEARER`` of the first path's time the least risky is handed out. What no such path
+avoids stays, and is counted in the path's risk. Only a path with such a tack costs more than the search itself.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.value import Problem
 from companion.planner.risk.tacks import Tack, tacks_at_risk
 
-DEARER = 1.10          # the issue of time: what another path may take of the first one's
-AGAIN_SHARE = 0.25     # of the search's effort, for each of the others
+DEARER = 1.10          # of the first path's time: what another may take
+AGAIN_SHARE = 0.15     # of the search's effort, for each of the others
+NARROWER = (1.0, 2.0, 3.0, 0.5)   # of the room that is missing: more of it lets more failures in a row pass
 SPARE_M = 0.5
 
 
@@ -62,8 +63,8 @@ def _risk(tacks: tuple[Tack, ...]) -> float:
 def _others(problem: Problem, tacks: tuple[Tack, ...]) -> Iterator[Problem]:
     """Yield the problem with more room about its tacks, and without tacks."""
     lack = max(tack.lack_m for tack in tacks if tack.is_risky) + SPARE_M
-    for more in (lack, 0.5 * lack):
-        wider = replace(problem, clearance_floor_m=problem.clearance_floor_m + more)
-        if defect_of(wider) is None:
-            yield wider
+    for share in NARROWER:
+        narrower = replace(problem, clearance_floor_m=problem.clearance_floor_m + share * lack)
+        if defect_of(narrower) is None:
+            yield narrower
     yield replace(problem, beat=None, boat=replace(problem.boat, can_tack=False))

@@ -9,7 +9,7 @@ import * as tables from "./tables.js";
 /** @typedef {import("./sketch.js").Sketch} Sketch @typedef {import("./sketch.js").Ref} Ref @typedef {import("./sketch.js").Place} Place @typedef {import("./sketch.js").Point} Point @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Area} Area */
 /** @typedef {{severity: string, place: string, text: string, remedy: string, at: Place | null, of: "start" | "goal" | "refuge" | null, number: number | null}} Finding */
 /** @typedef {{findings: Finding[], is_in_order: boolean, grown: Place[][][], water: Place[][][]}} Found */
-/** @typedef {{to: string, why: string, way: Place[], time_s: number, length_m: number, risk: number | null, risks: (number | null)[], tacks: number, gybes: number, clearance_m: number | null}} Leg */
+/** @typedef {{to: string, why: string, way: Place[], time_s: number, late_s: number | null, length_m: number, risk: number | null, risks: (number | null)[], tacks: number, gybes: number, clearance_m: number | null}} Leg */
 /** @typedef {{error: string, legs: Leg[], time_s: number, length_m: number, tacks: number, gybes: number, clearance_m: number | null}} Plan */
 /** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string, charts: import("./charts.js").Chart[]}} State */
 
@@ -170,7 +170,7 @@ function planWords() {
   words.classList.toggle("warn", Boolean(plan?.error) && history.now.goals.length > 0);
   const facts = plan === null || legs.length === 0 ? [] : [["time", duration(plan.time_s)], ["way", distance(plan.length_m)], ["tacks, gybes", `${plan.tacks}, ${plan.gybes}`], ["room beyond margin", distance(plan.clearance_m)]];
   get("planfacts").replaceChildren(...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
-  get("plantable").replaceChildren(...(plan && legs.length > 1 ? [table("Legs", ["to", "time", "way", "tacks", "risk"], legs.map((leg) => [leg.to, duration(leg.time_s), distance(leg.length_m), String(leg.tacks), percent(leg.risk)]))] : []));
+  get("plantable").replaceChildren(...(plan && legs.length > 1 ? [table("Legs", ["to", "time", "in nine winds of ten", "way", "tacks", "risk"], legs.map((leg) => [leg.to, duration(leg.time_s), duration(leg.late_s), distance(leg.length_m), String(leg.tacks), percent(leg.risk)]))] : []));
   const first = legs[0]?.why;
   if (plan && !plan.error && first && legs.length === 1) words.textContent = first;
   /** @type {Point[]} */ const way = [];

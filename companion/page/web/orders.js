@@ -4,7 +4,7 @@ import { distance, duration, percent, position } from "./format.js";
 import { onGlobe, pick, showPreview } from "./map.js";
 
 /** @typedef {import("../../view/view").View} View @typedef {import("./geometry.js").Point} Point */
-/** @typedef {{error: string | null, order?: string, way_en_m?: Point[], risks?: (number | null)[], time_s?: number, length_m?: number, risk?: number | null, tacks?: number, gybes?: number, clearance_m?: number | null}} Preview */
+/** @typedef {{error: string | null, order?: string, way_en_m?: Point[], risks?: (number | null)[], time_s?: number, late_s?: number | null, length_m?: number, risk?: number | null, tacks?: number, gybes?: number, clearance_m?: number | null}} Preview */
 
 const WORDS = /** @type {Record<string, string>} */ ({ hold: "Hold here", go_on: "Go on", goal: "Sail to…", refuge: "Refuge", home: "Home", replan: "Plan again", skip_goal: "Skip goal", stop: "Give up", why: "Why?" });
 const MEANS = /** @type {Record<string, string>} */ ({
@@ -107,7 +107,7 @@ async function confirm(verb, words, where) {
     if (found.error?.includes("again in a moment")) { await new Promise((resolve) => setTimeout(resolve, 1200)); continue; }
     if (found.error) return preview.replaceChildren(el("p", { class: "warn" }, found.error));
     showPreview({ way: found.way_en_m ?? [], risks: found.risks ?? [] });
-    const facts = [["way", distance(found.length_m)], ["time", duration(found.time_s)], ["tacks, gybes", `${found.tacks}, ${found.gybes}`], ["risk of it all", percent(found.risk)], ["beyond the margin", distance(found.clearance_m)]];
+    const facts = [["way", distance(found.length_m)], ["time", `${duration(found.time_s)}${found.late_s ? `, nine winds of ten ${duration(found.late_s)}` : ""}`], ["tacks, gybes", `${found.tacks}, ${found.gybes}`], ["risk of it all", percent(found.risk)], ["beyond the margin", distance(found.clearance_m)]];
     preview.replaceChildren(el("dl", { class: "facts" }, ...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? "")))));
     set(give, { disabled: null });
     give.focus();
