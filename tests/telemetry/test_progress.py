@@ -7,13 +7,14 @@ import shutil
 from dataclasses import replace
 
 import pytest
+import shapely
 
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode
 from companion.skipper import Skipper
 from companion.skipper.step.actions import Announce, Severity
 from companion.skipper.step.config import SkipperConfig
-from companion.telemetry.progress import ProgressLine, left_behind
+from companion.telemetry.progress import ProgressLine, left_behind, progress_text
 from tests.skipper.world import World, voyage
 
 STATUS = CompanionStatus(t_s=0.0, state="waiting")
@@ -55,6 +56,21 @@ def steps():
         out.append(Step(snapshot=snapshot, state=_with(world.state, why=LONG), actions=said,
                         voyage=world.skipper.voyage))
     return out
+
+
+def test_the_line_tells_the_clearance_and_when_she_is_there():
+    world = World(Skipper(voyage=voyage(obstacles=[shapely.box(40.0, 100.0, 60.0, 120.0)]), config=SkipperConfig()))
+    assert world.run(120, lambda w: w.state.sailing)
+    world.run(5)
+    step = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
+    route = world.state.route
+    assert f"clear {route.expected_clearance_m:.1f} m" in progress_text(step, None)
+    left = re.search(r"there in (\d+) s \(90 %: (\d+) s\)", progress_text(step, None))
+    gone_s = world.t - route.plan_t_s
+    assert int(left[1]) == pytest.approx(route.median_s - gone_s, abs=1.0)
+    assert int(left[2]) == pytest.approx(route.late_s - gone_s, abs=1.0)
+    never = replace(step, state=replace(step.state, route=replace(route, late_s=None)))
+    assert "90 %" not in progress_text(never, None)
 
 
 def _with(state, **changes):

@@ -24,7 +24,8 @@ from sitl.scene.scenario import load_scenario
 FOLDER = Path("sitl/scenarios")
 # What is folded again from the record: the new inputs of a failsafe's answer and of a watched rest among them.
 REPLAYED = {
-    "station-lost", "mode-switch", "at-rest", "watched", "rules-head-on", "field-ring", "field-square", "far-north"}
+    "station-lost", "mode-switch", "at-rest", "watched", "rules-head-on", "field-ring", "field-square", "far-north",
+    "tacks-fail"}
 LONG = {"endurance", "far-away", "ocean"}
 # Sailed with seed 0 by tests of their own, which ask for the verdict and for more: test_traffic, test_by_field and
 # test_passage.
@@ -78,11 +79,31 @@ def leaves_when_entered(folder):
     assert ends[1][0] - ends[0][0] < 60.0
 
 
+def waits_for_less_wind(folder):
+    """She sets sail only when the blow at the start is over, and says beforehand what is done about another."""
+    decisions = [json.loads(line) for line in (folder / "decisions.jsonl").read_text().splitlines()]
+    said = {code: d["t_s"] for d in reversed(decisions) for code in [d.get("code")] if code}
+    assert said["under way"] > 90.0
+    assert any("strong wind: to the nearest refuge" in d.get("text", "") for d in decisions)
+    assert summary(folder)["late_s"] >= summary(folder)["median_s"] > 0.0
+
+
+def counts_tacks_that_fail(folder):
+    """The plans' quantiles know of them, and the chance grows with what is seen."""
+    decisions = [json.loads(line) for line in (folder / "decisions.jsonl").read_text().splitlines()]
+    failed = [d["text"] for d in decisions if d.get("code") == "tack failed"]
+    assert failed
+    assert all("the next one does by" in text for text in failed)
+    plans = [d["plan"] for d in decisions if d["kind"] == "plan" and d["plan"]["status"] == "found"]
+    assert all(p["arrival"]["p50_s"] > p["cost_s"] for p in plans[:3])
+
+
 # What the record of one must show besides.
 RECORDED = {"field-ring": goes_round, "field-square": leaves_when_entered,
             "foreign-mission": is_said_once_in_a_while, "out-of-time": ends_by_itself,
             "by-astar": plans_by("astar"), "by-astar-flat": plans_by("astar"), "by-rrtstar": plans_by("rrtstar"),
-            "crossing-by-rrtstar": risks_a_vessel}
+            "crossing-by-rrtstar": risks_a_vessel, "wind-limits": waits_for_less_wind,
+            "tacks-fail": counts_tacks_that_fail}
 
 
 # Where a file lets her wait for long and nothing more happens, the wait is shorter; -m campaign sails it as it is.

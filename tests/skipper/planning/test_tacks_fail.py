@@ -1,0 +1,95 @@
+"""A tack that failed: said once, learned from, planned for at once near something, gybed round after two in a row."""
+
+import math
+from dataclasses import replace
+
+import pytest
+import shapely
+
+from companion.skipper.planning.asking import request
+from companion.skipper.planning.autopilot_beats import tacks_fail
+from companion.skipper.step.actions import ReplanReason, RequestPlan
+from companion.skipper.step.saved import Persisted
+from companion.skipper.step.tacking import Tacking
+from companion.skipper.step.turn import Turn
+from companion.skipper.watch.tacks import TACK_FAILED, watch_tacks
+from tests.skipper.test_voyage import make
+
+ROCK = shapely.box(25.0, 35.0, 60.0, 120.0)
+
+
+def under_way(given=0.1, obstacles=(), **tacking):
+    world = make(obstacles=obstacles)
+    voyage = world.skipper.voyage
+    world.skipper = replace(world.skipper, voyage=replace(voyage, boat=replace(voyage.boat, tack_fails=given)))
+    assert world.run(120, lambda w: w.state.sailing)
+    world.state = replace(world.state, tacking=Tacking(**tacking), asked="")
+    return world
+
+
+def turn_of(world, **changes):
+    return Turn(world.skipper.voyage, world.skipper.config, replace(world.state, **changes), world.snapshot())
+
+
+def fallen_back(world, **seen):
+    """Return the turn in which she is back on the tack that she came from."""
+    snapshot = world.snapshot()
+    off = math.radians(50.0)
+    vehicle = replace(snapshot.vehicle, heading_rad=off)
+    tacking = Tacking(side=-1, settled_rad=off, settled_s=world.t - 4.0, began_s=world.t - 3.0, **seen)
+    turn = Turn(world.skipper.voyage, world.skipper.config, replace(world.state, tacking=tacking),
+                replace(snapshot, vehicle=vehicle))
+    watch_tacks(turn)
+    return turn
+
+
+def test_a_failure_is_said_with_what_it_taught_and_asks_for_a_plan_near_something():
+    turn = fallen_back(under_way(obstacles=[ROCK]))
+    assert turn.state.tacking.failed == turn.state.tacking.tried == 1
+    [text] = [a.text for a in turn.actions if getattr(a, "code", "") == "tack failed"]
+    assert "1 of 1" in text
+    assert "18 %" in text                  # (0.1 * 10 + 1) / 11
+    assert turn.state.asked == TACK_FAILED
+
+
+def test_far_from_everything_only_the_second_in_a_row_asks():
+    assert fallen_back(under_way()).state.asked == ""
+    assert fallen_back(under_way(), tried=1, failed=1, in_a_row=1).state.asked == TACK_FAILED
+
+
+def test_a_mission_that_says_0_asks_for_nothing_and_goes_on_tacking():
+    turn = fallen_back(under_way(0.0, [ROCK]), tried=1, failed=1, in_a_row=1)
+    assert turn.state.tacking.failed == 2
+    assert turn.state.asked == ""
+    assert not tacks_fail(turn)
+
+
+def test_two_in_a_row_are_gybed_round_until_one_comes_off_or_ten_minutes_have_passed():
+    world = under_way(tried=4, failed=2, in_a_row=2, failed_s=0.0)
+    now = replace(world.state.tacking, failed_s=world.t)
+    assert tacks_fail(turn_of(world, tacking=now))
+    assert not tacks_fail(turn_of(world, tacking=replace(now, in_a_row=0)))
+    assert not tacks_fail(turn_of(world, tacking=replace(now, failed_s=world.t - 601.0)))
+
+
+def test_what_was_learned_is_in_the_next_problem():
+    world = under_way(0.1, tried=5, failed=4)
+    turn = turn_of(world)
+    assert request(turn, ReplanReason.ORDER)
+    [asked] = [a for a in turn.actions if isinstance(a, RequestPlan)]
+    assert asked.problem.boat.tack_fails == pytest.approx((1.0 + 4.0) / 15.0)
+    assert asked.problem.wind.strength.is_known
+    assert min(asked.problem.wind.strength.sigma_mps) > 0.0
+
+
+def test_what_was_counted_survives_a_restart_and_nonsense_does_not():
+    world = under_way(tried=7, failed=3)
+    saved = world.skipper.persisted(world.state)
+    assert saved.tacks == (7, 3)
+    data = saved.to_dict()
+    again = world.skipper.initial(Persisted.from_dict(data))
+    assert (again.tacking.tried, again.tacking.failed, again.tacking.in_a_row) == (7, 3, 0)
+    assert Persisted.from_dict({k: v for k, v in data.items() if k != "tacks"}).tacks == (0, 0)
+    for wrong in ([2, 3], [-1, 0], [1], "ab", [1.5, 1]):
+        with pytest.raises(ValueError, match="damaged"):
+            Persisted.from_dict(data | {"tacks": wrong})
