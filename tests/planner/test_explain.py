@@ -131,3 +131,13 @@ def test_an_invalid_problem_is_only_named_and_the_data_are_json():
     assert answer.status is PlanStatus.INVALID
     assert "Cannot be planned" in answer.why.text
     json.dumps(dict(explained(problem()).why.data))
+
+
+def test_the_explanation_says_the_clearance_expected_and_the_tacks_that_may_fail():
+    from tests.planner.track.test_track import problem as tracked
+
+    base = tracked()
+    answer = plan(base, expansions=5_000)
+    why = explain(base, answer, expansions=500).why
+    assert f"passes {answer.expected_clearance_m:.1f} m clear or more" in why.text
+    assert why.data["expected_clearance_m"] == answer.expected_clearance_m
