@@ -105,5 +105,6 @@ def test_what_will_be_done_is_said_once_before_she_sails():
     [(t_s, _, text)] = said(world, "safe ends")
     assert t_s <= said(world, "under way")[0][0]
     assert "leaking: to the nearest refuge, else loiter near by" in text
-    with_home = announcement(SkipperConfig(safe_end=SafeEnd.RETURN, voyage_timeout_s=60.0))
+    with_home = announcement(
+        SkipperConfig(safe_end=SafeEnd.RETURN, voyage_timeout_s=60.0), world.skipper.voyage.boat)
     assert "out of time: to the nearest refuge, else home, loiter near by" in with_home
