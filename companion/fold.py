@@ -302,6 +302,7 @@ class VoyageFold:
             heartbeat_age_s=None if self._heartbeat_s is None else t_s - self._heartbeat_s,
             wind=wind,
             current=self.current.view(),
+            doubt=self.current.doubt(),
             mission=self._mission,
             identity=replace(
                 self._identity, vehicle_type=None if autopilot is None else autopilot.vehicle_type,

@@ -1,7 +1,8 @@
-"""The estimate of the current against a boat whose water, polar, leeway and compass are known."""
+"""The estimate of the current against a boat whose water, polar, leeway, compass and vane are known."""
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -14,7 +15,19 @@ POLAR = ardurover_sitl()
 TWD, TWS = 0.0, 5.0
 
 
-def reading(t_s, heading_deg, current, *, scale=1.0, leeway_deg=0.0, noise=0.0, rng=None, is_driven=True):
+def turned_vane(now, by_rad):
+    """Return the moment as a boat has it whose vane is turned clockwise: the wind that she feels, turned."""
+    east, north = now.velocity_en_mps
+    felt_e = now.tws_mps * math.sin(now.twd_from_rad) + east
+    felt_n = now.tws_mps * math.cos(now.twd_from_rad) + north
+    from_e = math.cos(by_rad) * felt_e + math.sin(by_rad) * felt_n - east
+    from_n = math.cos(by_rad) * felt_n - math.sin(by_rad) * felt_e - north
+    return replace(now, twd_from_rad=math.atan2(from_e, from_n), tws_mps=math.hypot(from_e, from_n))
+
+
+def reading(
+    t_s, heading_deg, current, *, scale=1.0, leeway_deg=0.0, vane_deg=0.0, noise=0.0, rng=None, is_driven=True,
+):
     """Return what a boat of this polar tells on a heading."""
     heading = math.radians(heading_deg)
     from_rad, tws = over_water(TWD, TWS, current)
@@ -22,10 +35,11 @@ def reading(t_s, heading_deg, current, *, scale=1.0, leeway_deg=0.0, noise=0.0, 
     v = scale * POLAR.speed_mps(twa, tws)
     course = heading - math.copysign(math.radians(leeway_deg), twa)
     jolt = (rng.gauss(0.0, noise), rng.gauss(0.0, noise)) if rng else (0.0, 0.0)
-    return Sailing(
+    now = Sailing(
         t_s=t_s, velocity_en_mps=(v * math.sin(course) + current[0] + jolt[0],
                                   v * math.cos(course) + current[1] + jolt[1]),
         heading_rad=heading, yaw_rate_radps=0.0, twd_from_rad=TWD, tws_mps=TWS, is_driven=is_driven)
+    return turned_vane(now, math.radians(vane_deg)) if vane_deg else now
 
 
 def sailed(headings_deg, current, *, leg_s=100.0, prior=STILL, **boat):
@@ -126,7 +140,7 @@ def test_what_the_mission_expects_is_believed_until_the_track_tells_otherwise():
     estimator.update(0.0, None, None)
     assert estimator.view().en_mps == pytest.approx((0.5, 0.0))
     assert estimator.view().is_significant
-    wrong = sailed((55.0, -55.0, 100.0), (0.0, 0.0), leg_s=300.0, prior=prior).view()
+    wrong = sailed((55.0, -55.0, 100.0, -100.0), (0.0, 0.0), leg_s=300.0, prior=prior).view()
     assert wrong.drift_mps < 0.15
 
 

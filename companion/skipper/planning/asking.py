@@ -56,6 +56,7 @@ def request(
             turn.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
             delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
             beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk, current=current,
+            doubt=turn.snapshot.doubt if turn.config.sails else None,
             zone_half_rad=turn.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
             tracking=problem_tracking(
                 turn, start, from_index, floor_m=min(turn.config.margin_floor_m, turn.config.margin_m),
