@@ -16,6 +16,7 @@ is heard of it.
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -42,9 +43,10 @@ SLOW_S = 36_000.0            # polar, leeway, compass and vane hardly change in 
 ALONG_MPS, ALONG_SHARE = 0.08, 0.06   # noise of a reading along the heading: gusts that the hull has not answered
 ACROSS_MPS, ACROSS_SHARE = 0.06, 0.03
 ALIKE_S = 12.0               # readings this near in time are wrong alike: waves, a gust, the helm
+SWINGS_S = 4.0               # heading and velocity are means over it: waves swing her bow within less
 STEADY_RAD_S = math.radians(6.0)      # faster turns are manoeuvres ...
 SETTLES_S = 10.0             # ... after which she needs this long to have her speed again
-STEADY_MPS2 = 0.12           # a faster change of speed is none of the polar's
+STEADY_MPS2 = 0.06           # a faster change of speed is none of the polar's
 LEAST_TWA_RAD = math.radians(38.0)    # closer to the wind the polar says little
 EVERY_S = 1.0
 LATE_S = 1.5                 # an older position is no reading
@@ -57,7 +59,7 @@ STANDS_MPS, SHOULD_MPS = 0.15, 0.6    # a boat that stands where she should sail
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sailing:
-    """One moment of the boat: velocity over ground [m/s], heading, rate of turn, and the wind over the ground.
+    """One moment of the boat: velocity over ground [m/s], heading, and the wind over the ground.
 
     ``is_driven``: her sails are sheeted and nothing else drives her; ``age_s``: of the velocity and the heading.
     """
@@ -65,7 +67,6 @@ class Sailing:
     t_s: float
     velocity_en_mps: tuple[float, float]
     heading_rad: float
-    yaw_rate_radps: float | None
     twd_from_rad: float
     tws_mps: float
     is_driven: bool
@@ -88,6 +89,7 @@ class CurrentEstimator:
         self._t_s: float | None = None
         self._unsteady_s = -math.inf
         self._last: Sailing | None = None
+        self._means: tuple[complex, complex] | None = None   # heading's unit vector and velocity over the last seconds
         self._taken_s = -math.inf
         self._samples_s = 0.0
         self._rejected_s = 0.0
@@ -102,19 +104,25 @@ class CurrentEstimator:
         if now is None:
             return
         last, self._last = self._last, now
-        if last is not None and now.t_s - last.t_s > 0.0:
-            turned = abs(difference_rad(now.heading_rad, last.heading_rad)) / (now.t_s - last.t_s)
-            if max(turned, abs(now.yaw_rate_radps or 0.0)) > STEADY_RAD_S or not now.is_driven:
-                self._unsteady_s = t_s
         if last is None or not now.is_driven or now.age_s > LATE_S:
-            self._unsteady_s = t_s
+            self._unsteady_s, self._means = t_s, None
             return
+        dt_s = now.t_s - last.t_s
+        if dt_s <= 0.0:
+            return
+        # In a seaway the bow swings faster than it turns in a tack, and the boat goes on as before.
+        bow, made = cmath.rect(1.0, now.heading_rad), complex(*now.velocity_en_mps)
+        was_bow, was_made = (bow, made) if self._means is None else self._means
+        share = 1.0 - math.exp(-dt_s / SWINGS_S)
+        bow, made = was_bow + share * (bow - was_bow), was_made + share * (made - was_made)
+        self._means = bow, made
+        if abs(difference_rad(cmath.phase(bow), cmath.phase(was_bow))) > STEADY_RAD_S * dt_s:
+            self._unsteady_s = t_s
         if t_s - self._taken_s < 0.9 * EVERY_S or t_s - self._unsteady_s < SETTLES_S:
             return
-        dt_s = max(0.2, now.t_s - last.t_s)
-        if abs(math.hypot(*now.velocity_en_mps) - math.hypot(*last.velocity_en_mps)) / dt_s > STEADY_MPS2:
+        if abs(abs(made) - abs(was_made)) > STEADY_MPS2 * max(0.2, dt_s):
             return
-        self._take(t_s, now)
+        self._take(t_s, replace(now, heading_rad=cmath.phase(bow), velocity_en_mps=(made.real, made.imag)))
 
     def _predict(self, t_s: float, utc_s: float | None) -> None:
         expected = self._prior.at(utc_s)

@@ -110,4 +110,5 @@ def test_a_vane_is_turned_about_the_wind_that_is_felt():
     straight = reading(0.0, 50.0, (0.0, 0.0))
     wrong = turned_vane(straight, math.radians(8.0))
     v = POLAR.speed_mps(-math.radians(50.0), 5.0)
-    assert math.degrees(wrong.twd_from_rad) == pytest.approx(8.0 * (1.0 + v * math.cos(math.radians(50.0)) / 5.0), abs=1.0)
+    longer = 1.0 + v * math.cos(math.radians(50.0)) / 5.0
+    assert math.degrees(wrong.twd_from_rad) == pytest.approx(8.0 * longer, abs=1.0)

@@ -38,7 +38,7 @@ def reading(
     now = Sailing(
         t_s=t_s, velocity_en_mps=(v * math.sin(course) + current[0] + jolt[0],
                                   v * math.cos(course) + current[1] + jolt[1]),
-        heading_rad=heading, yaw_rate_radps=0.0, twd_from_rad=TWD, tws_mps=TWS, is_driven=is_driven)
+        heading_rad=heading, twd_from_rad=TWD, tws_mps=TWS, is_driven=is_driven)
     return turned_vane(now, math.radians(vane_deg)) if vane_deg else now
 
 
@@ -107,9 +107,23 @@ def test_turns_stops_and_sails_that_are_eased_teach_nothing():
     aground = reading(0.0, 60.0, (0.0, 0.0))
     for t in range(240, 400):
         estimator.update(float(t), None, Sailing(
-            t_s=float(t), velocity_en_mps=(0.01, 0.0), heading_rad=aground.heading_rad, yaw_rate_radps=0.0,
+            t_s=float(t), velocity_en_mps=(0.01, 0.0), heading_rad=aground.heading_rad,
             twd_from_rad=TWD, tws_mps=TWS, is_driven=True))
     assert estimator.view().samples_s == 0.0, "a boat that stands is not carried by its own speed backwards"
+
+
+@pytest.mark.parametrize("period_s", [2.0, 3.5, 5.0])
+def test_a_bow_that_the_waves_swing_tells_of_it_too(period_s):
+    """8 degrees to either side every few seconds: 10 to 25 degrees a second, faster than she tacks."""
+    current, estimator, t_s = (0.3, -0.2), CurrentEstimator(POLAR.speed_mps), 0.0
+    for heading_deg in (55.0, -55.0, 100.0):
+        for _ in range(100):
+            t_s += 1.0
+            swing = math.radians(8.0) * math.sin(2.0 * math.pi * t_s / period_s + 0.7)
+            now = reading(t_s, heading_deg, current)
+            estimator.update(t_s, None, replace(now, heading_rad=now.heading_rad + swing))
+    assert estimator.view().samples_s > 150.0
+    assert math.dist(estimator.view().en_mps, current) < 0.1
 
 
 def test_a_current_that_turns_is_followed():
