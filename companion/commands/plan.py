@@ -7,6 +7,7 @@ import contextlib
 import json
 import math
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -134,7 +135,7 @@ def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Prob
         answers.append(_answer(problem, args))
         return answers[-1][1]
 
-    walked(legs(mission, Wind(from_deg=from_deg, speed_mps=tws_mps), goes_home=False), answer)
+    walked(legs(mission, Wind(from_deg=from_deg, speed_mps=tws_mps), goes_home=False, unix_s=time.time()), answer)
     return answers
 
 
@@ -173,6 +174,7 @@ def describe(problem: Problem, answer: Plan) -> str:
         ", ".join((f"{length:.0f} m in {counted(len(courses(answer.legs)), 'course')}{_of_legs(answer)}",
                    counted(judged.tacks, "tack"), counted(judged.gybes, "gybe"))),
         _risk_text(problem, answer),
+        *_current_text(problem),
         effort,
         "",
         *_table(answer),
@@ -180,6 +182,14 @@ def describe(problem: Problem, answer: Plan) -> str:
     if answer.why.text:
         lines += ["", answer.why.text]
     return "\n".join(lines)
+
+
+def _current_text(problem: Problem) -> list[str]:
+    drift_mps = problem.current.drift_mps
+    if drift_mps == 0.0:
+        return []
+    return [f"current: sets {math.degrees(problem.current.set_rad):03.0f}° {drift_mps:.2f} m/s; headings and angles are "
+            f"through the water, the wind over it is {math.degrees(problem.wind.twd_from_rad) % 360.0:03.0f}°"]
 
 
 def _of_legs(answer: Plan) -> str:

@@ -95,7 +95,7 @@ class CurrentEstimator:
         self._rejected_s = 0.0
         self._misfit = 0.0
         self._seen: dict[int, float] = {}     # headings by sectors of 20 degrees: when they were sailed last
-        self._is_significant = False
+        self._is_significant = prior.strongest_mps > 0.0      # what the mission expects is planned for until it is doubtful
 
     # ------------------------------------------------------------------------------------------- feed
     def update(self, t_s: float, utc_s: float | None, now: Sailing | None) -> None:
