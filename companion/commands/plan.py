@@ -188,8 +188,9 @@ def _current_text(problem: Problem) -> list[str]:
     drift_mps = problem.current.drift_mps
     if drift_mps == 0.0:
         return []
-    return [f"current: sets {math.degrees(problem.current.set_rad):03.0f}° {drift_mps:.2f} m/s; headings and angles are "
-            f"through the water, the wind over it is {math.degrees(problem.wind.twd_from_rad) % 360.0:03.0f}°"]
+    set_deg, from_deg = math.degrees(problem.current.set_rad), math.degrees(problem.wind.twd_from_rad) % 360.0
+    return [(f"current: sets {set_deg:03.0f}° {drift_mps:.2f} m/s; headings and angles are through the water, the wind "
+             f"over it is from {from_deg:03.0f}°")]
 
 
 def _of_legs(answer: Plan) -> str:

@@ -45,7 +45,7 @@ ACROSS_MPS, ACROSS_SHARE = 0.06, 0.03
 ALIKE_S = 12.0               # readings this near in time are wrong alike: waves, a gust, the helm
 SWINGS_S = 4.0               # heading and velocity are means over it: waves swing her bow within less
 STEADY_RAD_S = math.radians(6.0)      # faster turns are manoeuvres ...
-SETTLES_S = 10.0             # ... after which she needs this long to have her speed again
+SETTLES_S = 6.0              # ... after which, and the means with them, she needs this long to have her speed again
 STEADY_MPS2 = 0.06           # a faster change of speed is none of the polar's
 LEAST_TWA_RAD = math.radians(38.0)    # closer to the wind the polar says little
 EVERY_S = 1.0
@@ -95,7 +95,7 @@ class CurrentEstimator:
         self._rejected_s = 0.0
         self._misfit = 0.0
         self._seen: dict[int, float] = {}     # headings by sectors of 20 degrees: when they were sailed last
-        self._is_significant = prior.strongest_mps > 0.0      # what the mission expects is planned for until it is doubtful
+        self._is_significant = prior.strongest_mps > 0.0   # what is expected is planned for until in doubt
 
     # ------------------------------------------------------------------------------------------- feed
     def update(self, t_s: float, utc_s: float | None, now: Sailing | None) -> None:
