@@ -302,6 +302,7 @@ class VoyageFold:
             heartbeat_age_s=None if self._heartbeat_s is None else t_s - self._heartbeat_s,
             wind=wind,
             current=self.current.view(),
+            doubt=self.current.doubt(),
             mission=self._mission,
             identity=replace(
                 self._identity, vehicle_type=None if autopilot is None else autopilot.vehicle_type,
@@ -334,7 +335,7 @@ class VoyageFold:
             and status.mode in _SAILS and wind.health in {WindHealth.GOOD, WindHealth.LIGHT})
         return Sailing(
             t_s=vehicle.t_s, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
-            yaw_rate_radps=vehicle.yaw_rate_radps, twd_from_rad=wind.present_twd_from_rad,
+            twd_from_rad=wind.present_twd_from_rad,
             tws_mps=wind.present_tws_mps, is_driven=is_driven, age_s=t_s - vehicle.t_s)
 
     def _wind_view(self, t_s: float) -> WindView:

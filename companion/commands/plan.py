@@ -7,6 +7,7 @@ import contextlib
 import json
 import math
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -135,7 +136,7 @@ def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Prob
         answers.append(_answer(problem, args))
         return answers[-1][1]
 
-    walked(legs(mission, Wind(from_deg=from_deg, speed_mps=tws_mps), goes_home=False), answer)
+    walked(legs(mission, Wind(from_deg=from_deg, speed_mps=tws_mps), goes_home=False, unix_s=time.time()), answer)
     return answers
 
 
@@ -175,6 +176,7 @@ def describe(problem: Problem, answer: Plan) -> str:
                    counted(judged.tacks, "tack"), counted(judged.gybes, "gybe"))),
         _risk_text(problem, answer),
         *_of_wind(problem, answer),
+        *_current_text(problem),
         effort,
         "",
         *_table(answer),
@@ -201,6 +203,15 @@ def _broken(problem: Problem, answer: Plan) -> str:
     from companion.planner.risk.arrival import limits_in_words
 
     return limits_in_words(problem, answer.arrival)
+
+
+def _current_text(problem: Problem) -> list[str]:
+    drift_mps = problem.current.drift_mps
+    if drift_mps == 0.0:
+        return []
+    set_deg, from_deg = math.degrees(problem.current.set_rad), math.degrees(problem.wind.twd_from_rad) % 360.0
+    return [(f"current: sets {set_deg:03.0f}° {drift_mps:.2f} m/s; headings and angles are through the water, the wind "
+             f"over it is from {from_deg:03.0f}°")]
 
 
 def _of_legs(answer: Plan) -> str:

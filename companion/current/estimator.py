@@ -4,8 +4,11 @@
 
 with the heading h and the polar's speed v in the wind over the water. The polar may be wrong by a share k, the compass
 by an angle, and leeway sets her to leeward, to the other side on the other tack. So on one heading a current along it
-looks like a polar error and one across it like leeway: the filter carries all five numbers and says so by its
-covariance, which shrinks when she sails on headings far apart. It is a linear Kalman filter, one reading a second.
+looks like a polar error and one across it like leeway. A vane that is turned makes her seem to point higher on one tack
+than on the other, and so too slow on one and too fast on the other, as a current across the wind does: v is that of
+the wind with the vane turned back by what is believed of it. The filter carries all six numbers and says what it cannot
+tell by its covariance, which shrinks when she sails on headings far apart. It is a Kalman filter, linear but for the
+vane (there about what is believed), one reading a second.
 
 The current is a departure from what the mission expects (``Prior``), and goes back to it with ``TAU_S`` where nothing
 is heard of it.
@@ -13,6 +16,7 @@ is heard of it.
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -20,25 +24,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.current.doubt import Doubt
 from companion.current.over_water import over_water
 from companion.current.prior import STILL, Expected, Prior
 from companion.current.value import WaterCurrent
 from companion.geo.angles import difference_rad, wrap_pi
 
 Matrix = NDArray[np.float64]
+TILT_RAD = math.radians(3.0)  # of the vane to either side, to see what it makes of her speed
 Speed = Callable[[float, float], float]
 """Speed through the water [m/s] at a true wind angle [rad] in a wind over the water [m/s]: the boat's polar."""
 
 SCALE_SD = 0.12              # of the polar: what a polar not measured on this very boat is wrong by
 ANGLE_SD_RAD = math.radians(2.5)   # of the compass, and so of leeway
+VANE_SD_RAD = math.radians(4.0)    # of a vane mounted by eye
 TAU_S = 7200.0               # a tide turns within hours
-SLOW_S = 36_000.0            # polar, leeway and compass hardly change in a voyage
+SLOW_S = 36_000.0            # polar, leeway, compass and vane hardly change in a voyage
 ALONG_MPS, ALONG_SHARE = 0.08, 0.06   # noise of a reading along the heading: gusts that the hull has not answered
 ACROSS_MPS, ACROSS_SHARE = 0.06, 0.03
 ALIKE_S = 12.0               # readings this near in time are wrong alike: waves, a gust, the helm
+SWINGS_S = 4.0               # heading and velocity are means over it: waves swing her bow within less
 STEADY_RAD_S = math.radians(6.0)      # faster turns are manoeuvres ...
-SETTLES_S = 10.0             # ... after which she needs this long to have her speed again
-STEADY_MPS2 = 0.12           # a faster change of speed is none of the polar's
+SETTLES_S = 6.0              # ... after which, and the means with them, she needs this long to have her speed again
+STEADY_MPS2 = 0.06           # a faster change of speed is none of the polar's
 LEAST_TWA_RAD = math.radians(38.0)    # closer to the wind the polar says little
 EVERY_S = 1.0
 LATE_S = 1.5                 # an older position is no reading
@@ -51,7 +59,7 @@ STANDS_MPS, SHOULD_MPS = 0.15, 0.6    # a boat that stands where she should sail
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sailing:
-    """One moment of the boat: velocity over ground [m/s], heading, rate of turn, and the wind over the ground.
+    """One moment of the boat: velocity over ground [m/s], heading, and the wind over the ground.
 
     ``is_driven``: her sails are sheeted and nothing else drives her; ``age_s``: of the velocity and the heading.
     """
@@ -59,7 +67,6 @@ class Sailing:
     t_s: float
     velocity_en_mps: tuple[float, float]
     heading_rad: float
-    yaw_rate_radps: float | None
     twd_from_rad: float
     tws_mps: float
     is_driven: bool
@@ -76,18 +83,19 @@ class CurrentEstimator:
 
     def __init__(self, speed: Speed, prior: Prior = STILL) -> None:
         self._speed, self._prior = speed, prior
-        self._x = np.zeros(5)      # departure east, north [m/s]; share k; leeway, compass [rad]
+        self._x = np.zeros(6)      # departure east, north [m/s]; share k; leeway, compass, vane [rad]
         self._expected: Expected | None = None
-        self._p = np.zeros((5, 5))
+        self._p = np.zeros((6, 6))
         self._t_s: float | None = None
         self._unsteady_s = -math.inf
         self._last: Sailing | None = None
+        self._means: tuple[complex, complex] | None = None   # heading's unit vector and velocity over the last seconds
         self._taken_s = -math.inf
         self._samples_s = 0.0
         self._rejected_s = 0.0
         self._misfit = 0.0
         self._seen: dict[int, float] = {}     # headings by sectors of 20 degrees: when they were sailed last
-        self._is_significant = False
+        self._is_significant = prior.strongest_mps > 0.0   # what is expected is planned for until in doubt
 
     # ------------------------------------------------------------------------------------------- feed
     def update(self, t_s: float, utc_s: float | None, now: Sailing | None) -> None:
@@ -96,29 +104,35 @@ class CurrentEstimator:
         if now is None:
             return
         last, self._last = self._last, now
-        if last is not None and now.t_s - last.t_s > 0.0:
-            turned = abs(difference_rad(now.heading_rad, last.heading_rad)) / (now.t_s - last.t_s)
-            if max(turned, abs(now.yaw_rate_radps or 0.0)) > STEADY_RAD_S or not now.is_driven:
-                self._unsteady_s = t_s
         if last is None or not now.is_driven or now.age_s > LATE_S:
-            self._unsteady_s = t_s
+            self._unsteady_s, self._means = t_s, None
             return
+        dt_s = now.t_s - last.t_s
+        if dt_s <= 0.0:
+            return
+        # In a seaway the bow swings faster than it turns in a tack, and the boat goes on as before.
+        bow, made = cmath.rect(1.0, now.heading_rad), complex(*now.velocity_en_mps)
+        was_bow, was_made = (bow, made) if self._means is None else self._means
+        share = 1.0 - math.exp(-dt_s / SWINGS_S)
+        bow, made = was_bow + share * (bow - was_bow), was_made + share * (made - was_made)
+        self._means = bow, made
+        if abs(difference_rad(cmath.phase(bow), cmath.phase(was_bow))) > STEADY_RAD_S * dt_s:
+            self._unsteady_s = t_s
         if t_s - self._taken_s < 0.9 * EVERY_S or t_s - self._unsteady_s < SETTLES_S:
             return
-        dt_s = max(0.2, now.t_s - last.t_s)
-        if abs(math.hypot(*now.velocity_en_mps) - math.hypot(*last.velocity_en_mps)) / dt_s > STEADY_MPS2:
+        if abs(abs(made) - abs(was_made)) > STEADY_MPS2 * max(0.2, dt_s):
             return
-        self._take(t_s, now)
+        self._take(t_s, replace(now, heading_rad=cmath.phase(bow), velocity_en_mps=(made.real, made.imag)))
 
     def _predict(self, t_s: float, utc_s: float | None) -> None:
         expected = self._prior.at(utc_s)
         if self._t_s is None or self._expected is None:
-            self._p = np.diag([expected.sigma_mps**2] * 2 + [SCALE_SD**2] + [ANGLE_SD_RAD**2] * 2)
+            self._p = np.diag(_limit(expected))
         else:
             dt_s = max(0.0, t_s - self._t_s)
-            keep = np.exp(-dt_s / np.array([TAU_S, TAU_S, SLOW_S, SLOW_S, SLOW_S]))
+            keep = np.exp(-dt_s / np.array([TAU_S, TAU_S, SLOW_S, SLOW_S, SLOW_S, SLOW_S]))
             was = self._expected
-            limit = np.array([expected.sigma_mps**2] * 2 + [SCALE_SD**2] + [ANGLE_SD_RAD**2] * 2)
+            limit = _limit(expected)
             self._x *= keep
             self._p = self._p * np.outer(keep, keep) + np.diag(limit * (1.0 - keep**2))
             if expected.sigma_mps > was.sigma_mps:      # a table that ends: what is doubted more is at once
@@ -127,32 +141,32 @@ class CurrentEstimator:
                 self._p[1, 1] += more
             if was.verdict and not expected.verdict:    # a row can be chosen at last: what it says is one more reading
                 self._x[:2] += (was.east_mps - expected.east_mps, was.north_mps - expected.north_mps)
-                self._correct(np.eye(2, 5), -self._x[:2], np.eye(2) * expected.sigma_mps**2)
+                self._correct(np.eye(2, 6), -self._x[:2], np.eye(2) * expected.sigma_mps**2)
         self._t_s, self._expected = t_s, expected
 
     def _correct(self, h: Matrix, residual: Matrix, noise: Matrix) -> None:
         """Take a reading whose departure from what was predicted is ``residual`` (Kalman's correction)."""
         gain = self._p @ h.T @ np.linalg.inv(h @ self._p @ h.T + noise)
         self._x = self._x + gain @ residual
-        rest = np.eye(5) - gain @ h
+        rest = np.eye(6) - gain @ h
         self._p = rest @ self._p @ rest.T + gain @ noise @ gain.T          # Joseph's form keeps it a covariance
 
     def _take(self, t_s: float, now: Sailing) -> None:
         assert self._expected is not None
         x = self._x
         base = np.array([self._expected.east_mps, self._expected.north_mps])
-        current = base + x[:2]
-        from_rad, tws_mps = over_water(now.twd_from_rad, now.tws_mps, (float(current[0]), float(current[1])))
-        twa = difference_rad(from_rad, now.heading_rad)     # positive: wind over starboard
-        v = self._speed(twa, tws_mps)
+        current = float(base[0] + x[0]), float(base[1] + x[1])
+        twa, v = self._speed_with(now, current, float(x[5]))
         sog = math.hypot(*now.velocity_en_mps)
         if abs(twa) < LEAST_TWA_RAD or (sog < STANDS_MPS and v > SHOULD_MPS):
             return
         sin, cos = math.sin(now.heading_rad), math.cos(now.heading_rad)
         along, across = np.array([sin, cos]), np.array([cos, -sin])     # across: to starboard
         side = -1.0 if twa > 0.0 else 1.0                               # leeway goes to leeward
-        h = np.column_stack([np.eye(2), v * along, side * v * across, v * across])           # (a)
-        z = np.asarray(now.velocity_en_mps) - base - v * along
+        slope = (self._speed_with(now, current, float(x[5]) + TILT_RAD)[1]
+                 - self._speed_with(now, current, float(x[5]) - TILT_RAD)[1]) / (2.0 * TILT_RAD)
+        h = np.column_stack([np.eye(2), v * along, side * v * across, v * across, slope * along])           # (a)
+        z = np.asarray(now.velocity_en_mps) - base - (v - slope * x[5]) * along
         noise = ((ALONG_MPS + ALONG_SHARE * v)**2 * np.outer(along, along)
                  + (ACROSS_MPS + ACROSS_SHARE * v)**2 * np.outer(across, across)) * ALIKE_S / EVERY_S
         self._taken_s = t_s
@@ -171,6 +185,20 @@ class CurrentEstimator:
         self._samples_s += EVERY_S
         self._seen[int(wrap_pi(now.heading_rad) // math.radians(20.0))] = t_s
 
+    def _speed_with(
+        self, now: Sailing, current_en_mps: tuple[float, float], vane_rad: float,
+    ) -> tuple[float, float]:
+        """Return the wind's angle to her bow and the polar's speed, where the vane is turned clockwise so far."""
+        east, north = now.velocity_en_mps
+        felt_e = now.tws_mps * math.sin(now.twd_from_rad) + east
+        felt_n = now.tws_mps * math.cos(now.twd_from_rad) + north
+        sin, cos = math.sin(vane_rad), math.cos(vane_rad)
+        ground_e, ground_n = cos * felt_e - sin * felt_n - east, cos * felt_n + sin * felt_e - north
+        from_rad, tws_mps = over_water(
+            math.atan2(ground_e, ground_n), math.hypot(ground_e, ground_n), current_en_mps)
+        twa_rad = difference_rad(from_rad, now.heading_rad)     # positive: wind over starboard
+        return twa_rad, self._speed(twa_rad, tws_mps)
+
     # ------------------------------------------------------------------------------------------- read
     def view(self) -> WaterCurrent:
         """Return the current as it is known now; whether it is planned for is decided here, with its hysteresis."""
@@ -184,6 +212,16 @@ class CurrentEstimator:
         self._is_significant = found.is_worth_planning(was=self._is_significant)
         return replace(found, is_significant=self._is_significant)
 
+    def doubt(self) -> Doubt | None:
+        """Return what is believed and how well, None before the first update; after ``view``, whose decision it has."""
+        expected = self._expected
+        if expected is None:
+            return None
+        believed = expected.east_mps + self._x[0], expected.north_mps + self._x[1], *self._x[2:]
+        return Doubt(
+            believed=tuple(map(float, believed)), covariance=tuple(tuple(map(float, row)) for row in self._p),
+            is_planned=self._is_significant)
+
     @property
     def scale(self) -> float:
         """How fast she is against her polar, as a share: 1 as it says."""
@@ -195,6 +233,11 @@ class CurrentEstimator:
             return 0.0
         recent = [math.radians(20.0) * n for n, t_s in self._seen.items() if self._t_s - t_s < TAU_S]
         return max((abs(difference_rad(a, b)) for a in recent for b in recent), default=0.0)
+
+
+def _limit(expected: Expected) -> Matrix:
+    """Return the variances of what is not known before anything is told."""
+    return np.array([expected.sigma_mps**2] * 2 + [SCALE_SD**2] + [ANGLE_SD_RAD**2] * 2 + [VANE_SD_RAD**2])
 
 
 def plain(current: WaterCurrent) -> dict[str, float | str | bool]:

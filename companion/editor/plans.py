@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ class Previews:
             return {"error": "a plan begins somewhere: put the start on the chart", "legs": []}
         async with self._turn:
             by = planner_of(mission).about(mission.frame().origin)
-            words, walk = leg_names(mission), legs(mission, wind)
+            words, walk = leg_names(mission), legs(mission, wind, unix_s=time.time())
             made: list[dict[str, Any]] = []
             error = ""
             try:

@@ -7,7 +7,8 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from companion.compose import RECENTRE_M, boat_of, voyage_of
+from companion.compose import RECENTRE_M, boat_of, voyage_of, water_of
+from companion.current import STILL_WATER, WaterCurrent, over_water
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission
 from companion.planner import Plan, Problem
@@ -35,11 +36,19 @@ class Wind:
 
 def leg_problem(
     mission: Mission, here_en: tuple[float, float], heading_deg: float, goal_en: tuple[float, float], radius_m: float,
-    *, wind: Wind, title: str = "", local: LocalArea | None = None,
+    *, wind: Wind, title: str = "", local: LocalArea | None = None, current: WaterCurrent = STILL_WATER,
 ) -> Problem:
-    """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady."""
+    """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady.
+
+    Where ``current`` is planned for the wind, which is that over the ground, is carried over to the water.
+    """
     local = mission.water() if local is None else local
     boat, sails = boat_of(mission), mission.autopilot.frame == "sailboat"
+    water: dict[str, object] = {}
+    if current.is_significant:
+        from_rad, speed_mps = over_water(math.radians(wind.from_deg), wind.speed_mps, current.en_mps)
+        wind = replace(wind, from_deg=math.degrees(from_rad), speed_mps=speed_mps)
+        water["current"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
     return Problem.from_json({
         "id": mission.name, "title": title,
         "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
@@ -49,8 +58,19 @@ def leg_problem(
         "wind": {"from_deg": wind.from_deg, "speed_mps": wind.speed_mps, "sigma": wind.sigma(),
                  **({"strength": strength_dict(assumed(wind.speed_mps))} if sails else {})},
         "boat": {**boat.problem_boat(wind.speed_mps), **({"speeds": boat.problem_speeds()} if sails else {})},
-        "delta_s": mission.risk.delta_s,
+        "delta_s": mission.risk.delta_s, **water,
     })
+
+
+def expected_current(mission: Mission, unix_s: float | None) -> WaterCurrent:
+    """Return the current that a plan reckons with which is made as the voyage begins, by the mission alone.
+
+    ``unix_s``: when; without it a tide table tells nothing. Raises InputError as ``water_of``.
+    """
+    expected = water_of(mission).at(unix_s)
+    found = WaterCurrent(east_mps=expected.east_mps, north_mps=expected.north_mps, var_ee=expected.sigma_mps**2,
+                         var_nn=expected.sigma_mps**2)
+    return replace(found, is_significant=found.is_worth_planning(was=True))
 
 
 def leg_names(mission: Mission) -> list[str]:
@@ -59,11 +79,14 @@ def leg_names(mission: Mission) -> list[str]:
     return [*words, "home"] if mission.skipper.end == "home" else words
 
 
-def legs(mission: Mission, wind: Wind, *, goes_home: bool = True) -> Generator[Problem, Plan, None]:
+def legs(
+    mission: Mission, wind: Wind, *, goes_home: bool = True, unix_s: float | None = None,
+) -> Generator[Problem, Plan, None]:
     """Yield the problem of each leg of one lap, and be sent its plan; end with the first that has no path.
 
     ``goes_home``: the leg home belongs to it, where the mission ends there. Home is taken to be the
-    start: the autopilot's is where it was armed. Without a start there is no leg.
+    start: the autopilot's is where it was armed. Without a start there is no leg. ``unix_s``: when the voyage begins,
+    for the row of a tide table that each leg begins in; without it tables are left out.
 
     Raises:
         ValueError: no water is left inside the fence at the margin.
@@ -79,9 +102,10 @@ def legs(mission: Mission, wind: Wind, *, goes_home: bool = True) -> Generator[P
     for point, radius_m, title in targets:
         blows = replace(wind, from_deg=wind.from_deg + _north_deg(frame, here)) if mission.is_passage else wind
         answer = yield leg_problem(mission, here, heading_deg, frame.en_from_geo(point), radius_m, wind=blows,
-                                   title=title, local=local)
+                                   title=title, local=local, current=expected_current(mission, unix_s))
         if not answer.has_path:
             return
+        unix_s = None if unix_s is None else unix_s + answer.cost_s
         here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
         heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
 

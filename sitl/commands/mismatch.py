@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import Any
 
+from companion.errors import InputError
 from companion.program.arguments import out_file, out_folder, whole
 from sitl.means import add_options, means_of
 
@@ -25,8 +26,11 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
     parser.add_argument("--planned", action="store_true",
                         help="no beat is left to the autopilot: every board is planned, and its risk promised")
-    parser.add_argument("--as-planned", action="store_true",
-                        help="the control: the same waters and winds, and nothing that the plan does not know of")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--as-planned", action="store_true",
+                       help="the control: the same waters and winds, and nothing that the plan does not know of")
+    which.add_argument("--only", action="append", metavar="KIND",
+                       help="every voyage has this, and nothing else; may be repeated (a wrong name lists them)")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="sail only the first seed and keep its voyage folder")
@@ -36,14 +40,19 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from sitl.campaigns.mismatch.draw import KINDS
     from sitl.campaigns.mismatch.voyages import Job, run_mismatch, sail_one
     from sitl.run.compiled import compile_ahead
 
     compile_ahead()
+    only = () if args.as_planned else None if args.only is None else tuple(args.only)
+    alien = next((kind for kind in only or () if kind not in KINDS), None)
+    if alien is not None:
+        raise InputError("--only", alien, "is not drawn", f"name one of: {', '.join(KINDS)}")
     if args.keep is not None:
-        record = sail_one(Job(seed=args.first_seed, planned=args.planned, as_planned=args.as_planned, keep=args.keep))
+        record = sail_one(Job(seed=args.first_seed, planned=args.planned, only=only, keep=args.keep))
         for key, value in record.items():
             print(f"{key}: {json.dumps(value)}")
         return 0 if record["passed"] else 1
     return run_mismatch(runs=args.runs, first_seed=args.first_seed, means=means_of(args), planned=args.planned,
-                        as_planned=args.as_planned, json_path=args.json)
+                        only=only, json_path=args.json)

@@ -1,7 +1,8 @@
-"""The estimate of the current against a boat whose water, polar, leeway and compass are known."""
+"""The estimate of the current against a boat whose water, polar, leeway, compass and vane are known."""
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -14,7 +15,19 @@ POLAR = ardurover_sitl()
 TWD, TWS = 0.0, 5.0
 
 
-def reading(t_s, heading_deg, current, *, scale=1.0, leeway_deg=0.0, noise=0.0, rng=None, is_driven=True):
+def turned_vane(now, by_rad):
+    """Return the moment as a boat has it whose vane is turned clockwise: the wind that she feels, turned."""
+    east, north = now.velocity_en_mps
+    felt_e = now.tws_mps * math.sin(now.twd_from_rad) + east
+    felt_n = now.tws_mps * math.cos(now.twd_from_rad) + north
+    from_e = math.cos(by_rad) * felt_e + math.sin(by_rad) * felt_n - east
+    from_n = math.cos(by_rad) * felt_n - math.sin(by_rad) * felt_e - north
+    return replace(now, twd_from_rad=math.atan2(from_e, from_n), tws_mps=math.hypot(from_e, from_n))
+
+
+def reading(
+    t_s, heading_deg, current, *, scale=1.0, leeway_deg=0.0, vane_deg=0.0, noise=0.0, rng=None, is_driven=True,
+):
     """Return what a boat of this polar tells on a heading."""
     heading = math.radians(heading_deg)
     from_rad, tws = over_water(TWD, TWS, current)
@@ -22,10 +35,11 @@ def reading(t_s, heading_deg, current, *, scale=1.0, leeway_deg=0.0, noise=0.0, 
     v = scale * POLAR.speed_mps(twa, tws)
     course = heading - math.copysign(math.radians(leeway_deg), twa)
     jolt = (rng.gauss(0.0, noise), rng.gauss(0.0, noise)) if rng else (0.0, 0.0)
-    return Sailing(
+    now = Sailing(
         t_s=t_s, velocity_en_mps=(v * math.sin(course) + current[0] + jolt[0],
                                   v * math.cos(course) + current[1] + jolt[1]),
-        heading_rad=heading, yaw_rate_radps=0.0, twd_from_rad=TWD, tws_mps=TWS, is_driven=is_driven)
+        heading_rad=heading, twd_from_rad=TWD, tws_mps=TWS, is_driven=is_driven)
+    return turned_vane(now, math.radians(vane_deg)) if vane_deg else now
 
 
 def sailed(headings_deg, current, *, leg_s=100.0, prior=STILL, **boat):
@@ -93,9 +107,23 @@ def test_turns_stops_and_sails_that_are_eased_teach_nothing():
     aground = reading(0.0, 60.0, (0.0, 0.0))
     for t in range(240, 400):
         estimator.update(float(t), None, Sailing(
-            t_s=float(t), velocity_en_mps=(0.01, 0.0), heading_rad=aground.heading_rad, yaw_rate_radps=0.0,
+            t_s=float(t), velocity_en_mps=(0.01, 0.0), heading_rad=aground.heading_rad,
             twd_from_rad=TWD, tws_mps=TWS, is_driven=True))
     assert estimator.view().samples_s == 0.0, "a boat that stands is not carried by its own speed backwards"
+
+
+@pytest.mark.parametrize("period_s", [2.0, 3.5, 5.0])
+def test_a_bow_that_the_waves_swing_tells_of_it_too(period_s):
+    """8 degrees to either side every few seconds: 10 to 25 degrees a second, faster than she tacks."""
+    current, estimator, t_s = (0.3, -0.2), CurrentEstimator(POLAR.speed_mps), 0.0
+    for heading_deg in (55.0, -55.0, 100.0):
+        for _ in range(100):
+            t_s += 1.0
+            swing = math.radians(8.0) * math.sin(2.0 * math.pi * t_s / period_s + 0.7)
+            now = reading(t_s, heading_deg, current)
+            estimator.update(t_s, None, replace(now, heading_rad=now.heading_rad + swing))
+    assert estimator.view().samples_s > 150.0
+    assert math.dist(estimator.view().en_mps, current) < 0.1
 
 
 def test_a_current_that_turns_is_followed():
@@ -126,7 +154,7 @@ def test_what_the_mission_expects_is_believed_until_the_track_tells_otherwise():
     estimator.update(0.0, None, None)
     assert estimator.view().en_mps == pytest.approx((0.5, 0.0))
     assert estimator.view().is_significant
-    wrong = sailed((55.0, -55.0, 100.0), (0.0, 0.0), leg_s=300.0, prior=prior).view()
+    wrong = sailed((55.0, -55.0, 100.0, -100.0), (0.0, 0.0), leg_s=300.0, prior=prior).view()
     assert wrong.drift_mps < 0.15
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,7 +53,7 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
 
     by = planner_of(mission).about(mission.frame().origin)
     return walked(
-        legs(mission, Wind(from_deg=math.degrees(twd_from_rad), speed_mps=tws_mps)),
+        legs(mission, Wind(from_deg=math.degrees(twd_from_rad), speed_mps=tws_mps), unix_s=time.time()),
         lambda problem: plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0, algorithm=by.algorithm,
                              settings=by.settings))
 

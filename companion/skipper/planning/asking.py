@@ -59,6 +59,7 @@ def request(
             beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk, current=current,
             tack_fails=turn.state.tacking.chance(turn.voyage.boat.tack_fails),
             is_wind_known=turn.snapshot.wind.health is not WindHealth.UNTRUSTED,
+            doubt=turn.snapshot.doubt if turn.config.sails else None,
             zone_half_rad=turn.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
             tracking=problem_tracking(
                 turn, start, from_index, floor_m=min(turn.config.margin_floor_m, turn.config.margin_m),

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from companion.current import STILL_WATER, WaterCurrent, forecast_over_water
+from companion.current import STILL_WATER, Doubt, WaterCurrent, forecast_over_water
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.messages import WindForecast
 from companion.planner.problem.json_write import strength_dict
@@ -208,8 +208,8 @@ def problem_dict(
     margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
     extra_obstacles: Sequence[str] = (), title: str = "", beat: dict[str, Any] | None = None,
     max_path_risk: float | None = None, tracking: dict[str, Any] | None = None,
-    current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0, tack_fails: float = 0.0,
-    is_wind_known: bool = True,
+    current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0, doubt: Doubt | None = None,
+    tack_fails: float = 0.0, is_wind_known: bool = True,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
 
@@ -234,6 +234,11 @@ def problem_dict(
         fence = shapely.to_wkt(min(pieces, key=lambda p: (float(p.distance(here)), -p.area)), rounding_precision=4)
     speed = float(np.max(forecast.mean_tws_mps))
     length_s = 1.5 * distance_m(start.en_m, aim.en_m) / max(0.3, voyage.boat.polar.max_speed_mps(speed))
+    half_rad = max(no_go_half_rad, voyage.boat.no_go_half_rad)
+    if doubt is not None:
+        forecast = doubt.widened(
+            forecast, beat_rad=half_rad, speed_mps=voyage.boat.polar.speed_mps(half_rad, speed),
+            leeway_rad=voyage.boat.made_good_rad(half_rad, speed) - half_rad)
     wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s, is_known=is_wind_known)
     water: dict[str, Any] = {}
     if current.is_significant:
@@ -244,8 +249,7 @@ def problem_dict(
     boat = dict(voyage.boat.problem_boat(wind["speed_mps"]))
     boat["speeds"] = voyage.boat.problem_speeds()
     boat["tack_fails"] = tack_fails
-    boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(
-        max(no_go_half_rad, voyage.boat.no_go_half_rad), wind["speed_mps"]))
+    boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(half_rad, wind["speed_mps"]))
     return {
         "id": voyage.name,
         "title": title,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from companion.boat import AutopilotLimits
-from companion.current import STILL_WATER, WaterCurrent
+from companion.current import STILL_WATER, Doubt, WaterCurrent
 from companion.mavlink.trust import Identity
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
 from companion.orders import Order
@@ -156,6 +156,7 @@ class Snapshot:
     heartbeat_age_s: float | None = None
     wind: WindView = WindView()
     current: WaterCurrent = STILL_WATER
+    doubt: Doubt | None = None
     mission: MissionOnBoard = MissionOnBoard()
     identity: Identity = field(default_factory=Identity)   # as far as the autopilot has told it
     neighbours: tuple[str, ...] = ()       # other autopilots on a link on which ours was not named, in words

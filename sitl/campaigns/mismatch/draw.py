@@ -38,6 +38,8 @@ Spec = TypeVar("Spec", HullSpec, SensorsSpec)
 LIMIT_S = 1500.0
 MAX_SILENCE_S = 10.0
 EVEN = 0.5              # of the voyages that have a kind of mismatch
+KINDS = ("gusts", "wind over the water", "current", "waves", "polar", "leeway", "tacks fail", "vane", "compass",
+         "position")
 MOON_S = 44_712.0
 
 
@@ -66,10 +68,11 @@ def _differing(spec: msgspec.Struct) -> dict[str, Any]:
     return {key: value for key, value in msgspec.to_builtins(spec).items() if value != plain[key]}
 
 
-def draw(seed: int, *, as_planned: bool = False) -> Drawn:
+def draw(seed: int, *, only: tuple[str, ...] | None = None) -> Drawn:
     """Return what a seed is; waters take turns, so that seeds in a row are sailed on all of them.
 
-    ``as_planned``: the control. The same water and mean wind, and nothing that the plan does not know of.
+    ``only`` are kinds that every voyage has, and no others; empty, the control. The water and the mean wind of a seed
+    are the same whatever it has.
     """
     from sitl.run.embedded import mission_of
 
@@ -80,7 +83,8 @@ def draw(seed: int, *, as_planned: bool = False) -> Drawn:
     kinds: list[str] = []
 
     def has(kind: str) -> bool:
-        if rng.random() < EVEN and not as_planned:
+        is_even = rng.random() < EVEN
+        if is_even if only is None else kind in only:
             kinds.append(kind)
             return True
         return False

@@ -1,7 +1,9 @@
 """What was promised and what came of it: the wind on each leg, the floor, the time of arrival.
 
 A leg's promise is the probability that the true wind puts its heading into the no-go zone, from the spread and the
-angle that it was planned with; what came of it is looked at once, half way along the leg.
+angle that it was planned with; what came of it is looked at once, half way along the leg. Both are of the bow through
+the water and of the wind over it: what the sails feel. Where there is a current or leeway the bow is the one that
+keeps her on the leg in them.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from companion.current import over_water
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import Mode
@@ -23,15 +26,16 @@ _SAME_M = 0.5
 # What a plan says of its arrival, and the probability of being there by then.
 QUANTILES = {"p10_s": 0.1, "p50_s": 0.5, "p90_s": 0.9}
 _SHORT_M = 10.0       # a leg that is shorter is the middle of a turn
+_SLOW_MPS = 0.3       # slower than this she goes nowhere that could be kept to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sailed:
-    """A leg as it was sailed: when its middle was passed, its end, its course, the true wind there."""
+    """A leg as it was sailed: when its middle was passed, its end, the bow that keeps to it, the wind over water."""
 
     t_s: float
     end_en_m: tuple[float, float]
-    course_rad: float
+    bow_rad: float
     twd_from_rad: float
 
 
@@ -58,12 +62,33 @@ class Legs:
         if along_m < 0.5 * length_m:
             return
         self._last = begin, end
+        current = autopilot.core.vehicle.current_en_mps
+        through = truth.velocity_en_mps[0] - current[0], truth.velocity_en_mps[1] - current[1]
         self.sailed.append(Sailed(
             t_s=t_s, end_en_m=self.frame.en_from_geo(autopilot.core.chart.point(end)),
-            course_rad=math.atan2(end[0] - begin[0], end[1] - begin[1]), twd_from_rad=truth.twd_from_rad))
+            bow_rad=bow_rad(math.atan2(end[0] - begin[0], end[1] - begin[1]), current, through, truth.heading_rad),
+            twd_from_rad=over_water(truth.twd_from_rad, truth.tws_mps, current)[0]))
 
     def life(self, start_s: float, end_s: float) -> None:
         """Take one life of the companion: none is taken from her here."""
+
+
+def bow_rad(
+    course_rad: float, current_en_mps: tuple[float, float], through_en_mps: tuple[float, float], heading_rad: float,
+) -> float:
+    """Return the heading that makes a course over the ground good.
+
+    ``through_en_mps`` is how she goes through the water while her bow is at ``heading_rad``: her speed, her leeway.
+
+    >>> round(math.degrees(bow_rad(0.0, (1.0, 0.0), (0.0, 2.0), 0.0)))     # set to the east, she holds up to the west
+    -30
+    """
+    speed_mps = math.hypot(*through_en_mps)
+    if speed_mps < _SLOW_MPS:
+        return course_rad
+    abeam_mps = current_en_mps[0] * math.cos(course_rad) - current_en_mps[1] * math.sin(course_rad)
+    slip_rad = wrap_pi(math.atan2(*through_en_mps) - heading_rad)
+    return wrap_pi(course_rad - math.asin(max(-1.0, min(1.0, abeam_mps / speed_mps))) - slip_rad)
 
 
 def chance_of_no_go(twa_rad: float, sigma_rad: float, half_rad: float) -> float:
@@ -78,7 +103,11 @@ def chance_of_no_go(twa_rad: float, sigma_rad: float, half_rad: float) -> float:
 
 
 def legs_promised(folder: Path, sailed: list[Sailed], half_rad: float) -> list[dict[str, Any]]:
-    """Return of each sailed leg that a plan of the record holds: its promise, what came, whose its tacks were."""
+    """Return of each sailed leg that a plan of the record holds: its promise, what came, whose its tacks were.
+
+    ``off_deg`` is how far the wind's angle to her bow was from the planned one, positive to starboard; ``sigma_deg``
+    how far it was expected to be.
+    """
     plans = [(d["t_s"], d["plan"]["legs"]) for d in decisions(folder) if d["kind"] == "plan" and d.get("plan")]
     found = []
     for leg in sailed:
@@ -86,10 +115,11 @@ def legs_promised(folder: Path, sailed: list[Sailed], half_rad: float) -> list[d
                         if math.dist(p["to"], leg.end_en_m) <= _SAME_M), None)
         if planned is None:
             continue
+        twa_rad, sigma_rad = math.radians(planned["twa_deg"]), math.radians(planned["sigma_deg"])
+        came_rad = wrap_pi(leg.twd_from_rad - leg.bow_rad)
         found.append({
-            "promised": round(chance_of_no_go(
-                math.radians(planned["twa_deg"]), math.radians(planned["sigma_deg"]), half_rad), 5),
-            "came": abs(wrap_pi(leg.course_rad - leg.twd_from_rad)) < half_rad,
+            "promised": round(chance_of_no_go(twa_rad, sigma_rad, half_rad), 5), "came": abs(came_rad) < half_rad,
+            "sigma_deg": round(planned["sigma_deg"], 2), "off_deg": round(math.degrees(wrap_pi(came_rad - twa_rad)), 2),
             "is_beat": bool(planned.get("is_beat"))})
     return found
 

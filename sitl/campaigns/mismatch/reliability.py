@@ -1,8 +1,9 @@
 """Reliability: what was promised with a probability, and how often it came, over the voyages of a campaign.
 
-Of each leg that a plan sails itself: the chance that the true wind puts its heading into the no-go zone. Of each
-voyage: whether it came below the margin's floor, by how much was not the plan's; its time as a share of what the first
-plan promised; and whether it was later than each quantile of that plan's arrival.
+Of each leg that a plan sails itself: the chance that the true wind puts its heading into the no-go zone, and whether
+the wind's angle to her bow was in the central intervals of its spread. Of each voyage: whether it came below the
+margin's floor, by how much was not the plan's; its time as a share of what the first plan promised; and whether it was
+later than each quantile of that plan's arrival.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ import itertools
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any
 
 from sitl.campaigns.mismatch.promises import QUANTILES
 from sitl.campaigns.mismatch.table import share_interval
 
 EDGES = (0.0, 0.001, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)     # of what is promised; the last of a bin belongs to it
+LEVELS = (0.5, 0.8, 0.9, 0.95)                           # of central intervals
 KINDS = ((0, 0), (1, 3), (4, 5), (6, 7), (8, 10))        # how much is not the plan's: from, to
 
 
@@ -48,7 +51,7 @@ class Bin:
 
 def no_go_curve(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
     """Return how often legs were in the no-go zone half way, by what was promised; empty bins are left out."""
-    legs = [leg for r in records for leg in r.get("legs", ()) if not leg["is_beat"]]
+    legs = _own_legs(records)
     bins = []
     for n, (low, high) in enumerate(itertools.pairwise(EDGES)):
         mine = [leg for leg in legs if (low < leg["promised"] or n == 0) and leg["promised"] <= high]
@@ -56,6 +59,18 @@ def no_go_curve(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
             bins.append(Bin(promised=statistics.fmean(leg["promised"] for leg in mine), name=f"{low:g} to {high:g}",
                             came=sum(leg["came"] for leg in mine), of=len(mine)))
     return bins
+
+
+def coverage(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
+    """Return how often the wind's angle to her bow was in the central interval of each level, as of a normal."""
+    legs = _own_legs(records)
+    wide = [(level, NormalDist().inv_cdf(0.5 + 0.5 * level)) for level in LEVELS if legs]
+    return [Bin(promised=level, name=f"central {100.0 * level:g} %", of=len(legs),
+                came=sum(abs(leg["off_deg"]) <= z * leg["sigma_deg"] for leg in legs)) for level, z in wide]
+
+
+def _own_legs(records: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    return [leg for r in records for leg in r.get("legs", ()) if not leg["is_beat"]]
 
 
 def floor_curve(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
@@ -88,6 +103,7 @@ def told(records: Sequence[Mapping[str, Any]]) -> str:
     lines = [f"{len(records)} voyages"]
     for title, bins in (("in the no-go zone half way along a leg that the plan sails itself, by what was promised",
                          no_go_curve(records)),
+                        ("the wind's angle to her bow there, in the intervals of its spread", coverage(records)),
                         ("below the margin's floor, by how many things were not the plan's", floor_curve(records)),
                         ("later than the plan's quantiles of arrival", late_curve(records))):
         lines.append(title)
@@ -111,5 +127,6 @@ def to_dict(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         return [{"name": b.name, "promised": b.promised, "came": b.came, "of": b.of, "interval": list(b.interval)}
                 for b in bins]
 
-    return {"voyages": len(records), "no_go": plain(no_go_curve(records)), "floor": plain(floor_curve(records)),
-            "late": plain(late_curve(records)), "time_shares": time_shares(records)}
+    return {"voyages": len(records), "no_go": plain(no_go_curve(records)), "coverage": plain(coverage(records)),
+            "floor": plain(floor_curve(records)), "late": plain(late_curve(records)),
+            "time_shares": time_shares(records)}

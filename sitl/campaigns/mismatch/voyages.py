@@ -32,11 +32,11 @@ ONE_GOAL = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """One voyage; with ``planned`` no beat is left to the autopilot, ``as_planned`` is the control."""
+    """One voyage; with ``planned`` no beat is left to the autopilot; ``only`` as of ``draw``."""
 
     seed: int
     planned: bool = False
-    as_planned: bool = False
+    only: tuple[str, ...] | None = None
     keep: Path | None = None
 
 
@@ -47,12 +47,12 @@ def sail_one(job: Job) -> dict[str, Any]:
 
     if job.keep is not None and job.keep.is_dir() and any(job.keep.iterdir()):
         raise InputError("--keep", str(job.keep), "is not empty", "a voyage's folder is taken up where it was left")
-    drawn = draw(job.seed, as_planned=job.as_planned)
+    drawn = draw(job.seed, only=job.only)
     mission = mission_of(drawn.scenario, drawn.source)
     legs = Legs(mission.frame())
     record: dict[str, Any] = {
         "seed": job.seed, "scenario": drawn.scenario.name, "planned": job.planned,
-        "as_planned": job.as_planned, "kinds": list(drawn.kinds),
+        "as_planned": job.only == (), "kinds": list(drawn.kinds),
         "drawn": drawn.told(), "floor_m": mission.margin_floor_m}
     with tempfile.TemporaryDirectory(prefix="mismatch-") as scratch:
         folder = job.keep if job.keep is not None else Path(scratch) / "voyage"
@@ -82,15 +82,16 @@ def sail_one(job: Job) -> dict[str, Any]:
 def key_of(job: Job) -> Key:
     """Return what a voyage is known by."""
     drawn = draw(job.seed)
-    return {"scenario": drawn.scenario.name, "hash": file_hash(drawn.source), "planned": job.planned,
-            "as_planned": job.as_planned, "seed": job.seed}
+    only = "any" if job.only is None else ", ".join(job.only)
+    return {"scenario": drawn.scenario.name, "hash": file_hash(drawn.source), "planned": job.planned, "only": only,
+            "seed": job.seed}
 
 
 def run_mismatch(
-    *, runs: int, first_seed: int, means: Means, planned: bool, as_planned: bool, json_path: Path | None,
+    *, runs: int, first_seed: int, means: Means, planned: bool, only: tuple[str, ...] | None, json_path: Path | None,
 ) -> int:
     """Sail what has no result yet, print what failed and the table; return the exit code."""
-    jobs = [Job(seed=seed, planned=planned, as_planned=as_planned) for seed in range(first_seed, first_seed + runs)]
+    jobs = [Job(seed=seed, planned=planned, only=only) for seed in range(first_seed, first_seed + runs)]
 
     def tell(record: dict[str, Any]) -> None:
         if not record["passed"]:
@@ -103,7 +104,8 @@ def run_mismatch(
     table = figures_of(records)
     print(told(table))
     print(sailed.took)
-    how = "".join(f" {name}" for name, is_set in (("--planned", planned), ("--as-planned", as_planned)) if is_set)
+    how = " --planned" if planned else ""
+    how += " --as-planned" if only == () else "".join(f' --only "{kind}"' for kind in only or ())
     for record in records:
         if not record["passed"] or record.get("below_floor"):
             print(f"again: sitl mismatch --first-seed {record['seed']}{how} --keep DIR")

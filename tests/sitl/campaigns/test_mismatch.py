@@ -8,8 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sitl import cli
-from sitl.campaigns.mismatch.draw import LIMIT_S, WATERS, draw
-from sitl.campaigns.mismatch.promises import Sailed, arrival_promised, chance_of_no_go, legs_promised, promised_s
+from sitl.campaigns.mismatch.draw import KINDS, LIMIT_S, WATERS, draw
+from sitl.campaigns.mismatch.promises import (
+    Sailed,
+    arrival_promised,
+    bow_rad,
+    chance_of_no_go,
+    legs_promised,
+    promised_s,
+)
 from sitl.campaigns.mismatch.table import figures_of, share_interval, told
 from sitl.campaigns.mismatch.voyages import Job, key_of, sail_one
 from sitl.runner import Ledger
@@ -30,9 +37,7 @@ def test_a_seed_is_one_boat(drawn):
 
 def test_all_waters_take_turns_and_every_kind_comes(drawn):
     assert [d.source for d in drawn[:len(WATERS)]] == list(WATERS)
-    assert {kind for d in drawn for kind in d.kinds} == {
-        "gusts", "wind over the water", "current", "waves", "polar", "leeway", "tacks fail", "vane", "compass",
-        "position"}
+    assert {kind for d in drawn for kind in d.kinds} == set(KINDS)
 
 
 def test_what_is_drawn_is_what_its_name_says_and_within_what_was_asked_for(drawn):
@@ -55,10 +60,26 @@ def test_what_is_drawn_is_what_its_name_says_and_within_what_was_asked_for(drawn
 
 def test_the_control_is_the_same_water_and_wind_and_nothing_else(drawn):
     for seed, other in enumerate(drawn[:len(WATERS)]):
-        control = draw(seed, as_planned=True)
+        control = draw(seed, only=())
         assert (control.source, control.kinds) == (other.source, ())
         assert control.scenario.wind.tws_mps == other.scenario.wind.tws_mps
         assert [getattr(control.scenario, name) for name in ("current", "waves", "boat", "sensors")] == [None] * 4
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_kind_alone_is_in_every_voyage_of_the_same_water_and_wind(drawn, kind):
+    for seed, other in enumerate(drawn[:len(WATERS)]):
+        alone = draw(seed, only=(kind,))
+        assert (alone.source, alone.kinds) == (other.source, (kind,))
+        assert alone.scenario.wind.tws_mps == other.scenario.wind.tws_mps
+        assert alone.told() != draw(seed, only=()).told()
+
+
+def test_a_kind_that_is_not_drawn_is_refused_and_the_others_are_named(capsys):
+    assert cli.main(["mismatch", "--runs", "1", "--only", "fog"]) == 2
+    said = capsys.readouterr().err
+    assert "fog" in said
+    assert "tacks fail" in said
 
 
 def test_a_voyage_is_judged_kept_and_repeats(tmp_path, capsys):
@@ -136,15 +157,27 @@ def test_a_leg_is_held_against_the_newest_plan_that_has_it(tmp_path):
         return json.dumps({"t_s": t_s, "kind": "plan", "plan": {"cost_s": 90.0 + t_s, "legs": [leg]}}) + "\n"
 
     (tmp_path / "decisions.jsonl").write_text(plan(1.0, 60.0) + plan(50.0, 45.0) + '{"t_s": 60, "ki')
-    sailed = [Sailed(t_s=t, end_en_m=end, course_rad=math.pi / 2.0, twd_from_rad=twd) for t, end, twd in (
+    sailed = [Sailed(t_s=t, end_en_m=end, bow_rad=math.pi / 2.0, twd_from_rad=twd) for t, end, twd in (
         (20.0, (100.1, 0.0), 0.0), (70.0, (100.0, 0.1), 1.2), (80.0, (120.0, 0.0), 0.0))]
     found = legs_promised(tmp_path, sailed, math.radians(45.0))
     assert [leg["came"] for leg in found] == [False, True]
     assert found[0]["promised"] == pytest.approx(0.0668, abs=1e-3)   # 1.5 sigma off
     assert found[1]["promised"] == pytest.approx(0.5, abs=1e-3)
+    assert found[1]["off_deg"] == pytest.approx(math.degrees(1.2 - math.pi / 2.0) - 45.0, abs=0.01)
     assert promised_s(tmp_path) == 91.0
     assert promised_s(tmp_path / "none") is None
     assert arrival_promised(tmp_path) is None     # a record from before plans said so
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(1.0, 3.0), st.floats(-0.2, 0.2))
+def test_the_bow_that_keeps_to_a_leg_makes_its_course_good(course, east, north, speed, slip):
+    heading = 0.4
+    through = speed * math.sin(heading + slip), speed * math.cos(heading + slip)
+    bow = bow_rad(course, (east, north), through, heading)
+    made = speed * math.sin(bow + slip) + east, speed * math.cos(bow + slip) + north
+    across = made[0] * math.cos(course) - made[1] * math.sin(course)
+    stemmed = abs(east * math.cos(course) - north * math.sin(course)) < speed
+    assert not stemmed or abs(across) < 1e-6
 
 
 @given(st.integers(0, 500), st.integers(1, 500))

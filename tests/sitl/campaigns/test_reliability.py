@@ -6,7 +6,7 @@ import random
 import pytest
 
 from sitl import cli
-from sitl.campaigns.mismatch.reliability import floor_curve, late_curve, no_go_curve, time_shares, told
+from sitl.campaigns.mismatch.reliability import coverage, floor_curve, late_curve, no_go_curve, time_shares, told
 from sitl.runner import Ledger
 
 
@@ -23,8 +23,10 @@ def honest(count, factor=1.0):
         legs = []
         for _ in range(10):
             promised = rng.choice((0.01, 0.08, 0.3))
-            legs.append({"promised": promised, "came": rng.random() < factor * promised, "is_beat": False})
-        yield voyage(seed, [*legs, {"promised": 0.9, "came": False, "is_beat": True}])
+            legs.append({"promised": promised, "came": rng.random() < factor * promised, "is_beat": False,
+                         "sigma_deg": 10.0, "off_deg": rng.gauss(0.0, 10.0 * factor)})
+        beat = {"promised": 0.9, "came": False, "is_beat": True, "sigma_deg": 9.0, "off_deg": 90.0}
+        yield voyage(seed, [*legs, beat])
 
 
 def test_promises_that_are_kept_lie_in_the_intervals():
@@ -37,6 +39,14 @@ def test_promises_that_are_kept_lie_in_the_intervals():
 def test_promises_that_are_broken_do_not():
     bins = no_go_curve(list(honest(300, factor=2.0)))
     assert all(b.promised < b.interval[0] for b in bins)
+
+
+def test_a_spread_that_is_true_holds_its_share_and_one_that_is_half_of_it_does_not():
+    true, half = coverage(list(honest(300))), coverage(list(honest(300, factor=2.0)))
+    assert [b.promised for b in true] == [0.5, 0.8, 0.9, 0.95]
+    assert all(b.interval[0] <= b.promised <= b.interval[1] for b in true)
+    assert all(b.interval[1] < b.promised for b in half)
+    assert coverage([]) == []
 
 
 def test_the_floor_is_counted_by_how_much_differs():

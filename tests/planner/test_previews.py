@@ -1,0 +1,83 @@
+"""Previews: what the mission says of the current is in what the planner is asked, as it is on board."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from companion import cli
+from companion.boat import ardurover_sitl
+from companion.compose import water_of
+from companion.current import CurrentEstimator, over_water
+from companion.geofence import load_mission
+from companion.planner import Plan, plan
+from companion.sailable.previews import Wind, expected_current, legs, walked
+
+SOUTH = Path("missions/southern-tide.toml")
+WIND = Wind(from_deg=0.0, speed_mps=5.0)
+HIGH_S = 1_795_262_400.0      # 2026-11-21T12:00:00Z
+
+
+@pytest.fixture
+def mission_with(tmp_path):
+    def write(current, table=""):
+        text, end = SOUTH.read_text(encoding="utf-8"), "\n[operator]"
+        head, tail = text[:text.index("[current]")], text[text.index(end):]
+        (tmp_path / "m.toml").write_text(head + (f"[current]\n{current}\n" if current else "") + tail, encoding="utf-8")
+        (tmp_path / "southern-tide.wkt").write_text(SOUTH.with_suffix(".wkt").read_text(encoding="utf-8"))
+        (tmp_path / "tide.csv").write_text(table)
+        return load_mission(tmp_path / "m.toml")
+
+    return write
+
+
+def first_problem(mission, unix_s=None):
+    return next(legs(mission, WIND, unix_s=unix_s))
+
+
+def test_a_preview_reckons_with_the_current_and_the_wind_over_the_water(mission_with):
+    problem = first_problem(load_mission(SOUTH))
+    assert (problem.current.set_rad, problem.current.drift_mps) == pytest.approx((0.5 * math.pi, 0.4))
+    from_rad, tws = over_water(0.0, 5.0, (0.4, 0.0))
+    assert problem.wind.twd_from_rad == pytest.approx(from_rad)
+    assert problem.wind.tws_mps == pytest.approx(tws)
+    still = first_problem(mission_with(""))
+    assert still.current.drift_mps == 0.0
+    assert still.wind.twd_from_rad == 0.0
+
+
+@pytest.mark.parametrize(("current", "is_planned"), [
+    ("set_deg = 90.0\ndrift_mps = 0.4\nsigma_mps = 0.15", True),
+    ("set_deg = 90.0\ndrift_mps = 0.4\nsigma_mps = 0.3", False),      # it may as well be none
+    ("set_deg = 90.0\ndrift_mps = 0.04\nsigma_mps = 0.02", False),     # too weak to matter
+])
+def test_a_preview_and_the_boat_at_the_start_agree_on_what_is_planned_for(mission_with, current, is_planned):
+    mission = mission_with(current)
+    on_board = CurrentEstimator(ardurover_sitl().speed_mps, water_of(mission))
+    on_board.update(0.0, None, None)
+    assert on_board.view().is_significant == is_planned
+    assert expected_current(mission, None).is_significant == is_planned
+    assert (first_problem(mission).current.drift_mps > 0.0) == is_planned
+
+
+def test_each_leg_has_the_row_of_a_tide_table_that_it_begins_in(mission_with):
+    mission = mission_with('table = "tide.csv"\nsigma_mps = 0.1', (
+        "time, set_deg, drift_mps\n2026-11-21T12:00:00Z, 90, 0.6\n2026-11-21T13:00:00Z, 270, 0.6\n"))
+    assert first_problem(mission, HIGH_S).current.set_rad == pytest.approx(0.5 * math.pi)
+    assert first_problem(mission, HIGH_S + 3600.0).current.set_rad == pytest.approx(1.5 * math.pi)
+    assert first_problem(mission).current.drift_mps == 0.0, "no row without a time"
+    assert first_problem(mission, HIGH_S + 1e6).current.drift_mps == 0.0, "it has ended: not believed any more"
+
+
+def test_the_way_of_a_preview_is_another_in_a_stream_and_keeps_the_margin():
+    mission = load_mission(SOUTH)
+    found = walked(legs(mission, WIND), lambda problem: plan(problem, expansions=2000))
+    assert all(isinstance(p, Plan) and p.has_path for p in found)
+    first = found[0].legs[0]
+    course = math.atan2(first.to_en[0] - first.from_en[0], first.to_en[1] - first.from_en[1])
+    assert abs(math.remainder(first.heading_rad - course, 2.0 * math.pi)) > math.radians(1.0), "she heads up"
+
+
+def test_the_command_plans_in_it(capsys):
+    assert cli.main(["plan", str(SOUTH), "--expansions", "2000"]) == 0
+    assert "current: sets 090° 0.40 m/s; headings and angles are through the water" in capsys.readouterr().out
