@@ -14,6 +14,7 @@ import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from types import MappingProxyType
 from typing import Any, NoReturn
 
@@ -60,12 +61,28 @@ class Parser(argparse.ArgumentParser):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
-    """A command line: its name, what it is for, and the summary of each command in the package of them."""
+    """A command line: its name, what it is for, and the summary of each command in the package of them.
+
+    ``guests`` is a group of entry points (pyproject.toml): commands of packages that this one does not know. Such a
+    module has its summary in ``SUMMARY``.
+    """
 
     name: str
     description: str
     package: str
     commands: Mapping[str, str]
+    guests: str = ""
+
+    def modules(self) -> dict[str, str]:
+        """Return the module of every command, the guests' last."""
+        own = {name: f"{self.package}.{name}" for name in self.commands}
+        return {**own, **{point.name: point.value for point in entry_points(group=self.guests)}} if self.guests else own
+
+    def summary(self, name: str) -> str:
+        """Return what a command does."""
+        if name in self.commands:
+            return self.commands[name]
+        return str(importlib.import_module(self.modules()[name]).SUMMARY)
 
     def parser(self, command: str | None = None) -> Parser:
         """Return the parser; only ``command``'s own options are loaded, or all of them when it is None."""
@@ -76,11 +93,13 @@ class Program:
         )
         parser.add_argument("--version", action="version", version=f"{self.name} {__version__}")
         subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-        for name, summary in self.commands.items():
+        # entry points are looked for where one is asked for, or all are
+        known = {name: f"{self.package}.{name}" for name in self.commands} if command in self.commands else self.modules()
+        for name, module in known.items():
             if command is None or name == command:
-                importlib.import_module(f"{self.package}.{name}").add_parser(subparsers, summary)
+                importlib.import_module(module).add_parser(subparsers, self.summary(name))
             else:
-                subparsers.add_parser(name, help=summary, add_help=False)
+                subparsers.add_parser(name, help=self.summary(name), add_help=False)
         return parser
 
     def run(self, argv: Sequence[str] | None = None) -> int:
@@ -92,7 +111,7 @@ class Program:
         arguments = with_negative_values(sys.argv[1:] if argv is None else argv)
         command = next((a for a in arguments if not a.startswith("-")), None)
         try:
-            if command is not None and command not in self.commands:
+            if command is not None and command not in self.commands and command not in self.modules():
                 raise self._unknown(command)
             args = self.parser(command or "").parse_args(arguments)
         except InputError as error:
@@ -123,8 +142,9 @@ class Program:
     def _unknown(self, word: str) -> InputError:
         """Return what to raise for a command that there is not: it may be a verb of one, or a slip of the pen."""
         whole = [f"{name} {word}" for name, parser in self.parser().commands.items() if word in parser.commands]
-        meant = whole or difflib.get_close_matches(word, self.commands, n=1)
-        remedy = f"there are {', '.join(self.commands)}; '{self.name} --help' says more"
+        names = list(self.modules())
+        meant = whole or difflib.get_close_matches(word, names, n=1)
+        remedy = f"there are {', '.join(names)}; '{self.name} --help' says more"
         if meant:
             remedy = f"did you mean {' or '.join(f'`{self.name} {words}`' for words in meant)}?"
         return InputError(self.name, "", f"there is no command {word[:40]!r}", remedy)

@@ -76,26 +76,38 @@ def draw(seed: int, *, as_planned: bool = False) -> Drawn:
     rng = random.Random(f"mismatch {seed}")
     source = WATERS[seed % len(WATERS)]
     scenario = load_scenario(source)
-    mission = mission_of(scenario, source)
+    wind = msgspec.structs.replace(scenario.wind, tws_mps=_round(rng.uniform(3.5, 8.0)))
+    drawn, kinds = departing(rng, msgspec.structs.replace(scenario, wind=wind), mission_of(scenario, source),
+                             share=0.0 if as_planned else EVEN)
+    return Drawn(source=source, kinds=kinds, scenario=msgspec.structs.replace(
+        drawn, limit_s=LIMIT_S, expect=ExpectSpec(arrived=None, max_silence_s=MAX_SILENCE_S)))
+
+
+def departing(
+    rng: random.Random, scenario: Scenario, mission: Mission, *, share: float = EVEN,
+) -> tuple[Scenario, tuple[str, ...]]:
+    """Return a scenario with what its plan does not know of, each kind there with the chance ``share``, and the kinds.
+
+    What is drawn of boat, sea and sensors takes the place of what the scenario has; its wind is kept and departed from.
+    """
     kinds: list[str] = []
 
     def has(kind: str) -> bool:
-        if rng.random() < EVEN and not as_planned:
+        if rng.random() < share:
             kinds.append(kind)
             return True
         return False
 
-    wind = msgspec.structs.replace(scenario.wind, tws_mps=_round(rng.uniform(3.5, 8.0)))
+    wind = scenario.wind
     if has("gusts"):
         wind = msgspec.structs.replace(
             wind, gust_spread=_round(rng.uniform(0.1, 0.35)), gust_s=_round(rng.uniform(8.0, 40.0)))
     if has("wind over the water"):
         wind = _varied(rng, wind, mission)
     drawn = msgspec.structs.replace(
-        scenario, wind=wind, limit_s=LIMIT_S, expect=ExpectSpec(arrived=None, max_silence_s=MAX_SILENCE_S),
-        current=_current(rng) if has("current") else None, waves=_waves(rng) if has("waves") else None,
-        boat=_other(_boat(rng, has)), sensors=_other(_sensors(rng, has)))
-    return Drawn(source=source, scenario=drawn, kinds=tuple(kinds))
+        scenario, wind=wind, current=_current(rng) if has("current") else None,
+        waves=_waves(rng) if has("waves") else None, boat=_other(_boat(rng, has)), sensors=_other(_sensors(rng, has)))
+    return drawn, tuple(kinds)
 
 
 def _other(spec: Spec) -> Spec | None:
