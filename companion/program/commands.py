@@ -15,7 +15,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import Any, NoReturn
 
 from companion import __version__
@@ -73,16 +73,20 @@ class Program:
     commands: Mapping[str, str]
     guests: str = ""
 
-    def modules(self) -> dict[str, str]:
-        """Return the module of every command, the guests' last."""
-        own = {name: f"{self.package}.{name}" for name in self.commands}
-        return {**own, **{point.name: point.value for point in entry_points(group=self.guests)}} if self.guests else own
+    @property
+    def names(self) -> list[str]:
+        """The names of all commands, the guests' last."""
+        return [*self.commands, *(entry_points(group=self.guests).names if self.guests else ())]
+
+    def module(self, name: str) -> ModuleType:
+        """Return the module of a command."""
+        if name in self.commands:
+            return importlib.import_module(f"{self.package}.{name}")
+        return importlib.import_module(entry_points(group=self.guests)[name].value)
 
     def summary(self, name: str) -> str:
         """Return what a command does."""
-        if name in self.commands:
-            return self.commands[name]
-        return str(importlib.import_module(self.modules()[name]).SUMMARY)
+        return self.commands[name] if name in self.commands else str(self.module(name).SUMMARY)
 
     def parser(self, command: str | None = None) -> Parser:
         """Return the parser; only ``command``'s own options are loaded, or all of them when it is None."""
@@ -94,10 +98,9 @@ class Program:
         parser.add_argument("--version", action="version", version=f"{self.name} {__version__}")
         subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
         # entry points are looked for where one is asked for, or all are
-        known = {name: f"{self.package}.{name}" for name in self.commands} if command in self.commands else self.modules()
-        for name, module in known.items():
+        for name in self.commands if command in self.commands else self.names:
             if command is None or name == command:
-                importlib.import_module(module).add_parser(subparsers, self.summary(name))
+                self.module(name).add_parser(subparsers, self.summary(name))
             else:
                 subparsers.add_parser(name, help=self.summary(name), add_help=False)
         return parser
@@ -111,7 +114,7 @@ class Program:
         arguments = with_negative_values(sys.argv[1:] if argv is None else argv)
         command = next((a for a in arguments if not a.startswith("-")), None)
         try:
-            if command is not None and command not in self.commands and command not in self.modules():
+            if command is not None and command not in self.commands and command not in self.names:
                 raise self._unknown(command)
             args = self.parser(command or "").parse_args(arguments)
         except InputError as error:
@@ -142,9 +145,8 @@ class Program:
     def _unknown(self, word: str) -> InputError:
         """Return what to raise for a command that there is not: it may be a verb of one, or a slip of the pen."""
         whole = [f"{name} {word}" for name, parser in self.parser().commands.items() if word in parser.commands]
-        names = list(self.modules())
-        meant = whole or difflib.get_close_matches(word, names, n=1)
-        remedy = f"there are {', '.join(names)}; '{self.name} --help' says more"
+        meant = whole or difflib.get_close_matches(word, self.names, n=1)
+        remedy = f"there are {', '.join(self.names)}; '{self.name} --help' says more"
         if meant:
             remedy = f"did you mean {' or '.join(f'`{self.name} {words}`' for words in meant)}?"
         return InputError(self.name, "", f"there is no command {word[:40]!r}", remedy)

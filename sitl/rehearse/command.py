@@ -43,8 +43,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "watchdogs, the worst\nvoyages, where the trouble is, and what a change is worth by pairs of voyages.")
     parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="a mission with a [start], or a scenario")
     weather = parser.add_argument_group("what is sailed")
-    weather.add_argument("--wind", metavar="WIND", help="SPEED@FROM [m/s, degrees], a measured record or the table of a "
-                         "climate as CSV (default: the mission's preview wind)")
+    weather.add_argument("--wind", metavar="WIND", help="SPEED@FROM [m/s, degrees], a measured record or the table "
+                         "of a climate as CSV (default: the mission's preview wind)")
     weather.add_argument("--wind-error", type=_error, metavar="DEG,MPS", help="how far the mean wind that is given may "
                          "be off, standard deviations (default: 10,0.5; of a climate 0,0)")
     weather.add_argument("--depart", type=_time, metavar="TIME", help="when she sets sail, as 2026-11-24T08:00Z: for a "
@@ -59,7 +59,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     ends = parser.add_argument_group("when it ends, what is tried")
     ends.add_argument("--sure", type=number("percent", above=0.0, at_most=100.0), default=10.0, metavar="PERCENT",
                       help="end when the intervals of arriving and of the floor are no wider (default: 10)")
-    ends.add_argument("--runs", type=whole(at_least=1), default=1000, metavar="N", help="voyages at most (default: 1000)")
+    ends.add_argument("--runs", type=whole(at_least=1), default=1000, metavar="N",
+                      help="voyages at most (default: 1000)")
     ends.add_argument("--minutes", type=number("minutes", above=0.0), metavar="M", help="end after so many minutes")
     ends.add_argument("--try", action="append", dest="tries", default=[], metavar="NAME=VALUE",
                       help="what a change is worth: margin_m, delta_s, SAIL_XTRACK_MAX, or later=1h; may be given more "
@@ -76,8 +77,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from sitl.rehearse.change import change_of, usual
-    from sitl.rehearse.prepared import prepared
     from sitl.rehearse.outcome import RESULTS
+    from sitl.rehearse.prepared import prepared
     from sitl.rehearse.rehearsal import Limits, rehearse
     from sitl.run.compiled import compile_ahead
     from sitl.scene import load_scenario

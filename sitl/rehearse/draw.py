@@ -99,7 +99,8 @@ def _hull(spec: HullSpec, share: float, polar: float) -> HullSpec:
 def _sensors(spec: SensorsSpec, share: float) -> SensorsSpec:
     return msgspec.structs.replace(
         spec, vane_deg=share * spec.vane_deg, compass_deg=share * spec.compass_deg,
-        deviation_deg=share * spec.deviation_deg, gps_noise_m=share * spec.gps_noise_m, gps_lag_s=share * spec.gps_lag_s)
+        deviation_deg=share * spec.deviation_deg, gps_noise_m=share * spec.gps_noise_m,
+        gps_lag_s=share * spec.gps_lag_s)
 
 
 def _as_given(rng: random.Random, scenario: Scenario, mission: Mission, share: float) -> Scenario:

@@ -1,4 +1,4 @@
-"""What is known of a mission from the voyages so far: chances with their intervals, times, the worst, in words and JSON.
+"""What is known of a mission from the voyages so far: chances with their intervals, times, the worst; words and JSON.
 
 Only voyages whose seeds come without a gap from the first on are counted: quick ones are done before slow ones, and
 whoever stops at some moment with all that there is has seen too many quick ones. So the answer is the same by however

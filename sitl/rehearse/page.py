@@ -41,16 +41,17 @@ def page_of(made: Prepared, outcome: Outcome, folder: Path) -> bytes:
     """
     known = outcome.known
     name = html.escape(made.mission.name)
-    picture = base64.b64encode((folder / PICTURE).read_bytes()).decode()
+    picture = ""
+    if (folder / PICTURE).is_file():
+        data = base64.b64encode((folder / PICTURE).read_bytes()).decode()
+        picture = f"<img alt='Map of the voyages, chances, times, changes' src='data:image/png;base64,{data}'>"
     head = ("<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content='width=device-width'>"
             f"<title>{name}, rehearsed</title><link rel=icon href='data:,'><style>{STYLE}</style>")
     asked = (f"<h1>{name}, rehearsed</h1><p>{len(known.records)} voyages, {html.escape(outcome.ends)}. Wind: "
              f"{html.escape(made.doubts.wind.told)}. Doubt in boat, sea and sensors: {made.doubts.boat:g}; "
              f"{'with' if made.doubts.faults else 'without'} trouble. In brackets what is 95 % sure.</p>")
-    parts = [
-        head, asked, _chances(known),
-        f"<img alt='Map of the voyages, chances, times, changes' src='data:image/png;base64,{picture}'>",
-        _changes(outcome.changes), "<h2>The worst</h2><table>", *_worst(outcome, folder), "</table>"]
+    parts = [head, asked, _chances(known), picture, _changes(outcome.changes), "<h2>The worst</h2><table>",
+             *_worst(outcome, folder), "</table>"]
     return "\n".join(parts).encode()
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from companion.disk import Disk, reason
 from companion.errors import CompanionError
+from companion.program.extras import missing
 from companion.words import counted
 from sitl.means import Means
 from sitl.rehearse.change import Change
@@ -80,15 +81,15 @@ def rehearse(
         sys.stdout.write("\n" + "\n".join(told(follower.known)) + "\nended by hand: the same command goes on\n")
         raise
     code = sailed.exit_code(is_good=True)
-    found: list[Tried] = []
     count = min(pairs, len(follower.known.records))
-    for change in changes if count else ():
-        others = [replace(job, change=change) for job in jobs[:count]]
-        sys.stderr.write(f"{change.told}: the first {counted(count, 'seed')} again\n")
-        again = _sailed(others, means, None)
+    found: list[Tried] = []
+    if changes and count:
+        sys.stderr.write(f"{counted(len(changes), 'change')}, each for the first {counted(count, 'seed')}\n")
+        again = _sailed([replace(job, change=change) for change in changes for job in jobs[:count]], means, None)
         code |= again.exit_code(is_good=True)
-        if again.records:
-            found.append(tried(change, follower.known.records[:count], again.records))
+        for change in changes:
+            if mine := [record for record in again.records if record["change"] == change.told]:
+                found.append(tried(change, follower.known.records[:count], mine))
     outcome = Outcome(known=follower.known, ends=follower.ends or "not as sure as was asked for",
                       changes=tuple(found), folders=_worst(follower.known, jobs, folder))
     sys.stdout.write("\n".join(_words(outcome, sailed)) + "\n")
@@ -138,7 +139,8 @@ def _worst(known: Known, jobs: Sequence[Job], folder: Path) -> tuple[tuple[dict[
 def _words(outcome: Outcome, sailed: Sailed) -> list[str]:
     lines = [*told(outcome.known), f"{outcome.ends}; {sailed.took}"]
     if outcome.changes:
-        lines.append("what to change, by pairs of voyages with the same seed (95 % intervals of the difference):")
+        lines.append("what to change, by pairs of voyages with the same seed (the difference and its 95 % interval; of "
+                     "twenty such intervals one is wrong):")
         lines += [f"  {change.told()}" for change in outcome.changes]
     if outcome.folders:
         lines.append("the worst:")
@@ -149,18 +151,30 @@ def _words(outcome: Outcome, sailed: Sailed) -> list[str]:
 
 def _written(outcome: Outcome, made: Prepared, folder: Path, json_path: Path | None) -> int:
     """Write figures, picture and page; say what the disk does not take. Return the exit code."""
-    from sitl.rehearse.picture import save_rehearsal  # matplotlib may be missing: the answer is told all the same
-
     figures = json.dumps(outcome.to_dict(made), indent=1).encode() + b"\n"
     try:
         for path in {folder / FIGURES, json_path or folder / FIGURES}:
             Disk().replace(path, figures)
-        save_rehearsal(made, outcome, folder / PICTURE)
+        _draw(outcome, made, folder / PICTURE)
         Disk().replace(folder / PAGE, page_of(made, outcome, folder))
     except (OSError, CompanionError) as error:
         why = f"{error.filename}: {reason(error)}" if isinstance(error, OSError) else str(error)
         sys.stdout.write(f"not written: {why}; the voyages are safe in {folder / RESULTS}: make room, and the same "
                          "command goes on\n")
         return 1
-    sys.stdout.write(f"picture: {folder / PICTURE}; page: {folder / PAGE}\n")
+    sys.stdout.write(f"page: {folder / PAGE}\n")
     return 0
+
+
+def _draw(outcome: Outcome, made: Prepared, path: Path) -> None:
+    """Draw the picture where there is something to draw with."""
+    path.unlink(missing_ok=True)
+    try:
+        from sitl.rehearse.picture import save_rehearsal
+    except ModuleNotFoundError as error:
+        why = missing(error)
+        if why is None:
+            raise
+        sys.stdout.write(f"there is no picture: {why}\n")
+        return
+    save_rehearsal(made, outcome, path)

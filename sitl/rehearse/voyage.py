@@ -26,6 +26,7 @@ from sitl.scene import HullTrack
 
 CAMPAIGN = "rehearse"
 TRACK_M = 1.0      # by how much a kept track may be off the true one
+UNDER_WAY_S = 2.0  # what is said when she sets sail is of the mission and of no place
 FIGURES = ("arrived", "contacts", "time_s", "distance_m", "tacks", "gybes", "min_clearance_m", "silence_s", "replans",
            "promised_risk", "no_go_entries", "end_reason")
 
@@ -126,7 +127,7 @@ def sail_one(job: Job) -> dict[str, Any]:
         "alerts": dict(Counter(code for _, code, _ in announced)), "track": trace.track(),
         "nearest": trace.nearest(solid_of(mission.water()), boat_of(mission).hull) if is_low else None,
         "troubles": [[code, *(round(x, 1) for x in place)] for t_s, code, severity in announced
-                     if severity <= Severity.WARNING and (place := trace.at(t_s)) is not None]}
+                     if severity <= Severity.WARNING and (place := trace.at(t_s - UNDER_WAY_S)) is not None]}
 
 
 def key_of(job: Job) -> Key:
