@@ -124,6 +124,12 @@ def clock(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
+def reached(time: Quantile) -> str:
+    """Return in words when a share of the voyages is there."""
+    share = f"{100.0 * time.of_all:.0f} %"
+    return f"{share} are there within {clock(time.value)}" if math.isfinite(time.value) else f"fewer than {share} arrive"
+
+
 def told(known: Known) -> list[str]:
     """Return what is known, a line for each thing."""
     lines = [f"{counted(len(known.records), 'voyage')}; in brackets what is 95 % sure, at whichever voyage one stops"]
@@ -131,8 +137,7 @@ def told(known: Known) -> list[str]:
                          ("touches something", known.touches)):
         lines.append(f"  {words}: {share.came} of {share.of} ({percent(share)})")
     for time in known.times:
-        lines.append(f"  {100.0 * time.of_all:.0f} % are there within {clock(time.value)} "
-                     f"({clock(time.low)} to {clock(time.high)})")
+        lines.append(f"  {reached(time)} ({clock(time.low)} to {clock(time.high)})")
     for name, share in known.watchdogs.items():
         lines.append(f"  {name}: {share.came} of {share.of} ({percent(share)})")
     quiet = len(WATCHDOGS) - len(known.watchdogs)

@@ -15,7 +15,7 @@ from pathlib import Path
 from companion.commands.view import read_record
 from companion.disk import Disk
 from companion.page import export
-from sitl.rehearse.known import Known, clock, percent, why_bad
+from sitl.rehearse.known import Known, clock, percent, reached, why_bad
 from sitl.rehearse.outcome import PICTURE, Outcome
 from sitl.rehearse.pairs import TOLD, Tried, is_sure, scaled, told_of
 from sitl.rehearse.prepared import Prepared
@@ -59,8 +59,7 @@ def _chances(known: Known) -> str:
     rows = [_row(words, _cell(share)) for words, share in (
         ("arrives", known.arrives), ("comes below the margin's floor", known.low),
         ("touches something", known.touches))]
-    rows += [_row(f"{100 * time.of_all:.0f} % are there within",
-                  f"{clock(time.value)} <span class=quiet>({clock(time.low)} to {clock(time.high)})</span>")
+    rows += [_row(reached(time), f"<span class=quiet>({clock(time.low)} to {clock(time.high)})</span>")
              for time in known.times]
     rows += [_row(html.escape(watchdog), _cell(share)) for watchdog, share in known.watchdogs.items()]
     return f"<h2>What will happen</h2><table>{''.join(rows)}</table>"

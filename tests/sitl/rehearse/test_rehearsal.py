@@ -77,7 +77,7 @@ def test_watchdogs_are_counted_by_voyages_and_times_by_all():
                       record(2, arrived=False)])
     assert {name: share.came for name, share in known.watchdogs.items()} == {"in irons": 2}
     assert [q.value for q in known.times] == [200.0, 201.0, math.inf]
-    assert "90 % are there within never" in "\n".join(told(known))
+    assert "fewer than 90 % arrive (3:20 to never)" in "\n".join(told(known))
     assert known.to_dict()["time_s"][2]["value"] is None
     assert json.loads(json.dumps(known.to_dict(), allow_nan=False))["voyages"] == 3
     assert clock(59.6) == "1:00"
