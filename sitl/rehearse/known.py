@@ -127,7 +127,8 @@ def clock(seconds: float) -> str:
 def reached(time: Quantile) -> str:
     """Return in words when a share of the voyages is there."""
     share = f"{100.0 * time.of_all:.0f} %"
-    return f"{share} are there within {clock(time.value)}" if math.isfinite(time.value) else f"fewer than {share} arrive"
+    return f"{share} are there within {clock(time.value)}" if math.isfinite(time.value) else (
+        f"fewer than {share} arrive")
 
 
 def told(known: Known) -> list[str]:
