@@ -20,7 +20,11 @@ LATEST_S = 170.0        # for a fault to begin
 
 def draw(seed: int, base: Scenario) -> Scenario:
     """Return ``base`` with the weather and the faults of ``seed``; its limit grows with what takes long."""
-    rng = random.Random(f"faults {seed}")
+    return drawn_by(random.Random(f"faults {seed}"), base)
+
+
+def drawn_by(rng: random.Random, base: Scenario) -> Scenario:
+    """Return ``base`` with the weather and the faults that ``rng`` draws."""
     # moderate winds as often as all others together: in them the boat is where the faults are
     tws_mps = rng.choice((rng.uniform(3.5, 7.0), rng.uniform(2.0, 12.0)))
     wind = WindSpec(

@@ -6,10 +6,8 @@ import datetime as dt
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import msgspec
-import tomli_w
 
 from companion.compose import planner_of, water_of
 from companion.disk import Disk
@@ -20,7 +18,7 @@ from companion.sailable.previews import Wind, leg_names, legs, walked
 from sitl.rehearse.draw import Doubts
 from sitl.rehearse.wind import given_wind
 from sitl.run.embedded import EXPANSIONS, mission_of
-from sitl.scene import Scenario, WindSpec, load_scenario
+from sitl.scene import Scenario, WindSpec, load_scenario, scenario_text
 
 SCENARIO = "rehearsal.toml"
 SLOWER = 3.0        # a voyage may take this much longer than planned ...
@@ -74,7 +72,7 @@ def prepared(
             base, mission), limit_s=limit_s or round(max(SLOWER * voyage_s, AT_LEAST_S) + needs_more * BESIDE_S))
     folder.mkdir(parents=True, exist_ok=True)
     source = folder / SCENARIO
-    Disk().replace(source, tomli_w.dumps(_plain(scenario)).encode())
+    Disk().replace(source, scenario_text(scenario).encode())
     return Prepared(
         source=source, scenario=scenario, mission=mission, plans=tuple(plans), doubts=Doubts(
             wind=replace(given, spec=scenario.wind), boat=doubt, faults=faults, voyage_s=round(max(voyage_s, 60.0), 1)),
@@ -112,19 +110,3 @@ def _planned(mission: Mission, wind: Wind) -> list[Plan]:
                          f"no way leads there in {wind.speed_mps:g} m/s from {wind.from_deg:g}° ({plans[-1].reason})",
                          "'companion mission check --plot' draws it")
     return plans
-
-
-def _plain(struct: msgspec.Struct) -> dict[str, Any]:
-    """Return a table for TOML: what is not the default."""
-    out: dict[str, Any] = {}
-    for field in msgspec.structs.fields(struct):
-        value = getattr(struct, field.name)
-        if value is None or (field.default is not msgspec.NODEFAULT and value == field.default):
-            continue
-        if isinstance(value, msgspec.Struct):
-            out |= {field.name: table} if (table := _plain(value)) else {}
-        elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
-            out[field.name] = [_plain(inner) for inner in value]
-        elif value not in ({}, ()):
-            out[field.name] = value
-    return out

@@ -71,10 +71,13 @@ def draw(seed: int, *, as_planned: bool = False) -> Drawn:
 
     ``as_planned``: the control. The same water and mean wind, and nothing that the plan does not know of.
     """
+    return drawn_by(random.Random(f"mismatch {seed}"), WATERS[seed % len(WATERS)], as_planned=as_planned)
+
+
+def drawn_by(rng: random.Random, source: Path, *, as_planned: bool = False) -> Drawn:
+    """Return what is drawn by ``rng`` over the water of a scenario's file."""
     from sitl.run.embedded import mission_of
 
-    rng = random.Random(f"mismatch {seed}")
-    source = WATERS[seed % len(WATERS)]
     scenario = load_scenario(source)
     wind = msgspec.structs.replace(scenario.wind, tws_mps=_round(rng.uniform(3.5, 8.0)))
     drawn, kinds = departing(rng, msgspec.structs.replace(scenario, wind=wind), mission_of(scenario, source),
