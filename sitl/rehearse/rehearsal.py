@@ -114,7 +114,8 @@ def _part(jobs: Sequence[Job], changes: Sequence[Change], pairs: int, means: Mea
 def _worst(known: Known, jobs: Sequence[Job], folder: Path) -> tuple[tuple[dict[str, Any], Path | None], ...]:
     """Sail the worst voyages again and keep their folders; a seed repeats to the last bit."""
     found: list[tuple[dict[str, Any], Path | None]] = []
-    shutil.rmtree(folder / WORST, ignore_errors=True)
+    for before in (folder / WORST).glob("*-seed-*"):   # ours, and nothing else that may be there
+        shutil.rmtree(before) if before.is_dir() else before.unlink()
     for number, record in enumerate(known.worst(MOST_WORST), start=1):
         place = folder / WORST / f"{number}-seed-{record['seed']}"
         sys.stderr.write(f"\rthe worst again: {number} of {min(MOST_WORST, len(known.records))}   ")

@@ -6,6 +6,7 @@ import math
 import random
 import re
 import shutil
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import pytest
 from companion import cli
 from companion.disk import Disk
 from sitl import cli as sitl_cli
+from sitl.rehearse import rehearsal
 from sitl.rehearse.known import clock, known_of, told, why_bad
 from sitl.rehearse.picture import shares_of
 from sitl.rehearse.prepared import prepared
@@ -91,6 +93,16 @@ def test_the_map_counts_voyages_and_not_how_long_they_stayed():
     row = shares[int(0.5 * shares.shape[0])]
     assert (row[0], row[-1]) == (1.0, 0.5)
     assert shares_of([], (0.0, 0.0, 1.0, 1.0)).max() == 0.0
+
+
+def test_without_the_library_of_pictures_it_is_said_and_no_old_one_is_left(tmp_path, monkeypatch, capsys):
+    old = tmp_path / "rehearsal.png"
+    old.write_bytes(b"of another run")
+    monkeypatch.delitem(sys.modules, "sitl.rehearse.picture", raising=False)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    rehearsal._draw(None, None, old)
+    assert "there is no picture: matplotlib is not installed" in capsys.readouterr().out
+    assert not old.exists()
 
 
 # ---------------------------------------------------------------------------------------------- by the command
