@@ -14,14 +14,16 @@ import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from types import MappingProxyType, ModuleType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from companion import __version__
 from companion.disk import reason
 from companion.errors import CompanionError, InputError
 from companion.program.extras import missing
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoints
 
 INTERRUPTED = 130
 # No option of ours begins with a digit, so this is a value; of all that begins with a minus argparse knows a lone
@@ -76,13 +78,20 @@ class Program:
     @property
     def names(self) -> list[str]:
         """The names of all commands, the guests' last."""
-        return [*self.commands, *(entry_points(group=self.guests).names if self.guests else ())]
+        return [*self.commands, *(point.name for point in self._points())]
 
     def module(self, name: str) -> ModuleType:
         """Return the module of a command."""
         if name in self.commands:
             return importlib.import_module(f"{self.package}.{name}")
-        return importlib.import_module(entry_points(group=self.guests)[name].value)
+        return importlib.import_module(next(point.value for point in self._points() if point.name == name))
+
+    def _points(self) -> EntryPoints | tuple[()]:
+        if not self.guests:
+            return ()
+        from importlib.metadata import entry_points  # most commands have no need of it, and it takes its time
+
+        return entry_points(group=self.guests)
 
     def summary(self, name: str) -> str:
         """Return what a command does."""

@@ -65,9 +65,9 @@ class Known:
 
 
 def known_of(there: Sequence[Record | None]) -> Known:
-    """Return what is known from the results of seeds in their order, None where there is none yet."""
+    """Return what is known from the results of seeds in their order; None: none yet, empty: it was lost."""
     gap = next((n for n, record in enumerate(there) if record is None), len(there))
-    records = tuple(record for record in there[:gap] if record is not None)
+    records = tuple(record for record in there[:gap] if record)
     count = len(records)
 
     def share(what: str) -> Share:

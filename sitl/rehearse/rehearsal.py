@@ -40,12 +40,16 @@ class Limits:
 
 @dataclass(slots=True)
 class Follower:
-    """Follows the results as they come, seed by seed, until they are sure enough or the time is over."""
+    """Follows the results as they come, seed by seed, until they are sure enough or the time is over.
+
+    A job that was lost is told, and holds up nothing.
+    """
 
     limits: Limits
     count: int = 0
     ends: str = ""
     known: Known = field(default_factory=lambda: known_of(()))
+    _of: int = 0
     _arrived: int = 0
     _low: int = 0
     _began_s: float = field(default_factory=time.monotonic)
@@ -54,9 +58,10 @@ class Follower:
         """Return what is known so far, in words, and whether that is enough."""
         while not self.ends and self.count < len(there) and (record := there[self.count]) is not None:
             self.count += 1
+            self._of += bool(record)
             self._arrived += bool(record.get("arrived"))
             self._low += bool(record.get("below_floor"))
-            widths = (share_of(came, self.count).width for came in (self._arrived, self._low))
+            widths = (share_of(came, self._of).width for came in (self._arrived, self._low))
             if max(widths) <= self.limits.width:
                 self.ends = "sure enough"
         minutes = self.limits.minutes

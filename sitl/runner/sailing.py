@@ -23,8 +23,8 @@ from sitl.runner.table import table_of, write_table
 from sitl.runner.work import Done, NoRoomError, Task, UnfitError, perform
 
 JobT = TypeVar("JobT")
-# Sees what there is of each job, in their order (None: nothing yet), when a run begins and after each result. Returns
-# what is known so far, in words, and whether that is enough.
+# Sees what there is of each job, in their order (None: nothing yet, {}: lost), when a run begins and after each result.
+# Returns what is known so far, in words, and whether that is enough.
 Watch = Callable[[Sequence[dict[str, Any] | None]], tuple[str, bool]]
 TOLD = 10   # of the jobs that were lost
 
@@ -91,6 +91,7 @@ def sail(
                 raise JobError(f"{done}{kept}") from done
             if isinstance(done, Exception):
                 lost.append((names[n], str(done)))
+                there[n] = {}
                 progress.add(is_failed=True)
                 continue
             cpu_s += done.facts["cpu_s"]

@@ -60,6 +60,13 @@ def test_a_quick_voyage_after_a_gap_is_not_counted_yet():
     assert [r["seed"] for r in known.records] == [0]
 
 
+def test_a_voyage_that_was_lost_is_no_voyage_and_holds_up_nothing():
+    follower = Follower(Limits(width=0.1, runs=100))
+    assert not follower([{} if n == 3 else record(n) for n in range(53)])[1]
+    assert follower([{} if n == 3 else record(n) for n in range(54)])[1]
+    assert follower.known.arrives.of == 53
+
+
 def test_the_time_ends_it_too():
     follower = Follower(Limits(width=0.01, runs=9, minutes=1e-9))
     assert follower([record(0), None]) == (follower.known.line(), True)
