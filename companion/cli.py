@@ -29,6 +29,7 @@ PROGRAM = Program(
         "view": "a voyage in a browser, recorded or heard by radio",
         "report": "pictures and a summary of a voyage",
     },
+    guests="companion.commands",
 )
 
 

@@ -107,7 +107,7 @@ def main(folder: Path) -> None:
         parser = program.parser()
         pages.joinpath(f"{program.name}.1").write_text(page(parser, program.description.rstrip(".")))
         for name, inner in parser.commands.items():
-            pages.joinpath(f"{program.name}-{name}.1").write_text(page(inner, program.commands[name]))
+            pages.joinpath(f"{program.name}-{name}.1").write_text(page(inner, program.summary(name)))
             for within, parsed in inner.commands.items():
                 told = parsed.description or f"a command of {program.name} {name}"
                 pages.joinpath(f"{program.name}-{name}-{within}.1").write_text(

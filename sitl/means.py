@@ -44,9 +44,12 @@ class Means:
 
 
 def add_options(
-    parser: argparse.ArgumentParser, *, workers: int | None = None, out: Path | None = None,
+    parser: argparse.ArgumentParser, *, workers: int | None = None, out: Path | None = None, has_out: bool = True,
 ) -> None:
-    """Add the options that every campaign has; ``workers`` and ``out`` are what it does without them."""
+    """Add the options that every campaign has; ``workers`` and ``out`` are what it does without them.
+
+    ``has_out`` is False where the results have their place in a folder of the campaign's own.
+    """
     group = parser.add_argument_group("where it is sailed, and where results stay")
     group.add_argument("--workers", type=whole(at_least=1), default=workers, metavar="W",
                        help=f"voyages at a time (default: {workers or 'one per core'})")
@@ -55,18 +58,20 @@ def add_options(
                             "'local' one; needs the extra [cluster]")
     group.add_argument("--array", type=_part, default=(1, 1), metavar="I/N",
                        help="only part I of N, into a file of its own beside --out: join them by 'sitl results join'")
-    group.add_argument("--out", type=_results, default=out, metavar="FILE.jsonl",
-                       help="append each result as it comes; what it holds already is not sailed again"
-                            + (f" (default: {out})" if out else ""))
+    if has_out:
+        group.add_argument("--out", type=_results, default=out, metavar="FILE.jsonl",
+                           help="append each result as it comes; what it holds already is not sailed again"
+                                + (f" (default: {out})" if out else ""))
     group.add_argument("--table", type=_table, metavar="FILE.parquet",
                        help="write all results as a table, for 'sitl results'; needs the extra [results]")
 
 
-def means_of(args: argparse.Namespace) -> Means:
-    """Return what the options say."""
-    if args.array[1] > 1 and args.out is None:
+def means_of(args: argparse.Namespace, *, out: Path | None = None) -> Means:
+    """Return what the options say; ``out`` is where results stay of a campaign that has its own folder."""
+    out = out or args.out
+    if args.array[1] > 1 and out is None:
         raise InputError("--array", "", "says a part, and nothing says where to keep it", "add --out FILE.jsonl")
-    return Means(workers=args.workers, dask=args.dask, array=args.array, out=args.out, table=args.table)
+    return Means(workers=args.workers, dask=args.dask, array=args.array, out=out, table=args.table)
 
 
 def _address(text: str) -> str:

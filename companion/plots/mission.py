@@ -80,7 +80,7 @@ def save_mission(
     legs = [np.asarray(p.waypoints_en) for p in plans if p.has_path]
     places = [*([start] if start is not None else []), *goals]
     refuges = [(frame.en_from_geo(r.point), f"refuge {r.name}") for r in mission.refuges]
-    extent = _extent(local, [*places, *(place for place, _ in refuges), *corners_of(mission)], legs)
+    extent = extent_of(local, [*places, *(place for place, _ in refuges), *corners_of(mission)], legs)
     handles += _draw_laylines(axes, places, twd_from_rad, beat_rad, extent)
     for leg in legs:
         axes.plot(leg[:, 0], leg[:, 1], "-", color=PATH, lw=1.8, zorder=6, solid_joinstyle="round")
@@ -88,7 +88,7 @@ def save_mission(
     if legs:
         handles.append(Line2D([], [], color=PATH, lw=1.8, label="plan in this wind, held steady"))
     sweeps = sweeps_of(mission, local, start, twd_from_rad)
-    handles += [*_draw_marks(axes, mission, start, goals), *draw_sweeps(axes, sweeps)]
+    handles += [*draw_marks(axes, mission, start, goals), *draw_sweeps(axes, sweeps)]
     for place, name in refuges:
         axes.plot(*place, "P", color=GOAL, ms=8, mec="black", mew=0.6, zorder=8)
         axes.annotate(name, place, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
@@ -119,7 +119,7 @@ def save_area(
     places = [frame.en_from_geo(p) for p in ((start,) if start else ()) + goals]
     figure, axes = plt.subplots(figsize=(8.0, 8.6), layout="constrained")
     handles = draw_area(axes, local, margin_m)
-    extent = _extent(local, places, [])
+    extent = extent_of(local, places, [])
     if twd_from_rad is not None:
         handles += _draw_laylines(axes, places, twd_from_rad, no_go_half_rad, extent)
     for index, place in enumerate(places):
@@ -204,7 +204,7 @@ def _draw_laylines(
     ]
 
 
-def _draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En]) -> list[Handle]:
+def draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En]) -> list[Handle]:
     """Draw start and goals by their names; return the legend's handles."""
     handles: list[Handle] = []
     if start is not None:
@@ -266,7 +266,7 @@ def _finish(
         figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
 
 
-def _extent(
+def extent_of(
     local: LocalArea, places: list[En], paths: list[Points],
 ) -> tuple[float, float, float, float]:
     """Return a square that holds the places, the paths, and what land lies about them."""

@@ -14,13 +14,16 @@ import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any, NoReturn
+from types import MappingProxyType, ModuleType
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from companion import __version__
 from companion.disk import reason
 from companion.errors import CompanionError, InputError
 from companion.program.extras import missing
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoints
 
 INTERRUPTED = 130
 # No option of ours begins with a digit, so this is a value; of all that begins with a minus argparse knows a lone
@@ -60,12 +63,39 @@ class Parser(argparse.ArgumentParser):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
-    """A command line: its name, what it is for, and the summary of each command in the package of them."""
+    """A command line: its name, what it is for, and the summary of each command in the package of them.
+
+    ``guests`` is a group of entry points (pyproject.toml): commands of packages that this one does not know. Such a
+    module has its summary in ``SUMMARY``.
+    """
 
     name: str
     description: str
     package: str
     commands: Mapping[str, str]
+    guests: str = ""
+
+    @property
+    def names(self) -> list[str]:
+        """The names of all commands, the guests' last."""
+        return [*self.commands, *(point.name for point in self._points())]
+
+    def module(self, name: str) -> ModuleType:
+        """Return the module of a command."""
+        if name in self.commands:
+            return importlib.import_module(f"{self.package}.{name}")
+        return importlib.import_module(next(point.value for point in self._points() if point.name == name))
+
+    def _points(self) -> EntryPoints | tuple[()]:
+        if not self.guests:
+            return ()
+        from importlib.metadata import entry_points  # most commands have no need of it, and it takes its time
+
+        return entry_points(group=self.guests)
+
+    def summary(self, name: str) -> str:
+        """Return what a command does."""
+        return self.commands[name] if name in self.commands else str(self.module(name).SUMMARY)
 
     def parser(self, command: str | None = None) -> Parser:
         """Return the parser; only ``command``'s own options are loaded, or all of them when it is None."""
@@ -76,11 +106,12 @@ class Program:
         )
         parser.add_argument("--version", action="version", version=f"{self.name} {__version__}")
         subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-        for name, summary in self.commands.items():
+        # entry points are looked for where one is asked for, or all are
+        for name in self.commands if command in self.commands else self.names:
             if command is None or name == command:
-                importlib.import_module(f"{self.package}.{name}").add_parser(subparsers, summary)
+                self.module(name).add_parser(subparsers, self.summary(name))
             else:
-                subparsers.add_parser(name, help=summary, add_help=False)
+                subparsers.add_parser(name, help=self.summary(name), add_help=False)
         return parser
 
     def run(self, argv: Sequence[str] | None = None) -> int:
@@ -92,7 +123,7 @@ class Program:
         arguments = with_negative_values(sys.argv[1:] if argv is None else argv)
         command = next((a for a in arguments if not a.startswith("-")), None)
         try:
-            if command is not None and command not in self.commands:
+            if command is not None and command not in self.commands and command not in self.names:
                 raise self._unknown(command)
             args = self.parser(command or "").parse_args(arguments)
         except InputError as error:
@@ -123,8 +154,8 @@ class Program:
     def _unknown(self, word: str) -> InputError:
         """Return what to raise for a command that there is not: it may be a verb of one, or a slip of the pen."""
         whole = [f"{name} {word}" for name, parser in self.parser().commands.items() if word in parser.commands]
-        meant = whole or difflib.get_close_matches(word, self.commands, n=1)
-        remedy = f"there are {', '.join(self.commands)}; '{self.name} --help' says more"
+        meant = whole or difflib.get_close_matches(word, self.names, n=1)
+        remedy = f"there are {', '.join(self.names)}; '{self.name} --help' says more"
         if meant:
             remedy = f"did you mean {' or '.join(f'`{self.name} {words}`' for words in meant)}?"
         return InputError(self.name, "", f"there is no command {word[:40]!r}", remedy)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 
 import msgspec
 
 from sitl.campaigns.failsafe_lots import FAILSAFES, unattended
 from sitl.campaigns.fault_lots import LOTS, PLANNER, SINGLE, Lot, Maker
-from sitl.scene import EventSpec, ExpectSpec, Scenario, WindSpec
+from sitl.scene import ExpectSpec, Scenario, WindSpec
 
 _MAKERS, _WEIGHTS = zip(*LOTS, *SINGLE, *FAILSAFES, strict=True)
 _ONCE = frozenset(maker for maker, _ in (*SINGLE, *FAILSAFES))
@@ -19,7 +20,11 @@ LATEST_S = 170.0        # for a fault to begin
 
 def draw(seed: int, base: Scenario) -> Scenario:
     """Return ``base`` with the weather and the faults of ``seed``; its limit grows with what takes long."""
-    rng = random.Random(f"faults {seed}")
+    return drawn_by(random.Random(f"faults {seed}"), base)
+
+
+def drawn_by(rng: random.Random, base: Scenario) -> Scenario:
+    """Return ``base`` with the weather and the faults that ``rng`` draws."""
     # moderate winds as often as all others together: in them the boat is where the faults are
     tws_mps = rng.choice((rng.uniform(3.5, 7.0), rng.uniform(2.0, 12.0)))
     wind = WindSpec(
@@ -27,22 +32,34 @@ def draw(seed: int, base: Scenario) -> Scenario:
         sd_deg=round(rng.uniform(3.0, 10.0), 1), tau_s=28.0, tws_sd_mps=round(rng.uniform(0.1, 0.6), 2),
     )
     lots: list[Lot] = [unattended(rng)] if rng.random() < UNATTENDED else []
+    lots += drawn_lots(rng, LATEST_S)
+    limit_s = base.limit_s * max(1.0, MODERATE_MPS / tws_mps)
+    return befallen(
+        msgspec.structs.replace(base, wind=wind, is_service=True, has_ftp=rng.random() < 0.5, limit_s=limit_s,
+                                expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None)), lots)
+
+
+def drawn_lots(rng: random.Random, latest_s: float) -> list[Lot]:
+    """Return one to five lots of trouble, each of which begins by ``latest_s``."""
+    lots: list[Lot] = []
     drawn: set[Maker] = set()
     for _ in range(rng.choice((1, 1, 2, 2, 3, 4, 5))):
         maker = rng.choices(_MAKERS, weights=_WEIGHTS)[0]
         if maker in _ONCE & drawn:
             continue
         drawn.add(maker)
-        lots.append(maker(rng, round(rng.uniform(3.0, LATEST_S), 1)))
-    events: list[EventSpec] = [event for lot in lots for event in lot.events]
+        lots.append(maker(rng, round(rng.uniform(3.0, latest_s), 1)))
+    return lots
+
+
+def befallen(base: Scenario, lots: Sequence[Lot]) -> Scenario:
+    """Return a scenario in which the lots befall the boat; its limit grows with what takes long."""
+    events = [*base.events, *(event for lot in lots for event in lot.events)]
     changes = {key: value for lot in lots for key, value in lot.changes.items()}
     parameters = {key: value for lot in lots for key, value in lot.parameters.items()}
-    limit_s = base.limit_s * max(1.0, MODERATE_MPS / tws_mps) + sum(lot.longer_s for lot in lots)
     return msgspec.structs.replace(
-        base, wind=wind, events=tuple(sorted(events, key=lambda e: e.at_s)), parameters=parameters, is_service=True,
-        has_ftp=rng.random() < 0.5, limit_s=round(limit_s, 1),
-        expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None), **changes,
-    )
+        base, events=tuple(sorted(events, key=lambda e: e.at_s)), parameters={**base.parameters, **parameters},
+        limit_s=round(base.limit_s + sum(lot.longer_s for lot in lots), 1), **changes)
 
 
 def draw_planner(seed: int, base: Scenario) -> Scenario:

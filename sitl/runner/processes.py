@@ -6,8 +6,10 @@ was in flight is done again, one job at a time by one process; whoever dies then
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -22,6 +24,7 @@ JobT = TypeVar("JobT")
 ResultT = TypeVar("ResultT")
 # Processes that die one after the other before any has done a job will not do one.
 MOST_DEAD = 4
+ENDED_S = 5.0   # within which a process ends that was told to
 AHEAD = 2   # jobs in flight for each process: none waits for this one
 
 
@@ -47,8 +50,10 @@ def in_processes(work: Callable[[JobT], ResultT], jobs: Iterable[JobT], workers:
 
 def settled(
     work: Callable[[JobT], ResultT], jobs: Iterable[JobT], workers: int | None,
-) -> Iterator[tuple[int, ResultT | Exception]]:
+) -> Generator[tuple[int, ResultT | Exception], None, None]:
     """Yield the number of each job, from 0, with its result or what it raised, as they are done.
+
+    Whoever has seen enough closes it: processes under way are ended.
 
     Raises:
         JobError: processes die at once, whatever they are given.
@@ -63,14 +68,15 @@ def settled(
     while waiting or suspects:
         is_alone = bool(suspects)
         flight = _flight(work, suspects if is_alone else waiting, 1 if is_alone else count, is_alone=is_alone)
-        while True:
-            try:
-                number, result = next(flight)
-            except StopIteration as ended:
-                fallen: list[tuple[int, JobT]] = ended.value
-                break
-            has_result = True
-            yield number, result
+        with contextlib.closing(flight):
+            while True:
+                try:
+                    number, result = next(flight)
+                except StopIteration as ended:
+                    fallen: list[tuple[int, JobT]] = ended.value
+                    break
+                has_result = True
+                yield number, result
         if not is_alone:
             suspects.extend(fallen)
         elif fallen:
@@ -97,8 +103,10 @@ def _flight(
 ) -> Generator[tuple[int, ResultT | Exception], None, list[tuple[int, JobT]]]:
     """Yield what comes of a queue until it is empty or a process dies; return what was in flight then."""
     before = set(active_children())
+    # What a process that is ended or killed leaves in its scratch folder is cleared away here.
+    scratch = tempfile.TemporaryDirectory(prefix="sailing-", ignore_cleanup_errors=True)
     # spawn: workers must not inherit a loop, threads or the kernels' locks
-    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_begin)
+    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_begin, initargs=(scratch.name,))
     flying: dict[Future[ResultT], tuple[int, JobT]] = {}
     fallen: list[tuple[int, JobT]] = []
     is_over = False
@@ -126,13 +134,18 @@ def _flight(
     finally:
         pool.shutdown(wait=is_over, cancel_futures=True)
         if not is_over:   # broken off: nobody waits for voyages under way
-            for process in set(active_children()) - before:
+            ended = set(active_children()) - before
+            for process in ended:
                 process.terminate()
+            for process in ended:
+                process.join(ENDED_S)
+        scratch.cleanup()
     return fallen
 
 
-def _begin() -> None:
-    """Begin a worker: Ctrl-C is its parent's, and it does not outlive that."""
+def _begin(scratch: str) -> None:
+    """Begin a worker: Ctrl-C is its parent's, it does not outlive that, and what it leaves is in ``scratch``."""
+    tempfile.tempdir = scratch
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     if parent is not None:

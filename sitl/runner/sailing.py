@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
@@ -23,6 +23,9 @@ from sitl.runner.table import table_of, write_table
 from sitl.runner.work import Done, NoRoomError, Task, UnfitError, perform
 
 JobT = TypeVar("JobT")
+# Sees what there is of each job, in their order (None: nothing yet, {}: lost), when a run begins and after each result.
+# Returns what is known so far, in words, and whether that is enough.
+Watch = Callable[[Sequence[dict[str, Any] | None]], tuple[str, bool]]
 TOLD = 10   # of the jobs that were lost
 
 
@@ -58,11 +61,12 @@ def sail(
     campaign: str, work: Callable[[JobT], dict[str, Any]], jobs: Sequence[JobT], means: Means, *,
     key: Callable[[JobT], Key], on_record: Callable[[dict[str, Any]], None] | None = None,
     is_failed: Callable[[dict[str, Any]], bool] = lambda record: not record.get("passed", True),
+    watch: Watch | None = None,
 ) -> Sailed:
     """Have every job of this part done that has no result yet, and return all results.
 
     ``work`` is a function of a module and gives what JSON can hold; ``key`` says what a job is known by. ``on_record``
-    sees each new result as it comes.
+    sees each new result as it comes; ``watch`` may end the run when it has seen enough.
 
     Raises:
         InputError: the file of results is another campaign's or program's.
@@ -73,18 +77,21 @@ def sail(
         import_module("pyarrow")   # missed now, and not when all is sailed
     mine = means.part(jobs)
     names = [text_of(key(job)) for job in mine]
-    began_s, cpu_s, lost = time.monotonic(), 0.0, []
+    began_s, cpu_s, now, lost = time.monotonic(), 0.0, 0, []
     with contextlib.ExitStack() as stack:
         ledger = None if means.file is None else stack.enter_context(Ledger(means.file, campaign))
         held = Held(campaign=campaign, by=made_by()) if ledger is None else ledger.held
-        left = {n: job for n, (name, job) in enumerate(zip(names, mine, strict=True)) if name not in held.results}
+        there = [held.results.get(name) for name in names]
+        words, is_enough = watch(there) if watch is not None else ("", False)
+        left = {} if is_enough else {n: job for n, job in enumerate(mine) if there[n] is None}
         progress = _Progress(len(left))
-        for n, done in _settled(work, left, means, progress.line):
+        for n, done in stack.enter_context(contextlib.closing(_settled(work, left, means, progress.line))):
             if isinstance(done, UnfitError | NoRoomError):
                 kept = f"; {means.file} holds {len(held.results)} results" if means.file is not None else ""
                 raise JobError(f"{done}{kept}") from done
             if isinstance(done, Exception):
                 lost.append((names[n], str(done)))
+                there[n] = {}
                 progress.add(is_failed=True)
                 continue
             cpu_s += done.facts["cpu_s"]
@@ -93,29 +100,35 @@ def sail(
                 held.results[names[n]] = done.result
             else:
                 ledger.add(names[n], done.result, done.facts)
+            now, there[n] = now + 1, done.result
             if on_record is not None:
                 progress.clear()
                 on_record(done.result)
-            progress.add(is_failed=is_failed(done.result))
+            if watch is not None:
+                words, is_enough = watch(there)
+            progress.add(is_failed=is_failed(done.result), words=words)
+            if is_enough:
+                break
         progress.end()
     if means.table is not None:
         write_table(table_of(held), means.table)
     return Sailed(
         records=[held.results[name] for name in names if name in held.results], held=held, lost=lost,
-        now=len(left) - len(lost), wall_s=time.monotonic() - began_s, cpu_s=cpu_s)
+        now=now, wall_s=time.monotonic() - began_s, cpu_s=cpu_s)
 
 
 def _settled(
     work: Callable[[JobT], Any], jobs: Mapping[int, JobT], means: Means, say: Callable[[str], None],
-) -> Iterator[tuple[int, Done | Exception]]:
+) -> Generator[tuple[int, Done | Exception], None, None]:
     """Yield jobs' numbers and what came of them, by the means."""
     if not jobs:
         return
     if means.dask is None:
         numbers = list(jobs)
         tasks = [Task(work=work, job=job) for job in jobs.values()]
-        for n, done in settled(perform, tasks, means.workers):
-            yield numbers[n], done
+        with contextlib.closing(settled(perform, tasks, means.workers)) as found:
+            for n, done in found:
+                yield numbers[n], done
         return
     paths = set() if means.dask == LOCAL else {path for job in jobs.values() for path in _scenarios(job)}
     cargoes = {path: Cargo.of(path) for path in paths}
@@ -136,7 +149,7 @@ class _Progress:
     """The line on the terminal: how many, how long."""
 
     def __init__(self, of: int) -> None:
-        self._of, self._done, self._failed = of, 0, 0
+        self._of, self._done, self._failed, self._widest = of, 0, 0, 0
         self._began_s = time.monotonic()
         self._strange: set[str] = set()
 
@@ -155,12 +168,16 @@ class _Progress:
         """Leave the line to what is printed."""
         sys.stderr.write("\r")
 
-    def add(self, *, is_failed: bool) -> None:
-        """Count one."""
+    def add(self, *, is_failed: bool, words: str = "") -> None:
+        """Count one; ``words`` is what is known so far, of a run that may end before all are done."""
         self._done += 1
         self._failed += is_failed
         left_s = (time.monotonic() - self._began_s) / self._done * (self._of - self._done)
-        sys.stderr.write(f"\r{self._done}/{self._of} sailed, {self._failed} failed, {left_s:.0f} s left   ")
+        line = f"{self._done}/{self._of} sailed, {self._failed} failed, {left_s:.0f} s left"
+        if words:
+            line = f"{self._done} sailed, {self._of - self._done} at most to come; {words}"
+        self._widest = max(self._widest, len(line) + 3)
+        sys.stderr.write(f"\r{line.ljust(self._widest)}")
         sys.stderr.flush()
 
     def end(self) -> None:

@@ -20,11 +20,12 @@ from sitl.scene.ships import Motion, free_port
 from sitl.scene.tasks import Tasks, tasks_of
 from sitl.scene.verdict import CALL_HOLDS_S, Truth, Verdict, count_tacks, judge
 from sitl.scene.weather import scenario_departures, scenario_waters, scenario_wind
+from sitl.scene.written import scenario_text
 
 __all__ = [
     "CALL_HOLDS_S", "CLOSE_HAULED_DEG", "TASK_S", "TRAFFIC", "Craft", "CurrentSpec", "EventSpec", "ExpectSpec",
     "HullSpec", "HullTrack", "LeeSpec", "Manner", "Motion", "Mover", "Others", "SatelliteSpec", "Scenario",
     "SensorsSpec", "StationScore", "Tasks", "Truth", "Verdict", "WavesSpec", "WindSpec", "count_tacks", "duty",
     "free_port", "is_all_ordinary", "judge", "load_scenario", "met_by", "own_polar", "recentre_m",
-    "scenario_departures", "scenario_waters", "scenario_wind", "station_score", "tasks_of",
+    "scenario_departures", "scenario_text", "scenario_waters", "scenario_wind", "station_score", "tasks_of",
 ]

@@ -72,6 +72,7 @@ class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     tau_s: float = 28.0          # 1 / rho: Wolsieffer's 0.036 Hz
     tws_sd_mps: float = 0.3
     file: str | None = None
+    from_s: float = 0.0                # of the weather's own time: what has blown by then is over
     gust_spread: Share = 0.0           # of the strength's logarithm, about the strength that is there without gusts
     gust_s: Positive = 15.0            # their correlation time
     stronger_per_km: Slope = 0.0       # the wind is stronger by this share for each km from the mission's origin ...

@@ -8,7 +8,7 @@ from pathlib import Path
 from sitl.autopilot import Departures
 from sitl.scene.mismatch import CurrentSpec, departures_of, lee_of, stream_of
 from sitl.scene.scenario import Scenario
-from sitl.world import AR1, Constant, Event, Gusty, Recorded, Scripted, Waters, Wind
+from sitl.world import AR1, Constant, Event, Gusty, Later, Recorded, Scripted, Waters, Wind
 
 
 def scenario_wind(scenario: Scenario, source: Path, seed: int) -> Wind:
@@ -26,6 +26,8 @@ def scenario_wind(scenario: Scenario, source: Path, seed: int) -> Wind:
         )
     if spec.gust_spread > 0.0:
         base = Gusty(base, spread=spec.gust_spread, tau_s=spec.gust_s, seed=seed)
+    if spec.from_s != 0.0:
+        base = Later(base, spec.from_s)
     events = tuple(
         Event(
             at_s=e.at_s, veer_rad=math.radians(e.veer_deg), tws_mps=e.tws_mps, over_s=e.over_s,

@@ -187,6 +187,18 @@ class Recorded:
         return cls(table[:, 0], table[:, 1], table[:, 2])
 
 
+@dataclass(frozen=True, slots=True)
+class Later:
+    """Another wind, of which the first ``by_s`` seconds are over."""
+
+    base: Wind
+    by_s: float
+
+    def at(self, t_s: float) -> tuple[float, float]:
+        """Return the wind at ``t_s``."""
+        return self.base.at(t_s + self.by_s)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
     """Something that happens to the wind from ``at_s``, brought in evenly over ``over_s`` and gone after ``for_s``.

@@ -328,7 +328,7 @@ def read_names(package):
     """
     names = set()
     paths = [*Path(inspect.getfile(package)).parent.rglob("*.py")]
-    for path in paths if package.__name__ != "sitl.commands" else [*paths, Path(inspect.getfile(means))]:
+    for path in paths if package.__name__ == "companion.commands" else [*paths, Path(inspect.getfile(means))]:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):
                 names.add(node.attr)
@@ -346,6 +346,11 @@ def test_every_option_is_read(program, package):
         if dest not in read and dest != "command"
     }
     assert unread == set()
+
+
+def test_every_option_of_the_companions_guest_is_read():
+    read = read_names(import_module("sitl.rehearse"))
+    assert set(options_of(cli.PROGRAM.parser("rehearse").commands["rehearse"])) - read == set()
 
 
 def test_every_watchdog_is_raised_in_a_scenario():

@@ -41,7 +41,7 @@ def test_every_command_has_a_page_and_is_completed(tmp_path):
     loaded("pages").main(tmp_path)
     pages = {p.stem for p in (tmp_path / "man1").iterdir()}
     for program in (cli.PROGRAM, sitl_cli.PROGRAM):
-        assert {program.name, *(f"{program.name}-{name}" for name in program.commands)} <= pages
+        assert {program.name, *(f"{program.name}-{name}" for name in program.names)} <= pages
     assert "companion-mission-new" in pages
     assert r"\-\-from\-autopilot" in (tmp_path / "man1/companion-run.1").read_text()
     asked = f"""source {tmp_path}/completions/companion

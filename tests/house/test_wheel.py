@@ -33,6 +33,8 @@ def test_it_holds_what_it_needs_and_nothing_else(installed):
                       for folder in (installed / "companion" / "missions", Path("missions")))
     assert inside == beside
     assert (installed / "companion" / "kernels.txt").is_file()
+    points, = installed.glob("*.dist-info/entry_points.txt")
+    assert "[companion.commands]\nrehearse = sitl.rehearse.command" in points.read_text()
 
 
 def test_it_sails_from_an_empty_folder(installed, tmp_path):

@@ -74,12 +74,29 @@ def draw(seed: int, *, only: tuple[str, ...] | None = None) -> Drawn:
     ``only`` are kinds that every voyage has, and no others; empty, the control. The water and the mean wind of a seed
     are the same whatever it has.
     """
+    return drawn_by(random.Random(f"mismatch {seed}"), WATERS[seed % len(WATERS)], only=only)
+
+
+def drawn_by(rng: random.Random, source: Path, *, only: tuple[str, ...] | None = None) -> Drawn:
+    """Return what is drawn by ``rng`` over the water of a scenario's file; ``only`` as of ``draw``."""
     from sitl.run.embedded import mission_of
 
-    rng = random.Random(f"mismatch {seed}")
-    source = WATERS[seed % len(WATERS)]
     scenario = load_scenario(source)
-    mission = mission_of(scenario, source)
+    wind = msgspec.structs.replace(scenario.wind, tws_mps=_round(rng.uniform(3.5, 8.0)))
+    drawn, kinds = departing(rng, msgspec.structs.replace(scenario, wind=wind), mission_of(scenario, source),
+                             only=only)
+    return Drawn(source=source, kinds=kinds, scenario=msgspec.structs.replace(
+        drawn, limit_s=LIMIT_S, expect=ExpectSpec(arrived=None, max_silence_s=MAX_SILENCE_S)))
+
+
+def departing(
+    rng: random.Random, scenario: Scenario, mission: Mission, *, only: tuple[str, ...] | None = None,
+) -> tuple[Scenario, tuple[str, ...]]:
+    """Return a scenario with what its plan does not know of, each kind in half of them, and the kinds.
+
+    ``only`` as of ``draw``. What is drawn of boat, sea, sensors takes the place of what the scenario has; its wind is
+    kept and departed from.
+    """
     kinds: list[str] = []
 
     def has(kind: str) -> bool:
@@ -89,17 +106,16 @@ def draw(seed: int, *, only: tuple[str, ...] | None = None) -> Drawn:
             return True
         return False
 
-    wind = msgspec.structs.replace(scenario.wind, tws_mps=_round(rng.uniform(3.5, 8.0)))
+    wind = scenario.wind
     if has("gusts"):
         wind = msgspec.structs.replace(
             wind, gust_spread=_round(rng.uniform(0.1, 0.35)), gust_s=_round(rng.uniform(8.0, 40.0)))
     if has("wind over the water"):
         wind = _varied(rng, wind, mission)
     drawn = msgspec.structs.replace(
-        scenario, wind=wind, limit_s=LIMIT_S, expect=ExpectSpec(arrived=None, max_silence_s=MAX_SILENCE_S),
-        current=_current(rng) if has("current") else None, waves=_waves(rng) if has("waves") else None,
-        boat=_other(_boat(rng, has)), sensors=_other(_sensors(rng, has)))
-    return Drawn(source=source, scenario=drawn, kinds=tuple(kinds))
+        scenario, wind=wind, current=_current(rng) if has("current") else None,
+        waves=_waves(rng) if has("waves") else None, boat=_other(_boat(rng, has)), sensors=_other(_sensors(rng, has)))
+    return drawn, tuple(kinds)
 
 
 def _other(spec: Spec) -> Spec | None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.errors import InputError
-from sitl.campaigns.mismatch.draw import draw
+from sitl.campaigns.mismatch.draw import Drawn, draw
 from sitl.campaigns.mismatch.promises import Legs, arrival_promised, legs_promised, promised_s
 from sitl.campaigns.mismatch.table import figures_of, told
 from sitl.means import Means
@@ -42,12 +42,16 @@ class Job:
 
 def sail_one(job: Job) -> dict[str, Any]:
     """Sail a seed; return what was drawn, promised and sailed. A voyage folder is left in ``job.keep``."""
+    return sail_drawn(draw(job.seed, only=job.only), job)
+
+
+def sail_drawn(drawn: Drawn, job: Job) -> dict[str, Any]:
+    """Sail what was drawn, with what else the job's seed decides."""
     from companion.clock import run_virtual
     from sitl.run.embedded import mission_of, run_embedded
 
     if job.keep is not None and job.keep.is_dir() and any(job.keep.iterdir()):
         raise InputError("--keep", str(job.keep), "is not empty", "a voyage's folder is taken up where it was left")
-    drawn = draw(job.seed, only=job.only)
     mission = mission_of(drawn.scenario, drawn.source)
     legs = Legs(mission.frame())
     record: dict[str, Any] = {

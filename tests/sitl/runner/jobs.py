@@ -3,6 +3,7 @@
 import os
 import random
 import signal
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,6 +36,10 @@ def raising(job):
     if job.seed % 2:
         raise ZeroDivisionError(f"of seed {job.seed}")
     return work(job)
+
+
+def leaving(job):
+    return {"left": tempfile.mkdtemp(), "seed": job.seed}
 
 
 def attempts(folder):

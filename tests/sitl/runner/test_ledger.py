@@ -73,6 +73,23 @@ def test_parts_of_an_array_are_all_of_it_and_none_twice(tmp_path, folder):
     assert not out.exists()
 
 
+def test_a_run_ends_when_enough_is_known_and_goes_on_when_more_is_wanted(tmp_path, folder, capsys):
+    out, seen = tmp_path / "r.jsonl", []
+
+    def until(count):
+        def watch(there):
+            seen.append(sum(result is not None for result in there))
+            return f"{seen[-1]} known", seen[-1] >= count
+        return watch
+
+    for count in (2, 2, 5):
+        found = sail("quick", work, jobs_in(folder), Means(workers=1, out=out), key=key_of, watch=until(count))
+        assert [r["seed"] for r in found.records] == list(range(count))
+    assert seen == [0, 1, 2, 2, 2, 3, 4, 5]
+    assert (found.now, attempts(folder)) == (3, dict.fromkeys(range(5), 1))
+    assert "2 sailed, 4 at most to come; 2 known" in capsys.readouterr().err
+
+
 def test_a_job_that_raises_is_told_and_tried_again(tmp_path, folder, capsys):
     out = tmp_path / "r.jsonl"
     first = sailed(folder, out, do=raising)

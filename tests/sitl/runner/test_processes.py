@@ -1,12 +1,13 @@
 """Processes of this machine: one that dies takes nothing with it, and a job that raises no other."""
 
 import json
+from pathlib import Path
 
 import pytest
 
 from companion.errors import InputError
 from sitl.runner import WorkerDiedError, in_processes, settled
-from tests.sitl.runner.jobs import Job, attempts, raising, work
+from tests.sitl.runner.jobs import Job, attempts, leaving, raising, work
 
 
 @pytest.fixture
@@ -38,6 +39,15 @@ def test_what_a_job_raises_is_its_own(folder):
     assert [n for n, result in found.items() if isinstance(result, ZeroDivisionError)] == [1, 3]
     with pytest.raises(ZeroDivisionError, match="of seed 1"):
         list(in_processes(raising, jobs, 1))
+
+
+def test_who_has_seen_enough_ends_it_and_nothing_is_left(folder):
+    found = settled(leaving, [Job(seed=n, folder=folder) for n in range(9)], 2)
+    left = Path(next(found)[1]["left"])
+    assert left.is_dir()
+    found.close()
+    assert not left.exists()
+    assert not left.parent.exists()
 
 
 def misread(source):

@@ -1,0 +1,117 @@
+"""``companion rehearse``: a mission sailed a thousand times before it is sailed.
+
+It is a command of the companion whose voyages are the simulator's. The companion does not know the simulator, so this
+one is found by its entry point (pyproject.toml).
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime as dt
+from argparse import ArgumentTypeError
+from pathlib import Path
+from typing import Any
+
+from companion.program.arguments import duration, number, out_file, out_folder, whole
+from companion.words import file_name
+from sitl.means import add_options, means_of
+
+SUMMARY = "sail a mission a thousand times before it is sailed"
+FOLDER = Path("rehearsals")
+_EPILOG = """\
+examples:
+  companion rehearse archipelago.toml                         until chances are known within 10 %
+  companion rehearse archipelago.toml --wind 6@240 --sure 5   the forecast, and an answer twice as sharp
+  companion rehearse archipelago.toml --wind yesterday.csv    a measured record (t_s,wind_from_deg,wind_speed_ms)
+  companion rehearse archipelago.toml --wind july.csv         a climate (wind_from_deg,wind_speed_ms,share)
+  companion rehearse archipelago.toml --faults --minutes 10   with trouble; what is known after ten minutes
+  companion rehearse archipelago.toml --try margin_m=20 --try later=2h --pairs 50
+  companion rehearse archipelago.toml --runs 5000 --sure 1 --dask tcp://HOST:8786
+
+The answer stands on the terminal and, with a map of the tracks and of the trouble, in rehearsal.html, .png and .json of
+the folder; the folders of the worst voyages are there for 'companion view' and 'companion replay'. The same command
+goes on where it was; what was sailed is not sailed again. docs/rehearse.md says what is drawn and how sure it is.
+"""
+
+
+def add_parser(subparsers: Any, summary: str) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "rehearse", help=summary, formatter_class=argparse.RawDescriptionHelpFormatter, epilog=_EPILOG,
+        description="Sail a mission in simulation, each voyage with a wind, a boat, a sea and sensors of its own, "
+        "until the chances\nof arriving and of coming below the margin's floor are known well enough. Then tell times, "
+        "watchdogs, the worst\nvoyages, where the trouble is, and what a change is worth by pairs of voyages.")
+    parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="a mission with a [start], or a scenario")
+    weather = parser.add_argument_group("what is sailed")
+    weather.add_argument("--wind", metavar="WIND", help="SPEED@FROM [m/s, degrees], a measured record or the table "
+                         "of a climate as CSV (default: the mission's preview wind)")
+    weather.add_argument("--wind-error", type=_error, metavar="DEG,MPS", help="how far the mean wind that is given may "
+                         "be off, standard deviations (default: 10,0.5; of a climate 0,0)")
+    weather.add_argument("--depart", type=_time, metavar="TIME", help="when she sets sail, as 2026-11-24T08:00Z: for a "
+                         "tide table and the dark")
+    weather.add_argument("--doubt", type=number(at_least=0.0, at_most=3.0), default=1.0, metavar="X",
+                         help="how far boat, sea and sensors may differ from the plan's: 0 not at all, 1 as a small "
+                         "boat meets them (default: 1)")
+    weather.add_argument("--faults", action="store_true", help="trouble befalls each voyage: links, sensors, calms, a "
+                         "companion that is killed, an operator")
+    weather.add_argument("--limit", type=duration, metavar="TIME", help="call a voyage off after 90m, 2h (default: "
+                         "three times the plan, at least 15m)")
+    ends = parser.add_argument_group("when it ends, what is tried")
+    ends.add_argument("--sure", type=number("percent", above=0.0, at_most=100.0), default=10.0, metavar="PERCENT",
+                      help="end when the intervals of arriving and of the floor are no wider (default: 10)")
+    ends.add_argument("--runs", type=whole(at_least=1), default=1000, metavar="N",
+                      help="voyages at most (default: 1000)")
+    ends.add_argument("--minutes", type=number("minutes", above=0.0), metavar="M", help="end after so many minutes")
+    ends.add_argument("--try", action="append", dest="tries", default=[], metavar="NAME=VALUE",
+                      help="what a change is worth: margin_m, delta_s, SAIL_XTRACK_MAX, or later=1h; may be given more "
+                      "than once (default: a usual set)")
+    ends.add_argument("--pairs", type=whole(), default=20, metavar="N",
+                      help="voyages with each change, of the first seeds; 0: none (default: 20)")
+    parser.add_argument("--out", type=out_folder, metavar="DIR",
+                        help=f"the folder of results (default: {FOLDER}/NAME of the mission)")
+    parser.add_argument("--json", type=out_file, metavar="FILE", help="write the figures there, too")
+    add_options(parser, has_out=False)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from sitl.rehearse.change import change_of, usual
+    from sitl.rehearse.outcome import RESULTS
+    from sitl.rehearse.prepared import prepared
+    from sitl.rehearse.rehearsal import Limits, rehearse
+    from sitl.run.compiled import compile_ahead
+    from sitl.scene import load_scenario
+
+    folder = args.out or FOLDER / file_name(load_scenario(args.mission).name)
+    compile_ahead()
+    made = prepared(args.mission, folder, wind=args.wind, wind_error=args.wind_error, doubt=args.doubt,
+                    faults=args.faults, depart=args.depart, limit_s=args.limit)
+    changes = [change_of(text, made.mission) for text in args.tries] or usual(
+        made.mission, tells_the_hour=made.tells_the_hour)
+    planned_s = sum(plan.cost_s for plan in made.plans)
+    print(f"{made.mission.name}: {made.doubts.wind.told}; doubt {args.doubt:g}{', with trouble' if args.faults else ''}"
+          f"{f'; planned {planned_s:.0f} s' if planned_s else ''}, called off after {made.scenario.limit_s:.0f} s; "
+          f"results in {folder}", flush=True)
+    return rehearse(made, folder, Limits(width=args.sure / 100.0, runs=args.runs, minutes=args.minutes), changes,
+                    args.pairs, means_of(args, out=folder / RESULTS), args.json)
+
+
+def _error(text: str) -> tuple[float, float]:
+    try:
+        from_deg, tws_mps = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ArgumentTypeError(f"{text[:40]!r} is no error of a wind; write DEG,MPS, as 10,0.5") from None
+    if not (0.0 <= from_deg <= 180.0 and 0.0 <= tws_mps <= 20.0):
+        raise ArgumentTypeError(f"{text[:40]} is out of range: 0..180 degrees, 0..20 m/s")
+    return from_deg, tws_mps
+
+
+def _time(text: str) -> dt.datetime:
+    try:
+        when = dt.datetime.fromisoformat(text)
+    except ValueError:
+        raise ArgumentTypeError(f"{text[:40]!r} is no time; write 2026-11-24T08:00Z") from None
+    if when.tzinfo is None:
+        raise ArgumentTypeError(f"{text} has no zone; write {text}Z for UTC")
+    return when.astimezone(dt.UTC)

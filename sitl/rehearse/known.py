@@ -1,0 +1,154 @@
+"""What is known of a mission from the voyages so far: chances with their intervals, times, the worst; words and JSON.
+
+Only voyages whose seeds come without a gap from the first on are counted: quick ones are done before slow ones, and
+whoever stops at some moment with all that there is has seen too many quick ones. So the answer is the same by however
+many workers it was sailed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from companion.skipper.watch.watchdogs import TABLE
+from companion.words import counted
+from sitl.rehearse.sure import Quantile, Share, quantile_of, share_of
+
+QUANTILES = (0.1, 0.5, 0.9)
+WATCHDOGS = tuple(dog.name for dog in TABLE)
+Record = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Known:
+    """What is known.
+
+    Attributes:
+        records: the voyages, by their seeds.
+        arrives, low, touches: the chances of arriving, of coming below the margin's floor, of touching something.
+        times: quantiles of the time until she arrives [s], of all voyages: who does not arrive takes for ever.
+        watchdogs: the chance that each is raised, the most frequent first; those that never were are left out.
+    """
+
+    records: tuple[Record, ...]
+    arrives: Share
+    low: Share
+    touches: Share
+    times: tuple[Quantile, ...]
+    watchdogs: Mapping[str, Share]
+
+    def is_sure(self, width: float) -> bool:
+        """Whether no interval of arriving and of the floor is wider."""
+        return max(self.arrives.width, self.low.width) <= width
+
+    def line(self) -> str:
+        """Return it for a line on a terminal."""
+        middle = next(time for time in self.times if time.of_all == 0.5)
+        return (f"of {len(self.records)}: arrives {percent(self.arrives)}, below the floor {percent(self.low)}, "
+                f"half by {clock(middle.value)}")
+
+    def worst(self, most: int) -> list[Record]:
+        """Return the worst voyages: errors, contacts, the floor, then those that do not arrive, then the longest."""
+        return sorted(self.records, key=_badness, reverse=True)[:most]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON; a time that is not reached is None."""
+        return {
+            "voyages": len(self.records), "arrives": _share(self.arrives), "below_floor": _share(self.low),
+            "touches": _share(self.touches),
+            "time_s": [{"quantile": q.of_all, "value": _finite(q.value), "low": _finite(q.low), "high": _finite(q.high)}
+                       for q in self.times],
+            "watchdogs": {name: _share(share) for name, share in self.watchdogs.items()}}
+
+
+def known_of(there: Sequence[Record | None]) -> Known:
+    """Return what is known from the results of seeds in their order; None: none yet, empty: it was lost."""
+    gap = next((n for n, record in enumerate(there) if record is None), len(there))
+    records = tuple(record for record in there[:gap] if record)
+    count = len(records)
+
+    def share(what: str) -> Share:
+        return share_of(sum(bool(record.get(what)) for record in records), count)
+
+    raised = Counter(name for record in records for name in WATCHDOGS if name in record.get("alerts", {}))
+    times = sorted(record["time_s"] if record.get("arrived") else math.inf for record in records)
+    return Known(
+        records=records, arrives=share("arrived"), low=share("below_floor"), touches=share("contacts"),
+        times=tuple(quantile_of(times, of_all) for of_all in QUANTILES),
+        watchdogs={name: share_of(came, count) for name, came in raised.most_common()})
+
+
+def _badness(record: Record) -> tuple[float, ...]:
+    clear_m = record.get("min_clearance_m")
+    return (bool(record.get("error")), bool(record.get("contacts")), bool(record.get("below_floor")),
+            not record.get("arrived"), -(clear_m if clear_m is not None else math.inf) if record.get("below_floor")
+            else 0.0, record.get("time_s") or 0.0, -record["seed"])
+
+
+def why_bad(record: Record) -> str:
+    """Return in words how a voyage went."""
+    clear_m = record.get("min_clearance_m")
+    clear = "" if clear_m is None else f", {clear_m:.1f} m clear at the nearest"
+    if record.get("error"):
+        return f"an error of the program: {record['error']}"
+    if record.get("contacts"):
+        return "touched something" + ("" if record.get("arrived") else ", did not arrive")
+    how = f"arrived after {clock(record['time_s'])}" if record.get("arrived") else (
+        f"did not arrive ({record.get('end_reason') or 'time is up'})")
+    return how + clear
+
+
+def percent(share: Share) -> str:
+    """Return a share's interval.
+
+    >>> percent(share_of(50, 100))
+    '35 to 65 %'
+    """
+    low, high = 100.0 * share.low, 100.0 * share.high
+    return f"{low:.0f} to {high:.0f} %" if high >= 10.0 else f"{low:.1f} to {high:.1f} %"
+
+
+def clock(seconds: float) -> str:
+    """Return a time in minutes and seconds.
+
+    >>> clock(75.0), clock(7300.0), clock(math.inf)
+    ('1:15', '2:01:40', 'never')
+    """
+    if not math.isfinite(seconds):
+        return "never"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def reached(time: Quantile) -> str:
+    """Return in words when a share of the voyages is there."""
+    share = f"{100.0 * time.of_all:.0f} %"
+    return f"{share} are there within {clock(time.value)}" if math.isfinite(time.value) else (
+        f"fewer than {share} arrive")
+
+
+def told(known: Known) -> list[str]:
+    """Return what is known, a line for each thing."""
+    lines = [f"{counted(len(known.records), 'voyage')}; in brackets what is 95 % sure, at whichever voyage one stops"]
+    for words, share in (("arrives", known.arrives), ("below the margin's floor", known.low),
+                         ("touches something", known.touches)):
+        lines.append(f"  {words}: {share.came} of {share.of} ({percent(share)})")
+    for time in known.times:
+        lines.append(f"  {reached(time)} ({clock(time.low)} to {clock(time.high)})")
+    for name, share in known.watchdogs.items():
+        lines.append(f"  {name}: {share.came} of {share.of} ({percent(share)})")
+    quiet = len(WATCHDOGS) - len(known.watchdogs)
+    lines.append(f"  {counted(quiet, 'other watchdog')} never raised ({percent(share_of(0, len(known.records)))} each)")
+    return lines
+
+
+def _share(share: Share) -> dict[str, Any]:
+    return {"came": share.came, "of": share.of, "low": round(share.low, 5), "high": round(share.high, 5)}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

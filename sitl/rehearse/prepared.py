@@ -1,0 +1,112 @@
+"""A rehearsal made ready: the mission believed and planned once, and the scenario of it written beside the results."""
+
+from __future__ import annotations
+
+import datetime as dt
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+
+from companion.compose import planner_of, water_of
+from companion.disk import Disk
+from companion.errors import InputError
+from companion.geofence import Mission
+from companion.planner import Plan, Problem, plan
+from companion.sailable.previews import Wind, leg_names, legs, walked
+from sitl.rehearse.draw import Doubts
+from sitl.rehearse.wind import given_wind
+from sitl.run.embedded import EXPANSIONS, mission_of
+from sitl.scene import Scenario, WindSpec, load_scenario, scenario_text
+
+SCENARIO = "rehearsal.toml"
+SLOWER = 3.0        # a voyage may take this much longer than planned ...
+AT_LEAST_S = 900.0  # ... and no less than this before it is called off
+BESIDE_S = 3600.0   # for what the preview of a plan does not count: a search, a box, a field
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prepared:
+    """A rehearsal that can begin.
+
+    Attributes:
+        source: the scenario of it, in the folder of results.
+        scenario: what it says.
+        mission: what it sails.
+        doubts: what a seed draws.
+        plans: the way in the mean wind, goal by goal; empty where fields lead.
+        tells_the_hour: whether it makes a difference when she sails: a measured wind, a tide, the dark.
+    """
+
+    source: Path
+    scenario: Scenario
+    mission: Mission
+    doubts: Doubts
+    plans: tuple[Plan, ...]
+    tells_the_hour: bool
+
+
+def prepared(
+    path: Path, folder: Path, *, wind: str | None, wind_error: tuple[float, float] | None, doubt: float, faults: bool,
+    depart: dt.datetime | None, limit_s: float | None,
+) -> Prepared:
+    """Read and plan a mission (or a scenario), and write the scenario that is sailed into ``folder``.
+
+    Raises:
+        InputError: it cannot be read, sailed or planned, has no start, or the wind is none.
+        OSError: the folder does not take it.
+    """
+    base = load_scenario(path)
+    mission = mission_of(base, path)
+    if mission.start is None:
+        raise InputError(str(mission.path), "[start]", "is missing, and a rehearsal begins somewhere",
+                         "add lat and lon of where she will set sail")
+    given = given_wind(wind, _mean(base, mission), wind_error)
+    middle = given.middle
+    plans = _planned(mission, Wind(from_deg=middle[0], speed_mps=middle[1]))
+    voyage_s = mission.skipper.laps * sum(p.cost_s for p in plans) + mission.skipper.station_s
+    needs_more = any(goal.field or goal.search or goal.box for goal in mission.goals)
+    scenario = msgspec.structs.replace(
+        base, mission=os.path.relpath(mission.path, folder), wind=given.beside(folder).spec, begins=depart or _hour(
+            base, mission), limit_s=limit_s or round(max(SLOWER * voyage_s, AT_LEAST_S) + needs_more * BESIDE_S))
+    folder.mkdir(parents=True, exist_ok=True)
+    source = folder / SCENARIO
+    Disk().replace(source, scenario_text(scenario).encode())
+    return Prepared(
+        source=source, scenario=scenario, mission=mission, plans=tuple(plans), doubts=Doubts(
+            wind=replace(given, spec=scenario.wind), boat=doubt, faults=faults, voyage_s=round(max(voyage_s, 60.0), 1)),
+        tells_the_hour=given.record_s > 0.0 or mission.tide_path is not None or mission.safety.dark != "say")
+
+
+def _mean(base: Scenario, mission: Mission) -> WindSpec:
+    """Return the weather where none is given: a scenario's own, of a mission what its previews assume."""
+    if base.wind != WindSpec():
+        return base.wind
+    return WindSpec(from_deg=mission.wind.preview_from_deg, tws_mps=mission.wind.preview_speed_mps)
+
+
+def _hour(base: Scenario, mission: Mission) -> dt.datetime:
+    """Return when she sails where nobody says: when a tide table begins, else the hour of all scenarios."""
+    rows = water_of(mission).rows
+    return dt.datetime.fromtimestamp(rows[0].utc_s, dt.UTC) if rows else base.begins
+
+
+def _planned(mission: Mission, wind: Wind) -> list[Plan]:
+    """Return the plans from goal to goal; InputError for a goal to which no way leads."""
+    if any(goal.field is not None for goal in mission.goals) or mission.autopilot.frame == "motor":
+        return []
+    by = planner_of(mission).about(mission.frame().origin)
+
+    def answer(problem: Problem) -> Plan:
+        return plan(problem, expansions=EXPANSIONS, seed=0, algorithm=by.algorithm, settings=by.settings)
+
+    try:
+        plans = walked(legs(mission, wind), answer)
+    except ValueError as error:
+        raise InputError(str(mission.path), "", str(error), "'companion mission check --plot' draws it") from None
+    if not plans[-1].has_path:
+        raise InputError(str(mission.path), leg_names(mission)[len(plans) - 1],
+                         f"no way leads there in {wind.speed_mps:g} m/s from {wind.from_deg:g}° ({plans[-1].reason})",
+                         "'companion mission check --plot' draws it")
+    return plans

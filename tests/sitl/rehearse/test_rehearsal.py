@@ -1,0 +1,261 @@
+"""A rehearsal by its command: it ends when it is sure, goes on where it was, and keeps what a full disk leaves."""
+
+import errno
+import json
+import math
+import random
+import re
+import shutil
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion import cli
+from companion.disk import Disk
+from sitl import cli as sitl_cli
+from sitl.rehearse import rehearsal
+from sitl.rehearse.known import clock, known_of, told, why_bad
+from sitl.rehearse.picture import shares_of
+from sitl.rehearse.prepared import prepared
+from sitl.rehearse.rehearsal import Follower, Limits
+from sitl.rehearse.voyage import Job, key_of
+from sitl.runner import Cargo
+
+ROCKS = Path("missions/rocks.toml").resolve()
+
+
+def record(seed, *, arrived=True, low=False, time_s=None, **more):
+    return {"seed": seed, "arrived": arrived, "below_floor": low, "contacts": 0, "time_s": time_s or 200.0 + seed,
+            "min_clearance_m": 7.0 if low else 12.0, "alerts": {}, **more}
+
+
+# ------------------------------------------------------------------------------------------------ what is known
+def test_it_ends_at_the_same_voyage_in_whatever_order_results_come():
+    rng = random.Random(5)
+    records = [record(n, arrived=rng.random() < 0.95) for n in range(400)]
+    ends = set()
+    for order in range(4):
+        follower, there = Follower(Limits(width=0.15, runs=400)), [None] * 400
+        seeds = list(range(400))
+        for n in range(0, 400, 20):   # workers are ahead of each other by some voyages
+            block = seeds[n:n + 20]
+            random.Random(order).shuffle(block)
+            seeds[n:n + 20] = block
+        for seed in seeds:
+            there[seed] = records[seed]
+            if follower(there)[1]:
+                break
+        ends.add((follower.count, follower.ends, len(follower.known.records)))
+    assert len(ends) == 1
+    count, words, known = ends.pop()
+    assert (words, known) == ("sure enough", count)
+    assert 20 < count < 400
+
+
+def test_a_quick_voyage_after_a_gap_is_not_counted_yet():
+    known = known_of([record(0), None, record(2)])
+    assert [r["seed"] for r in known.records] == [0]
+
+
+def test_a_voyage_that_was_lost_is_no_voyage_and_holds_up_nothing():
+    follower = Follower(Limits(width=0.1, runs=100))
+    assert not follower([{} if n == 3 else record(n) for n in range(53)])[1]
+    assert follower([{} if n == 3 else record(n) for n in range(54)])[1]
+    assert follower.known.arrives.of == 53
+
+
+def test_the_time_ends_it_too():
+    follower = Follower(Limits(width=0.01, runs=9, minutes=1e-9))
+    assert follower([record(0), None]) == (follower.known.line(), True)
+    assert follower.ends == "the time is over"
+
+
+def test_the_worst_come_in_the_order_of_what_they_cost():
+    records = [record(0), record(1, time_s=900.0), record(2, arrived=False, end_reason="out of time"),
+               record(3, low=True), record(4, contacts=1), record(5, arrived=False, error="ValueError()")]
+    known = known_of(records)
+    assert [r["seed"] for r in known.worst(6)] == [5, 4, 3, 2, 1, 0]
+    assert [why_bad(r).split(" ")[0] for r in known.worst(4)] == ["an", "touched", "arrived", "did"]
+
+
+def test_watchdogs_are_counted_by_voyages_and_times_by_all():
+    known = known_of([record(0, alerts={"in irons": 3}), record(1, alerts={"in irons": 1, "done": 1}),
+                      record(2, arrived=False)])
+    assert {name: share.came for name, share in known.watchdogs.items()} == {"in irons": 2}
+    assert [q.value for q in known.times] == [200.0, 201.0, math.inf]
+    assert "fewer than 90 % arrive (3:20 to never)" in "\n".join(told(known))
+    assert known.to_dict()["time_s"][2]["value"] is None
+    assert json.loads(json.dumps(known.to_dict(), allow_nan=False))["voyages"] == 3
+    assert clock(59.6) == "1:00"
+
+
+def test_the_map_counts_voyages_and_not_how_long_they_stayed():
+    there = np.array([[0.0, 5.0], [10.0, 5.0]])
+    back = np.array([[0.0, 5.0], [4.9, 5.0], [0.0, 5.0]])
+    shares = shares_of([there, back], (0.0, 0.0, 10.0, 10.0))
+    assert shares.max() == 1.0
+    row = shares[int(0.5 * shares.shape[0])]
+    assert (row[0], row[-1]) == (1.0, 0.5)
+    assert shares_of([], (0.0, 0.0, 1.0, 1.0)).max() == 0.0
+
+
+def test_without_the_library_of_pictures_it_is_said_and_no_old_one_is_left(tmp_path, monkeypatch, capsys):
+    old = tmp_path / "rehearsal.png"
+    old.write_bytes(b"of another run")
+    monkeypatch.delitem(sys.modules, "sitl.rehearse.picture", raising=False)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    rehearsal._draw(None, None, old)
+    assert "there is no picture: matplotlib is not installed" in capsys.readouterr().out
+    assert not old.exists()
+
+
+# ---------------------------------------------------------------------------------------------- by the command
+@pytest.fixture(scope="module")
+def sailed(tmp_path_factory):
+    """A rehearsal of a user's own mission, from an empty folder, three voyages and two with a change."""
+    home = tmp_path_factory.mktemp("user")
+    for name in ("rocks.toml", "rocks.wkt"):
+        shutil.copy(ROCKS.parent / name, home / name)
+    return home
+
+
+def run(home, monkeypatch, capsys, *words):
+    """Rehearse with voyages that are called off after a minute, one worst of them, by one process."""
+    monkeypatch.chdir(home)
+    monkeypatch.setattr("sitl.rehearse.rehearsal.MOST_WORST", 1)
+    code = cli.main(["rehearse", "rocks.toml", "--workers", "1", "--limit", "1m", *words])
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def test_it_is_a_command_of_the_companion_that_knows_no_simulator(capsys):
+    assert "rehearse" not in cli.PROGRAM.commands
+    assert "rehearse" in cli.PROGRAM.names
+    assert cli.main(["rehears"]) == 2
+    assert "did you mean `companion rehearse`?" in capsys.readouterr().err
+
+
+def test_a_user_rehearses_a_mission_goes_on_and_looks_at_the_worst(sailed, monkeypatch, capsys):
+    code, out, err = run(sailed, monkeypatch, capsys, "--runs", "1", "--pairs", "0")
+    assert code == 0
+    assert "1 voyage; in brackets what is 95 % sure" in out
+    assert re.search(r"1 sailed, 0 at most to come; of 1: arrives 0 to \d+ %", err)
+    folder = sailed / "rehearsals" / "rocks"
+    whole = (folder / "results.jsonl").read_bytes()
+
+    code, out, _ = run(sailed, monkeypatch, capsys, "--runs", "2", "--pairs", "1", "--try", "margin_m=15",
+                       "--json", "figures.json")
+    assert code == 0
+    assert "1 in the file before" in out
+    assert "margin_m 15, 1 pair: " in out
+    lines = (folder / "results.jsonl").read_bytes()
+    assert all(line in lines for line in whole.splitlines())
+    figures = json.loads((sailed / "figures.json").read_text())
+    assert figures == json.loads((folder / "rehearsal.json").read_text())
+    assert (figures["voyages"], figures["arrives"]["of"], len(figures["tracks"]), len(figures["worst"])) == (2, 2, 2, 1)
+    assert figures["changes"][0]["pairs"] == 1
+    assert all(len(track["en_m"]) > 1 for track in figures["tracks"])
+
+    page = (folder / "rehearsal.html").read_text()
+    links = re.findall(r"href='(worst/[^']+)'", page)
+    assert len(links) == 1
+    assert (folder / links[0]).is_file()
+    assert "http" not in re.sub(r"base64,[^']+", "", page)   # it asks nobody for anything
+    assert (folder / "rehearsal.png").read_bytes()[:4] == b"\x89PNG"
+    worst = Path(figures["worst"][0]["folder"])
+    assert (worst / "track.csv").is_file()
+    assert cli.main(["replay", str(worst)]) == 0
+
+
+def test_a_disk_that_is_full_when_all_is_sailed_costs_no_voyage(sailed, monkeypatch, capsys):
+    """The folder of the worst and the figures find no room; the answer is told, and is there again afterwards."""
+    words = ("--runs", "1", "--pairs", "0", "--out", "full")
+    run(sailed, monkeypatch, capsys, *words)
+    folder = sailed / "full"
+    before = (folder / "results.jsonl").read_bytes()
+    replaced, copied = Disk.replace, shutil.copytree
+
+    def full(source, target, *more, **words):
+        if "full" in Path(target).parts:
+            raise OSError(errno.ENOSPC, "No space left on device", str(target))
+        return copied(source, target, *more, **words)
+
+    def full_too(self, path, data, **words):
+        if path.name == "rehearsal.json":
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        replaced(self, path, data, **words)
+
+    with monkeypatch.context() as m:
+        m.setattr("sitl.rehearse.voyage.shutil.copytree", full)
+        m.setattr(Disk, "replace", full_too)
+        code, out, err = run(sailed, m, capsys, *words)
+    assert code == 1
+    assert "arrives: " in out
+    assert "not written: full/rehearsal.json: No space left on device; the voyages are safe" in out
+    assert "No space left on device: the folder is not kept, the result is" in err
+    assert (folder / "results.jsonl").read_bytes() == before
+    code, out, _ = run(sailed, monkeypatch, capsys, *words)
+    assert code == 0
+    assert "1 voyage, all of them in the file before" in out
+
+
+def test_a_part_says_how_the_parts_come_together(sailed, monkeypatch, capsys, tmp_path):
+    out = tmp_path / "parts"
+    words = ("--runs", "2", "--pairs", "0", "--out", str(out))
+    for number in (1, 2):
+        code, said, _ = run(sailed, monkeypatch, capsys, *words, "--array", f"{number}/2")
+        assert code == 0
+        assert f"part {number} of 2" in said
+    parts = sorted(map(str, out.glob("results.*-of-2.jsonl")))
+    assert len(parts) == 2
+    assert sitl_cli.main(["results", "join", *parts, "--out", str(out / "results.jsonl")]) == 0
+    capsys.readouterr()
+    code, said, _ = run(sailed, monkeypatch, capsys, *words)
+    assert code == 0
+    assert "2 voyages, all of them in the file before" in said
+
+
+def test_on_another_machine_a_rehearsal_is_whole(sailed, monkeypatch):
+    """Its scenario, mission, water and measured wind are packed, and are the same there."""
+    monkeypatch.chdir(sailed)
+    (sailed / "day.csv").write_text("t_s,wind_from_deg,wind_speed_ms\n0,10,5\n3600,40,6\n")
+    made = prepared(Path("rocks.toml"), Path("packed"), wind="day.csv", wind_error=None, doubt=1.0, faults=False,
+                    depart=None, limit_s=60.0)
+    cargo = Cargo.of(made.source)
+    assert sorted(Path(name).name for name, _ in cargo.packed) == ["day.csv", "rehearsal.toml", "rocks.toml",
+                                                                  "rocks.wkt"]
+    job = Job(scenario=made.source, seed=3, doubts=made.doubts)
+    assert key_of(replace(job, scenario=cargo.here()))["hash"] == key_of(job)["hash"]
+    assert made.tells_the_hour
+
+
+# A ring of land round the goal: there is water on both sides, and no way from one to the other.
+RING = ("POLYGON ((-1.3115 50.8175, -1.3085 50.8175, -1.3085 50.8195, -1.3115 50.8195, -1.3115 50.8175), "
+        "(-1.3108 50.8180, -1.3108 50.8191, -1.3092 50.8191, -1.3092 50.8180, -1.3108 50.8180))\n")
+
+
+@pytest.mark.parametrize(("old", "new", "words", "told_"), [
+    ("[start]\nlat = 50.8170000\nlon = -1.3100000\nheading_deg = 60.0\n", "", (), "[start]: is missing"),
+    ("rocks.wkt", "ring.wkt", (), "no way leads there in 5 m/s from 0°"),
+    ("rocks.wkt", "reef.wkt", (), "reef.wkt"),
+    ("", "", ("--wind", "gale"), "gale: is no wind"),
+    ("", "", ("--wind-error", "5"), "is no error of a wind; write DEG,MPS"),
+    ("", "", ("--depart", "2026-11-24T08:00"), "has no zone"),
+    ("", "", ("--try", "jib=1"), "is not a change that is known"),
+    ("", "", ("--dask", "tcp://127.0.0.1:1"), "no Dask scheduler answers"),
+])
+def test_what_cannot_be_rehearsed_is_said_at_once_in_one_line(tmp_path, monkeypatch, capsys, old, new, words, told_):
+    monkeypatch.setattr("sitl.runner.cluster.ANSWER_S", 0.5)
+    shutil.copy(ROCKS.parent / "rocks.wkt", tmp_path)
+    (tmp_path / "ring.wkt").write_text(RING)
+    assert old in ROCKS.read_text()
+    (tmp_path / "rocks.toml").write_text(ROCKS.read_text().replace(old, new) if old else ROCKS.read_text())
+    code, out, err = run(tmp_path, monkeypatch, capsys, "--runs", "1", "--pairs", "0", *words)
+    assert code in {1, 2}
+    assert "arrives" not in out
+    lines = [line for line in err.replace("\r", "\n").splitlines() if line and "compiling" not in line]
+    assert len(lines) == 1
+    assert told_ in lines[0]
