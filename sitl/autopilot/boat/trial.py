@@ -23,6 +23,11 @@ WINDS_MPS = np.arange(0.5, 20.25, 0.25)
 TRIED_S, TACKED_S = 120.0, (40.0, 60.0, 80.0)
 
 
+def no_go_half_rad(parameters: Mapping[str, float]) -> float:
+    """Return how near to the wind the autopilot sails, whatever the mission plans by."""
+    return math.radians(Parameters(parameters).get("SAIL_NO_GO_ANGLE"))
+
+
 def settled_polar(parameters: Mapping[str, float]) -> Polar:
     """Return what SIM_Sailboat's hull settles at, sheeted as the autopilot does it, by whole degrees."""
     told = Parameters(parameters)

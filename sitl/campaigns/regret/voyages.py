@@ -12,7 +12,7 @@ import numpy as np
 from companion.compose import boat_of
 from companion.errors import InputError
 from companion.geofence import Mission, load_mission
-from sitl.autopilot import TACK_RETRY_S, settled_polar, tack_loss_s
+from sitl.autopilot import TACK_RETRY_S, no_go_half_rad, settled_polar, tack_loss_s
 from sitl.campaigns.baselines import Track
 from sitl.campaigns.figures import Job, key_of, latest, voyage_of
 from sitl.campaigns.regret.table import figures_of, told
@@ -51,7 +51,7 @@ def race_of(scenario: Scenario, track: Track) -> Race:
     polar, parameters = own_polar(mission), scenario.parameters
     return Race(
         craft=Craft(
-            polar=settled_polar(parameters) if polar is None else polar, no_go_half_rad=boat.no_go_half_rad,
+            polar=settled_polar(parameters) if polar is None else polar, no_go_half_rad=no_go_half_rad(parameters),
             max_twa_rad=boat.max_twa_rad, tack_s=tack_loss_s(parameters, polar, float(tws.mean())),
             board_s=TACK_RETRY_S),
         weather=Weather(t_s=t_s - t_s[0], twd_from_rad=np.array(truth.twd_from_rad), tws_mps=tws),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from companion.boat.library import ardurover_sitl
-from sitl.autopilot import settled_polar, tack_loss_s
+from sitl.autopilot import no_go_half_rad, settled_polar, tack_loss_s
 
 
 def test_the_settled_speeds_are_those_that_were_measured_on_the_real_program():
@@ -17,6 +17,11 @@ def test_the_settled_speeds_are_those_that_were_measured_on_the_real_program():
 def test_a_sail_that_is_not_hauled_in_drives_less_to_windward():
     eased = settled_polar({"SAIL_ANGLE_MIN": 30.0})
     assert eased.speed_mps(np.radians(45.0), 5.0) < 0.9 * settled_polar({}).speed_mps(np.radians(45.0), 5.0)
+
+
+def test_she_sails_as_near_to_the_wind_as_her_parameter_says():
+    assert no_go_half_rad({}) == pytest.approx(np.radians(45.0))
+    assert no_go_half_rad({"SAIL_NO_GO_ANGLE": 50.0}) == pytest.approx(np.radians(50.0))
 
 
 def test_a_tack_costs_a_third_of_a_second():
