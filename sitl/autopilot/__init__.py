@@ -32,7 +32,7 @@ from sitl.autopilot.protocol.ais_list import Vessel
 from sitl.autopilot.server import Server, serve
 
 __all__ = [
-    "EPOCH_S", "FRAME_M", "HOME", "PERFECT", "TACK_RETRY_S", "Autopilot", "AutopilotConfig", "Departures", "FrameStream",
-    "GpsFault", "Impairment", "MemoryEnd", "MemoryLink", "Sensors", "Server", "Truth", "VaneFault", "VaneState",
-    "Vessel", "Waves", "check_parameters", "no_go_half_rad", "serve", "settled_polar", "tack_loss_s",
+    "EPOCH_S", "FRAME_M", "HOME", "PERFECT", "TACK_RETRY_S", "Autopilot", "AutopilotConfig", "Departures",
+    "FrameStream", "GpsFault", "Impairment", "MemoryEnd", "MemoryLink", "Sensors", "Server", "Truth", "VaneFault",
+    "VaneState", "Vessel", "Waves", "check_parameters", "no_go_half_rad", "serve", "settled_polar", "tack_loss_s",
 ]

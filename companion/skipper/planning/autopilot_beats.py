@@ -9,6 +9,7 @@ from typing import Any
 from companion.boat import AutopilotLimits
 from companion.boat.tracking import Helm, beat_band_m
 from companion.geo.angles import difference_rad
+from companion.skipper.planning.shifting import shifting
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, cross_track_m
 from companion.skipper.way.voyage import PointEn
@@ -57,13 +58,14 @@ def problem_beat(turn: Turn, margin_m: float) -> dict[str, Any] | None:
     room = room_m(turn)
     if room is None:
         return None
-    boat = turn.voyage.boat
+    boat, by_shifts = turn.voyage.boat, shifting(turn)
+    tack_s = 2.0 * turn.no_go_half_rad / boat.turn_rate_radps + boat.tack_loss_s
     return {
         # the angle that her bow is held at, with leeway too: a leg at her course's angle she would be held below
         "no_go_half_deg": math.degrees(turn.no_go_half_rad),
         "corridor_m": turn.tack_corridor_m,
         "clearance_m": max(0.0, room - margin_m),
-        "tack_s": 2.0 * turn.no_go_half_rad / boat.turn_rate_radps + boat.tack_loss_s,
+        "tack_s": tack_s if by_shifts is None else min(tack_s, by_shifts.tack_s),
     }
 
 
