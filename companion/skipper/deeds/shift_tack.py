@@ -38,8 +38,10 @@ def shift_tack(turn: Turn) -> None:
             abs(abs(off_rad) - half_rad) > TURNING * half_rad):
         return
     beat = shifting(turn, bearing_rad(*leg))
-    to_go_s = math.dist(boat, leg[1]) / beat.table.made_good_mps if beat is not None else 0.0
-    if beat is None or to_go_s < LAST_S:
+    if beat is None:
+        return
+    to_go_s = math.dist(boat, leg[1]) / beat.table.made_good_mps
+    if to_go_s < LAST_S:
         return
     is_port = off_rad < 0.0
     shift_rad = difference_rad(wind[0], beat.mean_rad)
