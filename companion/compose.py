@@ -158,7 +158,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "planner": planner_of(mission),
         "plan_budget_s": options.planning_budget_s,
         "first_plan_budget_s": options.planning_budget_s,
-        "autopilot_beats": options.autopilot_beats,
+        "autopilot_beats": options.autopilot_beats, "shifts": options.shifts,
         "replan_policy": ReplanPolicy(options.replan),
         "guidance": Guidance(options.guidance),
         "station_s": options.station_s,

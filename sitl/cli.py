@@ -23,6 +23,7 @@ PROGRAM = Program(
         "reliability": "what was promised and how often it came, over the voyages of a campaign",
         "ablate": "what each part is worth: the same weather with one thing taken away",
         "baselines": "the companion against ArduRover alone and with its own path planning",
+        "regret": "every sailor's time over the best that could have been made of the same wind",
         "results": "what campaigns left: shown, joined, held against each other by seed",
         "hostile": "forge what the companion reads, and see what comes of it",
         "fetch": "download the official ArduRover simulator",

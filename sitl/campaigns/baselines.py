@@ -1,10 +1,11 @@
 """What the companion is worth: the same water and weather sailed by ArduRover alone.
 
-Two baselines beside the companion. ``alone``: ArduRover with nothing but a waypoint at each goal, in AUTO.
-``dijkstra``: the same with ArduRover's own path planning round the obstacles as exclusion fences, set at boot as
-well as we know how. Both sail on the real ArduRover; ``alone`` on the embedded autopilot too, which has no path
-planning. The companion sails on both. On the real one a disarmed boat drifts while the companion watches the wind,
-so the others begin where the companion set sail, if it has sailed that seed into the same file.
+Beside the companion: ``fixed``: her first plan, which she uploads and then dies. ``alone``: ArduRover with nothing but
+a waypoint at each goal, in AUTO. ``dijkstra``: the same with ArduRover's own path planning round the obstacles as
+exclusion fences, set at boot as well as we know how. The companion sails on the embedded autopilot and the real
+ArduRover, and so does ``alone``; ``dijkstra`` on the real one alone, for the embedded one has no path planning, and the
+fixed plan on the embedded one. On the real one a disarmed boat drifts while the companion watches the wind, so the
+others begin where the companion set sail, if it has sailed that seed into the same file.
 
 Everybody is timed alike, on the true track: from sailing in AUTO to being within the radius of the last goal, all
 goals reached in order; a contact is an entry into an obstacle or over the limits.
@@ -19,6 +20,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from companion.clock import now_s, run, run_virtual
 from companion.compose import boat_of
@@ -36,7 +39,7 @@ from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Truth as Now
 from sitl.run.embedded import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.run.live import run_live
-from sitl.scene import Truth, Verdict, count_tacks, load_scenario, own_polar, scenario_wind
+from sitl.scene import EventSpec, Truth, Verdict, count_tacks, load_scenario, own_polar, scenario_wind
 from sitl.world import Wind
 
 # Measured to be its best (ArduPilot 4.7): margins that a tacking boat needs, the fence itself without action.
@@ -48,6 +51,8 @@ DIJKSTRA = {
 FENCE_PLAYS_M = (4.0, 6.0, 8.0)
 # A voyage of ArduRover alone that takes this long is stuck [s].
 LIMIT_S = 900.0
+# A companion with a fixed plan dies so long after the start: it is on board, and no leg of it is sailed [s].
+DIES_S = 45.0
 # The companion has watched the wind for about this long when it sets sail: everybody meets the same weather [s].
 WEATHER_FROM_S = 35.0
 
@@ -109,6 +114,11 @@ class Track:
         """Whether all goals were reached."""
         return len(self.goals_s) == len(self.mission.goals)
 
+    @property
+    def time_s(self) -> float | None:
+        """From sailing in AUTO to the last goal [s]; None where it was not reached."""
+        return self.goals_s[-1] - self.truth.t_s[0] if self.is_done else None
+
     def record(self, who: str, scenario: str, seed: int) -> dict[str, Any]:
         """Return how it went."""
         hulls, solid = self.truth.hull(boat_of(self.mission).hull), solid_of(
@@ -117,7 +127,7 @@ class Track:
         tacks, gybes = count_tacks(self.truth)
         return {
             "who": who, "scenario": scenario, "seed": seed, "arrived": self.is_done, "contacts": contacts,
-            "time_s": self.goals_s[-1] - self.truth.t_s[0] if self.is_done else None, "tacks": tacks, "gybes": gybes,
+            "time_s": self.time_s, "tacks": tacks, "gybes": gybes,
             "clearance_m": clearance_m if math.isfinite(clearance_m) else None,
         }
 
@@ -138,17 +148,37 @@ class _Observer:
         pass
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Voyage:
+    """A voyage: the true track, and what is told of it."""
+
+    track: Track
+    record: dict[str, Any]
+
+
 # ------------------------------------------------------------------------------------------- voyages
-def sail_companion(path: Path, seed: int) -> dict[str, Any]:
+def sail_companion(path: Path, seed: int) -> Voyage:
     """Sail with the companion on the embedded autopilot."""
     scenario = load_scenario(path)
     track = Track(load_mission(scenario.mission_path(path)))
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
         verdict = run_virtual(run_embedded(scenario, path, seed, Path(folder) / "voyage", observer=track.observe()))
-    return {**track.record("companion", scenario.name, seed), **_promises(verdict)}
+    return Voyage(track=track, record={**track.record("companion", scenario.name, seed), **_promises(verdict)})
 
 
-def sail_companion_ardurover(path: Path, seed: int, speedup: float) -> dict[str, Any]:
+def sail_fixed(path: Path, seed: int) -> Voyage:
+    """Sail the companion's first plan on the embedded autopilot: nobody plans again."""
+    scenario = load_scenario(path)
+    dies = EventSpec(at_s=DIES_S, kind="kill_companion")
+    track = Track(load_mission(scenario.mission_path(path)))
+    with tempfile.TemporaryDirectory(prefix="figures-") as folder:
+        run_virtual(run_embedded(
+            msgspec.structs.replace(scenario, events=(*scenario.events, dies)), path, seed, Path(folder) / "voyage",
+            observer=track.observe()))
+    return Voyage(track=track, record=track.record("fixed plan", scenario.name, seed))
+
+
+def sail_companion_ardurover(path: Path, seed: int, speedup: float) -> Voyage:
     """Sail with the companion, as a process of its own, on the real ArduRover."""
     scenario = load_scenario(path)
     track, noted = Track(load_mission(scenario.mission_path(path))), Truth()
@@ -161,14 +191,15 @@ def sail_companion_ardurover(path: Path, seed: int, speedup: float) -> dict[str,
         raise JobError("it never sailed in AUTO")
     point = track.mission.frame().geo_from_en(*noted.en_m[0])
     start = [point.lat_deg, point.lon_deg, math.degrees(noted.heading_rad[0])]
-    return {**track.record("companion, ArduRover", scenario.name, seed), **_promises(verdict), "start": start}
+    told = track.record("companion, ArduRover", scenario.name, seed)
+    return Voyage(track=track, record={**told, **_promises(verdict), "start": start})
 
 
 def _promises(verdict: Verdict) -> dict[str, Any]:
     return {key: verdict.figures.get(key) for key in ("promised_risk", "no_go_entries", "replans")}
 
 
-def sail_alone(path: Path, seed: int) -> dict[str, Any]:
+def sail_alone(path: Path, seed: int) -> Voyage:
     """Sail with one waypoint per goal on the embedded autopilot."""
     scenario = load_scenario(path)
     track = Track(load_mission(scenario.mission_path(path)))
@@ -188,12 +219,12 @@ def sail_alone(path: Path, seed: int) -> dict[str, Any]:
             await _sail(pilot, track, lambda: autopilot.truth)
 
     run_virtual(voyage())
-    return track.record("alone, embedded", scenario.name, seed)
+    return Voyage(track=track, record=track.record("alone, embedded", scenario.name, seed))
 
 
 def sail_ardurover(
     path: Path, seed: int, who: str, speedup: float, set_sail: tuple[float, float, float] | None = None,
-) -> dict[str, Any]:
+) -> Voyage:
     """Sail with the real ArduRover, "alone" or with its own "dijkstra".
 
     ``set_sail`` is where, in place of the mission's start: latitude, longitude, heading [deg].
@@ -238,7 +269,7 @@ def sail_ardurover(
             await _sail(pilot, track, now)
 
     run(voyage(), speedup=speedup)
-    return track.record(f"{who}, ArduRover", scenario.name, seed)
+    return Voyage(track=track, record=track.record(f"{who}, ArduRover", scenario.name, seed))
 
 
 def _heading_rad(mission: Mission) -> float:

@@ -9,7 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sitl.campaigns.baselines import sail_alone, sail_ardurover, sail_companion, sail_companion_ardurover
+from sitl.campaigns.baselines import (
+    Voyage,
+    sail_alone,
+    sail_ardurover,
+    sail_companion,
+    sail_companion_ardurover,
+    sail_fixed,
+)
 from sitl.means import Means
 from sitl.runner import Key, file_hash, read_results, sail
 from sitl.scene import load_scenario
@@ -19,6 +26,8 @@ SCENARIOS = (
     HERE / "figures" / "block.toml", HERE / "two-channels.toml", HERE / "demo.toml", HERE / "lee-shore.toml",
     HERE / "figures" / "slalom.toml", HERE / "upwind.toml",
 )
+# The sailors as they are told in tables, in their order there.
+TOLD = ("companion", "fixed plan", "companion, ArduRover", "alone, embedded", "alone, ArduRover", "dijkstra, ArduRover")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +42,18 @@ class Job:
 
 
 def sail_one(job: Job) -> dict[str, Any]:
+    """Sail a job; return what is told of it."""
+    return voyage_of(job).record
+
+
+def voyage_of(job: Job) -> Voyage:
     """Sail a job; JobError or LinkError where the harness fails, and then there is no result."""
     if job.who == "companion":
         return sail_companion(job.scenario, job.seed)
     if job.who == "companion-ardurover":
         return sail_companion_ardurover(job.scenario, job.seed, job.speedup)
+    if job.who == "fixed":
+        return sail_fixed(job.scenario, job.seed)
     if job.who == "alone-embedded":
         return sail_alone(job.scenario, job.seed)
     return sail_ardurover(job.scenario, job.seed, job.who, job.speedup, job.set_sail)
@@ -87,7 +103,7 @@ def table(records: Sequence[dict[str, Any]]) -> str:
     ]
     names = list(dict.fromkeys(load_scenario(p).name for p in SCENARIOS))
     for name in [*names, *sorted({r["scenario"] for r in records} - set(names))]:
-        for who in ("companion", "companion, ArduRover", "alone, embedded", "alone, ArduRover", "dijkstra, ArduRover"):
+        for who in TOLD:
             rows = [r for r in records if r["scenario"] == name and r["who"] == who]
             if rows:
                 lines.append(_row(name, who, rows))

@@ -9,7 +9,7 @@ from typing import Any
 from companion.program.arguments import number, whole
 from sitl.means import add_options, means_of
 
-SAILORS = ("companion", "companion-ardurover", "alone-embedded", "alone", "dijkstra")
+SAILORS = ("companion", "fixed", "companion-ardurover", "alone-embedded", "alone", "dijkstra")
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -17,9 +17,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser = subparsers.add_parser(
         "baselines", help=summary,
         description="Sail six scenarios with the companion and with ArduRover alone, in the same weather, and print "
-        "the table of arrivals, contacts, times, tacks and clearances. 'companion' and 'alone-embedded' use the "
-        "embedded autopilot; 'companion-ardurover', 'alone' (a waypoint per goal) and 'dijkstra' (its own path "
-        "planning) the real ArduRover. "
+        "the table of arrivals, contacts, times, tacks and clearances. 'companion', 'fixed' (its first plan, never "
+        "another) and 'alone-embedded' use the embedded autopilot; 'companion-ardurover', 'alone' (a waypoint per "
+        "goal) and 'dijkstra' (its own path planning) the real ArduRover. "
         "Voyages are appended to FILE, and the table is of everything in it.",
         epilog="Example: sitl baselines --who alone dijkstra --seeds 5 --out figures.jsonl",
     )

@@ -196,6 +196,7 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     end: Literal["loiter", "home"] = "loiter"
     """After the last goal: loiter there, or plan the way to the autopilot's home and loiter there."""
     autopilot_beats: bool = True
+    shifts: bool = False
     """Where the water is clear by its corridor, leave the beat to the autopilot: it follows each shift at once."""
     guidance: Literal["plan", "heading", "field"] = "plan"
     """Sail the plan's mission in AUTO; or steer in GUIDED, by the plan's headings or by vector fields.

@@ -46,11 +46,11 @@ def arm(turn: Turn) -> bool:
     return _ask(turn, ARMING, lambda number: Arm(command_id=number))
 
 
-def tack(turn: Turn, text: str) -> bool:
-    """Ask for a tack; False when not permitted or not now."""
+def tack(turn: Turn, code: str, text: str) -> bool:
+    """Ask for a tack, announced by ``code``; False when not permitted or not now."""
     if not _ask(turn, TACK, lambda number: Tack(command_id=number, text=text), tacked_s=turn.t_s):
         return False
-    turn.say(Severity.NOTICE, "short tack", text)
+    turn.say(Severity.NOTICE, code, text)
     return True
 
 

@@ -15,6 +15,7 @@ from companion.skipper.deeds.failsafe import waits_for
 from companion.skipper.deeds.headings import desired_heading_rad
 from companion.skipper.deeds.helm import check_current, hand_back, is_busy, make_current, repair, set_mode
 from companion.skipper.deeds.rest import comes_to_rest, rest
+from companion.skipper.deeds.shift_tack import shift_tack
 from companion.skipper.deeds.short_tack import short_tack
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S
@@ -78,6 +79,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     else:
         check_current(turn)
         short_tack(turn)
+        shift_tack(turn)
     if turn.is_raised("stuck waypoint") and turn.state.own_index > turn.state.index:
         make_current(turn, turn.state.own_index + 1)
     if bound is not None and not bound.has_place:

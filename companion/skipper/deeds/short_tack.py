@@ -47,7 +47,8 @@ def short_tack(turn: Turn) -> None:
         return
     other_rad = wrap_pi(wind[0] + side * turn.no_go_half_rad)
     if _clearance_m(turn, boat, other_rad, LOOK_S) > now_m + GAIN_M:
-        tack(turn, f"{now_m:.0f} m clear ahead on this tack in {LEAD_S:g} s: tacking before the corridor's edge")
+        tack(turn, "short tack",
+             f"{now_m:.0f} m clear ahead on this tack in {LEAD_S:g} s: tacking before the corridor's edge")
 
 
 def _clearance_m(turn: Turn, boat: PointEn, course_rad: float, span_s: float) -> float:
