@@ -1,8 +1,9 @@
 """Watches tacks: which come off, which fail; what is done about one that failed.
 
 A tack is tried when her heading, and not the wind, has brought the bow near the wind. It has come off when she is
-settled on the other tack, and failed when she is back on the old one or lies near head to wind for ``LIES_S``. A wind
-that heads her and makes her bear away is no tack: her heading has turned the other way.
+settled on the other tack, and failed when she is back on the old one, having lain near the wind for ``ABORTED_S``, or
+lies there for ``LIES_S``. A wind that heads her and makes her bear away is no tack: her heading has turned the other
+way.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from companion.skipper.step.turn import Turn
 SETTLED_RAD = math.radians(30.0)
 NEAR_RAD = math.radians(20.0)      # of the wind, of which the mean of 5 s is known
 TURNED_RAD = math.radians(15.0)    # towards it, since she was settled
+ABORTED_S = 5.0                    # back sooner, she was told otherwise: an upload has begun her leg anew
 LIES_S = 8.0                       # as the watchdog "in irons" has it
 FORGET_S = 20.0                    # settled longer ago than this, whatever follows is no tack from there
 LEAST_TWS_MPS = 1.5                # in less she does as she likes
@@ -52,7 +54,9 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float) 
         now = _counted(replace(now, is_counted=True, settled_s=t_s), t_s, failed=True)
     if abs(off) >= SETTLED_RAD:
         if now.began_s is not None and not now.is_counted:
-            now = _counted(now, t_s, failed=side == now.side)
+            is_back = side == now.side
+            if not is_back or t_s - now.began_s >= ABORTED_S:
+                now = _counted(now, t_s, failed=is_back)
         elif fresh and now.began_s is None and side != now.side and _through_the_eye(now, heading_rad, off):
             now = _counted(now, t_s, failed=False)   # between two looks
         return replace(now, side=side, settled_rad=heading_rad, settled_s=t_s, began_s=None, is_counted=False)

@@ -36,7 +36,7 @@ def fallen_back(world, **seen):
     snapshot = world.snapshot()
     off = math.radians(50.0)
     vehicle = replace(snapshot.vehicle, heading_rad=off)
-    tacking = Tacking(side=-1, settled_rad=off, settled_s=world.t - 4.0, began_s=world.t - 3.0, **seen)
+    tacking = Tacking(side=-1, settled_rad=off, settled_s=world.t - 7.0, began_s=world.t - 6.0, **seen)
     turn = Turn(world.skipper.voyage, world.skipper.config, replace(world.state, tacking=tacking),
                 replace(snapshot, vehicle=vehicle))
     watch_tacks(turn)

@@ -22,12 +22,13 @@ def seen(headings_deg, twd_deg=0.0, step_s=1.0, begin=NO_TACKS):
 
 
 GOOD = [45, 45, 45, 25, -5, -35, -45, -45]
-FAILED = [45, 45, 45, 25, 12, 14, 15, 15, 30, 50, 50]
+FAILED = [45, 45, 45, 25, 12, 14, 15, 15, 15, 30, 50, 50]
 
 
 @pytest.mark.parametrize(("headings", "tried", "failed"), [
     (GOOD, 1, 0), ([45, 45, -45, -45], 1, 0), ([45, 20, -40], 1, 0), (FAILED, 1, 1),
     (FAILED + GOOD, 2, 1), ([45, 45, 12] + [14] * 15 + [50, 50], 1, 1), ([45, 45, 12] + [14] * 15 + [-40, -45], 1, 1),
+    ([45, 45, 45, 25, 12, 10, 30, 45], 0, 0),
     ([150, 150, 180, -150, -150], 0, 0), ([45, 60, 90, 120, 150], 0, 0), ([90, 60, 45, 60], 0, 0), ([], 0, 0),
 ])
 def test_each_tack_is_counted_once_and_gybes_and_bearing_away_are_none(headings, tried, failed):
