@@ -190,17 +190,17 @@ def _of_wind(problem: Problem, answer: Plan) -> list[str]:
     """Return what the wind's strength makes of the plan; that is said with the explanation, too."""
     if answer.arrival is None or answer.why.data.get("arrival") is not None:
         return []
-    from companion.planner.risk.arrival import in_words
+    from companion.planner.risk import arrival_in_words
 
     broken = _broken(problem, answer)
-    return [in_words(answer.arrival, answer.cost_s), *([f"NOT to be sailed: {broken}"] if broken else [])]
+    return [arrival_in_words(answer.arrival, answer.cost_s), *([f"NOT to be sailed: {broken}"] if broken else [])]
 
 
 def _broken(problem: Problem, answer: Plan) -> str:
     """Return which of the boat's limits of wind a plan breaks, in words; empty: none."""
     if answer.arrival is None:
         return ""
-    from companion.planner.risk.arrival import limits_in_words
+    from companion.planner.risk import limits_in_words
 
     return limits_in_words(problem, answer.arrival)
 

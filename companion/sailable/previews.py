@@ -12,8 +12,7 @@ from companion.current import STILL_WATER, WaterCurrent, over_water
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission
 from companion.planner import Plan, Problem
-from companion.planner.problem.json_write import strength_dict
-from companion.planner.problem.strength import assumed
+from companion.planner.problem import assumed, strength_dict
 from companion.skipper.planning import HOME_RADIUS_M
 
 PROBE_M = 100.0

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 import shapely
 
@@ -49,8 +50,10 @@ def states():
     out = {}
 
     def keep(name, world):
-        snapshot = world.snapshot()
-        out[name] = (world.skipper, world.state, replace(snapshot, events=(), outcomes=()))
+        snapshot, skipper = world.snapshot(), world.skipper
+        boat = replace(skipper.voyage.boat, max_tws_mps=15.0, min_tws_mps=0.5)
+        skipper = replace(skipper, voyage=replace(skipper.voyage, boat=boat))
+        out[name] = (skipper, world.state, replace(snapshot, events=(), outcomes=()))
 
     fresh = make()
     keep("idle", fresh)
@@ -119,6 +122,11 @@ def wind(**changes):
     return lambda s: replace(s, wind=replace(s.wind, **changes))
 
 
+def forecast(tws_mps):
+    return lambda s: wind(forecast=s.wind.forecast and replace(
+        s.wind.forecast, mean_tws_mps=np.full_like(s.wind.forecast.mean_tws_mps, tws_mps)))(s)
+
+
 def status(**changes):
     return lambda s: replace(s, autopilot=replace(s.autopilot, **changes))
 
@@ -178,6 +186,8 @@ EVENTS = {
     "position lost": lambda s: replace(s, vehicle_age_s=40.0),
     "position jump": lambda s: replace(s, position_en_m=(s.position_en_m[0] + 500.0, s.position_en_m[1])),
     "wind untrusted": wind(health=WindHealth.UNTRUSTED, verdict="frozen"),
+    "strong wind": forecast(25.0),
+    "light wind": forecast(0.1),
     "becalmed": lambda s: replace(
         vehicle(velocity_en_mps=(0.0, 0.0))(s),
         wind=replace(s.wind, health=WindHealth.LIGHT, mean_tws_mps=0.1, present_tws_mps=0.1)),

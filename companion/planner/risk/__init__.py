@@ -1,5 +1,7 @@
 """The risk of a plan: from the wind over its whole length, and from vessels that are not sure."""
 
+from companion.planner.risk.arrival import in_words as arrival_in_words
+from companion.planner.risk.arrival import limits_in_words
 from companion.planner.risk.wind import path_risk, simulate_entries, with_risk
 
-__all__ = ["path_risk", "simulate_entries", "with_risk"]
+__all__ = ["arrival_in_words", "limits_in_words", "path_risk", "simulate_entries", "with_risk"]

@@ -12,12 +12,12 @@ from companion.skipper.deeds.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.ends import announcement
 from companion.skipper.planning.errands import fenced_off, home_trouble
-from companion.skipper.planning.wind_limits import winds_wanted
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import SafeEnd
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
+from companion.skipper.step.wind_limits import winds_wanted
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.geometry import distance_m, leg_distance_m
 

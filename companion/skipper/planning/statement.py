@@ -18,9 +18,9 @@ from shapely.geometry import LineString, Polygon
 from companion.current import STILL_WATER, Doubt, WaterCurrent, forecast_over_water
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.messages import WindForecast
-from companion.planner.problem.json_write import strength_dict
-from companion.planner.problem.strength import ASSUMED_SHARE, Strength
+from companion.planner.problem import strength_dict
 from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.wind_limits import strength_of
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.judge import half_width_rad, mean_twd_rad
@@ -33,7 +33,6 @@ REPAIR_RINGS_M = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 140.0, 210
 REPAIR_DIRECTIONS = 24
 NOTCH = 2.0     # radius of the notch as a multiple of what the start lacks: room to turn out of it
 LEG_SAVING = 8e-5   # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
-LEAST_SHARE = 0.03  # of the mean strength: what a cup anemometer errs by
 HAIR_M = 0.2    # a repaired point stands this far clear of the margin it was repaired for
 
 
@@ -59,22 +58,6 @@ class Aim:
     en_m: PointEn
     radius_m: float
     gate: int
-
-
-def strength_of(forecast: WindForecast, *, after_s: float = 0.0, is_known: bool = True) -> Strength:
-    """Return how strong the wind will be, from ``after_s`` of the forecast on.
-
-    Never surer than an anemometer is (``LEAST_SHARE``); where the wind is not believed (``is_known``), no surer than
-    one of which only the mean is known.
-    """
-    times = np.unique(np.concatenate([[0.0], np.clip(forecast.horizon_s - after_s, 0.0, None)]))
-    mean = np.interp(after_s + times, forecast.horizon_s, forecast.mean_tws_mps)
-    sigma = np.interp(after_s + times, forecast.horizon_s, forecast.sigma_tws_mps)
-    least = (LEAST_SHARE if is_known else ASSUMED_SHARE) * mean
-    return Strength(
-        horizon_s=tuple(times.tolist()), mean_mps=tuple(mean.tolist()),
-        sigma_mps=tuple(np.maximum(sigma, least).tolist()), correlation_s=forecast.correlation_time_s,
-        is_known=is_known)
 
 
 def wind_part(

@@ -11,10 +11,10 @@ from companion.messages import VehicleState
 from companion.skipper.deeds.adrift import meets_in_s, sails
 from companion.skipper.deeds.by_field import meets_in
 from companion.skipper.planning.errands import Kind, errand, is_composed
-from companion.skipper.planning.wind_limits import too_light, too_strong
 from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.turn import Turn
+from companion.skipper.step.wind_limits import too_light, too_strong
 from companion.skipper.watch.watchdogs import BY_NAME
 from companion.skipper.way.geometry import along_m, cross_track_m, distance_m
 

@@ -7,13 +7,32 @@ sail that is a reason to wait; under way ``[safety] strong_wind`` and ``light_wi
 
 from __future__ import annotations
 
-from companion.planner.problem.strength import Strength
-from companion.skipper.planning.statement import strength_of
+import numpy as np
+
+from companion.messages import WindForecast
+from companion.planner.problem import ASSUMED_SHARE, Strength
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.turn import Turn
 
 LEAST_S = 60.0       # ahead, however near the end of the plan is
 AHEAD_S = 600.0      # while there is no plan
+LEAST_SHARE = 0.03  # of the mean strength: what a cup anemometer errs by
+
+
+def strength_of(forecast: WindForecast, *, after_s: float = 0.0, is_known: bool = True) -> Strength:
+    """Return how strong the wind will be, from ``after_s`` of the forecast on.
+
+    Never surer than an anemometer is (``LEAST_SHARE``); where the wind is not believed (``is_known``), no surer than
+    one of which only the mean is known.
+    """
+    times = np.unique(np.concatenate([[0.0], np.clip(forecast.horizon_s - after_s, 0.0, None)]))
+    mean = np.interp(after_s + times, forecast.horizon_s, forecast.mean_tws_mps)
+    sigma = np.interp(after_s + times, forecast.horizon_s, forecast.sigma_tws_mps)
+    least = (LEAST_SHARE if is_known else ASSUMED_SHARE) * mean
+    return Strength(
+        horizon_s=tuple(times.tolist()), mean_mps=tuple(mean.tolist()),
+        sigma_mps=tuple(np.maximum(sigma, least).tolist()), correlation_s=forecast.correlation_time_s,
+        is_known=is_known)
 
 
 def too_strong(turn: Turn) -> float | None:
