@@ -19,7 +19,8 @@ from companion.planner.problem.value import Problem
 from companion.planner.risk.tacks import Tack, tacks_at_risk
 
 DEARER = 1.10          # of the first path's time: what another may take
-AGAIN_SHARE = 0.15     # of the search's effort, for each of the others
+AGAIN_SHARE = 0.15     # of the search's expansions, for each of the others
+AGAIN_TIME_SHARE = 0.04   # of its seconds: together they stay within a fifth of the budget
 NARROWER = (1.0, 2.0, 3.0, 0.5)   # of the room that is missing: more of it lets more failures in a row pass
 SPARE_M = 0.5
 
@@ -36,8 +37,7 @@ def with_contingency(search: Search) -> Search:
             return outcome
         best, best_key, limit_s = outcome, (_risk(tacks), judged.time_s), DEARER * judged.time_s
         for other in _others(problem, tacks):
-            again = Effort(None if math.isinf(effort.budget_s) else AGAIN_SHARE * effort.budget_s,
-                           None if effort.limit is None else max(1, int(AGAIN_SHARE * effort.limit)))
+            again = _again(effort)
             found = search(other, again, seed)
             effort.spend(again.used)
             if found.waypoints_en is None:
@@ -54,6 +54,13 @@ def with_contingency(search: Search) -> Search:
         return replace(best, lower_bound_s=outcome.lower_bound_s)
 
     return careful
+
+
+def _again(effort: Effort) -> Effort:
+    """Return what another search may spend."""
+    if effort.limit is not None:
+        return Effort(None, max(1, int(AGAIN_SHARE * effort.limit)))
+    return Effort(None if math.isinf(effort.budget_s) else AGAIN_TIME_SHARE * effort.budget_s, None)
 
 
 def _risk(tacks: tuple[Tack, ...]) -> float:
