@@ -61,7 +61,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
                       help="end when the intervals of arriving and of the floor are no wider (default: 10)")
     ends.add_argument("--runs", type=whole(at_least=1), default=1000, metavar="N",
                       help="voyages at most (default: 1000)")
-    ends.add_argument("--minutes", type=number("minutes", above=0.0), metavar="M", help="end after so many minutes")
+    ends.add_argument("--minutes", type=number("minutes", above=0.0, at_most=100_000.0), metavar="M",
+                      help="end after so many minutes")
     ends.add_argument("--try", action="append", dest="tries", default=[], metavar="NAME=VALUE",
                       help="what a change is worth: margin_m, delta_s, SAIL_XTRACK_MAX, or later=1h; may be given more "
                       "than once (default: a usual set)")

@@ -196,8 +196,9 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     end: Literal["loiter", "home"] = "loiter"
     """After the last goal: loiter there, or plan the way to the autopilot's home and loiter there."""
     autopilot_beats: bool = True
-    shifts: bool = False
     """Where the water is clear by its corridor, leave the beat to the autopilot: it follows each shift at once."""
+    shifts: bool = False
+    """On a beat so left, ask the autopilot for a tack where the wind's shifts make one worth it (docs/regret.md)."""
     guidance: Literal["plan", "heading", "field"] = "plan"
     """Sail the plan's mission in AUTO; or steer in GUIDED, by the plan's headings or by vector fields.
 

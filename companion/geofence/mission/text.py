@@ -56,9 +56,10 @@ def dump_options(options: MissionOptions) -> str:
     """Return the options as TOML, leaving out what has its default."""
     data = without_defaults(options)
     order = [
-        "name", "description", "from_autopilot", "start", "goal", "field", "refuge", "area", "wind", "risk", "boat",
-        "autopilot", "operator", "skipper", "planner", "passage", "safety", "traffic", "output"]
-    return tomli_w.dumps({k: data[k] for k in order if k in data})
+        "name", "description", "from_autopilot", "start", "goal", "field", "refuge", "area", "wind", "current", "risk",
+        "boat", "autopilot", "operator", "skipper", "planner", "passage", "safety", "traffic", "output"]
+    # whatever has no place in the order yet comes last, and is not lost
+    return tomli_w.dumps({k: data[k] for k in (*order, *data) if k in data})
 
 
 def without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
