@@ -57,7 +57,7 @@ test: $(ENV)
 	@$(KERNELS)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not campaign and not long"
 
-# What takes seconds of a core each (tests/long.txt): whole voyages, browsers, months.
+# What takes a second of a core or more (tests/long.txt): whole voyages, browsers, months.
 test-long: $(ENV)
 	@$(KERNELS)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m long
