@@ -103,7 +103,7 @@ def test_a_turned_vane_is_no_current(vane_deg):
         assert not found.view().is_significant
         assert found.view().drift_mps < 2.0 * found.view().sigma_mps
     believed = math.degrees(found.doubt().believed[5])
-    assert believed == pytest.approx(vane_deg, abs=6.0)
+    assert believed == pytest.approx(vane_deg, abs=2.0)
 
 
 def test_a_vane_is_turned_about_the_wind_that_is_felt():

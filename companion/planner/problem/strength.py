@@ -50,23 +50,21 @@ class Strength:
         """Return the spread at times [m/s]."""
         return np.interp(np.asarray(t_s, dtype=np.float64), self.horizon_s, self.sigma_mps)
 
-    def over(self, tws_mps: float, until_s: float) -> tuple[float, float]:
-        """Return the probability of more wind than ``tws_mps`` at the worst instant until then, and that instant."""
+    def over(self, tws_mps: float, until_s: float) -> float:
+        """Return the probability of more wind than ``tws_mps`` at the worst instant until then."""
         return self._worst(tws_mps, until_s, sign=1.0)
 
-    def under(self, tws_mps: float, until_s: float) -> tuple[float, float]:
+    def under(self, tws_mps: float, until_s: float) -> float:
         """Return the same of less wind."""
         return self._worst(tws_mps, until_s, sign=-1.0)
 
-    def _worst(self, tws_mps: float, until_s: float, *, sign: float) -> tuple[float, float]:
+    def _worst(self, tws_mps: float, until_s: float, *, sign: float) -> float:
         times = [t for t in self.horizon_s if t < until_s] + [max(until_s, 0.0)]
-        worst, at_s = -1.0, 0.0
-        for t, mean, sigma in zip(times, self.mean_at(times).tolist(), self.sigma_at(times).tolist(), strict=True):
+        worst = 0.0
+        for mean, sigma in zip(self.mean_at(times).tolist(), self.sigma_at(times).tolist(), strict=True):
             past = sign * (mean - tws_mps)
-            chance = 0.5 * math.erfc(-past / (sigma * math.sqrt(2.0))) if sigma > 0.0 else float(past > 0.0)
-            if chance > worst:
-                worst, at_s = chance, t
-        return worst, at_s
+            worst = max(worst, 0.5 * math.erfc(-past / (sigma * math.sqrt(2.0))) if sigma > 0.0 else float(past > 0.0))
+        return worst
 
 
 def assumed(tws_mps: float) -> Strength:

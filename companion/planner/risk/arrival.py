@@ -50,8 +50,8 @@ def arrival(problem: Problem, legs: Sequence[Leg]) -> Arrival | None:
     boat = problem.boat
     return Arrival(
         early_s=early, median_s=median, late_s=late, doubts=doubts,
-        over_max=None if boat.max_tws_mps is None else strength.over(boat.max_tws_mps, until_s)[0],
-        under_min=None if boat.min_tws_mps is None else strength.under(boat.min_tws_mps, until_s)[0])
+        over_max=None if boat.max_tws_mps is None else strength.over(boat.max_tws_mps, until_s),
+        under_min=None if boat.min_tws_mps is None else strength.under(boat.min_tws_mps, until_s))
 
 
 def _speeds(problem: Problem, strength: Strength) -> tuple[Speeds, tuple[str, ...]]:

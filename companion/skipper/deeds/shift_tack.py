@@ -12,7 +12,8 @@ from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.deeds.helm import TACK, is_busy, tack
 from companion.skipper.deeds.short_tack import LEAST_MPS
-from companion.skipper.planning.autopilot_beats import is_left_to_beat, shifting, tacks_fail
+from companion.skipper.planning.autopilot_beats import is_left_to_beat, tacks_fail
+from companion.skipper.step.shifting import shifting
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, cross_track_m
 
