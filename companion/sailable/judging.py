@@ -17,8 +17,8 @@ from companion.compose import (
     voyage_of,
     water_of,
 )
+from companion.compose.fields import findings_of, require_fields
 from companion.errors import InputError
-from companion.fields import findings_of, require_fields
 from companion.geofence import Code, Finding, Mission, Severity
 from companion.geofence.check import Conditions, check_area
 from companion.geofence.mission import AreaOptions, kind_of, place_troubles, read_mission

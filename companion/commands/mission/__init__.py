@@ -115,7 +115,7 @@ def _check(args: argparse.Namespace) -> int:
         print_findings(document.findings, args.file)
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
-    from companion.fields import told_of
+    from companion.compose.fields import told_of
     from companion.sailable import judge, words_of
     from companion.sailable.previews import wind_limit_words
 
