@@ -113,7 +113,7 @@ def test_a_fault_of_its_own_is_said_once_and_ends_nothing(monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("of all things")
 
-    monkeypatch.setattr(fold.wind, "set_parameters", broken)
+    monkeypatch.setattr(WindRoom, "set_parameters", broken)
     for n in range(3):
         told(fold, "WNDVN_TYPE", 10.0 + n)
     [said] = disbelieved(fold)

@@ -1,7 +1,6 @@
-"""The companion without its shell: values in, snapshots, steps and actions out.
+"""A voyage's fold: every value, outcome and tick goes through it in order.
 
-A voyage is a fold: every decoded value, every outcome of an action and every tick goes through here in order, and
-nothing else does. The application feeds it live; ``companion replay`` feeds it from a recorded voyage and must get
+Nothing else decides. The application feeds it live; ``companion replay`` feeds it from a recorded voyage, and must get
 the same actions.
 """
 
@@ -11,20 +10,18 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from companion.boat import AutopilotLimits
 from companion.current import STILL, CurrentEstimator, Prior, Sailing
-from companion.geo.angles import wrap_pi
+from companion.fold.air import Air
+from companion.fold.parameters import ToldParameters
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
 from companion.mavlink.trust import GAP_S, UID_EVERY_S, Identity, Witness
 from companion.mavlink.wire import (
     AUTOPILOT_COMPONENT,
-    RANGES,
     Drop,
     Message,
     VehicleAssembler,
     autopilot_version,
-    believable,
     is_autopilot_heartbeat,
 )
 from companion.messages import (
@@ -56,18 +53,7 @@ from companion.skipper.step import (
     WindView,
 )
 from companion.traffic import TargetLimits, Targets
-from companion.wind import Estimator, Verdict, WindRoom, make
-
-# Wind is believed after this long a record [s]; until then its spread is a guess.
-SETTLED_S = 20.0
-
-# A spiking vane is not among them: its spikes are not fed, and what is left is widened.
-_UNTRUSTED = frozenset({
-    Verdict.FROZEN, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR,
-})
-
-# Parameters without which the autopilot's limits are not known.
-_LIMITS = frozenset({"SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS"})
+from companion.wind import WindRoom
 
 # Modes in which the sheets are trimmed to sail; in HOLD they are eased, and by hand nobody knows.
 _SAILS = frozenset({Mode.AUTO, Mode.GUIDED, Mode.LOITER})
@@ -106,7 +92,8 @@ class VoyageFold:
         self._waters = waters
         skipper, persisted = begun(skipper, persisted, waters)
         self.current = CurrentEstimator(skipper.voyage.boat.polar.speed_mps, water)
-        self.skipper, self.wind, self.permissions = skipper, wind, permissions
+        self.skipper, self.permissions = skipper, permissions
+        self._air = Air(wind)
         self.state: SkipperState = skipper.initial(persisted, known)
         self.assembler = VehicleAssembler()
         self._witness = Witness()
@@ -116,21 +103,14 @@ class VoyageFold:
         self._has_company = False
         self._has_shore = False
         self._shore_s: float | None = None   # when a ground station was last heard
-        self._parameters: dict[str, float] = {}
-        self._in_doubt: dict[str, float] = {}
-        self._answered: set[str] = set()
+        self._parameters = ToldParameters()
         self._disbelieved: set[str] = set()
         self._targets = Targets.empty(skipper.voyage.frame, traffic)
-        self._mean90: Estimator = make("mean90")
-        self._mean5: Estimator = make("mean5")
         self._vehicle: VehicleState | None = None
         self._autopilot: AutopilotStatus | None = None
         self._heartbeat_s: float | None = None
         self._mission = MissionOnBoard()
-        self._limits: AutopilotLimits | None = None
         self._mode: Mode | None = None
-        self._first_wind_s: float | None = None
-        self._sample_s: float | None = None
         self._planner_alive = True
         self._events: list[Event] = []
         self._outcomes: list[Outcome] = []
@@ -173,15 +153,15 @@ class VoyageFold:
         self._events.append(AutopilotRebooted())
         self._mission = MissionOnBoard()
         self._identity = self._identity.doubted()
-        self._answered.clear()
+        self._parameters.doubt()
 
     def take(self, value: Value) -> None:
         """Take one decoded value, in the order of time."""
         if isinstance(value, VehicleState):
             self._vehicle = value
-            self.wind.update(value)
+            self._air.room.update(value)
         elif isinstance(value, WindSample | ApparentWind):
-            self._take_wind(value)
+            self._air.take(value)
         elif isinstance(value, AutopilotStatus):
             self._take_status(value)
         elif isinstance(value, StatusText):
@@ -207,27 +187,17 @@ class VoyageFold:
         One that cannot be is said and left out. One that was known and has changed is asked for again, and believed
         when it is told twice.
         """
-        good, refused = believable(values)
+        good, refused = self._parameters.take(values)
         for why in refused:
             self._disbelieve(why.split()[0], f"the autopilot's {why}: not used")
-        self._answered |= values.keys()
-        for name in tuple(good):
-            known, value = self._parameters.get(name), good[name]
-            if name in RANGES and known not in {None, value} and self._in_doubt.get(name) != value:
-                self._in_doubt[name] = good.pop(name)
-            else:
-                self._in_doubt.pop(name, None)
-        self._parameters.update(good)
         self._identity = self._identity.with_parameters(good)
         if any(name.startswith("WNDVN_") for name in good):
-            self.wind.set_parameters(self._parameters)
-        if self._answered >= _LIMITS:
-            self._limits = AutopilotLimits.from_params(self._parameters)
+            self._air.room.set_parameters(self._parameters.values)
 
     @property
     def unread(self) -> tuple[str, ...]:
         """The parameters that were not told yet, or once with another value: to be asked for."""
-        return tuple(name for name in RANGES if name not in self._answered or name in self._in_doubt)
+        return self._parameters.unread
 
     def wants_uid(self, t_s: float) -> bool:
         """Return whether the autopilot is to be asked who it is."""
@@ -254,18 +224,6 @@ class VoyageFold:
             self._mode = status.mode
         self._autopilot = status
 
-    def _take_wind(self, value: WindSample | ApparentWind) -> None:
-        status = self.wind.update(value)
-        if status is None or status.sample is None or status.sample.t_s == self._sample_s:
-            return
-        sample = status.sample
-        self._sample_s = sample.t_s
-        if self._first_wind_s is None:
-            self._first_wind_s = sample.t_s
-        for mean in (self._mean90, self._mean5):
-            mean.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight,
-                        speed_weight=status.speed_weight)
-
     # -------------------------------------------------------------------------------------- step
     def tick(self, t_s: float) -> Step:
         """Step the skipper at ``t_s``."""
@@ -290,7 +248,7 @@ class VoyageFold:
         vehicle, autopilot = self._vehicle, self._autopilot
         if self._has_shore:
             self._shore_s = t_s
-        wind = self._wind_view(t_s)
+        wind = self._air.view(t_s)
         self.current.update(t_s, self._utc_s(t_s), self._sailing(t_s, wind))
         return Snapshot(
             t_s=t_s,
@@ -310,7 +268,7 @@ class VoyageFold:
             neighbours=self._neighbours,
             has_company=self._has_company,
             shore_age_s=None if self._shore_s is None else t_s - self._shore_s,
-            limits=self._limits,
+            limits=self._parameters.limits,
             permissions=self.permissions,
             planner_alive=self._planner_alive,
             traffic=self._targets.picture(t_s) if self._targets.last_heard_s is not None else None,
@@ -337,36 +295,6 @@ class VoyageFold:
             t_s=vehicle.t_s, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
             twd_from_rad=wind.present_twd_from_rad,
             tws_mps=wind.present_tws_mps, is_driven=is_driven, age_s=t_s - vehicle.t_s)
-
-    def _wind_view(self, t_s: float) -> WindView:
-        status = self.wind.status(t_s)
-        table = self.wind.forecast_table(t_s)
-        if status is None or table is None or self._first_wind_s is None:
-            return WindView()
-        mean_rad, _, mean_mps, _ = self._mean90.forecast(0.0)
-        now_rad, _, now_mps, _ = self._mean5.forecast(0.0)
-        record_s = t_s - self._first_wind_s
-        is_calm = Verdict.CALM in status.verdicts
-        # In a calm the autopilot holds the old direction, by its least speed: that is the calm and no fault.
-        if any(v in _UNTRUSTED and not (is_calm and v is Verdict.HELD) for v in status.verdicts):
-            health = WindHealth.UNTRUSTED
-        elif is_calm:
-            health = WindHealth.LIGHT
-        elif record_s < SETTLED_S:
-            health = WindHealth.SETTLING
-        else:
-            health = WindHealth.GOOD
-        return WindView(
-            health=health,
-            forecast=table,
-            mean_twd_from_rad=wrap_pi(mean_rad),
-            mean_tws_mps=max(0.0, mean_mps),
-            sigma_twd_rad=float(table.sigma_twd_rad[0]),
-            present_twd_from_rad=wrap_pi(now_rad),
-            present_tws_mps=max(0.0, now_mps),
-            record_s=record_s,
-            verdict="" if health is WindHealth.GOOD else status.reason,
-        )
 
 
 def begun(
