@@ -1,5 +1,5 @@
 """The companion without its shell: values in, snapshots, steps and actions out."""
 
-from companion.fold.voyage import Step, VoyageFold, Waters, begun
+from companion.fold.fold import Step, VoyageFold, Waters, begun
 
 __all__ = ["Step", "VoyageFold", "Waters", "begun"]
