@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import sys
+import threading
 import time
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
@@ -66,7 +68,7 @@ def sail(
     """Have every job of this part done that has no result yet, and return all results.
 
     ``work`` is a function of a module and gives what JSON can hold; ``key`` says what a job is known by. ``on_record``
-    sees each new result as it comes; ``watch`` may end the run when it has seen enough.
+    sees each new result as it comes; ``watch`` may end the run when it has seen enough. SIGTERM ends it as Ctrl-C does.
 
     Raises:
         InputError: the file of results is another campaign's or program's.
@@ -79,6 +81,7 @@ def sail(
     names = [text_of(key(job)) for job in mine]
     began_s, cpu_s, now, lost = time.monotonic(), 0.0, 0, []
     with contextlib.ExitStack() as stack:
+        stack.enter_context(_ends_when_told())
         ledger = None if means.file is None else stack.enter_context(Ledger(means.file, campaign))
         held = Held(campaign=campaign, by=made_by()) if ledger is None else ledger.held
         there = [held.results.get(name) for name in names]
@@ -115,6 +118,23 @@ def sail(
     return Sailed(
         records=[held.results[name] for name in names if name in held.results], held=held, lost=lost,
         now=now, wall_s=time.monotonic() - began_s, cpu_s=cpu_s)
+
+
+@contextlib.contextmanager
+def _ends_when_told() -> Iterator[None]:
+    """Take SIGTERM, by which a queue ends what it began, for Ctrl-C: workers are ended, and nothing is left behind."""
+    if threading.current_thread() is not threading.main_thread():   # where no signal comes
+        yield
+        return
+
+    def end(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _settled(

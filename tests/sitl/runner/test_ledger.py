@@ -1,6 +1,7 @@
 """Results stay: appended as they come, read again wherever a run was broken off, never mixed or torn."""
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -88,6 +89,18 @@ def test_a_run_ends_when_enough_is_known_and_goes_on_when_more_is_wanted(tmp_pat
     assert seen == [0, 1, 2, 2, 2, 3, 4, 5]
     assert (found.now, attempts(folder)) == (3, dict.fromkeys(range(5), 1))
     assert "2 sailed, 4 at most to come; 2 known" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_sigterm_ends_it_as_ctrl_c_does_and_leaves_nobody(tmp_path, folder, workers):
+    out, before = tmp_path / "r.jsonl", signal.getsignal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt):
+        sail("quick", work, jobs_in(folder), Means(workers=workers, out=out), key=key_of,
+             on_record=lambda _: os.kill(os.getpid(), signal.SIGTERM))
+    assert signal.getsignal(signal.SIGTERM) is before
+    assert not multiprocessing.active_children()
+    assert len(read_results(out).results) == 1
+    assert len(sailed(folder, out).records) == 6
 
 
 def test_a_job_that_raises_is_told_and_tried_again(tmp_path, folder, capsys):
