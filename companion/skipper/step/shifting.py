@@ -13,8 +13,9 @@ from companion.skipper.way.shifts import ShiftTable, shift_table
 WORTH = 0.01                   # tacked on where it gains at least this share of the speed made good
 NARROWEST_M = 20.0             # in a narrower corridor she meets the edge before a shift
 LEG_RAD = math.radians(25.0)   # a leg farther off the mean wind is sailed on one tack for the most part
-LONG_S = 300.0                 # the horizon by which the forecast's mean and spread are read
+SOON_S, LONG_S = 30.0, 300.0   # horizons: mean and spread are read by the longer, how fast it shifts by both
 TAU_S = (15.0, 600.0)
+GROWN = 0.1, 0.995             # of the spread after the shorter of the later one, at the least and at the most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,14 +53,29 @@ def shifts_of(
 
     ``speed_mps`` is hers close-hauled at ``half_rad``, ``tack_s`` what a tack costs.
     """
-    far = max(0, int(forecast.horizon_s.searchsorted(LONG_S, side="right")) - 1)
+    far = _by(forecast, LONG_S)
     spread_rad, mean_rad = float(forecast.sigma_twd_rad[far]), float(forecast.mean_twd_from_rad[far])
     off_rad = 0.0 if leg_rad is None else difference_rad(leg_rad, mean_rad)
     if corridor_m < NARROWEST_M or spread_rad <= 0.0 or abs(off_rad) > LEG_RAD:
         return None
-    tau_s = min(max(forecast.correlation_time_s, TAU_S[0]), TAU_S[1])
     table = shift_table(   # round figures: it is made anew when something has changed that matters
         corridor_m=round(corridor_m, 1), spread_rad=math.radians(2.0 * max(1, round(math.degrees(spread_rad) / 2.0))),
-        tau_s=TAU_S[0] * 1.5 ** round(math.log(tau_s / TAU_S[0], 1.5)), speed_mps=round(max(0.2, speed_mps), 1),
-        half_rad=half_rad, leg_rad=math.radians(5.0 * round(math.degrees(off_rad) / 5.0)), tack_s=tack_s)
+        tau_s=TAU_S[0] * 1.5 ** round(math.log(shift_time_s(forecast) / TAU_S[0], 1.5)),
+        speed_mps=round(max(0.2, speed_mps), 1), half_rad=half_rad,
+        leg_rad=math.radians(5.0 * round(math.degrees(off_rad) / 5.0)), tack_s=tack_s)
     return Shifting(table=table, mean_rad=mean_rad) if table.made_good_mps > (1.0 + WORTH) * table.plainly_mps else None
+
+
+def shift_time_s(forecast: WindForecast) -> float:
+    """Return how long a shift lasts [s]: the correlation time with which a mean-reverting spread grows as forecast.
+
+    The forecast's own ``correlation_time_s`` needs hours of wind: in the first minutes of one of 28 s it says 270.
+    """
+    near, far = _by(forecast, SOON_S), _by(forecast, LONG_S)
+    grown = float(forecast.sigma_twd_rad[near] / forecast.sigma_twd_rad[far])
+    known = min(max(grown, GROWN[0]), GROWN[1]) ** 2
+    return min(max(-2.0 * float(forecast.horizon_s[near]) / math.log1p(-known), TAU_S[0]), TAU_S[1])
+
+
+def _by(forecast: WindForecast, horizon_s: float) -> int:
+    return max(0, int(forecast.horizon_s.searchsorted(horizon_s, side="right")) - 1)
