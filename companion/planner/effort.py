@@ -20,12 +20,13 @@ class Effort:
 
     Algorithms call ``spend`` with what they did and stop when ``is_over``. ``fraction`` is the share used of the
     limit that decides (expansions when given), so a schedule made from it does not depend on the machine when
-    there is an expansion budget.
+    there is an expansion budget. ``after_s`` of the seconds are for what is done with the path afterwards.
     """
 
     def __init__(self, budget_s: float | None, expansions: int | None) -> None:
         self.limit = expansions
         self.budget_s = math.inf if budget_s is None else budget_s
+        self.after_s = 0.0
         self.used = 0
         self.first_s: float | None = None
         self._began_s = effort_s()
@@ -44,19 +45,20 @@ class Effort:
         """Share of the deciding limit used, 0..1 and beyond."""
         if self.limit is not None:
             return self.used / max(1, self.limit)
-        return self.elapsed_s / self.budget_s if self.budget_s > 0.0 else 1.0
+        available_s = self.budget_s - self.after_s
+        return self.elapsed_s / available_s if available_s > 0.0 else 1.0
 
     @property
     def is_over(self) -> bool:
         """Must the search stop now?"""
         if self.limit is not None and self.used >= self.limit:
             return True
-        return math.isfinite(self.budget_s) and self.elapsed_s >= self.budget_s
+        return self.remaining_s <= 0.0
 
     @property
     def remaining_s(self) -> float:
-        """Computing time left [s]; inf without a budget in seconds."""
-        return self.budget_s - self.elapsed_s
+        """Computing time left for the search [s]; inf without a budget in seconds."""
+        return self.budget_s - self.after_s - self.elapsed_s
 
     def part(self, share: float) -> Effort:
         """Return an effort that ends when ``share`` of this one's limits is spent; what it spends counts here."""

@@ -29,6 +29,7 @@ from companion.planner.warm import warm_problems
 
 DEFAULT_BUDGET_S = 1.0
 OPTIMAL_GAP = 1e-3
+SEARCHED = 0.94        # of a budget in seconds: the last step of a search ends late, and its path is checked exactly
 
 ALGORITHMS: Mapping[str, tuple[str, str]] = {
     "auto": ("companion.planner.search.auto", "search"),
@@ -78,7 +79,7 @@ def plan(
     if budget_s is None and expansions is None:
         budget_s = DEFAULT_BUDGET_S
     warm(algorithm)
-    effort = Effort(budget_s, expansions)
+    effort = Effort(SEARCHED * budget_s if budget_s is not None and expansions is None else budget_s, expansions)
     empty = Plan(status=PlanStatus.INVALID, reason=defect_of(problem) or "", waypoints_en=np.empty((0, 2)),
                  algorithm=algorithm, seed=seed, elapsed_s=effort.elapsed_s)
     if defect_of(problem) is not None:

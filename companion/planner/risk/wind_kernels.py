@@ -21,7 +21,7 @@ NONE, KALMAN, AR1, TABLE = 0, 1, 2, 3
 
 Z_MAX = 6.5          # the grid ends here; beyond lies 4e-11 of the wind
 Z_CELLS = 260        # cells of 0.05 standard deviations
-NEVER = 10.0         # standard deviations that no step goes: 1e-23
+NEVER = 7.0          # standard deviations that no step goes: 3e-12
 R_STEP = 0.965       # correlation over one step: its standard deviation, 0.26, is five cells
 # Between steps a continuous process peeks over the barrier; a barrier nearer by this many step deviations
 # accounts for it (Chernoff 1965; Broadie, Glasserman and Kou 1997: -zeta(1/2) / sqrt(2 pi)).
@@ -78,10 +78,10 @@ def _phi(x):  # type: ignore[no-untyped-def]
 
 @kernel
 def _kernel(r, dz, out):  # type: ignore[no-untyped-def]
-    """Fill out[i, j]: the probability to go from the centre of cell i into cell j; 0 where it is below 1e-23."""
+    """Fill out[i, j]: the probability to go from the centre of cell i into cell j; 0 where none goes so far."""
     n = out.shape[0]
     s = math.sqrt(max(1e-12, 1.0 - r * r))
-    for i in range(n):
+    for i in range((n + 1) // 2):
         mean = r * (-Z_MAX + (i + 0.5) * dz)
         first = max(0, min(n, int((mean - NEVER * s + Z_MAX) / dz)))
         last = min(n, int((mean + NEVER * s + Z_MAX) / dz) + 2)
@@ -95,6 +95,8 @@ def _kernel(r, dz, out):  # type: ignore[no-untyped-def]
             low = high
         for j in range(first, last):
             out[i, j] /= total
+        if 2 * i + 1 < n:   # the other half is its mirror image
+            out[n - 1 - i, :] = out[i, ::-1]
 
 
 @kernel

@@ -132,7 +132,7 @@ def _improve(s: Searcher) -> None:
     spent, looked, turned, sharpened = 0.0, not has_solid, False, False
     s.next_turn()
     if has_solid and not s.is_done:
-        s.geodesic(40_000)
+        s.geodesic(s.tests(40_000, 0.15))
     while not s.is_done:
         before = s.effort.fraction
         if before >= FINE_FROM:

@@ -32,6 +32,14 @@ FINE_FROM = 0.85
 STOP_GAP = 2e-4
 """Stop when the path is this close to the bound."""
 _CHUNK = 4_000
+_MOVE_S, _POINT_S = 4e-6, 9e-7
+"""What a move of a candidate takes before one has been timed: at the least, and for each point of its path [s]."""
+_LEAST = 50
+"""Moves below which a chunk is not worth its call."""
+_LEG_S = 1.5e-4
+"""What the exact check and the risk of the found path take for each of its legs [s]."""
+_TESTS_PER_S = 1.2e6
+"""Visibility tests that take a second."""
 _FIRST_CYCLE = 8_000
 _LONGEST_CYCLE = 512_000
 _HOT, _COLD = 2e-3, 1e-7
@@ -56,6 +64,7 @@ class Candidate:
     cycles: int = 0
     spots: Floats = field(default_factory=lambda: np.empty((0, 2)))
     spots_at: int = 0
+    move_s: float = 0.0
 
     def worth(self, price_s: float) -> float:
         """Return the cost with every point priced [s]."""
@@ -127,6 +136,7 @@ class Searcher:
         if self.best is None or candidate.worth(price) < self.best.worth(price):
             self.best = candidate
             self.effort.found()
+        self.effort.after_s = _LEG_S * len(self.best.points)
 
     # ---------------------------------------------------------------------------------------- guides
     def along(self, guide: Floats, *, most: int = 3, halving: int = 0) -> Floats | None:
@@ -215,8 +225,8 @@ class Searcher:
         if len(nodes) < 2 or len(nodes) > 900:
             return 0
         args = (world.grid, nodes, gauge.normals, gauge.blocked, gauge.table, self.goal)
-        to, before, _, _, n1 = geodesics(*args, 1, limit, 200_000, self.bound.ends)
-        back, after, _, _, n2 = geodesics(*args, 2, limit, 200_000, self.bound.ends)
+        to, before, _, _, n1 = geodesics(*args, 1, limit, self.tests(200_000, 0.12), self.bound.ends)
+        back, after, _, _, n2 = geodesics(*args, 2, limit, self.tests(200_000, 0.12), self.bound.ends)
         self.effort.spend((n1 + n2) // 8 + 1)
         through = to + back
         known = {c.side for c in self.pool}
@@ -287,6 +297,11 @@ class Searcher:
             seconds -= share * self.effort.budget_s
         return max(0.0, steps), max(0.0, seconds)
 
+    @property
+    def deciding_s(self) -> float:
+        """Computing time left [s]; inf where expansions decide, so that nothing depends on the machine."""
+        return self.effort.remaining_s if self.effort.limit is None else math.inf
+
     def lattice(self, cells: int, reach: int, *, margin: float, half_at_s: float, stretch: float = 1.0,
                 bound_s: float | None = None, side: int = 0) -> Candidate | None:
         """Run one lattice whose axes fit the no-go zone at ``half_at_s`` and offer its path."""
@@ -354,7 +369,8 @@ class Searcher:
             reach=2 + int(2.0 * uniform(self.rng)), half_rad=math.pi - self.world.boat.down if downwind else half,
             box=(low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin), downwind=downwind,
             origin=(float(a[0]), float(a[1]), h, begin), goal=(float(e[0]), float(e[1]), 0.0),
-            bound_s=begin + span * 1.01 + 0.5 / self.world.boat.omega, max_pops=60_000,
+            bound_s=begin + span * 1.01 + 0.5 / self.world.boat.omega,
+            max_pops=int(min(60_000.0, max(2_000.0, 0.4 * self.pops_per_s * self.deciding_s))),
         )
         self.effort.spend(max(20, found.pops // 8))
         if found.points is None:
@@ -373,17 +389,18 @@ class Searcher:
     def refine(self, c: Candidate) -> None:
         """Take the candidate one chunk further through its annealing cycle."""
         chunk = max(400, min(_CHUNK, 60_000 // len(c.last)))
-        moves = max(1, min(chunk, self.effort.remaining(chunk), c.cycle - c.done))
+        moves = max(1, min(self._in_time(c, chunk), self.effort.remaining(chunk), c.cycle - c.done))
         cold, price = _COLD, self.leg_price * c.cost_s * (2 if c.cycles == 0 else 1)
         hot = _HOT * (0.25 ** (c.cycles % 3))
         f0, f1 = c.done / c.cycle, (c.done + moves) / c.cycle
         at = [c.cost_s * hot * (cold / hot) ** f for f in (f0, f1)]
-        size = float(np.max(np.ptp(c.points, axis=0))) + 1e-9
+        size, began_s = float(np.max(np.ptp(c.points, axis=0))) + 1e-9, self.effort.elapsed_s
         cost, points, _, last = anneal(
             self.world.grid, self.world.boat, c.last, self.world.h0, self.goal, 0.5 * size, self._spots(c), moves,
             at[0], at[1], price, self.rng,
         )
         self.effort.spend(moves)
+        c.move_s = (self.effort.elapsed_s - began_s) / moves
         c.last, c.moves, c.done = last, c.moves + moves, c.done + moves
         if cost + price * len(points) < c.worth(price):
             c.cost_s, c.points = float(cost), points
@@ -393,6 +410,16 @@ class Searcher:
             c.cycle = min(_LONGEST_CYCLE, 2 * c.cycle)
             c.last = c.points
         self.note(c)
+
+    def _in_time(self, c: Candidate, moves: int) -> int:
+        """Return as many moves of a candidate as the time left allows."""
+        # half of what fits: how long a move takes changes with the path
+        fits = 0.5 * self.deciding_s / (c.move_s or _MOVE_S + _POINT_S * len(c.last))
+        return int(min(moves, max(_LEAST, fits)))
+
+    def tests(self, most: int, share: float) -> int:
+        """Return as many visibility tests as take a share of the time left."""
+        return max(1, int(min(most, share * _TESTS_PER_S * self.deciding_s)))
 
     def next_turn(self) -> None:
         """Give one chunk to the best candidate or to one that may still beat it."""

@@ -131,6 +131,19 @@ def test_the_sum_that_the_tree_adds_up_is_not_below_what_is_computed(angle, t, s
     assert risk.boole >= 0.85 * risk.computed - 1e-6
 
 
+@given(r=st.floats(0.05, 0.995))
+@settings(max_examples=20, deadline=None, derandomize=True)
+def test_the_chance_to_go_from_cell_to_cell_is_the_normal_laws(r):
+    """Against the error function itself, cell by cell, both halves of the grid; rows sum to one."""
+    step = kernels.steps_of(r)
+    edges = np.linspace(-kernels.Z_MAX, kernels.Z_MAX, kernels.Z_CELLS + 1)
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    at = (edges[None, :] - r * centres[:, None]) / math.sqrt(2.0 * (1.0 - r * r))
+    law = np.diff(0.5 * np.vectorize(math.erfc)(-at), axis=1)
+    assert np.allclose(step, law / law.sum(axis=1, keepdims=True), rtol=0.0, atol=1e-11)
+    assert np.allclose(step.sum(axis=1), 1.0, rtol=0.0, atol=1e-12)
+
+
 def test_cutting_a_leg_in_two_changes_nothing():
     p = problem(AR1)
     whole = path_risk(p, legs((0.0, 200.0, 62.0)))
