@@ -16,6 +16,7 @@ from companion.skipper.board.custody import judge, stand_by
 from companion.skipper.board.on_board import mission_is_known
 from companion.skipper.composed import follow_field
 from companion.skipper.deeds.adrift import follow_ground
+from companion.skipper.deeds.brake import brakes
 from companion.skipper.deeds.doubt import follow
 from companion.skipper.deeds.failsafe import follow_answer, follow_stops, take_over
 from companion.skipper.deeds.helm import is_busy
@@ -165,6 +166,8 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         return
     notice_truncation(turn)
     if not mission_is_known(turn):
+        if turn.state.after_operator and not turn.state.foreign:
+            brakes(turn)   # a mode changes no mission, and a step may be all that is left of the water
         return
     if holds_ashore(turn):
         return

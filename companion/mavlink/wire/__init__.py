@@ -3,7 +3,7 @@
 from companion.mavlink.wire.assembler import VehicleAssembler
 from companion.mavlink.wire.codec import AUTOPILOT_COMPONENT, autopilot_version, is_autopilot_heartbeat
 from companion.mavlink.wire.dialect import Dialect
-from companion.mavlink.wire.fixes import LEAP_M, MEMORY_S, leap_m
+from companion.mavlink.wire.fixes import MEMORY_S
 from companion.mavlink.wire.frames import Codec, Drop, Message
 from companion.mavlink.wire.high_latency import CONTROL_COMMAND, HIGH_LATENCY_S
 from companion.mavlink.wire.items import first_difference, mission_hash
@@ -12,7 +12,7 @@ from companion.mavlink.wire.status import StatusReader, StatusReport
 from companion.mavlink.wire.streams import Stream
 
 __all__ = [
-    "AUTOPILOT_COMPONENT", "CONTROL_COMMAND", "HIGH_LATENCY_S", "LEAP_M", "MEMORY_S", "RANGES", "Codec", "Dialect",
+    "AUTOPILOT_COMPONENT", "CONTROL_COMMAND", "HIGH_LATENCY_S", "MEMORY_S", "RANGES", "Codec", "Dialect",
     "Drop", "Message", "StatusReader", "StatusReport", "Stream", "VehicleAssembler", "autopilot_version", "believable",
-    "first_difference", "is_autopilot_heartbeat", "leap_m", "mission_hash",
+    "first_difference", "is_autopilot_heartbeat", "mission_hash",
 ]

@@ -8,8 +8,10 @@ from functools import cached_property
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from companion.boat.tracking import Helm
+from companion.geo.segments import PolygonIndex
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,3 +54,17 @@ class Tracking:
         if self.limits is not None and not self.limits.is_empty:
             shapes.append(self.limits.boundary)
         return shapely.STRtree(np.asarray(shapes, dtype=object))
+
+    @cached_property
+    def _indices(self) -> tuple[PolygonIndex, PolygonIndex]:
+        limits = self.limits
+        return (PolygonIndex([g if g.is_valid else shapely.make_valid(g) for g in self.solids if not g.is_empty]),
+                PolygonIndex([] if limits is None or limits.is_empty else [limits]))
+
+    def distance_m(self, places_en: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return each place's distance from everything solid [m], 0 inside; (n, 2) places, inf where there is none.
+
+        What ``tree`` tells, in a hundredth of its time: thousands of places are asked for with each plan.
+        """
+        solids, limits = self._indices
+        return np.minimum(np.maximum(solids.distance_m(places_en), 0.0), np.abs(limits.distance_m(places_en)))

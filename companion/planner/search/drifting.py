@@ -47,11 +47,12 @@ def drift_search(
     n_states = nx * ny * kinds
     wx, wy = (box[2] - box[0]) / nx, (box[3] - box[1]) / ny
     time = np.full(n_states, np.inf)
-    px, py, course = np.zeros(n_states), np.zeros(n_states), np.zeros(n_states)
+    # Of what a state keeps only what is written is read; most states are never come to, and their pages never touched.
+    px, py, course = np.empty(n_states), np.empty(n_states), np.empty(n_states)
     # What the boat has turned since its last leg with room for a turn the long way round, and its present leg so far.
-    wound, run = np.zeros(n_states), np.zeros(n_states)
+    wound, run = np.empty(n_states), np.empty(n_states)
     w, r, w1, r1 = 0.0, 0.0, 0.0, 0.0
-    parent = np.full(n_states, -1, np.int32)
+    parent = np.empty(n_states, np.int32)
     done = np.zeros(n_states, np.uint8)
     n_gauge = gauge.shape[0]
     keys, items, size = np.empty(1 << 14), np.empty(1 << 14, np.int32), 0
@@ -153,7 +154,8 @@ def drift_search(
             break
         done[s] = 1
         x, y, t, h = px[s], py[s], time[s], course[s]
-        w, r = wound[s], run[s]
+        if b.room > 0.0:
+            w, r = wound[s], run[s]
     if last == -2:
         return math.inf, np.empty((0, 2)), pops
     path = np.empty((4096, 2))

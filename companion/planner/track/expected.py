@@ -104,7 +104,7 @@ def _expected(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...], ha
     leg = track.leg - first
     mine = (leg >= 0) | (np.hypot(*(track.en_m - path[0]).T) < BESIDE_M)
     en, leg = track.en_m[mine], np.maximum(leg[mine], 0)
-    distance = _distance_m(tracking, en)
+    distance = tracking.distance_m(en)
     best = float(np.max(curve))
     near = are_near_short(np.hypot(*np.diff(whole, axis=0).T), best)[first:]
     errors = np.array([stated_error_m(best, has_short=bool(short) or not tracking.is_known) for short in near])
@@ -197,24 +197,16 @@ def _nearest_of_each(
     """
     coarse = np.arange(0, len(en), STRIDE)
     distance = np.full(len(en), math.inf)
-    distance[coarse] = _distance_m(tracking, en[coarse])
+    distance[coarse] = tracking.distance_m(en[coarse])
     least = np.full(int(group.max()) + 1, math.inf)
     np.minimum.at(least, group, distance)
     before = np.arange(len(en)) // STRIDE * STRIDE
     could = distance[before] - np.hypot(*(en - en[before]).T) < least[group]
     could[coarse] = False
-    distance[could] = _distance_m(tracking, en[could])
+    distance[could] = tracking.distance_m(en[could])
     order = np.lexsort((distance, group))
     firsts = order[np.searchsorted(group[order], np.arange(len(least)))]
     return [(int(i), float(distance[i])) for i in firsts]
-
-
-def _distance_m(tracking: Tracking, en: NDArray[np.float64]) -> NDArray[np.float64]:
-    points = shapely.points(en)
-    (which, _), distance = tracking.tree.query_nearest(points, return_distance=True, all_matches=False)
-    out = np.full(len(en), math.inf)
-    out[which] = distance
-    return out
 
 
 def _nearest(tracking: Tracking, en: NDArray[np.float64]) -> tuple[float, float]:

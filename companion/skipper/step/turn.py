@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from companion.frozen import changed
-from companion.mavlink.wire import LEAP_M, MEMORY_S, leap_m
+from companion.mavlink.wire import MEMORY_S
 from companion.messages import AutopilotStatus, Mode
 from companion.skipper.step.actions import (
     Action,
@@ -39,7 +39,8 @@ from companion.skipper.way.stemming import Water
 from companion.skipper.way.voyage import PointEn, Voyage
 
 FRESH_S = 3.0          # a part older than this is not acted upon
-JUMP_M = LEAP_M        # a fix this much farther than the boat can sail is a jump
+JUMP_M = 10.0          # a fix this much farther from where she is reckoned than she can have turned away is a jump
+GAINS_MPS = 1.0        # ... or gained speed
 SHOWS_S = 2.5          # a command that was accepted shows in the next heartbeats: it is not repeated before that
 DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
 
@@ -197,12 +198,20 @@ class Turn:
 
     @property
     def jump_m(self) -> float:
-        """How much farther than it can sail the boat has moved since the last fix [m]."""
-        here, last, age = self.snapshot.position_en_m, self.state.last_seen, self.snapshot.vehicle_age_s
-        if here is None or last is None or age is None or self.state.back_s == self.t_s:
+        """How much farther the boat is from where her last fix has her sail than she can have turned away [m].
+
+        At a leap's 8 m/s a second would hide what a margin is: she is held against her own speed.
+        """
+        here, last, vehicle = self.snapshot.position_en_m, self.state.last_seen, self.snapshot.vehicle
+        age = self.snapshot.vehicle_age_s
+        if here is None or last is None or vehicle is None or age is None or self.state.back_s == self.t_s:
             return 0.0
-        elapsed_s = self.t_s - age - last.t_s
-        return 0.0 if elapsed_s > MEMORY_S else leap_m(math.dist(here, last.en_m), elapsed_s)
+        elapsed_s = max(0.0, self.t_s - age - last.t_s)
+        if elapsed_s > MEMORY_S:
+            return 0.0
+        east, north = vehicle.velocity_en_mps
+        reckoned = (last.en_m[0] + east * elapsed_s, last.en_m[1] + north * elapsed_s)
+        return max(0.0, math.dist(here, reckoned) - (vehicle.speed_mps + GAINS_MPS) * elapsed_s)
 
     @property
     def speed_mps(self) -> float:

@@ -62,7 +62,7 @@ TABLE: tuple[Watchdog, ...] = (
       why="nothing can be asked of an autopilot that is not heard; it sails its mission to the safe end alone"),
     W(name="position lost", watches="time since the last position", enter=5.0, exit=2.0, unit="s", enter_s=0.0,
       exit_s=2.0, severity=S.ERROR, response=Response.NO_BOAT_PLANS, at_rest=True, why="a plan needs a start"),
-    W(name="position jump", watches="distance between fixes beyond what the boat can sail", enter=JUMP_M, exit=10.0,
+    W(name="position jump", watches="distance of a fix from where the boat is reckoned", enter=JUMP_M, exit=5.0,
       unit="m", enter_s=0.0, exit_s=20.0, severity=S.WARNING, response=Response.NO_BOAT_PLANS, at_rest=True,
       why="a GPS jump may put the start into an obstacle; the plan on the autopilot does not depend on us"),
     W(name="wind untrusted", watches="the wind room's verdict (frozen, mirrored, spiking, silent vane)", enter=1.0,
