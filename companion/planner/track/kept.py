@@ -2,8 +2,8 @@
 
 The search plans lines. Here its path is laid again: legs that are too short to be followed go, an arc of them becomes
 one corner or two where the legs around it meet, or one leg that is long enough: round a wall's end there and back
-those legs meet nowhere. Waypoints that nothing needs are left out. Where the predicted track still comes nearer than the
-floor, the corners near that place are pushed away from what is solid. A path that cannot be made to keep it is no
+those legs meet nowhere. Waypoints that nothing needs are left out. Where the predicted track still comes nearer than
+the floor, the corners near that place are pushed away from what is solid. A path that cannot be made to keep it is no
 answer: then the reason says where, and how near it would come.
 """
 
@@ -29,7 +29,7 @@ Path = list[tuple[float, float]]
 Judge = Callable[[Path], Evaluation]
 """Says of a path whether it is feasible, and how long it takes."""
 
-AT_MOST = 40                # changes to one path: each costs a check and a prediction
+AT_MOST = 80                # changes to one path: each costs a check and a prediction
 LARGEST = 60                # waypoints: a longer path is looked at as it is
 SHORTER_SHARE, SHORTER_S = 0.006, 0.4   # what a waypoint less may cost
 SHORT_SHARE, SHORT_EXTRA_S = 0.03, 2.0  # ... and a leg less that cannot be followed
@@ -97,7 +97,7 @@ def _scorer(problem: Problem) -> Judge:
 def _fewer(
     problem: Problem, judge: Judge, path: Path, judged: Evaluation, seen: Expected,
 ) -> tuple[Path, Evaluation, Expected]:
-    """Leave out corners and short legs, the shortest first, while that costs little and brings her nearer to nothing."""
+    """Leave out corners and short legs, the shortest first, while it costs little and brings her nearer to nothing."""
     tried: set[tuple[int, ...]] = set()
     least_m = SHORT_S * float(np.max(curve_mps(problem)))
     limit_s = judged.time_s * (1.0 + SHORT_SHARE) + SHORT_EXTRA_S
