@@ -20,6 +20,7 @@ SHOOT_S = 2.1        # of her speed, before she lies
 FILL_S = 0.8         # of her speed, on the old course until she tries again
 AGAIN_SHARE = 0.6    # of her speed, at the next try
 TRIES = 2            # then she gybes round where there is room
+RISKY = 0.01         # one failure must not touch; several in a row may, with no more than this probability
 IRONS_S = 10.0       # she lies head to wind: the skipper bears away after 8 s (``in irons``), and that takes her two
 # Of the wind's speed: hull and flogging sails. A skiff under bare poles is blown at 3 to 6 % of it.
 BLOWN_SHARE = 0.04

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import math
 
-from companion.boat.failed_tack import AGAIN_SHARE, IRONS_S, TRIES, failed_tack, lee_set
+from companion.boat.failed_tack import AGAIN_SHARE, IRONS_S, RISKY, TRIES, failed_tack, lee_set
 from companion.current import UNTOLD_MPS
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Mode
-from companion.planner.risk.tacks import RISKY
 from companion.skipper.deeds.helm import TACK, is_busy, tack
 from companion.skipper.planning.autopilot_beats import tacks_fail
 from companion.skipper.step.turn import Turn
