@@ -3,7 +3,8 @@
 Measured on the simulator's hull (winds of 3 to 9 m/s, 4 to 14 s in irons): she shoots 1.9 to 2.1 s of her speed, half
 way between the old course and the wind, and has sailed 0.3 to 0.6 s of it on the old course when she tries again, at
 half the speed; ``tests/boat/test_failed_tack.py`` holds these figures against it. That hull hardly goes astern. One
-with a rig does: what she is blown back is reckoned from its windage, beside the track without it.
+with a rig does: what she is blown back is reckoned from its windage, beside the track without it. One that makes
+leeway is set to the lee side while she lies a little on her old tack, farther on than she was going (``lee_set``).
 """
 
 from __future__ import annotations
@@ -19,9 +20,13 @@ SHOOT_S = 2.1        # of her speed, before she lies
 FILL_S = 0.8         # of her speed, on the old course until she tries again
 AGAIN_SHARE = 0.6    # of her speed, at the next try
 TRIES = 2            # then she gybes round where there is room
+RISKY = 0.01         # one failure must not touch; several in a row may, with no more than this probability
 IRONS_S = 10.0       # she lies head to wind: the skipper bears away after 8 s (``in irons``), and that takes her two
 # Of the wind's speed: hull and flogging sails. A skiff under bare poles is blown at 3 to 6 % of it.
 BLOWN_SHARE = 0.04
+# Likewise, abeam: a hull whose leeway is 5 degrees on a beat, the wind 15 degrees off her bow and her sails flogging
+# (``companion.boat.leeway``, of the push a quarter).
+SET_SHARE = 0.05
 
 Track = NDArray[np.float64]
 
@@ -41,6 +46,12 @@ def failed_tack(
     ends = [_moved(place, course_rad, FILL_S * speed_mps) for place in (blown + carried, shot + carried)]
     corner = np.asarray(corner_en, dtype=np.float64)
     return np.array([corner, shot, blown + carried, ends[0]]), np.array([corner, shot, shot + carried, ends[1]])
+
+
+def lee_set(*, course_rad: float, twd_from_rad: float, tws_mps: float) -> tuple[float, float]:
+    """Return how a hull with leeway is set while she lies (east, north) [m/s]: abeam, to the lee of her old tack."""
+    abeam = twd_from_rad - math.copysign(0.5 * math.pi, wrap_pi(twd_from_rad - course_rad))
+    return SET_SHARE * tws_mps * math.sin(abeam), SET_SHARE * tws_mps * math.cos(abeam)
 
 
 def _moved(place: NDArray[np.float64], course_rad: float, length_m: float) -> NDArray[np.float64]:

@@ -9,8 +9,10 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.boat.failed_tack import AGAIN_SHARE, failed_tack
+from companion.boat.failed_tack import AGAIN_SHARE, SET_SHARE, failed_tack, lee_set
+from companion.boat.leeway import coefficient_of
 from sitl.autopilot.boat import kernel as k
+from sitl.autopilot.boat.departed import IRONS_RAD, side_mps
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.surroundings import Surroundings
 from sitl.autopilot.boat.vehicle import Vehicle
@@ -81,3 +83,17 @@ def test_a_current_carries_her_while_she_lies():
     moved = failed_tack((0.0, 0.0), course_rad=0.8, speed_mps=2.0, twd_from_rad=0.0, tws_mps=5.0,
                         current_en_mps=(0.5, 0.0))
     assert moved[0][-1] - still[0][-1] == pytest.approx([5.0, 0.0])
+
+
+@given(course=st.floats(-math.pi, math.pi), twd=st.floats(-math.pi, math.pi), tws=st.floats(0.0, 15.0))
+def test_she_is_set_abeam_to_the_lee_of_her_old_tack(course, twd, tws):
+    assume(abs(math.sin(twd - course)) > 1e-6)
+    east, north = lee_set(course_rad=course, twd_from_rad=twd, tws_mps=tws)
+    assert math.hypot(east, north) == pytest.approx(SET_SHARE * tws)
+    assert east * math.sin(twd) + north * math.cos(twd) == pytest.approx(0.0, abs=1e-9)
+    assert east * math.sin(course) + north * math.cos(course) >= -1e-9      # farther on, never back
+
+
+def test_the_set_is_what_the_simulators_hull_makes_with_five_degrees_of_leeway():
+    eased = side_mps(coefficient_of(math.radians(5.0)), 6.0, IRONS_RAD, 0.0, math.pi, 0.3)
+    assert abs(eased) == pytest.approx(SET_SHARE * 6.0, rel=0.05)

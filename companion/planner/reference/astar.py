@@ -9,7 +9,8 @@ goal, turned away from the wind until it can be sailed. Ships become fixed discs
 What the thesis leaves open: the grid is stretched so that start and goal are both nodes (a goal less than a quarter
 of a cell off the start's row or column counts as on it, and the last leg makes up for it);
 the first turn may exceed 90 degrees; a problem's own limits and its widened no-go zone narrow the range of
-headings further; a boat faster than 7 knots is estimated at its own top speed, or the estimate would overestimate.
+headings further, and in a current so do the courses that the autopilot does not follow (``zone``); a boat faster
+than 7 knots is estimated at its own top speed, or the estimate would overestimate.
 The grid refuses to be larger than ``memory_bytes``, the weak spot that the thesis names in its conclusion.
 
 References:
@@ -28,7 +29,7 @@ from numpy.typing import NDArray
 from companion.geo.angles import difference_rad, heading_of, wrap_pi
 from companion.planner.effort import Effort, Outcome
 from companion.planner.plan import PlanStatus
-from companion.planner.problem.evaluate import endpoint_error, ground_track
+from companion.planner.problem.evaluate import endpoint_error, ground_track, is_zoned
 from companion.planner.problem.parts import Target
 from companion.planner.problem.value import Problem
 from companion.planner.reference import astar_kernels as kernels
@@ -202,7 +203,8 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: Grid, 
     for k, course in enumerate(courses):
         heading, speed = ground_track(problem, math.sin(course), math.cos(course))
         twa = abs(wrap_pi(heading - problem.wind.twd_from_rad))
-        is_sailable = max(settings.min_twa_rad, problem.no_go_min_rad) - 1e-9 <= twa <= deepest + 1e-9
+        is_sailable = (max(settings.min_twa_rad, problem.no_go_min_rad) - 1e-9 <= twa <= deepest + 1e-9
+                       and not is_zoned(problem, math.sin(course), math.cos(course)))
         way[k] = wrap_pi(heading), speed if is_sailable else 0.0, twa
     (sx, sy), (gx, gy) = problem.start_en, problem.goal_en
     goal_heading = target_heading(courses, way[:, 1] > 0.0, heading_of(gx - sx, gy - sy))

@@ -79,8 +79,9 @@ class FlatPlane:
         start, goal = (tuple(float(c) for c in row) for row in self.to([p.start_en, p.goal_en]))
         boat = replace(p.boat, no_go_half_rad=p.boat.no_go_half_rad + turn,
                        max_twa_rad=p.boat.max_twa_rad - (turn if p.boat.max_twa_rad < math.pi else 0.0))
+        zone = p.zone and replace(p.zone, half_rad=p.zone.half_rad + turn)
         return replace(
-            p, start_en=(start[0], start[1]), goal_en=(goal[0], goal[1]), boat=boat,
+            p, start_en=(start[0], start[1]), goal_en=(goal[0], goal[1]), boat=boat, zone=zone,
             obstacles=tuple(flat(shape).buffer(bend, join_style="mitre") for shape in p.obstacles),
             fence=None if p.fence is None else flat(p.fence).buffer(-bend, join_style="mitre"),
             goal_radius_m=p.goal_radius_m / (1.0 + scale), targets=tuple(self._target(t, scale) for t in p.targets),

@@ -14,9 +14,10 @@ from companion.planner.problem.parts import CLEAR_TURN_RAD
 
 TWO_PI = 2.0 * math.pi
 EDGE_PAD = 1e-6     # of a heading laid on the edge of the no-go zone [rad]: below the judge's slack
+ZONE_PAD = math.radians(0.3)    # of a course laid on the edge of the autopilot's zone: the table's step is 0.25 degrees
 STEER_ROUNDS = 6    # of the fixed point between a leg's heading and its end's no-go zone
 # ``number``'s places
-TWD, HALF, DEEP, RATE, TACK, GYBE, W0, W1, RHO, CX, CY = range(11)
+TWD, HALF, DEEP, RATE, TACK, GYBE, W0, W1, RHO, CX, CY, ZONE, ZONE_HALF = range(13)
 
 
 @kernel
@@ -209,7 +210,8 @@ def steer(  # type: ignore[no-untyped-def]
     Lines 4-5: straight there where the no-go zone allows it. Lines 6-16: else along the edge of the zone whose
     heading has the larger cosine to the target, if it is positive. Lines 17-19: propagated while the distance
     decreases, that is to the foot of the perpendicular. The zone is taken at its widest over the leg, not at its
-    start as in the paper: constraint 13 holds at every instant. The deepest angle is treated like an edge.
+    start as in the paper: constraint 13 holds at every instant. The deepest angle is treated like an edge, and so are
+    the edges of the zone that the autopilot does not follow (``parts.Zone``), over the ground.
     """
     dx, dy = tx - x, ty - y
     dist = math.hypot(dx, dy)
@@ -222,8 +224,18 @@ def steer(  # type: ignore[no-untyped-def]
         return True, x + share * dx, y + share * dy
     twa = wrap(bearing - number[TWD])
     best, best_x, best_y = 0.0, x, y
-    for side in range(4):
+    for side in range(6 if number[ZONE_HALF] > 0.0 else 4):
         sign = 1.0 if side % 2 == 0 else -1.0
+        if side >= 4:
+            edge = number[ZONE] + sign * (number[ZONE_HALF] + ZONE_PAD)
+            gamma = (dx * math.sin(edge) + dy * math.cos(edge)) / dist
+            length = min(reach, gamma * dist)
+            if gamma > best + 1e-12:
+                ex, ey = x + length * math.sin(edge), y + length * math.cos(edge)
+                ok, _, _, _ = straight(x, y, heading, t, ex, ey, number, model, table, polar, course)
+                if ok:
+                    best, best_x, best_y = gamma, ex, ey
+            continue
         if side >= 2 and (number[DEEP] >= math.pi - 1e-9 or abs(twa) < 0.5 * math.pi):
             continue
         half = no_go(t, number, model, table)
@@ -240,6 +252,8 @@ def steer(  # type: ignore[no-untyped-def]
             if speed <= 1e-9:
                 break
             cx, cy = gx / speed, gy / speed
+            if abs(wrap(math.atan2(cx, cy) - number[ZONE])) < number[ZONE_HALF]:
+                break
             length = min(reach, dx * cx + dy * cy)
             if length <= 1e-9:
                 break

@@ -14,6 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi
+from companion.planner.problem.evaluate import is_zoned
 from companion.planner.problem.parts import TOUCH_M
 from companion.planner.problem.value import Problem
 
@@ -30,9 +31,10 @@ class World(NamedTuple):
 
     ``edge`` (m, 4) x0 y0 x1 y1; ``cell_first`` (nx ny + 1,) and ``cell_edge`` index edges by cell, row by row;
     ``grid`` x0, y0, cell size [m]; ``shape`` nx, ny. ``number``: wind from, no-go half, deepest angle, turn rate,
-    tack loss, gybe loss, k sigma0, k growth or k sigma_inf, rho, drift east, drift north. ``table`` (2, n) times
-    and widenings of a forecast. ``polar`` (2, n) angles and speeds. ``course`` (3, n) heading, speed over ground
-    and whether the boat can, by course from -π (a current only). ``target`` (n, 8) x y vx vy r growth from until.
+    tack loss, gybe loss, k sigma0, k growth or k sigma_inf, rho, drift east, drift north, the autopilot's zone: from,
+    half (0 without one). ``table`` (2, n) times and widenings of a forecast. ``polar`` (2, n) angles and speeds.
+    ``course`` (3, n) heading, speed over ground and whether the boat can and the autopilot follows it (``is_zoned``),
+    by course from -π (a current only). ``target`` (n, 8) x y vx vy r growth from until.
     """
 
     edge: Floats
@@ -81,6 +83,7 @@ def world_of(p: Problem) -> World:
         p.wind.twd_from_rad, b.no_go_half_rad, b.max_twa_rad, b.turn_rate_radps,
         b.tack_loss_s if b.can_tack else math.inf, b.gybe_loss_s,
         *widen, c.drift_mps * math.sin(c.set_rad), c.drift_mps * math.cos(c.set_rad),
+        *((p.zone.from_rad, p.zone.half_rad) if p.zone is not None and c.drift_mps > 0.0 else (0.0, 0.0)),
     ], dtype=np.float64)
     target = np.array([
         [t.x_m, t.y_m, t.vx_mps, t.vy_mps, t.radius_m, t.growth_mps, t.from_s, min(t.until_s, 1e15)] for t in p.targets
@@ -144,5 +147,6 @@ def _courses(p: Problem) -> Floats:
     out = np.zeros((3, _COURSES))
     for i, course in enumerate(np.linspace(-math.pi, math.pi, _COURSES)):
         heading, speed = solve_heading(p, float(course), 0.0)
-        out[:, i] = wrap_pi(heading), speed, float(speed > 0.0)
+        is_followed = not is_zoned(p, math.sin(course), math.cos(course))
+        out[:, i] = wrap_pi(heading), speed, float(speed > 0.0 and is_followed)
     return out

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.boat.failed_tack import AGAIN_SHARE, TRIES, failed_tack
+from companion.boat.failed_tack import AGAIN_SHARE, RISKY, TRIES, failed_tack
 from companion.boat.tracking import stated_error_m
 from companion.geo.angles import wrap_pi
 from companion.planner.plan import Leg
@@ -25,7 +25,6 @@ from companion.planner.problem.shore import shore_of
 from companion.planner.problem.value import Problem
 
 MOST_FAILURES = 5      # in a row that are looked at
-RISKY = 0.01           # a tack is avoided where one failure touches, or several do with more than this probability
 EDGE_STEP_M = 10.0     # between the places of a corridor's edge at which a tack is looked at
 Place = tuple[float, float]
 

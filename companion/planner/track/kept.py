@@ -1,9 +1,10 @@
 """A search whose paths keep their clearance when they are sailed, with as few corners as that needs.
 
 The search plans lines. Here its path is laid again: legs that are too short to be followed go, an arc of them becomes
-one corner or two where the legs around it meet, waypoints that nothing needs are left out. Where the predicted track
-still comes nearer than the floor, the corners near that place are pushed away from what is solid. A path that cannot be
-made to keep it is no answer: then the reason says where, and how near it would come.
+one corner or two where the legs around it meet, or one leg that is long enough: round a wall's end there and back
+those legs meet nowhere. Waypoints that nothing needs are left out. Where the predicted track still comes nearer than
+the floor, the corners near that place are pushed away from what is solid. A path that cannot be made to keep it is no
+answer: then the reason says where, and how near it would come.
 """
 
 from __future__ import annotations
@@ -28,13 +29,15 @@ Path = list[tuple[float, float]]
 Judge = Callable[[Path], Evaluation]
 """Says of a path whether it is feasible, and how long it takes."""
 
-AT_MOST = 40                # changes to one path: each costs a check and a prediction
+AT_MOST = 80                # changes to one path: each costs a check and a prediction
 LARGEST = 60                # waypoints: a longer path is looked at as it is
 SHORTER_SHARE, SHORTER_S = 0.006, 0.4   # what a waypoint less may cost
 SHORT_SHARE, SHORT_EXTRA_S = 0.03, 2.0  # ... and a leg less that cannot be followed
 PUSH_M = (1.0, 2.5, 5.0)    # a corner is pushed by as much
 BEAT_MORE_M = 1.0           # of room for a beat whose boards come too near
 MEET_M = 60.0               # legs that meet farther from their corners do not meet
+BEYOND_M = (0.0, 3.0, 6.0)  # an arc's ends, on along the legs around it, before the leg between them is long enough
+SPARE = 1.001               # of that length
 
 
 def with_track(search: Search, judge: Judge | None = None) -> Search:
@@ -79,8 +82,11 @@ def laid(problem: Problem, path: Path, judge: Judge | None = None) -> tuple[Path
     seen = expected(problem, path, judged.legs)
     if len(path) > LARGEST or not judged.is_feasible:
         return path, seen
-    path, seen = _fewer(problem, judge, path, judged, seen)
-    return _pushed(problem, judge, path, seen)
+    path, judged, seen = _fewer(problem, judge, path, judged, seen)
+    pushed, seen = _pushed(problem, judge, path, seen)
+    if pushed is not path:   # a corner that was put into a leg may have made two of it that are too short
+        pushed, _, seen = _fewer(problem, judge, pushed, judge(pushed), seen)
+    return pushed, seen
 
 
 def _scorer(problem: Problem) -> Judge:
@@ -90,8 +96,8 @@ def _scorer(problem: Problem) -> Judge:
 
 def _fewer(
     problem: Problem, judge: Judge, path: Path, judged: Evaluation, seen: Expected,
-) -> tuple[Path, Expected]:
-    """Leave out corners, the shortest legs' first, while that costs little and brings her nearer to nothing."""
+) -> tuple[Path, Evaluation, Expected]:
+    """Leave out corners and short legs, the shortest first, while it costs little and brings her nearer to nothing."""
     tried: set[tuple[int, ...]] = set()
     least_m = SHORT_S * float(np.max(curve_mps(problem)))
     limit_s = judged.time_s * (1.0 + SHORT_SHARE) + SHORT_EXTRA_S
@@ -100,14 +106,16 @@ def _fewer(
         best: tuple[Path, Evaluation, Expected] | None = None
         lengths = [math.dist(a, b) for a, b in itertools.pairwise(path)]
         for n in sorted(range(len(lengths)), key=lengths.__getitem__):
-            for option in (*(_rounded(path, n, lengths, least_m) if lengths[n] < least_m else ()), *_without(path, n)):
+            is_short = lengths[n] < least_m
+            longer = (*_rounded(path, n, lengths, least_m), *_stretched(path, n, lengths, least_m)) if is_short else ()
+            for option in (*longer, *_without(path, n)):
                 key = tuple(round(10.0 * c) for point in option for c in point)
                 if key in tried or count >= AT_MOST:
                     continue
                 tried.add(key)
                 count += 1
                 found = judge(option)
-                allowed_s = limit_s if lengths[n] < least_m else min(
+                allowed_s = limit_s if is_short else min(
                     limit_s, judged.time_s * (1.0 + SHORTER_SHARE) + SHORTER_S)
                 if not found.is_feasible or found.time_s > allowed_s:
                     continue
@@ -121,7 +129,7 @@ def _fewer(
         if best is None:
             break
         path, judged, seen = best
-    return path, seen
+    return path, judged, seen
 
 
 def _pushed(
@@ -173,11 +181,7 @@ def _pushes(problem: Problem, path: Path, seen: Expected) -> Iterator[Path]:
 
 def _rounded(path: Path, n: int, lengths: list[float], least_m: float) -> Iterator[Path]:
     """Yield the path with the whole arc of short legs about leg n as one corner, or as two."""
-    first, last = n, n
-    while first > 0 and lengths[first - 1] < least_m:
-        first -= 1
-    while last + 1 < len(lengths) and lengths[last + 1] < least_m:
-        last += 1
+    first, last = _arc(n, lengths, least_m)
     if first == 0 or last + 2 > len(path) - 1 or first == last:
         return
     before, after = (path[first - 1], path[first]), (path[last + 1], path[last + 2])
@@ -188,6 +192,41 @@ def _rounded(path: Path, n: int, lengths: list[float], least_m: float) -> Iterat
         a, b = meeting(*before, path[middle], path[middle + 1]), meeting(path[middle], path[middle + 1], *after)
         if a is not None and b is not None:
             yield [*path[:first], a, b, *path[last + 2:]]
+
+
+def _arc(n: int, lengths: list[float], least_m: float) -> tuple[int, int]:
+    """Return the first and the last of the short legs on end that leg n is one of."""
+    first, last = n, n
+    while first > 0 and lengths[first - 1] < least_m:
+        first -= 1
+    while last + 1 < len(lengths) and lengths[last + 1] < least_m:
+        last += 1
+    return first, last
+
+
+def _stretched(path: Path, n: int, lengths: list[float], least_m: float) -> Iterator[Path]:
+    """Yield the path with the arc of short legs about leg n as one leg that is long enough, its ends moved apart."""
+    first, last = _arc(n, lengths, least_m)
+    shorts = sum(length < least_m for length in lengths)
+    for beyond_m in BEYOND_M if first > 0 and last + 2 < len(path) else BEYOND_M[:1]:
+        a, b = path[first], path[last + 1]
+        if beyond_m > 0.0:
+            a, b = _on(path[first - 1], a, beyond_m), _on(path[last + 2], b, beyond_m)
+        gap = SPARE * least_m - math.dist(a, b)
+        for share in (0.5, 1.0, 0.0) if gap > 0.0 else (0.5,):
+            # the start stays where it is
+            ends = (_on(b, a, share * gap), _on(a, b, (1.0 - share) * gap)) if gap > 0.0 else (a, b)
+            option = [*path[:first], *ends, *path[last + 2:]]
+            if option[0] == path[0] and sum(
+                    math.dist(p, q) < least_m for p, q in itertools.pairwise(option)) < shorts:
+                yield option
+
+
+def _on(a: tuple[float, float], b: tuple[float, float], more_m: float) -> tuple[float, float]:
+    """Return the end of the leg from a to b when it is sailed on by ``more_m``."""
+    length = math.dist(a, b)
+    share = more_m / length if length > 0.0 else 0.0
+    return b[0] + share * (b[0] - a[0]), b[1] + share * (b[1] - a[1])
 
 
 def _without(path: Path, n: int) -> Iterator[Path]:

@@ -3,13 +3,16 @@
 On a leg that the wind has closed ArduRover sails at its no-go angle until it is SAIL_XTRACK_MAX off the line, whatever
 lies there; a margin narrower than that corridor does not bear it. A plan takes seconds and, after a great shift, may
 not be found at all. The autopilot tacks at once when it is asked to (DO_AUX_FUNCTION 63), on such a leg and 5 s after
-its last tack at the earliest.
+its last tack at the earliest. Where tacks can fail she is asked while there is room for one that does: the corridor's
+edge knows of none.
 """
 
 from __future__ import annotations
 
 import math
 
+from companion.boat.failed_tack import AGAIN_SHARE, IRONS_S, RISKY, TRIES, failed_tack, lee_set
+from companion.current import UNTOLD_MPS
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Mode
 from companion.skipper.deeds.helm import TACK, is_busy, tack
@@ -23,6 +26,8 @@ LEAST_MPS = 1.0      # slower she may not get through the wind
 APART_S = 6.0        # between two tacks: the autopilot's own 5 s, and a step
 LOOK_S = 8.0         # of the other tack, which must be better
 GAIN_M = 1.0
+HAIR_M = 0.5
+NEXT_S = 2.0         # the tack that is asked for in the next step begins so far on
 
 
 def short_tack(turn: Turn) -> None:
@@ -43,19 +48,63 @@ def short_tack(turn: Turn) -> None:
     side = 1.0 if off >= 0.0 else -1.0
     floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
     now_m = _clearance_m(turn, boat, vehicle.heading_rad, LEAD_S)
+    why = f"{now_m:.0f} m clear ahead on this tack in {LEAD_S:g} s"
     if now_m >= floor_m:
-        return
+        if now_m >= float(turn.voyage.area.clearance_m([boat])[0]) - HAIR_M or _may_fail(turn, boat, wind, floor_m):
+            return
+        why = "a tack that failed later would bring her below the floor"
     other_rad = wrap_pi(wind[0] + side * turn.no_go_half_rad)
     if _clearance_m(turn, boat, other_rad, LOOK_S) > now_m + GAIN_M:
-        tack(turn, "short tack",
-             f"{now_m:.0f} m clear ahead on this tack in {LEAD_S:g} s: tacking before the corridor's edge")
+        tack(turn, "short tack", f"{why}: tacking before the corridor's edge")
+
+
+def _may_fail(turn: Turn, boat: PointEn, wind: tuple[float, float], floor_m: float) -> bool:
+    """Return whether a tack in the next step may fail, as often in a row as is likely, and she keeps the floor.
+
+    While she lies the current that is believed carries her, planned for or not, and as much as is not told brings her
+    nearer to whatever is near; she is blown back, or is not, or is set to lee.
+    """
+    vehicle, water = turn.snapshot.vehicle, turn.snapshot.current
+    chance = turn.state.tacking.chance(turn.voyage.boat.tack_fails)
+    if vehicle is None or chance <= 0.0:
+        return True
+    course, speed = vehicle.heading_rad, _through_mps(turn)
+    there = _there(turn, boat, course, NEXT_S)
+    need_m = floor_m + IRONS_S * min(water.sigma_mps, UNTOLD_MPS)
+    lee = lee_set(course_rad=course, twd_from_rad=wind[0], tws_mps=wind[1])
+    for failures in range(1, TRIES + 1):
+        blown, still = _failed(there, course, speed, wind, water.en_mps)
+        _, aside = _failed(there, course, speed, wind, (water.en_mps[0] + lee[0], water.en_mps[1] + lee[1]))
+        if min(turn.voyage.area.path_clearance_m(way) for way in (blown, still, aside)) < need_m:
+            return False
+        if chance ** (failures + 1) <= RISKY:
+            return True
+        there, speed = still[-1], AGAIN_SHARE * _through_mps(turn)
+    return True
+
+
+def _failed(
+    there: PointEn, course_rad: float, speed_mps: float, wind: tuple[float, float], carried_en_mps: PointEn,
+) -> tuple[list[PointEn], list[PointEn]]:
+    """Return the tracks of a tack that fails, blown back and not, as lists of places."""
+    blown, still = failed_tack(there, course_rad=course_rad, speed_mps=speed_mps, twd_from_rad=wind[0],
+                               tws_mps=wind[1], current_en_mps=carried_en_mps)
+    return [(float(e), float(n)) for e, n in blown], [(float(e), float(n)) for e, n in still]
 
 
 def _clearance_m(turn: Turn, boat: PointEn, course_rad: float, span_s: float) -> float:
     """Return how clear the water is that a heading takes her through in ``span_s``, the current with her [m]."""
+    return turn.voyage.area.path_clearance_m([boat, _there(turn, boat, course_rad, span_s)])
+
+
+def _there(turn: Turn, boat: PointEn, course_rad: float, span_s: float) -> PointEn:
+    """Return where a heading takes her in ``span_s``."""
     east, north = turn.current_en_mps
-    vehicle = turn.snapshot.vehicle
+    return moved((boat[0] + east * span_s, boat[1] + north * span_s), course_rad, _through_mps(turn) * span_s)
+
+
+def _through_mps(turn: Turn) -> float:
+    """Return her speed through the water [m/s]."""
+    vehicle, (east, north) = turn.snapshot.vehicle, turn.current_en_mps
     velocity = (0.0, 0.0) if vehicle is None else vehicle.velocity_en_mps
-    through_m = math.hypot(velocity[0] - east, velocity[1] - north) * span_s
-    there = moved((boat[0] + east * span_s, boat[1] + north * span_s), course_rad, through_m)
-    return turn.voyage.area.path_clearance_m([boat, there])
+    return math.hypot(velocity[0] - east, velocity[1] - north)

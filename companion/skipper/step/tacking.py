@@ -22,6 +22,8 @@ class Tacking:
         failed_s: when the last failed.
         side: of the wind when she was last settled on a tack: 1 starboard, -1 port, 0 never.
         settled_rad: her heading then, and ``settled_s`` when.
+        settled_mps: her speed then.
+        slowest_mps: the least since the tack that is being tried began.
         began_s: since when a tack is being tried, None: none is.
         is_counted: that one was counted as failed: she lies in irons.
 
@@ -34,6 +36,8 @@ class Tacking:
     side: int = 0
     settled_rad: float = 0.0
     settled_s: float = -math.inf
+    settled_mps: float = 0.0
+    slowest_mps: float = math.inf
     began_s: float | None = None
     is_counted: bool = False
 

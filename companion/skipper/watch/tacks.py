@@ -1,7 +1,8 @@
 """Watches tacks: which come off, which fail; what is done about one that failed.
 
-A tack is tried when her heading, and not the wind, has brought the bow near the wind. It has come off when she is
-settled on the other tack, and failed when she is back on the old one, having lain near the wind for ``ABORTED_S``, or
+A tack is tried when her heading, and not the wind, has brought the bow near the wind, or nearer and to a stop: the wind
+over a boat in irons is not that of 5 s ago, and a vane may be turned. It has come off when she is settled on the other
+tack, and failed when she is back on the old one, having lain near the wind for ``ABORTED_S`` or lost her way there, or
 lies there for ``LIES_S``. A wind that heads her and makes her bear away is no tack: her heading has turned the other
 way.
 """
@@ -21,7 +22,8 @@ from companion.skipper.step.turn import Turn
 SETTLED_RAD = math.radians(30.0)
 NEAR_RAD = math.radians(20.0)      # of the wind, of which the mean of 5 s is known
 TURNED_RAD = math.radians(15.0)    # towards it, since she was settled
-ABORTED_S = 5.0                    # back sooner, she was told otherwise: an upload has begun her leg anew
+ABORTED_S = 5.0                    # back sooner, she was told otherwise: an upload has begun her leg anew ...
+STOPPED = 0.4                      # ... unless her speed fell to less than this share: in a tack it falls to half
 LIES_S = 8.0                       # as the watchdog "in irons" has it
 FORGET_S = 20.0                    # settled longer ago than this, whatever follows is no tack from there
 LEAST_TWS_MPS = 1.5                # in less she does as she likes
@@ -38,15 +40,15 @@ def watch_tacks(turn: Turn) -> None:
         if now.side or now.began_s is not None:
             turn.update(tacking=replace(now, side=0, began_s=None, is_counted=False))
         return
-    then = followed(now, turn.t_s, vehicle.heading_rad, wind[0])
+    then = followed(now, turn.t_s, vehicle.heading_rad, wind[0], _through_mps(turn))
     if then != now:
         turn.update(tacking=then)
     if then.failed > now.failed:
         _failed(turn, then)
 
 
-def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float) -> Tacking:
-    """Return what is known of her tacks with one more look at her heading."""
+def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, speed_mps: float) -> Tacking:
+    """Return what is known of her tacks with one more look at her heading, and at her speed through the water."""
     off = difference_rad(twd_from_rad, heading_rad)
     side = 1 if off > 0.0 else -1
     fresh = now.side != 0 and t_s - now.settled_s <= FORGET_S
@@ -55,15 +57,24 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float) 
     if abs(off) >= SETTLED_RAD:
         if now.began_s is not None and not now.is_counted:
             is_back = side == now.side
-            if not is_back or t_s - now.began_s >= ABORTED_S:
+            is_stopped = now.slowest_mps < STOPPED * now.settled_mps
+            if not is_back or is_stopped or t_s - now.began_s >= ABORTED_S:
                 now = _counted(now, t_s, failed=is_back)
         elif fresh and now.began_s is None and side != now.side and _through_the_eye(now, heading_rad, off):
             now = _counted(now, t_s, failed=False)   # between two looks
-        return replace(now, side=side, settled_rad=heading_rad, settled_s=t_s, began_s=None, is_counted=False)
+        return replace(now, side=side, settled_rad=heading_rad, settled_s=t_s, settled_mps=speed_mps, began_s=None,
+                       is_counted=False)
     turned = now.side * difference_rad(heading_rad, now.settled_rad)
-    if fresh and now.began_s is None and abs(off) < NEAR_RAD and turned >= TURNED_RAD:
-        return replace(now, began_s=t_s)
-    return now
+    is_near = abs(off) < NEAR_RAD or speed_mps < STOPPED * now.settled_mps
+    if fresh and now.began_s is None and is_near and turned >= TURNED_RAD:
+        return replace(now, began_s=t_s, slowest_mps=speed_mps)
+    return replace(now, slowest_mps=min(now.slowest_mps, speed_mps)) if now.began_s is not None else now
+
+
+def _through_mps(turn: Turn) -> float:
+    """Return her speed through the water, as it is believed to move [m/s]."""
+    vehicle, (east, north) = turn.snapshot.vehicle, turn.snapshot.current.en_mps
+    return 0.0 if vehicle is None else math.hypot(vehicle.velocity_en_mps[0] - east, vehicle.velocity_en_mps[1] - north)
 
 
 def _counted(now: Tacking, t_s: float, *, failed: bool) -> Tacking:

@@ -58,7 +58,7 @@ def reliability_figure(records: Sequence[Mapping[str, Any]]) -> Figure:
     right.axvline(1.0, color="black", lw=0.8, ls=":")
     right.set(xlabel="time, share of the first plan's", ylabel="share of arrivals", ylim=(0.0, 1.0),
               title="Time against the expected time")
-    left.legend(loc="upper left", fontsize=8, framealpha=0.6)
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), fontsize=8)   # below: no corner is free of points
     right.legend(loc="lower right", fontsize=8)
     return figure
 

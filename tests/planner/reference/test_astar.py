@@ -175,3 +175,16 @@ def test_expansions_are_counted_and_two_runs_agree():
     b = plan(problem(), algorithm="astar", expansions=10**7)
     c = plan(problem(), algorithm="astar", expansions=10**7, seed=9)
     assert np.array_equal(b.waypoints_en, c.waypoints_en)
+
+
+def test_courses_that_the_autopilot_does_not_follow_are_none_of_the_16_headings():
+    tide = {"set_deg": 90.0, "drift_mps": 0.5}
+    free, zoned = problem(current=tide), problem(current=tide, zone={"from_deg": 5.0, "half_deg": 60.0})
+    (_, free_way), (_, zoned_way) = run(free, max_turn_rad=2.7), run(zoned, max_turn_rad=2.7)
+    assert free_way.is_feasible
+    assert zoned_way.is_feasible
+    assert not evaluate(zoned, [leg.from_en for leg in free_way.legs] + [zoned.goal_en]).is_feasible
+    assert zoned_way.time_s > free_way.time_s
+    outcome = search(problem(current=tide, zone={"from_deg": 0.0, "half_deg": 179.0}), Effort(None, 10**8), 0,
+                     AstarSettings())
+    assert outcome.waypoints_en is None

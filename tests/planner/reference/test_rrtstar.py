@@ -95,6 +95,7 @@ def test_the_deepest_angle_bounds_the_steering_too():
     {"boat": {"no_go_half_deg": 40, "max_twa_deg": 160, "turn_rate_rad_s": 0.3, "tack_loss_s": 3.0, "gybe_loss_s": 2.0,
               "speed": {"model": "polar", "twa_deg": [0, 45, 90, 180], "v_mps": [0, 1.4, 2.0, 1.2]}}},
     {"current": {"set_deg": 90, "drift_mps": 0.3}},
+    {"current": {"set_deg": 90, "drift_mps": 0.3}, "zone": {"from_deg": 10, "half_deg": 65}},
     {"targets": [{"x": -200, "y": 300, "vx": 1.0, "vy": 0.0, "radius_m": 30}]},
 ])
 def test_every_state_s_time_is_the_scorer_s_time_of_its_path(change):
@@ -114,6 +115,19 @@ def test_every_state_s_time_is_the_scorer_s_time_of_its_path(change):
         assert judged.time_s == pytest.approx(tree.node[state, kernels.T], rel=2e-3 if "current" in change else 1e-9)
     children = sum(_children(tree, i) for i in range(n))
     assert children == n - 1
+
+
+@pytest.mark.parametrize("set_deg", [90.0, 180.0])
+def test_no_leg_is_one_that_the_autopilot_does_not_follow(set_deg):
+    """The zone is wider than the no-go angle through the water: every beat lies on its edges over the ground."""
+    tide = {"set_deg": set_deg, "drift_mps": 0.4}
+    free, zoned = problem(current=tide), problem(current=tide, zone={"from_deg": 8.0, "half_deg": 66.0})
+    ways = [plan(p, algorithm="rrtstar", expansions=20_000, seed=1) for p in (free, zoned)]
+    assert all(way.has_path for way in ways)
+    assert not evaluate(zoned, ways[0].waypoints_en).is_feasible
+    judged = evaluate(zoned, ways[1].waypoints_en)
+    assert judged.is_feasible
+    assert judged.time_s < 2.5 * ways[0].cost_s
 
 
 def _children(tree, i):

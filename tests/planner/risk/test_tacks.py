@@ -8,10 +8,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from companion.boat.failed_tack import RISKY
 from companion.planner import Problem, plan
 from companion.planner.contingency import DEARER
 from companion.planner.problem import evaluate
-from companion.planner.risk.tacks import RISKY, tacks_at_risk
+from companion.planner.risk.tacks import tacks_at_risk
 from companion.planner.risk.wind import path_risk
 
 BOAT = {"no_go_half_deg": 45.0, "max_twa_deg": 180.0, "turn_rate_rad_s": 0.5, "tack_loss_s": 3.0,

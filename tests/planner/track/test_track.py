@@ -11,7 +11,7 @@ import shapely
 
 from companion.boat import ardurover_sitl
 from companion.boat.boat import Boat
-from companion.boat.tracking import predict
+from companion.boat.tracking import SHORT_S, predict
 from companion.errors import InputError
 from companion.planner import Plan, PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
@@ -54,6 +54,22 @@ def test_round_the_ends_of_walls_the_floor_is_kept_with_fewer_waypoints():
     assert near > found.expected_clearance_m + 0.5   # the hull and the prediction's error are taken off
     again = plan(tracked, expansions=15_000, seed=1)
     assert np.array_equal(again.waypoints_en, found.waypoints_en)
+
+
+@pytest.mark.parametrize("start", [(-150.0, 40.0), (-60.0, 40.0), (150.0, 35.0)])
+def test_round_walls_ends_there_and_back_no_leg_is_too_short_to_be_followed(start):
+    tracked = replace(problem(margin=9.0, tracking={"wp_radius_m": 8.0}), start_en=start)
+    lines = plan(replace(tracked, tracking=None), expansions=8_000, seed=1)
+    found = plan(tracked, expansions=8_000, seed=1)
+    short_m = SHORT_S * float(np.max(curve_mps(tracked)))
+    assert min(lengths_m(lines)) < short_m      # arcs, whose legs on either side meet nowhere
+    assert min(lengths_m(found)) >= short_m
+    assert expected(tracked, found.waypoints_en).is_kept
+    assert found.cost_s <= 1.03 * lines.cost_s + 2.0
+
+
+def lengths_m(found):
+    return np.hypot(*np.diff(found.waypoints_en, axis=0).T)
 
 
 def test_a_plan_says_it_in_its_json_and_reads_it_back():

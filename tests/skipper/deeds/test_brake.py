@@ -1,6 +1,7 @@
 """Too near to plan round, and too near to beat on: one command first."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import shapely
@@ -8,7 +9,8 @@ import shapely
 from companion.messages import Mode
 from companion.skipper.step import actions as act
 from companion.skipper.way.voyage import Goal
-from tests.skipper.test_voyage import is_done, is_sailing, make, nothing, said
+from tests.skipper.test_voyage import FAST, is_done, is_sailing, make, nothing, said
+from tests.skipper.world import World, skipper, voyage
 
 ISLAND = shapely.box(-60.0, 100.0, 60.0, 130.0)
 GOAL = Goal(en_m=(0.0, 300.0), radius_m=8.0)
@@ -50,8 +52,6 @@ def test_farther_away_a_plan_is_enough():
 
 def test_without_permission_the_plan_is_all_there_is():
     world = handed_back(22.0)
-    from dataclasses import replace
-
     world.permissions = replace(world.permissions, may_set_mode=False)
     world.run(20)
     assert not any(isinstance(a, act.SetMode) and a.mode is Mode.LOITER for _, a in world.actions)
@@ -65,13 +65,13 @@ def test_a_voyage_without_trouble_is_never_braked():
 
 
 # ------------------------------------------------------------------------------------- short tack
-WEST, EAST = shapely.box(-80.0, 60.0, -14.0, 260.0), shapely.box(14.0, 60.0, 80.0, 260.0)
-
-
-def in_the_narrows(**how):
-    """A channel 28 m wide; in its middle the wind comes ahead, and nothing is found."""
-    world = make(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(WEST, EAST), wind=lambda t: (
-        (-math.pi / 2.0 if t < 45.0 else 0.0), 5.0), config={"margin_m": 12.0, "margin_floor_m": 5.0}, **how)
+def in_the_narrows(half_m=14.0, tack_fails=0.0):
+    """A channel, 28 m wide; in its middle the wind comes ahead, and nothing is found."""
+    sides = [shapely.box(-80.0, 60.0, -half_m, 260.0), shapely.box(half_m, 60.0, 80.0, 260.0)]
+    made = voyage(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=sides)
+    made = replace(made, boat=replace(made.boat, tack_fails=tack_fails))
+    world = World(skipper=skipper(made, autopilot_beats=False, margin_m=12.0, margin_floor_m=5.0),
+                  wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0), **FAST)
     assert world.run(44, is_sailing)
     world.run(44 - world.t)
     assert 60.0 < world.position[1] < 150.0
@@ -93,6 +93,18 @@ def test_without_it_the_corridor_would_have_been_too_wide(monkeypatch):
     world = in_the_narrows()
     world.run(60)
     assert world.clearance() < world.skipper.config.margin_floor_m - 1.0
+
+
+def test_where_tacks_can_fail_there_is_room_for_one_that_does():
+    def narrows(tack_fails):
+        world = in_the_narrows(half_m=20.0, tack_fails=tack_fails)    # at the corridor's edge she is 10 m clear
+        world.run(60)
+        return world
+
+    certain, doubtful = narrows(0.0), narrows(0.03)
+    assert not said(certain, "short tack")
+    assert "failed" in said(doubtful, "short tack")[0][2]
+    assert doubtful.clearance() > certain.clearance() + 1.0
 
 
 def test_in_open_water_the_autopilot_beats_as_it_likes():

@@ -12,12 +12,12 @@ from companion.skipper.watch.tacks import followed
 D = math.radians
 
 
-def seen(headings_deg, twd_deg=0.0, step_s=1.0, begin=NO_TACKS):
+def seen(headings_deg, twd_deg=0.0, step_s=1.0, begin=NO_TACKS, speeds_mps=None):
     """Return what is known after headings, one a step."""
     now = begin
     for n, heading in enumerate(headings_deg):
         twd = twd_deg(n) if callable(twd_deg) else twd_deg
-        now = followed(now, step_s * n, D(heading), D(twd))
+        now = followed(now, step_s * n, D(heading), D(twd), 2.0 if speeds_mps is None else speeds_mps[n])
     return now
 
 
@@ -35,6 +35,20 @@ def test_each_tack_is_counted_once_and_gybes_and_bearing_away_are_none(headings,
     for side in (1, -1):
         now = seen([side * h for h in headings])
         assert (now.tried, now.failed) == (tried, failed)
+
+
+@pytest.mark.parametrize(("least_mps", "failed"), [(1.2, 0), (0.6, 1)])
+def test_who_is_back_soon_was_told_otherwise_unless_she_had_stopped(least_mps, failed):
+    headings = [45, 45, 45, 25, 12, 10, 12, 45, 45]
+    now = seen(headings, speeds_mps=[2.4, 2.4, 2.4, 1.9, 1.5, least_mps, least_mps, 1.3, 2.0])
+    assert (now.tried, now.failed) == (failed, failed)
+
+
+@pytest.mark.parametrize(("lain_mps", "failed"), [(1.2, 0), (0.5, 1)])
+def test_who_stops_short_of_the_wind_has_failed_as_a_turned_vane_has_it(lain_mps, failed):
+    headings = [45, 45, 45, 30, 24, 24, 24, 24, 45, 45]     # never within 20 degrees of the wind that is measured
+    now = seen(headings, speeds_mps=[2.0, 2.0, 2.0, 1.3, lain_mps, lain_mps, lain_mps, lain_mps, 1.3, 2.0])
+    assert (now.tried, now.failed) == (failed, failed)
 
 
 def test_a_wind_that_heads_her_is_no_tack_and_one_that_she_follows_is_none():
