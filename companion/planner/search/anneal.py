@@ -75,9 +75,10 @@ def time_after(
         last = n - tail + 1
     if b.room > 0.0:
         wound = wound_at(b, xs, ys, course, first)
-        while last < n - 1 and math.hypot(xs[last] - xs[last - 1], ys[last] - ys[last - 1]) < b.room:
-            last += 1
-            tail -= 1
+    # a leg of no length has no course: the turn after it is out of the leg before
+    while last < n - 1 and math.hypot(xs[last] - xs[last - 1], ys[last] - ys[last - 1]) < max(b.room, 1e-9):
+        last += 1
+        tail -= 1
     t = walk_on(b, xs, ys, first, last, float(at[first]), float(course[first]), wound)
     if last < n - 1:
         t += float(at[on - 1] - at[on - tail + 1])
