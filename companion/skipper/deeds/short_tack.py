@@ -68,7 +68,7 @@ def _may_fail(turn: Turn, boat: PointEn, wind: tuple[float, float], floor_m: flo
     chance = turn.state.tacking.chance(turn.voyage.boat.tack_fails)
     if vehicle is None or chance <= 0.0:
         return True
-    course, speed = vehicle.heading_rad, _through_mps(turn)
+    course, speed = vehicle.heading_rad, math.hypot(*turn.through_en_mps)
     there = _there(turn, boat, course, NEXT_S)
     need_m = floor_m + IRONS_S * min(water.sigma_mps, UNTOLD_MPS)
     lee = lee_set(course_rad=course, twd_from_rad=wind[0], tws_mps=wind[1])
@@ -79,7 +79,7 @@ def _may_fail(turn: Turn, boat: PointEn, wind: tuple[float, float], floor_m: flo
             return False
         if chance ** (failures + 1) <= RISKY:
             return True
-        there, speed = still[-1], AGAIN_SHARE * _through_mps(turn)
+        there, speed = still[-1], AGAIN_SHARE * math.hypot(*turn.through_en_mps)
     return True
 
 
@@ -99,12 +99,5 @@ def _clearance_m(turn: Turn, boat: PointEn, course_rad: float, span_s: float) ->
 
 def _there(turn: Turn, boat: PointEn, course_rad: float, span_s: float) -> PointEn:
     """Return where a heading takes her in ``span_s``."""
-    east, north = turn.current_en_mps
-    return moved((boat[0] + east * span_s, boat[1] + north * span_s), course_rad, _through_mps(turn) * span_s)
-
-
-def _through_mps(turn: Turn) -> float:
-    """Return her speed through the water [m/s]."""
-    vehicle, (east, north) = turn.snapshot.vehicle, turn.current_en_mps
-    velocity = (0.0, 0.0) if vehicle is None else vehicle.velocity_en_mps
-    return math.hypot(velocity[0] - east, velocity[1] - north)
+    (east, north), through_m = turn.current_en_mps, math.hypot(*turn.through_en_mps) * span_s
+    return moved((boat[0] + east * span_s, boat[1] + north * span_s), course_rad, through_m)

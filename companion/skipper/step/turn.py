@@ -234,6 +234,13 @@ class Turn:
         return self.snapshot.current.planned_en_mps
 
     @property
+    def through_en_mps(self) -> tuple[float, float]:
+        """Her velocity less that current [m/s]: over the ground where none is significant; 0 when unknown."""
+        vehicle, (east, north) = self.snapshot.vehicle, self.current_en_mps
+        return (0.0, 0.0) if vehicle is None else (
+            vehicle.velocity_en_mps[0] - east, vehicle.velocity_en_mps[1] - north)
+
+    @property
     def water(self) -> Water | None:
         """The current as it is to be stemmed, None where none is planned with or the wind is not known."""
         wind = self.wind_mean

@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 from companion.geo.angles import difference_rad
 from companion.geo.sun import sun_height_rad
-from companion.messages import VehicleState
 from companion.skipper.deeds.adrift import meets_in_s, sails
 from companion.skipper.deeds.by_field import meets_in
 from companion.skipper.planning.errands import Kind, errand, is_composed
@@ -63,7 +62,7 @@ def _irons(turn: Turn) -> float | None:
         return None
     if abs(difference_rad(wind[0], vehicle.heading_rad)) > IRONS_TWA_RAD:
         return BY_NAME["in irons"].exit
-    east, north = _through_water(turn, vehicle)
+    east, north = turn.through_en_mps
     return max(0.0, east * math.sin(vehicle.heading_rad) + north * math.cos(vehicle.heading_rad))
 
 
@@ -88,16 +87,10 @@ def _heading(turn: Turn) -> float | None:
     vehicle = turn.snapshot.vehicle
     if vehicle is None or turn.boat_en is None:
         return None
-    velocity = _through_water(turn, vehicle)
+    velocity = turn.through_en_mps
     if math.hypot(*velocity) < MOVING_MPS:
         return 0.0
     return math.degrees(abs(difference_rad(math.atan2(*velocity), vehicle.heading_rad)))
-
-
-def _through_water(turn: Turn, vehicle: VehicleState) -> tuple[float, float]:
-    """Return the velocity less the current that is known [m/s]: over the ground where none is."""
-    east, north = turn.current_en_mps
-    return vehicle.velocity_en_mps[0] - east, vehicle.velocity_en_mps[1] - north
 
 
 def corridor_m(turn: Turn) -> float:

@@ -40,7 +40,8 @@ def watch_tacks(turn: Turn) -> None:
         if now.side or now.began_s is not None:
             turn.update(tacking=replace(now, side=0, began_s=None, is_counted=False))
         return
-    then = followed(now, turn.t_s, vehicle.heading_rad, wind[0], _through_mps(turn))
+    through_mps = math.dist(vehicle.velocity_en_mps, turn.snapshot.current.en_mps)   # as it is believed to move
+    then = followed(now, turn.t_s, vehicle.heading_rad, wind[0], through_mps)
     if then != now:
         turn.update(tacking=then)
     if then.failed > now.failed:
@@ -69,12 +70,6 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, 
     if fresh and now.began_s is None and is_near and turned >= TURNED_RAD:
         return replace(now, began_s=t_s, slowest_mps=speed_mps)
     return replace(now, slowest_mps=min(now.slowest_mps, speed_mps)) if now.began_s is not None else now
-
-
-def _through_mps(turn: Turn) -> float:
-    """Return her speed through the water, as it is believed to move [m/s]."""
-    vehicle, (east, north) = turn.snapshot.vehicle, turn.snapshot.current.en_mps
-    return 0.0 if vehicle is None else math.hypot(vehicle.velocity_en_mps[0] - east, vehicle.velocity_en_mps[1] - north)
 
 
 def _counted(now: Tacking, t_s: float, *, failed: bool) -> Tacking:
