@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test test-long check docs slowest campaign nightly nightly-reference bench figures deb release clean
+.PHONY: env demo test test-long draws check docs slowest campaign nightly nightly-reference bench figures deb release clean
 env: $(ENV)
 
 # What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
@@ -61,6 +61,12 @@ test: $(ENV)
 test-long: $(ENV)
 	@$(KERNELS)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m long
+
+# The tests that draw their examples, on new draws each time: what it finds is a defect, with the example that shows it.
+draws: $(ENV)
+	@$(KERNELS)
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not campaign" --hypothesis-profile=new \
+	  $$(grep -rlE "^ *@given|StateMachine" tests)
 
 check: $(ENV)
 	$(BIN)/ruff check .

@@ -52,7 +52,7 @@ def test_parameters_by_their_ardupilot_names():
 
 
 @given(st.floats(0.0, 10.0), st.floats(0.0, 100.0), st.floats(0.0, 40.0), st.floats(0.0, math.pi))
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 def test_a_margin_never_shrinks_with_speed_corridor_or_radius(speed, corridor, radius, turn):
     def total(v, x, r):
         limits = AutopilotLimits(sail_xtrack_max_m=x, wp_radius_m=r, fence_action=2)

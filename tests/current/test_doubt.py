@@ -43,7 +43,7 @@ def angle_rad(from_rad, tws, speed, side, x):
     return difference_rad(math.atan2(*over_water), bow)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(-3.0, 3.0), st.floats(4.0, 9.0), st.floats(1.5, 3.0), st.integers(0, 9))
 def test_the_spread_is_that_of_drawn_boats(from_rad, tws, speed, seed):
     sigmas = np.array([0.07, 0.04, 0.1, 0.04, 0.03, 0.05])

@@ -52,7 +52,7 @@ def sailed(headings_deg, current, *, leg_s=100.0, prior=STILL, **boat):
     return estimator
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(0.0, 6.28), st.floats(0.2, 0.9))
 def test_on_both_tacks_and_a_reach_it_is_found_whichever_way_it_sets(set_rad, drift_mps):
     current = drift_mps * math.sin(set_rad), drift_mps * math.cos(set_rad)
@@ -75,7 +75,7 @@ def test_in_still_water_no_error_of_the_boat_is_taken_for_a_current(boat):
         assert not sailed(headings, (0.0, 0.0), noise=0.05, **boat).view().is_significant
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(0.88, 1.12), st.floats(-3.0, 3.0), st.floats(0.0, 6.28), st.integers(0, 999))
 def test_the_stated_spread_holds_what_it_should(scale, leeway_deg, set_rad, seed):
     current = 0.4 * math.sin(set_rad), 0.4 * math.cos(set_rad)

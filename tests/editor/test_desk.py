@@ -297,7 +297,7 @@ json_values = st.recursive(
     max_leaves=12)
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(values=st.lists(json_values, min_size=20, max_size=20))
 def test_values_of_any_form_are_refused_in_one_line(bay, values):
     async def talk(asker):

@@ -26,7 +26,7 @@ ATOMS: tuple[Field, ...] = (Line(), Circle(), AttractivePoint(), RepulsivePoint(
 metre = st.floats(-500.0, 500.0)
 angle = st.floats(-math.pi, math.pi)
 atom = st.sampled_from(ATOMS)
-property_test = settings(max_examples=120, deadline=None, derandomize=True)
+property_test = settings(max_examples=120)
 
 
 @pytest.mark.parametrize("field", ATOMS, ids=lambda f: type(f).__name__)

@@ -16,7 +16,7 @@ angle = st.floats(-math.pi, math.pi)
 PARAMETERS = VaimosParameters().array()
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(st.floats(-300, 300), st.floats(-300, 300), angle, angle, st.floats(-300, 300), st.floats(-300, 300),
        st.sampled_from([-1, 1]))
 def test_heading_is_sailable_and_commands_are_in_range(x: float, y: float, h: float, twd: float, bx: float, by: float,
@@ -56,7 +56,7 @@ def test_the_boat_follows_the_line_on_every_point_of_sailing(twd_deg: float) -> 
     assert np.quantile(band, 0.95) < 30.0
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.floats(-2.0, 2.0))
 def test_motors(rudder: float) -> None:
     u1, u2 = motor_commands(rudder)

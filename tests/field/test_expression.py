@@ -30,13 +30,13 @@ expressions = st.recursive(
     max_leaves=8)
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(expressions)
 def test_what_is_printed_is_read_again(expression):
     assert parse(printed(expression), NAMES, *PLACE) == expression
 
 
-@settings(max_examples=500, deadline=None, derandomize=True)
+@settings(max_examples=500)
 @given(st.one_of(st.text(max_size=80), st.text("ring+*(),.0123 -max", max_size=60)))
 def test_whatever_is_written_raises_one_line_of_input_error_or_is_a_field(text):
     try:

@@ -29,7 +29,7 @@ def seen(heading_deg: float = 90.0, twd_deg: float = 0.0, speed: float = 2.0, **
     return Situation(**(values | more))  # type: ignore[arg-type]
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(angle, angle, angle, st.floats(-1.0, 3.0), st.sampled_from(list(Manoeuvre)), st.floats(0.0, 100.0),
        st.sampled_from([-1, 1]), st.integers(0, 2), st.booleans())
 def test_no_setpoint_is_ever_inside_the_no_go_zone(wanted: float, heading: float, twd: float, speed: float,
@@ -106,7 +106,7 @@ def test_without_the_recovery_she_stays_in_irons_for_long() -> None:
         assert abs(float(boat.state[5])) < 0.3
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.floats(-100, 100), st.floats(-100, 100), st.floats(-3, 3), st.floats(-3, 3), st.floats(2.0, 30.0), angle)
 def test_margins_are_the_least_sampled_ones(x: float, y: float, vx: float, vy: float, keep: float, h: float) -> None:
     obstacle = Obstacle(en_m=(x, y), velocity_en_mps=(vx, vy), keep_m=keep)

@@ -23,7 +23,7 @@ def test_both_motors_at_one_half_go_straight_at_two_metres_a_second() -> None:
     assert boat.heading_rad == 0.0
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.floats(-math.pi, math.pi), st.floats(-math.pi, math.pi), st.floats(0.0, 2.0))
 def test_any_heading_is_reached_the_short_way_and_held(heading: float, wanted: float, speed: float) -> None:
     boat = MotorBoat(heading_rad=heading, speed_mps=speed)

@@ -45,7 +45,7 @@ def sail(water: LocalArea, goal: tuple[float, float], at: tuple[float, float] = 
     return track
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.floats(-60.0, 60.0), st.floats(-60.0, 60.0))
 def test_the_field_points_away_from_the_nearest_shore(x: float, y: float) -> None:
     rock = box(-10.0, -10.0, 10.0, 10.0)

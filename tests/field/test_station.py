@@ -46,7 +46,7 @@ def test_a_loop_gathers_way_before_it_goes_through_the_wind_and_eases_where_she_
     assert fast.heading_rad > 0.0
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(st.floats(-40.0, 40.0), st.floats(-40.0, 40.0), st.floats(-180.0, 180.0), st.floats(0.0, 3.0),
        st.sampled_from(list(Phase)), st.sampled_from([-1, 1]), st.sampled_from([BOARDS, LOOPS]))
 def test_no_setpoint_is_inside_the_no_go_zone(east: float, north: float, heading: float, speed: float, phase: Phase,

@@ -59,7 +59,7 @@ def test_the_least_distance_is_found_between_samples() -> None:
     assert score(track, np.array([[0.0, 10.0], [0.0, 10.0]])).least_m == pytest.approx(10.0 - 3.825)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.integers(0, 10_000))
 def test_the_draw_is_the_task(seed: int) -> None:
     c = draw(seed)

@@ -54,7 +54,7 @@ def at(made, *points, conditions=NORTH):
     return field_of(made, conditions)(points)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(expressions, st.tuples(atoms, atoms, atoms, atoms), st.lists(places, min_size=1, max_size=4),
        st.floats(-7.0, 7.0), st.booleans())
 def test_any_field_is_finite_and_bounded_anywhere(expression, four, points, twd, sails):

@@ -50,7 +50,7 @@ def disbelieved(fold, t_s=2.0):
     return [e for e in fold.tick(t_s).snapshot.events if isinstance(e, Disbelieved)]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.dictionaries(st.sampled_from(sorted(RANGES)), st.floats(width=32)))
 def test_no_value_of_a_parameter_raises_and_the_limits_are_learnt(values):
     good, refused = believable(values)

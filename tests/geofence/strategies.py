@@ -11,7 +11,7 @@ from companion.geofence.shapes import Circle, Zone, ZoneKind
 from companion.messages import Command, GeoPoint, MissionItem
 
 # of every property test: a busy machine is no failure, and a seed repeats the run
-QUIET = {"deadline": None, "derandomize": True, "suppress_health_check": [HealthCheck.too_slow]}
+QUIET = {"suppress_health_check": [HealthCheck.too_slow]}
 NAMES = st.text(alphabet=st.sampled_from("abcÅß岩 -_.'&<>\"0123"), max_size=12).map(lambda s: " ".join(s.split()))
 
 

@@ -147,7 +147,7 @@ def test_a_line_has_two_places_and_a_motor_boat_no_no_go_zone(tmp_path):
         load(tmp_path, motor)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.recursive(
     st.one_of(st.integers(), st.floats(), st.booleans(), st.text(max_size=8)),
     lambda inner: st.one_of(st.lists(inner, max_size=2), st.dictionaries(

@@ -43,7 +43,7 @@ def test_mavutil_reads_what_we_write(tmp_path):
     assert names == ours
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.integers(0, len(RAW)))
 def test_a_torn_tail_costs_one_record_at_most(size):
     whole = [r for i, r in enumerate(RECORDS)

@@ -53,7 +53,7 @@ def test_what_is_sent_is_what_is_read(wanted):
 
 
 @given(st.lists(st.text(min_size=1).filter(str.strip), min_size=1, max_size=8, unique_by=mark_of), st.data())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_refuges_name_travels_as_a_number(names, data):
     wanted = data.draw(st.sampled_from(names))
     read = wanted_of(on_the_wire(message_of(Wanted(verb=Verb.REFUGE, name=wanted), 1)))
@@ -62,7 +62,7 @@ def test_a_refuges_name_travels_as_a_number(names, data):
     assert mark_of(" mill BAY ") == mark_of("Mill Bay")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.sampled_from(sorted(COMMANDS)), st.lists(FLOAT32, min_size=7, max_size=7))
 @example(VERB_COMMAND, [math.nan] * 7)
 @example(VERB_COMMAND, [6.0] + [0.0] * 6)
@@ -76,7 +76,7 @@ def test_any_command_long_is_read_or_says_why_not(command, params):
     assert wanted.words
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.sampled_from(sorted(COMMANDS)), st.integers(0, 255), st.lists(FLOAT32, min_size=4, max_size=4), INT32, INT32,
        FLOAT32)
 @example(PLACE_COMMAND, 0, [0.0] * 4, 0, 0, 0.0)

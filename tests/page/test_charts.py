@@ -39,7 +39,7 @@ def test_both_formats_give_the_same_tiles_and_say_the_same(both):
 
 
 @given(z=st.integers(-3, 40), x=st.integers(-5, 1 << 40), y=st.integers(-5, 1 << 40))
-@settings(max_examples=80, deadline=None, derandomize=True,
+@settings(max_examples=80,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_where_there_is_no_tile_the_water_is_clear(both, z, x, y):
     for chart in open_charts(both):
@@ -99,7 +99,7 @@ def _with_bounds(path, bounds):
 
 
 @given(data=st.data())
-@settings(max_examples=60, deadline=None, derandomize=True,
+@settings(max_examples=60,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_chart_with_flipped_bytes_is_refused_or_gives_pictures(both, tmp_path, data):
     path = data.draw(st.sampled_from(both))

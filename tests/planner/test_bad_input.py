@@ -117,7 +117,7 @@ def test_thousands_of_slivers_are_not_united():
         assert not any(shapely.intersects(g.buffer(-1e-3), line) for g in p.obstacles)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(random_problems(), st.lists(st.tuples(metres(-150, 150), metres(-50, 350)), min_size=2, max_size=8),
        st.sampled_from([0.0, 3.0]))
 def test_the_test_by_neighbours_agrees_with_the_test_against_everything(raw, points, floor):
@@ -144,7 +144,7 @@ def _depth(solid, shape):
     return solid.buffer(-1e-3, join_style="mitre", mitre_limit=5.0).boundary.distance(shape)
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(random_problems())
 def test_a_leg_may_touch_every_convex_corner(raw):
     world = make_world(Problem.from_json(raw | {"fence": None}))
@@ -175,7 +175,7 @@ def wild(draw):
     return raw
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(wild(), st.sampled_from(["auto", "auto", "rrtstar", "astar"]))
 def test_anything_ends_in_a_status_with_a_reason(raw, algorithm):
     p = Problem.from_json(raw)

@@ -151,7 +151,7 @@ def test_a_wobble_through_the_wind_is_no_tack():
     assert count_tacks(_truth([10.0] * 40 + [-5.0] * 4 + [10.0] * 40)) == (0, 0)
 
 
-@settings(deadline=None, max_examples=30, derandomize=True)
+@settings(max_examples=30)
 @given(st.floats(-720.0, 720.0))
 def test_turning_the_world_changes_no_count(turn_deg):
     beat = np.array([45.0] * 60 + [-45.0] * 60 + [45.0] * 60)

@@ -79,7 +79,7 @@ JSON = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=4), max_leaves=6)
 
 
-@settings(max_examples=120, deadline=None, derandomize=True)
+@settings(max_examples=120)
 @given(st.data())
 def test_a_state_with_anything_anywhere_is_read_or_refused(data):
     values = SAVED.to_dict()

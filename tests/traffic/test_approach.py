@@ -70,7 +70,7 @@ angle = st.floats(0.0, 359.0)
 coordinate = st.floats(-2000.0, 2000.0)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(coordinate, coordinate, angle, st.floats(0.0, 12.0), angle, st.floats(0.0, 4.0), st.floats(2.0, 150.0))
 def test_cpa_is_the_least_sampled_distance(x: float, y: float, course: float, speed: float, ours: float, v: float,
                                            bow: float) -> None:
@@ -91,7 +91,7 @@ def test_cpa_is_the_least_sampled_distance(x: float, y: float, course: float, sp
     assert a.time_s >= 0.0
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(angle, st.floats(0.0, 12.0), st.floats(-0.1, 0.1), st.floats(0.0, 900.0), st.floats(0.0, 900.0))
 def test_the_spread_only_grows(course: float, speed: float, turn: float, a: float, b: float) -> None:
     ship = vessel((0.0, 0.0), course, speed, turn_rate_radps=turn)
@@ -124,7 +124,7 @@ def test_risk_of_the_disc_against_drawn_positions() -> None:
         assert outside <= risk
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(angle, st.floats(0.0, 15.0), st.floats(-0.1, 0.1), st.floats(-120.0, 0.0), st.floats(0.0, 900.0),
        st.booleans(), st.floats(0.0, 0.5), st.sampled_from([0.1, 1e-3, 1e-6]))
 def test_the_discs_hold_the_region_at_every_moment(course: float, speed: float, turn: float, heard: float, at: float,

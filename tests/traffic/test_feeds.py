@@ -206,7 +206,7 @@ def test_a_feed_that_stops_is_silent_after_a_minute_and_heard_again() -> None:
 
 
 # ------------------------------------------------------------------------------------------- noise
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(
     st.lists(st.binary(max_size=300) | st.sampled_from(
         [b"!AIVDM,", b"\r\n", b"$", b"\\s:x*00\\", b"{", b"\x00" * 50]), max_size=20),

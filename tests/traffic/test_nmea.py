@@ -101,7 +101,7 @@ def test_fragments_are_bounded() -> None:
     assert len(d._pending) <= MAX_PENDING
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(st.one_of(st.binary(max_size=200), st.text(max_size=120)))
 def test_noise_never_raises(line: str | bytes) -> None:
     d = NmeaDecoder()
@@ -109,7 +109,7 @@ def test_noise_never_raises(line: str | bytes) -> None:
     assert d.counts.lines == 1
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(st.text(alphabet="0123456789:;<=>?@ABCDEFGHIJKLMNOPQRSTUVW`abcdefghijklmnopqrstuvw", max_size=60),
        st.integers(0, 5))
 def test_any_payload_with_a_right_checksum_is_a_finite_report_or_nothing(payload: str, fill: int) -> None:
@@ -144,7 +144,7 @@ def test_bad_json_is_no_report(raw: bytes) -> None:
     assert decode_json(raw, 0.0) is None
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(st.dictionaries(st.sampled_from(["lat", "lon", "mmsi", "id", "speed_mps", "heading_deg", "age_s", "length_m"]),
                        st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5))))
 def test_any_json_is_finite_or_nothing(raw: dict[str, object]) -> None:

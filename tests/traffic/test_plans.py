@@ -38,7 +38,7 @@ def test_what_is_sailed_already_does_not_count() -> None:
 number = st.floats(-300.0, 300.0)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(number, number, st.floats(-5, 5), st.floats(-5, 5), st.floats(1.0, 60.0), st.floats(0.0, 1.0), number, number,
        st.floats(5.0, 200.0), st.floats(0.0, 80.0), st.floats(0.0, 100.0))
 def test_check_agrees_with_sampling(x: float, y: float, vx: float, vy: float, radius: float, growth: float, tx: float,
@@ -82,7 +82,7 @@ def test_path_distance_by_hand() -> None:
     assert path_distance_m(a, [(0.0, 0.0), (80.0, 50.0), (0.0, 100.0)]) == pytest.approx(80.0, abs=3.0)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(number, number, number, number)
 def test_distance_of_two_straight_paths_from_one_start_is_that_of_their_ends(ax: float, ay: float, bx: float,
                                                                               by: float) -> None:

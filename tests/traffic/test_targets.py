@@ -156,7 +156,7 @@ def test_the_voyage_tells_the_targets_where_its_boat_is() -> None:
 numbers = st.one_of(st.none(), st.floats(allow_nan=True, allow_infinity=True))
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(st.lists(st.tuples(st.floats(-1e4, 1e4), st.integers(1, 4), st.floats(-90, 90), st.floats(-180, 180), numbers,
                           numbers, numbers, st.floats(-5, 1e4)), max_size=12))
 def test_nothing_a_feed_says_breaks_the_fold(rows: list[tuple[float, ...]]) -> None:

@@ -41,7 +41,7 @@ def test_unknown_name_is_refused():
 
 
 @pytest.mark.parametrize("name", NAMES)
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(horizon=st.floats(0.0, 3600.0), p=st.floats(0.01, 0.99), q=st.floats(0.01, 0.99))
 def test_forecast_is_in_range(name, horizon, p, q):
     e = FED[name]
@@ -56,7 +56,7 @@ def test_forecast_is_in_range(name, horizon, p, q):
 
 
 @pytest.mark.parametrize("name", NAMES)
-@settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=6, suppress_health_check=[HealthCheck.too_slow])
 @given(turn=st.floats(-math.pi, math.pi))
 def test_rotating_the_record_rotates_the_forecast_and_nothing_else(name, turn):
     plain = feed(make(name), WIND, stop_s=700.0)

@@ -96,7 +96,7 @@ def test_ar1_wants_a_record():
 
 
 # --------------------------------------------------------------------------------------------------- scores
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(error=st.floats(-math.pi, math.pi), sigma=st.floats(0.02, 3.0))
 def test_circular_crps_is_its_definition(error, sigma):
     """E d(X, y) - E d(X, X') / 2 by quadrature over the wrapped normal."""

@@ -39,7 +39,7 @@ def test_worked_examples(heading, speed, awa, aws, twd, tws):
     assert found.reference is WindReference.GROUND
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(twd=ANGLE, tws=st.floats(0.5, 40.0), heading=ANGLE, course=ANGLE, speed=st.floats(0.0, 10.0))
 def test_apparent_and_true_are_inverses(twd, tws, heading, course, speed):
     vehicle = VehicleState(
@@ -51,7 +51,7 @@ def test_apparent_and_true_are_inverses(twd, tws, heading, course, speed):
     assert back.tws_mps == pytest.approx(tws, rel=1e-6)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(awa=ANGLE, aws=st.floats(1.0, 20.0), heading=ANGLE, speed=st.floats(0.0, 5.0), turn=ANGLE)
 def test_turning_the_world_turns_the_wind(awa, aws, heading, speed, turn):
     def made(h):

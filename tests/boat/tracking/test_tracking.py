@@ -76,7 +76,7 @@ def test_a_board_goes_beyond_the_corridor_by_what_is_predicted_and_no_more_than_
 # --------------------------------------------------------------------------------------------- always so
 @given(st.floats(0.0, 2.0 * math.pi), st.lists(st.tuples(st.floats(25.0, 90.0), st.floats(-1.5, 1.5)),
                                                min_size=1, max_size=5))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_turned_with_the_wind_it_is_the_same_track(turn, legs):
     here, course, path = (0.0, 0.0), math.radians(110.0), [(0.0, 0.0)]
     for length, bend in legs:
@@ -168,7 +168,7 @@ def test_short_legs_taint_their_neighbours():
 
 # ---------------------------------------------------------------------------------------------- the parts
 @given(st.floats(0.5, 200.0), st.floats(0.5, 8.0), st.floats(0.3, 3.0), st.floats(0.3, 3.0))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_point_runs_a_leg_from_rest_to_rest_without_a_leap(length, fastest, accel, jerk):
     top = s.top_speed_mps(length, fastest, accel, jerk)
     whole = s.leg_s(length, top, accel, jerk)

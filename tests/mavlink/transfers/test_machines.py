@@ -20,7 +20,7 @@ from companion.messages import MissionItem, MissionType
 PARTY = Party(1, 1, 1, 191)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(st.floats(0.0, 1e7), st.floats(0.01, 3.0), st.floats(0.5, 30.0))
 def test_a_retry_ends_at_any_time_of_day(start_s, first_s, give_up_s):
     retry = Retry(first_s=first_s, give_up_s=give_up_s)

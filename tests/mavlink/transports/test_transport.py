@@ -44,7 +44,7 @@ def test_bad_link_names_say_what_to_write(text):
         parse_link(text)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.text(max_size=40))
 def test_any_text_is_a_link_or_an_input_error(text):
     try:

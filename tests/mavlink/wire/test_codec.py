@@ -111,7 +111,7 @@ def test_ships_move_as_they_were_told_to():
 
 
 # -------------------------------------------------------------------------------------------- signs
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80)
 @given(st.floats(-360.0, 360.0), st.floats(0.0, 90.0))
 def test_wind_direction_is_where_it_comes_from(direction, speed):
     sample = codec.wind_sample(0.0, heard(wire.MAVLink_wind_message(direction, speed, 0.0)))
@@ -120,7 +120,7 @@ def test_wind_direction_is_where_it_comes_from(direction, speed):
     assert sample.tws_mps == pytest.approx(speed, rel=1e-6)
 
 
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80)
 @given(st.floats(-89.9, 89.9), st.floats(-180.0, 180.0))
 def test_positions_survive_the_wire_to_a_centimetre(lat, lon):
     point = GeoPoint(lat_deg=lat, lon_deg=lon)
@@ -132,7 +132,7 @@ def test_positions_survive_the_wire_to_a_centimetre(lat, lon):
         assert abs(back.lon_deg - lon) <= 0.6e-7
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.floats(-math.pi, math.pi))
 def test_a_heading_setpoint_carries_its_heading(heading):
     q = heard(codec.heading_setpoint((1, 1), 1.0, heading, 1.0)).q
@@ -171,7 +171,7 @@ SAMPLES = {m.get_type(): m for n in ("beat", "boot", "ais", "fence_breach") for 
 EVIL = [math.nan, math.inf, -math.inf, 1e30, -1e30, 3.4e38, 0.0, 361.0, -1.0]
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(st.sampled_from(NAMES), st.data())
 def test_no_field_value_raises_or_gets_through_as_nonsense(name, data):
     message = SAMPLES[name]
@@ -260,7 +260,7 @@ def test_the_heading_falls_back_to_the_positions_own_when_attitude_is_old():
     assert late.yaw_rate_radps is None
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=250), st.integers(0, 70000))
 def test_long_texts_survive_chunking(text, text_id):
     assembler = VehicleAssembler()

@@ -55,7 +55,7 @@ def test_truncated_frames_do_not_swallow_the_next():
     assert [bytes(m.get_msgbuf()) for m in messages] == kept
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.lists(st.binary(max_size=400), max_size=6), st.integers(0, len(FRAMES) - 1))
 def test_no_bytes_raise_and_a_good_frame_behind_them_arrives(chunks, which):
     codec = Codec(1, 191)
@@ -65,7 +65,7 @@ def test_no_bytes_raise_and_a_good_frame_behind_them_arrives(chunks, which):
     assert FRAMES[which] in [bytes(m.get_msgbuf()) for m in messages]
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.integers(0, len(FRAMES) - 1), st.data())
 def test_a_changed_byte_is_never_taken_for_a_message(which, data):
     frame = bytearray(FRAMES[which])

@@ -32,7 +32,7 @@ ITEM = st.builds(
 ITEMS = st.lists(ITEM, min_size=1, max_size=8)
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(ITEM)
 def test_canonical_is_settled(item):
     assert canonical(canonical(item)) == canonical(item)
@@ -40,7 +40,7 @@ def test_canonical_is_settled(item):
         assert (canonical(item).lat_e7, canonical(item).lon_e7) == (item.lat_e7, item.lon_e7)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(ITEMS, st.integers(0, 12))
 def test_padding_changes_the_length_and_nothing_that_is_sailed(items, count):
     items = [*items, MissionItem(command=Command.NAV_LOITER_UNLIM, lat_e7=1, lon_e7=2)]
@@ -51,7 +51,7 @@ def test_padding_changes_the_length_and_nothing_that_is_sailed(items, count):
     assert all(i.command in ENDING for i in long[len(items):])
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(ITEMS, st.data())
 def test_the_hash_names_what_is_sailed(items, data):
     ended = sailed(items)
@@ -70,7 +70,7 @@ def test_the_hash_names_what_is_sailed(items, data):
     assert first_difference(items, moved).startswith(f"item {where + 1} written")
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(ITEMS, st.integers(0, 5), st.sampled_from(list(MissionType)))
 def test_mission_dat_holds_every_bit(items, start, kind):
     data = pack_mission_dat(items, kind, start=start)
@@ -78,7 +78,7 @@ def test_mission_dat_holds_every_bit(items, start, kind):
     assert unpack_mission_dat(data) == (kind, start, tuple(items))
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(st.binary(max_size=120))
 def test_no_bytes_but_a_mission_dat_are_one(data):
     try:

@@ -52,7 +52,7 @@ TOLERANCE = {
 }
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(STATUS)
 def test_a_status_survives_the_air(status):
     payload = pack_status(status)
@@ -74,7 +74,7 @@ def test_a_status_survives_the_air(status):
             assert got == sent, field.name
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(st.binary(max_size=140))
 def test_no_payload_raises_anything_but_value_error(payload):
     try:
@@ -156,7 +156,7 @@ SEEN = st.builds(
 )
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(SEEN)
 def test_what_is_seen_of_vessels_survives_the_air(seen):
     payload = pack_traffic(seen)
@@ -172,7 +172,7 @@ def test_what_is_seen_of_vessels_survives_the_air(seen):
             assert got == pytest.approx(sent, rel=1e-6, abs=0.51 if field.name.endswith("_s") else 1e-6), field.name
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(st.binary(max_size=140))
 def test_no_traffic_payload_raises_anything_but_value_error(payload):
     try:

@@ -64,7 +64,7 @@ STEPS = {"goal_m": 5.0, "waypoint_m": 0.5, "speed_mps": 0.05, "tws_mps": 0.1, "t
          "plan_age_s": 30.0, "promised_risk": 0.002, "clearance_m": 1.0, "cpa_m": 2.0, "battery_v": 0.1}
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(ORDERS)
 def test_an_order_is_read_as_it_was_given(given_order):
     data = pack_order(given_order, KEY)
@@ -80,7 +80,7 @@ def test_an_order_is_read_as_it_was_given(given_order):
     assert by_the_page.write(ORDER, KEY.key, 1, **counts) == data
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(STATUSES)
 def test_a_status_is_read_as_it_was_told_within_its_steps(told):
     data = pack_status(told, KEY)
@@ -125,7 +125,7 @@ def test_one_bit_changed_is_refused(data, unpack):
             unpack(bytes(bad), KEY)
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(st.binary(max_size=60) | st.binary(min_size=24, max_size=24) | st.binary(min_size=42, max_size=42))
 @example(b"")
 @example(GOOD_ORDER[:-1])
@@ -139,7 +139,7 @@ def test_what_is_not_ours_is_refused_in_one_line(data):
         assert "\n" not in str(refusal.value)
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(st.binary(min_size=16, max_size=16), st.binary(min_size=34, max_size=34))
 def test_with_the_right_code_too_nothing_but_a_message_is_taken(body, other):
     """Who has the key may be of another release: what cannot be said by this one is refused, or read and said alike."""

@@ -53,7 +53,7 @@ def test_of_the_window_each_is_taken_late_and_what_is_older_is_not():
     assert judged(order(100 - WINDOW), taken, NOW_S)[0] is Reply.OVERTAKEN
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(st.lists(st.integers(1, 300), max_size=120), st.randoms(use_true_random=False))
 def test_no_counter_is_ever_taken_twice_whatever_comes_and_however_often_it_restarts(counters, lots: random.Random):
     taken, done = Taken(), []

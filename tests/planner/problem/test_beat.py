@@ -109,7 +109,7 @@ def test_the_time_of_a_beat_is_the_mixture_of_its_tacks() -> None:
     assert none == pytest.approx(0.0, abs=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(x=st.floats(-300.0, 300.0), y=st.floats(-300.0, 300.0), heading=st.floats(0.0, 360.0),
        corridor=st.floats(2.0, 40.0), tack=st.floats(0.0, 8.0), block=st.booleans())
 def test_no_plan_is_below_its_bound(

@@ -99,7 +99,7 @@ def definition():
 
 
 @needs_scorer
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(random_problems(), st.lists(st.tuples(st.floats(-150, 150), st.floats(-40, 380)), max_size=5))
 def test_agrees_with_the_definition_on_random_paths(raw, middle):
     scorer = definition()

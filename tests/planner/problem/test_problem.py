@@ -44,7 +44,7 @@ def test_a_file_that_is_not_json(tmp_path):
         Problem.from_json(tmp_path / "missing.json")
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(random_problems())
 def test_write_then_read_is_the_same_problem(raw):
     first = Problem.from_json(raw)

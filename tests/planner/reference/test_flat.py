@@ -23,7 +23,7 @@ lats, courses = st.floats(-70.0, 70.0), st.floats(0.0, 2.0 * math.pi)
 
 
 @pytest.mark.parametrize("reach_m", sorted(WITHIN))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(lat=lats, lon=st.floats(-180.0, 180.0), bearing=courses, share=st.floats(0.0, 1.0), course=courses)
 def test_the_plane_is_within_what_the_docs_say(reach_m, lat, lon, bearing, share, course):
     plane = FlatPlane(GeoPoint(lat_deg=lat, lon_deg=lon))
@@ -46,7 +46,7 @@ def test_the_worst_of_it_is_near_what_the_docs_say(lat):
     assert np.hypot(*(flat - at).T).max() == pytest.approx({0.0: 281.0, 50.8: 382.0, 70.0: 716.0}[lat], rel=0.01)
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(lat=lats, course=courses, at=st.tuples(st.floats(-20_000.0, 20_000.0), st.floats(-20_000.0, 20_000.0)),
        length_m=st.floats(100.0, 10_000.0))
 def test_a_leg_bends_by_what_solids_are_grown_by_at_the_most(lat, course, at, length_m):

@@ -67,7 +67,7 @@ def test_a_target_dead_to_windward_behind_a_wide_zone_cannot_be_approached():
 
 @given(bearing=st.floats(-math.pi, math.pi), wind_from=st.floats(0.0, 360.0), t=st.floats(0.0, 600.0),
        sigma=st.sampled_from([AR1, KALMAN, {"model": "none"}]))
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 def test_whatever_it_steers_keeps_the_widened_zone_to_the_leg_s_end_and_comes_nearer(bearing, wind_from, t, sigma):
     p = problem(wind=wind(wind_from, sigma), delta_s=0.8, obstacles=[])
     tx, ty = 120.0 * math.sin(bearing), 120.0 * math.cos(bearing)
@@ -188,7 +188,7 @@ def test_the_tree_grows_past_its_first_arrays(monkeypatch):
 # ----------------------------------------------------------------------------------- collision
 @given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(1, 20), st.floats(0, 6)), min_size=1,
                 max_size=6), st.tuples(*[st.floats(-80, 80)] * 4))
-@settings(max_examples=120, deadline=None, derandomize=True)
+@settings(max_examples=120)
 def test_first_hit_is_what_shapely_says(shapes, segment):
     import shapely
 

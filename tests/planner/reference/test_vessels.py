@@ -82,7 +82,7 @@ def test_with_a_small_part_of_the_promise_it_goes_round():
     assert path_risk(tight, round_).vessels.worst_instant <= 1e-6 < path_risk(loose, through).vessels.worst_instant
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=8)
 @given(st.floats(-300.0, 300.0), st.floats(120.0, 240.0), st.floats(1.0, 6.0), st.booleans(),
        st.sampled_from([None, 0.003, 0.02, 0.1]), st.floats(1e-4, 0.09), st.integers(0, 99))
 def test_no_path_that_is_returned_is_above_the_bound(off_m, course_deg, speed_mps, has_other, limit, part, seed):

@@ -72,7 +72,7 @@ def test_less_wind_costs_more_than_more_wind_gains():
     assert found.late_s > planned > found.early_s
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(tws=st.floats(1.0, 12.0), share=st.floats(0.0, 0.6), tau=st.floats(1.0, 3000.0), turn=st.floats(0.0, 20.0),
        fails=st.floats(0.0, 0.5))
 def test_quantiles_are_in_order_and_the_same_when_asked_again(tws, share, tau, turn, fails):

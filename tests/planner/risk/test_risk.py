@@ -113,7 +113,7 @@ def test_a_leg_in_the_zone_fails_for_sure_and_nothing_is_nothing():
 
 @given(angle=st.floats(46.0, 120.0), more=st.floats(0.5, 20.0), t=st.floats(5.0, 2000.0),
        sigma=st.sampled_from([AR1, KALMAN, TABLE, STILL]))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 def test_risk_is_a_probability_that_falls_with_the_angle_and_rises_with_time(angle, more, t, sigma):
     p = problem(sigma)
     here = path_risk(p, legs((0.0, t, angle)))
@@ -125,14 +125,14 @@ def test_risk_is_a_probability_that_falls_with_the_angle_and_rises_with_time(ang
 
 
 @given(angle=st.floats(60.0, 90.0), t=st.floats(10.0, 1500.0), sigma=st.sampled_from([AR1, KALMAN, TABLE, STILL]))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 def test_the_sum_that_the_tree_adds_up_is_not_below_what_is_computed(angle, t, sigma):
     risk = path_risk(problem(sigma), legs((0.0, t, angle), (t + 5.0, 2.0 * t, -angle)))
     assert risk.boole >= 0.85 * risk.computed - 1e-6
 
 
 @given(r=st.floats(0.05, 0.995))
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 def test_the_chance_to_go_from_cell_to_cell_is_the_normal_laws(r):
     """Against the error function itself, cell by cell, both halves of the grid; rows sum to one."""
     step = kernels.steps_of(r)

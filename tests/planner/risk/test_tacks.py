@@ -64,7 +64,7 @@ def test_where_nothing_else_is_within_a_tenth_the_risk_is_counted_and_limited():
     assert "risk" in limited.reason
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(gap=st.floats(0.5, 60.0), chance=st.floats(0.01, 0.6))
 def test_a_tack_is_the_riskier_the_nearer_the_wall(gap, chance):
     def to_wall(gap_m):

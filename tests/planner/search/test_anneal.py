@@ -21,7 +21,7 @@ BOATS = [make_world(Problem.from_json(simple(boat=PLAIN | kind))).boat
 few = st.lists(st.tuples(st.integers(-2, 2), st.integers(-2, 2)), min_size=1, max_size=5)
 
 
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=400)
 @given(st.sampled_from(BOATS), few, few, few, few)
 def test_a_changed_path_takes_what_its_walk_takes(boat, head, middle, other, tail):
     # Points of a coarse grid: many fall on each other, and a leg of no length has no course to turn from.

@@ -59,7 +59,7 @@ def test_the_same_seed_and_expansions_give_the_same_plan(name):
     assert first.expansions == again.expansions
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(random_problems(), st.integers(0, 5))
 def test_any_problem_ends_in_a_status_and_a_path_passes_the_scorer(raw, seed):
     p = Problem.from_json(raw)
@@ -123,7 +123,7 @@ def test_a_clearance_floor_is_kept():
 
 
 # ------------------------------------------------------------------------------------- the pieces
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80)
 @given(random_problems(), st.lists(st.tuples(st.floats(-200, 200), st.floats(-60, 400)), min_size=2, max_size=12))
 def test_the_grid_agrees_with_shapely(raw, points):
     world = make_world(Problem.from_json(raw))
@@ -135,7 +135,7 @@ def test_the_grid_agrees_with_shapely(raw, points):
         assert is_free(world.grid, ax, ay, bx, by) == (not walls.intersects(line))
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(random_problems(), st.floats(-100, 100), st.floats(50, 300), st.sampled_from([(0, 1), (1, 0)]))
 def test_a_corner_sails_its_courses_exactly(raw, x, y, kinds):
     p = Problem.from_json(raw | {"obstacles": [], "fence": None})
@@ -157,7 +157,7 @@ def test_the_lattice_beats_without_rounding():
     assert found.cost_s <= best * 1.002
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 @given(random_problems(), st.integers(1, 2**32))
 def test_annealing_keeps_a_path_feasible_and_never_makes_it_worse(raw, seed):
     p = Problem.from_json(raw)

@@ -35,7 +35,7 @@ def searched(raw, turns=6):
     return p, s, bound
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(random_problems())
 def test_never_above_a_feasible_plan(raw):
     p = Problem.from_json(raw)
@@ -66,7 +66,7 @@ def test_the_late_metric_sees_obstacles_in_a_closing_wind():
     assert bound.value_s < evaluate(p, plan(p, expansions=20_000).waypoints_en).time_s
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.floats(20, 70), st.sampled_from([180.0, 150.0]), st.floats(0, 60),
        st.lists(st.tuples(st.floats(-180, 180), st.floats(1, 200)), min_size=1, max_size=5))
 def test_the_gauge_is_below_every_mixture_of_courses(half, deepest, radius, legs):
@@ -90,7 +90,7 @@ def test_the_gauge_is_exact_where_it_is_known():
     assert disc_time(g.normals, g.blocked, 0.0, 5.0, 10.0) == 0.0
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(st.floats(-300, 300), st.floats(-300, 300), st.floats(-300, 300), st.floats(-300, 300))
 def test_the_gauge_obeys_the_triangle_inequality(ax, ay, bx, by):
     g = make_gauge(Problem.from_json(simple(boat=simple()["boat"] | {"speed": POLAR})))
@@ -126,7 +126,7 @@ def test_a_disc_that_reaches_round_a_wall_is_not_called_cut_off():
     assert cut_off(make_world(Problem.from_json(wall | {"goal": {"x": 0, "y": 100, "radius": 40}}))) is None
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(st.floats(60, 89), st.floats(0.2, 3.0), st.floats(0.6, 0.95), st.floats(50, 400))
 def test_proved_hopeless_by_noise_means_that_no_search_finds_a_path(half, growth, delta, distance):
     raw = simple(goal={"x": 0, "y": distance, "radius": 2}, delta_s=delta,

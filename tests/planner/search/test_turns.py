@@ -87,7 +87,7 @@ def test_a_turn_has_one_name_and_mirrors(a, b):
 
 
 # ------------------------------------------------------------------------------------- the pieces
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(BOATS, st.floats(-180, 180), st.floats(-180, 180))
 def test_the_guess_is_never_above_the_turn(changes, before, after):
     b = make_world(problem(**changes)).boat
@@ -97,7 +97,7 @@ def test_the_guess_is_never_above_the_turn(changes, before, after):
         assert exact < math.inf
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.floats(45, 80), st.floats(45, 80), st.integers(0, WAYS - 1), st.sampled_from([180, 160, 150]))
 def test_a_round_keeps_both_lines(first, second, way, deepest):
     p = problem(can_tack=False, max_twa_deg=deepest)
@@ -116,7 +116,7 @@ def test_a_round_keeps_both_lines(first, second, way, deepest):
     assert all(np.hypot(*leg) >= p.boat.room_m for leg in legs)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(random_problems(), BOATS, st.lists(st.tuples(st.floats(-100, 100), st.floats(-50, 300)), min_size=1, max_size=9))
 def test_the_kernel_agrees_with_the_scorer(raw, changes, points):
     raw = raw | {"obstacles": [], "fence": None, "boat": raw["boat"] | changes,
@@ -196,7 +196,7 @@ def test_channels_without_tacking(name):
     assert answer.cost_s > plan(load(name), expansions=20_000).cost_s
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(random_problems(), BOATS, st.integers(0, 5))
 def test_any_plan_keeps_the_turns_the_boat_can_do_and_the_bound(raw, changes, seed):
     p = Problem.from_json(raw | {"boat": raw["boat"] | changes})
@@ -211,7 +211,7 @@ def test_any_plan_keeps_the_turns_the_boat_can_do_and_the_bound(raw, changes, se
     assert answer.lower_bound_s <= answer.cost_s
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 @given(BOATS, st.integers(1, 2**32))
 def test_annealing_keeps_the_turns_possible(changes, seed):
     raw = simple(obstacles=[box(-20, 40, 5, 45)], fence=box(-60, -20, 60, 120), boat=boat(**changes))

@@ -360,7 +360,7 @@ def test_arming_in_a_breach_is_refused_until_the_fence_is_cleared() -> None:
     sail(job, is_moored=True, FENCE_TYPE=4.0)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 10_000), east=st.floats(-150.0, 150.0), north=st.floats(-150.0, 150.0),
     inclusion=st.booleans(),

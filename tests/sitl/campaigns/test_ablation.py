@@ -90,7 +90,7 @@ def test_times_are_paired_and_only_of_those_that_both_arrived():
 
 
 @given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=30))
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 def test_the_interval_holds_the_mean_and_lies_within_what_was_seen(shares):
     middle, low, high = interval(shares)
     assert min(shares) - 1e-9 <= low <= middle + 1e-9

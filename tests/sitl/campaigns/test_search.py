@@ -26,7 +26,7 @@ def test_a_stream_gives_its_numbers_and_goes_on_the_same_behind_its_end():
     assert all(0.0 <= x < 1.0 for x in first)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.lists(st.floats(0.0, 0.999999), min_size=LENGTH, max_size=LENGTH), st.integers(0, 5))
 def test_whatever_a_stream_holds_can_be_drawn(numbers, seed):
     point = Point(seed=seed, numbers=tuple(numbers))

@@ -106,7 +106,7 @@ def test_groups_are_shown_and_all_of_them_judged():
 
 
 @given(st.lists(st.tuples(st.floats(10.0, 900.0), st.floats(10.0, 900.0)), min_size=1, max_size=12))
-@settings(max_examples=60, derandomize=True)
+@settings(max_examples=60)
 def test_a_change_lies_in_its_interval_and_turns_with_the_tables(times):
     before, after = (table([row(n, pair[k]) for n, pair in enumerate(times)]) for k in (0, 1))
     there, back = change_of(compare(before, after), "time"), change_of(compare(after, before), "time")

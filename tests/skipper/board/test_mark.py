@@ -24,7 +24,7 @@ PLACES = st.builds(
 ITEMS = st.lists(
     st.builds(lambda p, c: waypoint(p, command=c), PLACES,
               st.sampled_from([Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM])), min_size=1, max_size=8)
-CHECK = settings(max_examples=200, deadline=None, derandomize=True)
+CHECK = settings(max_examples=200)
 
 
 def as_ardupilot_keeps(alt_m):

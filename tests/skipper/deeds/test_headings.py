@@ -12,7 +12,7 @@ from companion.skipper.way.geometry import bearing_rad
 from companion.skipper.way.voyage import Side
 
 ANGLE = st.floats(-math.pi, math.pi)
-CHECK = settings(max_examples=100, deadline=None, derandomize=True)
+CHECK = settings(max_examples=100)
 
 
 def test_pushed_to_port_means_steering_to_starboard():

@@ -46,7 +46,7 @@ def test_a_circle_that_the_autopilot_does_not_complain_of_is_not_where_we_believ
     assert circle_of(voyage(), limits, status(fence_breached=True), outside) is not None
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(20.0, 2000.0), st.floats(0.0, 2.0 * math.pi), st.floats(0.0, 3.0))
 def test_what_it_leaves_is_inside_of_it_and_nearly_all_of_it(radius_m, course, share):
     circle = Circle(en_m=(30.0, -20.0), radius_m=radius_m)

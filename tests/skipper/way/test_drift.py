@@ -59,7 +59,7 @@ def test_a_point_too_thin_for_the_looks_is_met_all_the_same():
     assert ahead.contact_s == pytest.approx(100.0 / 3.0, abs=1.0)
 
 
-@settings(deadline=None, max_examples=60, derandomize=True)
+@settings(max_examples=60)
 @given(st.floats(-math.pi, math.pi), st.floats(0.05, 2.0), st.floats(0.0, 15.0))
 def test_before_it_is_said_to_come_near_it_is_not_near(set_rad, speed, floor_m):
     water = area(ROCK, shapely.Point(-60.0, 70.0).buffer(15.0))

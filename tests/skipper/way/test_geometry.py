@@ -27,7 +27,7 @@ from tests.skipper.world import area, voyage
 COORD = st.floats(-1000.0, 1000.0)
 POINT = st.tuples(COORD, COORD)
 ANGLE = st.floats(-math.pi, math.pi)
-CHECK = settings(max_examples=100, deadline=None, derandomize=True)
+CHECK = settings(max_examples=100)
 
 
 @CHECK

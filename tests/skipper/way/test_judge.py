@@ -22,7 +22,7 @@ from tests.skipper.world import area, forecast, voyage
 
 BOAT = Boat(polar=ardurover_sitl())
 NO_GO = math.radians(45.0)
-CHECK = settings(max_examples=60, deadline=None, derandomize=True)
+CHECK = settings(max_examples=60)
 
 
 def verdict(path, twd=0.0, **more):

@@ -60,7 +60,7 @@ def test_in_a_steady_wind_it_is_not_worth_its_name():
     assert steady.gain_s(0.0, 0.0, is_port=True) < 0.0
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(spread_deg=st.sampled_from([4.0, 8.0, 16.0]), tau_s=st.sampled_from([15.0, 60.0, 300.0]),
        leg_deg=st.sampled_from([0.0, 10.0, 25.0]), corridor_m=st.sampled_from([20.0, 50.0]))
 def test_a_mirrored_leg_has_the_mirrored_table(spread_deg, tau_s, leg_deg, corridor_m):

@@ -83,7 +83,7 @@ def test_her_leeway_is_that_of_the_boats_model(beat, aws, awa, v):
     assert math.atan2(-side, v) == pytest.approx(leeway_rad(coefficient_of(beat), aws, awa, v), abs=1e-9)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(beat=st.floats(0.0, 0.3), aws=st.floats(0.0, 20.0), awa=st.floats(-3.14, 3.14), v=st.floats(-2.0, 5.0))
 def test_the_drift_is_finite_and_to_leeward_without_way_too(beat, aws, awa, v):
     side = side_mps(coefficient_of(beat), aws, awa, v, 0.0, 0.44)

@@ -95,7 +95,7 @@ def test_cut_mend_close_and_open_again() -> None:
     run_virtual(main())
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.binary(max_size=400), st.integers(0, 5))
 def test_frames_loses_no_byte(noise: bytes, count: int) -> None:
     codec = mav.MAVLink(None)
