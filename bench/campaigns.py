@@ -32,7 +32,7 @@ MACHINES, CORES, VOYAGES = 100, 2, 10_000
 
 @dataclass(frozen=True)
 class Spent:
-    """What a run took: seconds of the wall and of all processors, and of the largest worker [MB]."""
+    """What a run took: seconds of the wall and of all processors."""
 
     jobs: int
     wall_s: float
@@ -76,6 +76,10 @@ def empty(count, means):
     return sail("empty", nothing, range(count), means, key=lambda seed: {"seed": seed})
 
 
+def tell(name, row):
+    print(f"  {name:18} {row.jobs / row.wall_s:5.2f} a second, {row.cpu_s / row.jobs:5.2f} s CPU each", flush=True)
+
+
 def main(argv=None):
     parser = argparse.ArgumentParser(prog="python -m bench.campaigns", description=__doc__.split("\n", 1)[0])
     parser.add_argument("--empty", type=int, default=4000, help="jobs that do nothing, a tenth by dask (default 4000)")
@@ -84,7 +88,7 @@ def main(argv=None):
     args = parser.parse_args(argv)
     compile_ahead()
     with tempfile.TemporaryDirectory() as folder:
-        ways = [(f"{w} workers", Means(workers=w)) for w in args.workers if w > 1]
+        ways = [(f"{w} workers", Means(workers=w)) for w in args.workers]
         ways += [(f"{w} workers, dask", Means(workers=w, dask="local")) for w in args.workers]
         print("jobs that do nothing")
         added_s = {}
@@ -99,19 +103,17 @@ def main(argv=None):
         if not args.voyages:
             return 0
         seeds = range(args.voyages)
-        print(f"{args.voyages} demo voyages")
-        rows = [(f"bare, {w}", spent(len(seeds), lambda w=w: bare(seeds, w))) for w in args.workers]
+        print(f"{args.voyages} demo voyages, with what the workers take to begin")
+        for w in args.workers:
+            tell(f"bare, {w}", spent(len(seeds), lambda w=w: bare(seeds, w)))
         peaks, inner = [], []
         for name, means in ways:
             out = Path(folder) / f"v-{name}.jsonl"
             whole = Means(workers=means.workers, dask=means.dask, out=out)
-            rows.append((name, spent(len(seeds), lambda whole=whole: voyages(seeds, whole))))
+            tell(name, spent(len(seeds), lambda whole=whole: voyages(seeds, whole)))
             facts = [json.loads(line) for line in out.with_suffix(".facts.jsonl").read_text().splitlines()]
             peaks.append((name, max(fact["peak_mb"] for fact in facts)))
             inner += [fact["cpu_s"] for fact in facts]
-        for name, row in rows:
-            print(f"  {name:18} {row.jobs / row.wall_s:5.2f} a second, {row.cpu_s / row.jobs:5.2f} s CPU each, with "
-                  "their beginning")
         print("largest worker: " + ", ".join(f"{name} {mb:.0f} MB" for name, mb in peaks))
         each_s = statistics.median(inner)
         print(f"a voyage: {each_s:.2f} s CPU (median); the runner adds " + ", ".join(
