@@ -91,10 +91,11 @@ class Server:
             if link is not None and link.has_output:
                 write(link.take())
 
-    async def wait(self, for_s: float | None = None) -> None:
-        """Return when the simulation ended with an error, or after ``for_s`` simulated seconds."""
-        if self._task is not None:
-            await asyncio.wait([self._task], timeout=for_s)
+    async def wait(self, for_s: float | None = None) -> bool:
+        """Return whether the simulation goes on: when it ended with an error, or after ``for_s`` simulated seconds."""
+        if self._task is None:
+            return False
+        return bool((await asyncio.wait([self._task], timeout=for_s))[1])
 
     def follow(self, task: asyncio.Task[None]) -> None:
         """Remember who lets time pass."""

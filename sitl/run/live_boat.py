@@ -1,6 +1,7 @@
 """The simulated autopilot of a live scenario as a process of its own: ``python -m sitl.run.live_boat``.
 
-Differs from ``sitl boat`` only in that its weather, start and parameters come from the scenario file.
+Differs from ``sitl boat`` only in that its weather, start and parameters come from the scenario file, and that it
+ends with the process that began it, which may be killed and then ends nobody.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import math
+import os
 import sys
 from pathlib import Path
 
@@ -18,7 +20,7 @@ from sitl.scene import load_scenario, own_polar, recentre_m, scenario_departures
 
 
 def main() -> int:
-    """Run until terminated."""
+    """Run until terminated, or alone."""
     parser = argparse.ArgumentParser(prog="python -m sitl.run.live_boat", description=__doc__)
     parser.add_argument("scenario", type=Path)
     parser.add_argument("--seed", type=int, default=0)
@@ -38,9 +40,12 @@ def main() -> int:
         wind, args.seed,
     )
 
+    parent = os.getppid()
+
     async def sail() -> None:
         async with serve(autopilot, args.endpoint) as server:
-            await server.wait(None)
+            while await server.wait(args.speedup) and os.getppid() == parent:   # each second of the wall
+                pass
 
     try:
         run(sail(), speedup=args.speedup)

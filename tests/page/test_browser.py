@@ -7,7 +7,6 @@ a folder, pictures of it are left there.
 import asyncio
 import contextlib
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -360,7 +359,7 @@ def test_the_demonstration_is_watched_live_an_order_is_given_and_obeyed(tmp_path
             assert window.complaints() == []
             assert is_own(window, url)
     finally:
-        done.send_signal(signal.SIGINT)
+        done.terminate()   # a SIGINT is ignored by what was begun in a shell's background
         try:
             done.wait(30.0)
         except subprocess.TimeoutExpired:

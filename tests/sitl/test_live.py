@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import socket
 import subprocess
 import sys
 import time
@@ -220,3 +221,28 @@ def children(pid):
         found |= {n: command_of(n) for n in below}
         above = below
     return found
+
+
+def hear_for(ear, for_s):
+    until_s = time.monotonic() + for_s
+    while time.monotonic() < until_s:
+        ear.recv(300)
+
+
+def test_the_boat_ends_with_the_one_who_began_it():
+    """Who is killed can end nobody."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
+        ear.bind(("127.0.0.1", 0))
+        ear.settimeout(60.0)
+        boat = [sys.executable, "-m", "sitl.run.live_boat", "sitl/scenarios/demo.toml", "--endpoint",
+                f"udpout:127.0.0.1:{ear.getsockname()[1]}"]
+        starter = subprocess.Popen(
+            [sys.executable, "-c", f"import subprocess; subprocess.run({boat!r})"], stdin=subprocess.DEVNULL)
+        try:
+            ear.recv(300)
+        finally:
+            starter.kill()
+            starter.wait()
+        ear.settimeout(3.0)
+        with pytest.raises(TimeoutError):
+            hear_for(ear, 60.0)
