@@ -14,7 +14,6 @@ from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.errands import Kind, errand
 from companion.skipper.planning.not_found import asks_again, not_found
-from companion.skipper.planning.rejudged import is_begun_risky, is_riskier
 from companion.skipper.planning.track import of_way, said
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step.actions import Change, ReplanReason, Severity
@@ -25,6 +24,7 @@ from companion.skipper.step.state import PendingPlan, Phase, Retry
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.manoeuvre import gybe_round
+from companion.skipper.way.rejudged import is_begun_risky, is_riskier
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
 

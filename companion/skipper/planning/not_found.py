@@ -8,7 +8,6 @@ from companion.messages import Command, waypoint
 from companion.skipper.board.uploads import upload
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import room_m
-from companion.skipper.planning.rejudged import too_risky
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step.actions import Severity
@@ -16,6 +15,7 @@ from companion.skipper.step.missions import loiter_place
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.judge import judge
+from companion.skipper.way.rejudged import too_risky
 from companion.skipper.way.stemming import waiting_place
 from companion.skipper.way.voyage import PointEn
 

@@ -11,9 +11,9 @@ from companion.planner.risk.tacks import of_risky, tacks_at_risk
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.not_found import not_found
-from companion.skipper.planning.rejudged import is_begun_risky, is_riskier, too_risky
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, UploadMission
 from companion.skipper.step.snapshot import PlanOutcome
+from companion.skipper.way.rejudged import is_begun_risky, is_riskier, too_risky
 from companion.skipper.way.voyage import Goal
 from tests.planner.risk.test_tacks import channel
 from tests.skipper.planning.test_tacks_fail import turn_of

@@ -13,8 +13,7 @@ import numpy as np
 
 from companion.planner import Leg, Problem
 from companion.planner.problem import evaluate
-from companion.planner.risk import path_risk
-from companion.planner.risk.tacks import of_risky, tacks_at_risk
+from companion.planner.risk import of_risky, path_risk, tacks_at_risk
 from companion.skipper.way.voyage import PointEn
 
 
