@@ -16,7 +16,7 @@ from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.problem.defects import defect_of
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.value import Problem
-from companion.planner.risk.tacks import Tack, tacks_at_risk
+from companion.planner.risk.tacks import Tack, of_risky, tacks_at_risk
 
 DEARER = 1.10          # of the first path's time: what another may take
 AGAIN_SHARE = 0.15     # of the search's expansions, for each of the others
@@ -35,7 +35,7 @@ def with_contingency(search: Search) -> Search:
         tacks = tacks_at_risk(problem, judged.legs)
         if not any(tack.is_risky for tack in tacks):
             return outcome
-        best, best_key, limit_s = outcome, (_risk(tacks), judged.time_s), DEARER * judged.time_s
+        best, best_key, limit_s = outcome, (of_risky(tacks), judged.time_s), DEARER * judged.time_s
         for other in _others(problem, tacks):
             again = _again(effort)
             found = search(other, again, seed)
@@ -46,7 +46,7 @@ def with_contingency(search: Search) -> Search:
             seen = evaluate(problem, found.waypoints_en)
             if not seen.is_feasible or seen.time_s > limit_s:
                 continue
-            key = (_risk(tacks_at_risk(problem, seen.legs)), seen.time_s)
+            key = (of_risky(tacks_at_risk(problem, seen.legs)), seen.time_s)
             if key < best_key:
                 best, best_key = found, key
             if key[0] == 0.0:
@@ -61,10 +61,6 @@ def _again(effort: Effort) -> Effort:
     if effort.limit is not None:
         return Effort(None, max(1, int(AGAIN_SHARE * effort.limit)))
     return Effort(None if math.isinf(effort.budget_s) else AGAIN_TIME_SHARE * effort.budget_s, None)
-
-
-def _risk(tacks: tuple[Tack, ...]) -> float:
-    return round(sum(tack.risk for tack in tacks if tack.is_risky), 6)
 
 
 def _others(problem: Problem, tacks: tuple[Tack, ...]) -> Iterator[Problem]:

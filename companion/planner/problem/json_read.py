@@ -169,14 +169,13 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
     if not isinstance(names, (list, tuple)) or (names and len(names) != len(obstacles)):
         raise InputError(source, "obstacle_names", "is not a list as long as obstacles", "write one name for each")
     fence = raw.get("fence")
-    current = _Reader(raw.get("current") or {}, source, "current")
     targets = raw.get("targets") or []
     if not isinstance(targets, (list, tuple)):
         raise InputError(source, "targets", "is not a list", "write a list of objects")
     twa, mps = _parse_speed(boat.child("speed"))
     known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
-             "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat", "obstacle_names", "tracking",
-             "zone"}
+             "adrift", "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat", "obstacle_names",
+             "tracking", "zone"}
     fields: dict[str, Any] = dict(  # noqa: C408, the names of Problem's fields
         id=top.text("id", ""),
         title=top.text("title", ""),
@@ -210,8 +209,8 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
             tack_fails=boat.number("tack_fails", 0.0),
         ),
         delta_s=top.number("delta_s"),
-        current=Current(set_rad=math.radians(current.number("set_deg", 0.0)),
-                        drift_mps=current.number("drift_mps", 0.0)),
+        current=_parse_current(_Reader(raw.get("current") or {}, source, "current")),
+        adrift=_parse_current(_Reader(raw.get("adrift") or {}, source, "adrift")),
         targets=tuple(_parse_target(_Reader(t, source, f"targets[{i}]")) for i, t in enumerate(targets)),
         vessels_part=_parse_allocation(top.child("allocation")) if raw.get("allocation") is not None else None,
         risk=_parse_risk(_Reader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,
@@ -319,6 +318,10 @@ def _parse_allocation(allocation: _Reader) -> float:
 def _parse_risk(risk: _Reader) -> RiskLimit:
     return RiskLimit(max_path_risk=risk.number("max_path_risk"),
                      correlation_time_s=risk.number("correlation_time_s", 60.0))
+
+
+def _parse_current(current: _Reader) -> Current:
+    return Current(set_rad=math.radians(current.number("set_deg", 0.0)), drift_mps=current.number("drift_mps", 0.0))
 
 
 def _parse_zone(zone: _Reader) -> Zone:

@@ -81,8 +81,9 @@ def to_dict(p: Problem) -> dict[str, Any]:
         out["obstacle_names"] = list(p.obstacle_names)
     if p.notes:
         out["notes"] = p.notes
-    if p.current.drift_mps:
-        out["current"] = {"set_deg": deg(p.current.set_rad), "drift_mps": p.current.drift_mps}
+    for name, water in (("current", p.current), ("adrift", p.adrift)):
+        if water.drift_mps:
+            out[name] = {"set_deg": deg(water.set_rad), "drift_mps": water.drift_mps}
     if p.targets:
         out["targets"] = [
             {"x": t.x_m, "y": t.y_m, "vx": t.vx_mps, "vy": t.vy_mps, "radius_m": t.radius_m,

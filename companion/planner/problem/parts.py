@@ -127,6 +127,11 @@ class Current:
     set_rad: float = 0.0
     drift_mps: float = 0.0
 
+    @property
+    def en_mps(self) -> tuple[float, float]:
+        """Towards east and north [m/s]."""
+        return self.drift_mps * math.sin(self.set_rad), self.drift_mps * math.cos(self.set_rad)
+
 
 NO_CURRENT = Current()
 

@@ -48,6 +48,7 @@ class Problem:
 
     ``vessels_part`` is what uncertain targets get of 1 - delta_s, at each instant and together; None: a tenth of it.
     ``tracking`` says how the plan will be sailed, and what that track keeps clear of; without it the legs alone count.
+    ``adrift`` is a current that is believed and not sure enough to be planned with: it carries her where a tack fails.
     ``leg_saving`` is what a leg must save, as a share of the path's time, for ``auto`` to keep it.
     """
 
@@ -64,6 +65,7 @@ class Problem:
     boat: BoatLimits
     delta_s: float = 0.5
     current: Current = NO_CURRENT
+    adrift: Current = NO_CURRENT
     zone: Zone | None = None
     targets: tuple[Target, ...] = ()
     vessels_part: float | None = None

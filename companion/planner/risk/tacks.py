@@ -76,6 +76,11 @@ def tacks_at_risk(problem: Problem, legs: Sequence[Leg]) -> tuple[Tack, ...]:
     return tuple(found)
 
 
+def of_risky(tacks: Sequence[Tack]) -> float:
+    """Return what a path's risky tacks add to its risk."""
+    return round(sum(tack.risk for tack in tacks if tack.is_risky), 6)
+
+
 def tack_risks(legs: Sequence[Leg], tacks: Sequence[Tack]) -> tuple[float, ...]:
     """Return what tacks that fail add to the risk of each leg."""
     out = [0.0] * len(legs)
@@ -149,11 +154,11 @@ class _Solids:
         if self.distance_m(shapely.Point(at)) > self.far_m(speed_mps, tws):
             return None
         speed, place = speed_mps, at
-        drift = problem.current.drift_mps
-        current = (drift * math.sin(problem.current.set_rad), drift * math.cos(problem.current.set_rad))
+        (east, north), (east_too, north_too) = problem.current.en_mps, problem.adrift.en_mps
+        carried = (east + east_too, north + north_too)
         for failures in range(1, MOST_FAILURES + 1):
             tracks = failed_tack(place, course_rad=course_rad, speed_mps=speed,
-                                 twd_from_rad=problem.wind.twd_from_rad, tws_mps=tws, current_en_mps=current)
+                                 twd_from_rad=problem.wind.twd_from_rad, tws_mps=tws, current_en_mps=carried)
             room = min(self.distance_m(shapely.LineString(track)) for track in tracks) - self.need_m
             if room <= 0.0:
                 lack = max(-room, self._lack_m(at, np.concatenate(tracks)))

@@ -10,7 +10,8 @@ import numpy as np
 from companion.planner import Plan, PlanStatus
 from companion.planner.problem import evaluate, resolved
 from companion.skipper.board.uploads import upload
-from companion.skipper.planning.autopilot_beats import tacks_fail
+from companion.skipper.planning.asking import request
+from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.errands import Kind, errand
 from companion.skipper.planning.not_found import asks_again, not_found
 from companion.skipper.planning.track import of_way, said
@@ -21,12 +22,15 @@ from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import PendingPlan, Phase, Retry
 from companion.skipper.step.turn import Turn
-from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.manoeuvre import gybe_round
+from companion.skipper.way.rejudged import is_begun_risky, is_riskier
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
 
 SAME_M = 1.0             # a new waypoint this near to the old one is the old one
+# Plans from a waypoint between here and a goal: one from the boat leads to the same goal.
+AT_WAYPOINT = frozenset({ReplanReason.WAYPOINT, ReplanReason.FORECAST})
 GYBE_RADIUS_M = 8.0      # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
 
 
@@ -54,6 +58,10 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
     if keep is None:
         turn.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
         return
+    if pending.reason in AT_WAYPOINT and is_begun_risky(pending.problem, plan.legs) and may_restart_leg(turn) and (
+            pending.from_index is not None
+            and request(turn, pending.reason, text="the tack at the next waypoint may touch when it fails")):
+        return   # no plan from that waypoint takes its tack away
     if _keep_old(turn, pending, plan):
         return
     put_in_place(turn, pending, plan, keep, set_current)
@@ -98,7 +106,7 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
         return False
     before_en = None if pending.from_index is None else route.leg_from_en_m[pending.from_index]
     seen = of_way(problem, [pending.start_en_m, *points], heading_rad=problem.start_heading_rad, before_en=before_en)
-    if not seen.is_kept:
+    if not seen.is_kept or is_riskier(problem, old.legs, plan.legs):
         return False
     if problem.targets:
         tail = [(float(e), float(n)) for e, n in plan.waypoints_en]
@@ -132,9 +140,7 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     expected_m = plan.expected_clearance_m
     if tacks_fail(turn):
         # Tacks have failed: turn the other way round where there is room.
-        points = list(gybe_round(
-            start, points, twd_from_rad=pending.facts.plan_twd_from_rad, radius_m=GYBE_RADIUS_M,
-            area=turn.voyage.area, floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m)))
+        points = list(_gybed_round(turn, pending, start, points))
         seen = of_way(pending.problem, [start, *points], heading_rad=pending.problem.start_heading_rad, before_en=None)
         if not seen.is_kept:
             points = [*pending.lead_in, *planned[1:]]   # rather a tack that may fail than a loop onto something
@@ -170,6 +176,17 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     _look_at_time(turn, route)
     clear = said(expected_m, turn.config.margin_floor_m)
     upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change)
+
+
+def _gybed_round(turn: Turn, pending: PendingPlan, start: PointEn, points: list[PointEn]) -> tuple[PointEn, ...]:
+    """Return the waypoints behind the start with their tacks gybed round, the one that begins them, too."""
+    vehicle, heading = turn.snapshot.vehicle, pending.problem.start_heading_rad
+    if pending.lead_in and vehicle is not None:
+        heading = vehicle.heading_rad
+    return gybe_round(
+        moved(start, heading, -1.0), [start, *points], twd_from_rad=pending.facts.plan_twd_from_rad,
+        radius_m=GYBE_RADIUS_M, area=turn.voyage.area,
+        floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m))[1:]
 
 
 def _look_at_time(turn: Turn, route: Route) -> None:

@@ -15,6 +15,7 @@ from companion.skipper.step.missions import loiter_place
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.judge import judge
+from companion.skipper.way.rejudged import too_risky
 from companion.skipper.way.stemming import waiting_place
 from companion.skipper.way.voyage import PointEn
 
@@ -54,6 +55,14 @@ def _keeps_floor(turn: Turn, pending: PendingPlan) -> bool:
     return of_way(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad, before_en=None).is_kept
 
 
+def _risk_of_old(turn: Turn, pending: PendingPlan) -> str:
+    """Return what of the mission sailed now is a greater risk than is allowed, by today's knowledge; empty: nothing."""
+    boat, vehicle, ahead = turn.boat_en, turn.snapshot.vehicle, turn.ahead()
+    if boat is None or vehicle is None or not ahead:
+        return ""
+    return too_risky(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad)
+
+
 def _is_sound(turn: Turn, way: list[PointEn]) -> bool:
     """Return whether a way is good for the mean wind and for the present one, and keeps the margin's floor.
 
@@ -77,7 +86,7 @@ def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
     met = meetings(turn) if state.route is not None else ()
     if (
         pending.rung == 0 and state.route is not None and not met and is_old_plan_sound(turn)
-        and _keeps_floor(turn, pending)
+        and _keeps_floor(turn, pending) and not _risk_of_old(turn, pending)
     ):
         turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
         turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
@@ -95,6 +104,11 @@ def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
         if request(turn, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
             return
     turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
+    risk = _risk_of_old(turn, pending)
+    if risk and state.route is not None and not met and is_old_plan_sound(turn) and _keeps_floor(turn, pending):
+        turn.say(Severity.WARNING, "no plan",
+                 f"no plan on any step of the ladder ({reason}): the old one stays; {risk}", every_s=0.0)
+        return
     if met and is_old_plan_sound(turn):
         # Loitering in a vessel's way is no better than sailing on through it: the operator must know.
         turn.say(

@@ -232,6 +232,8 @@ def problem_dict(
     boat = dict(voyage.boat.problem_boat(wind["speed_mps"]))
     boat["speeds"] = voyage.boat.problem_speeds()
     boat["tack_fails"] = tack_fails
+    if not current.is_significant and tack_fails > 0.0:
+        water["adrift"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
     boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(half_rad, wind["speed_mps"]))
     return {
         "id": voyage.name,

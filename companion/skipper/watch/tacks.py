@@ -55,7 +55,9 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, 
     fresh = now.side != 0 and t_s - now.settled_s <= FORGET_S
     if now.began_s is not None and not now.is_counted and t_s - now.began_s >= LIES_S and abs(off) < SETTLED_RAD:
         now = _counted(replace(now, is_counted=True, settled_s=t_s), t_s, failed=True)
-    if abs(off) >= SETTLED_RAD:
+    # Yawing in a sea she is beyond that angle for a moment while she lies, and settled on no tack.
+    lies = now.began_s is not None and speed_mps < STOPPED * now.settled_mps and side == now.side
+    if abs(off) >= SETTLED_RAD and not lies:
         if now.began_s is not None and not now.is_counted:
             is_back = side == now.side
             is_stopped = now.slowest_mps < STOPPED * now.settled_mps

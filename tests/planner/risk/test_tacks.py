@@ -12,6 +12,8 @@ from companion.boat.failed_tack import RISKY
 from companion.planner import Problem, plan
 from companion.planner.contingency import DEARER
 from companion.planner.problem import evaluate
+from companion.planner.problem.defects import defect_of
+from companion.planner.problem.json_write import to_dict
 from companion.planner.risk.tacks import tacks_at_risk
 from companion.planner.risk.wind import path_risk
 
@@ -104,3 +106,15 @@ def test_tacks_of_a_beat_left_to_the_autopilot_count():
     far = channel(0.3, width_m=400.0, beat={"no_go_half_deg": 45, "corridor_m": 15, "clearance_m": 20, "tack_s": 4})
     assert tacks_at_risk(far, evaluate(far, [(0, 0), (0, 300)]).legs) == ()
     assert math.isclose(path_risk(p, judged.legs).of_tacks, tack.risk)
+
+
+def test_a_current_that_is_believed_carries_her_while_a_tack_fails_and_nowhere_else():
+    way = [(0, 0), (24, 24), (0, 48)]
+    still, adrift = channel(), channel(adrift={"set_deg": 90.0, "drift_mps": 0.4})
+    legs = evaluate(still, way).legs
+    assert evaluate(adrift, way).legs == legs
+    [before], [after] = tacks_at_risk(still, legs), tacks_at_risk(adrift, legs)
+    assert after.failures < before.failures
+    assert after.risk > before.risk
+    assert Problem.from_json(to_dict(adrift)).adrift == adrift.adrift
+    assert defect_of(channel(adrift={"set_deg": 90.0, "drift_mps": -0.4}))

@@ -114,14 +114,15 @@ def test_nor_does_one_that_the_campaign_or_the_search_found(seed):
 @pytest.mark.campaign
 @pytest.mark.xfail(strict=True, reason="found and not mended")
 @pytest.mark.parametrize("seed", [
-    198, 284, 60496028, 106980778, 1026825460, 1261850702, 1262423428, 1494742110, 1632617857, 1896519915, 2045914046])
+    198, 60496028, 106980778, 1026825460, 1261850702, 1262423428, 1494742110, 1632617857, 1896519915, 2045914046])
 def test_what_was_found_and_is_not_mended_fails_still(seed):
     record = sail_kept(seed)
     assert record["passed"], record
 
 
+# Refused plans had her hold beside a rock when her position jumped (284); they are found since legs are long enough.
 @pytest.mark.campaign
-@pytest.mark.parametrize("seed", [83, 548, 808])
+@pytest.mark.parametrize("seed", [83, 284, 548, 808])
 def test_nor_does_one_of_those_that_came_too_near(seed):
     record = sail_kept(seed)
     assert record["passed"], record

@@ -95,3 +95,11 @@ def test_the_posterior_is_that_of_bayes():
     now = Tacking(tried=10, failed=3)
     assert now.chance(0.1) == pytest.approx(mean, abs=1e-4)
     assert now.spread(0.1) == pytest.approx(spread, abs=1e-4)
+
+
+def test_a_yaw_beyond_30_degrees_while_she_lies_is_no_end_of_it():
+    headings = [45, 45, 17, 18, 33, 15, 12, 20, 45, 50]
+    speeds = [2.1, 2.1, 1.5, 0.8, 0.7, 0.7, 0.6, 0.7, 1.0, 1.8]
+    for side in (1, -1):
+        now = seen([side * h for h in headings], speeds_mps=speeds)
+        assert (now.tried, now.failed) == (1, 1)

@@ -1,0 +1,137 @@
+"""A plan that is there, judged by what is known today: kept while its risk is allowed, not for being there."""
+
+import math
+from dataclasses import replace
+
+import shapely
+
+from companion.planner import plan
+from companion.planner.problem import RiskLimit, evaluate
+from companion.planner.risk.tacks import of_risky, tacks_at_risk
+from companion.skipper.planning.answers import take_plan
+from companion.skipper.planning.asking import request
+from companion.skipper.planning.not_found import not_found
+from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, UploadMission
+from companion.skipper.step.snapshot import PlanOutcome
+from companion.skipper.way.rejudged import is_begun_risky, is_riskier, too_risky
+from companion.skipper.way.voyage import Goal
+from tests.planner.risk.test_tacks import channel
+from tests.skipper.planning.test_tacks_fail import turn_of
+from tests.skipper.test_voyage import make
+
+WALLS = (shapely.box(-90.0, -80.0, -46.0, 500.0), shapely.box(46.0, -80.0, 90.0, 500.0))
+LEARNED = {"tried": 10, "failed": 9}     # 47 % from now on
+
+
+def careless(fails=0.3):
+    """Return a channel where tacks fail so often, and legs up to its walls."""
+    return channel(fails), plan(channel(0.0), expansions=20_000).legs
+
+
+def test_old_legs_stay_no_longer_when_tacks_fail_and_new_ones_have_room_for_it():
+    problem, old = careless()
+    new = plan(problem, expansions=20_000).legs
+    assert is_riskier(problem, old, new)
+    assert not is_riskier(problem, new, old)
+    assert not is_riskier(problem, old, old)            # no better: no reason to change
+    assert not is_riskier(channel(0.0), old, new)       # nobody knew of it when they were planned
+
+
+def test_a_limit_on_the_risk_of_a_path_holds_for_what_is_there():
+    problem, old = careless()
+    limited = replace(problem, risk=RiskLimit(max_path_risk=0.01))
+    assert is_riskier(limited, old, old)
+    assert "above the limit" in too_risky(limited, [old[0].from_en, *(leg.to_en for leg in old)],
+                                          heading_rad=problem.start_heading_rad)
+    assert not is_riskier(replace(problem, risk=RiskLimit(max_path_risk=1.0)), old, old)
+
+
+def test_what_may_touch_is_said_of_a_way_from_elsewhere():
+    problem = channel()
+    assert "bring her onto something" in too_risky(problem, [(0, 100), (28, 128), (0, 156)], heading_rad=math.pi / 4)
+    assert too_risky(problem, [(0, 100), (5, 105), (0, 110)], heading_rad=math.pi / 4) == ""
+
+
+def test_only_the_turn_that_begins_a_plan_begins_it():
+    problem = replace(channel(), start_en=(28.0, 128.0))
+    at_once = evaluate(problem, [(28, 128), (0, 156), (5, 161)]).legs
+    later = evaluate(channel(), [(0, 0), (28, 28), (0, 56)]).legs
+    assert is_begun_risky(problem, at_once)
+    assert not is_begun_risky(channel(), later)
+
+
+def sailing(obstacles=WALLS):
+    """Return a boat under way between walls, on a mission whose one tack is 10 m from a wall."""
+    world = make(Goal(en_m=(0.0, 50.0), radius_m=5.0), obstacles=obstacles, wind=lambda t: (0.0, 5.0),
+                 config={"margin_m": 6.0, "margin_floor_m": 3.0})
+    voyage = world.skipper.voyage
+    world.skipper = replace(world.skipper, voyage=replace(voyage, boat=replace(voyage.boat, tack_fails=0.001)))
+    assert world.run(120, lambda w: w.state.sailing)
+    route, corner, goal = world.state.route, (36.0, 26.0), (0.0, 50.0)
+    world.state = replace(world.state, index=0, route=replace(
+        route, items=(*route.items[:1] * 2, route.items[-1]), points_en_m=(corner, goal, route.points_en_m[-1]),
+        leg_from_en_m=((0.0, 0.0), corner, goal), gate_of=(-1, 0, -1)))
+    return world
+
+
+def asked(turn, reason=ReplanReason.ORDER, **more):
+    """Return the problem that the turn asks for, its action taken off."""
+    assert request(turn, reason, **more)
+    [action] = [a for a in turn.actions if isinstance(a, RequestPlan)]
+    turn.actions.clear()
+    return action.problem
+
+
+def test_the_skipper_takes_the_new_plan_when_a_tack_of_the_old_one_has_become_too_risky():
+    world = sailing()
+    taken = []
+    for tacking in ({}, LEARNED):
+        turn = turn_of(world, tacking=replace(world.state.tacking, **tacking))
+        problem = asked(turn)
+        found = plan(problem, expansions=8000)
+        way = [problem.start_en, *turn.ahead()]
+        old = evaluate(problem, way)
+        assert old.is_feasible
+        before, after = (of_risky(tacks_at_risk(problem, legs)) for legs in (old.legs, found.legs))
+        assert (before > after) == bool(tacking)
+        # as fast as the old one, so that nothing else speaks for it
+        take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id,
+                                    plan=replace(found, cost_s=old.time_s)))
+        taken.append(any(isinstance(a, UploadMission) for a in turn.actions))
+    assert taken == [False, True]
+
+
+def test_the_ladder_is_climbed_by_name_while_the_old_plan_is_too_risky_and_at_its_end_it_stays():
+    world = sailing()
+    for tacking, code in (({}, "no plan"), (LEARNED, "ladder 0")):
+        turn = turn_of(world, tacking=replace(world.state.tacking, **tacking))
+        asked(turn)
+        not_found(turn, turn.state.pending_plan, "nothing")
+        assert [a.code for a in turn.actions if isinstance(a, Announce)] == [code]
+    while turn.state.pending_plan is not None and any(isinstance(a, RequestPlan) for a in turn.actions):
+        turn.actions.clear()
+        not_found(turn, turn.state.pending_plan, "nothing")
+    [said] = [a.text for a in turn.actions if isinstance(a, Announce)]
+    assert "the old one stays; tacks of it that fail would bring her onto something" in said
+
+
+def test_a_tack_at_the_next_waypoint_that_has_become_too_risky_is_planned_away_from_the_boat():
+    world = sailing()
+    for tacking, from_seq in (({}, []), (LEARNED, [None])):
+        turn = turn_of(world, tacking=replace(world.state.tacking, **tacking))
+        problem = asked(turn, ReplanReason.WAYPOINT, from_index=turn.state.index)
+        take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id,
+                                    plan=plan(problem, expansions=8000)))
+        assert [a.from_seq for a in turn.actions if isinstance(a, RequestPlan)] == from_seq
+
+
+def test_the_tack_that_begins_a_plan_is_gybed_round_too_after_two_that_failed():
+    world = sailing(obstacles=())
+    turn = turn_of(world, tacking=replace(world.state.tacking, tried=2, failed=2, in_a_row=2, failed_s=world.t))
+    problem = asked(turn)
+    found = plan(problem, expansions=8000)
+    came_from_the_other_side = replace(problem, start_heading_rad=-problem.start_heading_rad)
+    turn.update(pending_plan=replace(turn.state.pending_plan, problem=came_from_the_other_side))
+    take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id, plan=found))
+    loop = turn.state.pending_upload.route.points_en_m[:2]
+    assert all(point[1] < problem.start_en[1] for point in loop)     # to leeward, before anything else
