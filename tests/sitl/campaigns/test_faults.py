@@ -22,8 +22,9 @@ SEEDS = Path(__file__).parent / "seeds"
 ROCK = shapely.box(10.0, -5.0, 20.0, 5.0)
 
 
-def sail_kept(seed):
-    return sail_faults(load_scenario(SEEDS / f"{seed}.toml"), seed, SEEDS / f"{seed}.toml")
+def sail_kept(seed, again=0):
+    """Sail what a seed drew; ``again`` with other noise, for what it shows is no matter of one."""
+    return sail_faults(load_scenario(SEEDS / f"{seed}.toml"), seed + again, SEEDS / f"{seed}.toml")
 
 
 def test_a_seed_draws_the_same_faults_and_another_seed_others():
@@ -114,10 +115,15 @@ def test_nor_does_one_that_the_campaign_or_the_search_found(seed):
 @pytest.mark.campaign
 @pytest.mark.xfail(strict=True, reason="found and not mended")
 @pytest.mark.parametrize("seed", [
-    198, 60496028, 106980778, 1026825460, 1261850702, 1262423428, 1494742110, 1632617857, 1896519915, 2045914046])
+    198, 60496028, 106980778, 1261850702, 1262423428, 1494742110, 1632617857, 1896519915, 2045914046])
 def test_what_was_found_and_is_not_mended_fails_still(seed):
-    record = sail_kept(seed)
-    assert record["passed"], record
+    assert all(sail_kept(seed, again)["passed"] for again in range(6))
+
+
+# Short legs in a gap of 30 m (1026825460).
+@pytest.mark.campaign
+def test_a_gap_between_rocks_is_sailed_clear_whatever_the_noise():
+    assert min(sail_kept(1026825460, again)["clearance_m"] for again in range(6)) > 10.0
 
 
 # Refused plans had her hold beside a rock when her position jumped (284); they are found since legs are long enough.
