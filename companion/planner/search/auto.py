@@ -36,7 +36,8 @@ _DRIFTS = ((1_600, 1.45), (6_000, 4.0), (6_000, 2.5), (6_000, 1.45), (12_000, 4.
 
 def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
     """Return the best path found within ``effort``, or what was proved."""
-    reason = no_course(problem)
+    gauge = make_gauge(problem)
+    reason = None if gauge.can_move else no_course(problem)
     if reason:
         return Outcome(waypoints_en=None, status=PlanStatus.INFEASIBLE, reason=reason)
     world = make_world(problem)
@@ -50,7 +51,6 @@ def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
         if target_hit(problem, problem.start_en, problem.start_en, 0.0, 0.0) == i:
             name = target.name or f"target {i}"
             return Outcome(waypoints_en=None, status=PlanStatus.INFEASIBLE, reason=f"the start is inside {name}")
-    gauge = make_gauge(problem)
     bound = Bound(world, gauge)
     if not math.isfinite(bound.value_s):
         return Outcome(waypoints_en=None, status=PlanStatus.INFEASIBLE, reason=_hopeless(problem))

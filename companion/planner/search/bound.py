@@ -89,9 +89,7 @@ def progress_s(problem: Problem, goal: tuple[float, float], radius_m: float) -> 
     bearings = np.concatenate([np.linspace(-math.pi, math.pi, _NORMALS, endpoint=False), [0.0, heading]])
     n = np.column_stack([np.sin(bearings), np.cos(bearings)])
     need = n @ np.asarray(goal) - radius_m
-    side = np.maximum(np.sin(angle)[None, :] * n[:, :1], -np.sin(angle)[None, :] * n[:, :1])
-    reachable = v[None, :] * (side + np.cos(angle)[None, :] * n[:, 1:])
-    best_from = np.maximum.accumulate(reachable[:, ::-1], axis=1)[:, ::-1]      # over all angles >= this one
+    n, need = n[need > 0.0], need[need > 0.0]
     # Time steps that stretch, up to where sigma has settled or closed everything.
     scale = max(1.0, math.hypot(*goal) / max(1e-9, float(v.max())))
     times = np.concatenate([[0.0], np.geomspace(scale / 500.0, 1e4 * scale, _STEPS)])
@@ -99,13 +97,15 @@ def progress_s(problem: Problem, goal: tuple[float, float], radius_m: float) -> 
     index = np.searchsorted(angle, half, side="left")
     index = np.maximum(0, index - 1)                                            # one sample wider: outer bound
     closed = half > top
-    rate = np.maximum(0.0, best_from[:, np.minimum(index, len(angle) - 1)])
+    # The best progress along n of all angles from each moment's on: the best between two moments' angles, gathered.
+    parts, place = np.unique(np.minimum(index, len(angle) - 1), return_inverse=True)
+    reachable = v[None, :] * (np.sin(angle)[None, :] * np.abs(n[:, :1]) + np.cos(angle)[None, :] * n[:, 1:])
+    between = np.maximum.reduceat(reachable, parts, axis=1)
+    rate = np.maximum(0.0, np.maximum.accumulate(between[:, ::-1], axis=1)[:, ::-1][:, place])
     rate[:, closed] = 0.0
     made = np.concatenate([np.zeros((len(n), 1)), np.cumsum(rate[:, :-1] * np.diff(times)[None, :], axis=1)], axis=1)
     worst = 0.0
     for k in range(len(n)):
-        if need[k] <= 0.0:
-            continue
         if made[k, -1] >= need[k]:
             i = int(np.searchsorted(made[k], need[k]))
             worst = max(worst, float(times[i - 1] + (need[k] - made[k, i - 1]) / max(rate[k, i - 1], 1e-12)))

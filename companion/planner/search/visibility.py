@@ -165,6 +165,9 @@ def circle_cuts(edges: Floats, goal: Floats) -> Floats:
     """Return the points where boundary segments cut the goal's circle, (k, 2)."""
     if len(edges) == 0 or goal[2] <= 0.0:
         return np.empty((0, 2))
+    near = ((np.minimum(edges[:, 0], edges[:, 2]) <= goal[0] + goal[2])
+            & (np.maximum(edges[:, 0], edges[:, 2]) >= goal[0] - goal[2]))
+    edges = edges[near]
     p, d = edges[:, :2] - goal[:2], edges[:, 2:] - edges[:, :2]
     a, b = np.sum(d * d, axis=1), np.sum(p * d, axis=1)
     root = b * b - a * (np.sum(p * p, axis=1) - goal[2] ** 2)
