@@ -29,7 +29,8 @@ _LADDER = ((400, 2), (1_600, 2), (6_000, 2), (24_000, 2), (100_000, 2), (400_000
 _LATTICES = ((6_000, 3), (2_500, 3), (24_000, 2), (12_000, 3), (40_000, 3), (100_000, 2), (60_000, 3), (160_000, 2),
              (200_000, 3), (400_000, 2), (800_000, 2))
 
-
+_BOARDS_FROM = 80_000
+"""Visibility tests that could still be made when the bound on turns, which takes some 30 ms, is worth its time."""
 _DRIFTS = ((1_600, 1.45), (6_000, 4.0), (6_000, 2.5), (6_000, 1.45), (12_000, 4.0), (12_000, 2.5), (24_000, 4.0),
            (24_000, 1.45), (24_000, 2.5), (60_000, 2.5), (60_000, 1.45))
 
@@ -149,6 +150,8 @@ def _improve(s: Searcher) -> None:
             left = 8.0 * (s.effort.limit - s.effort.used) if s.effort.limit is not None else 2e6 * s.effort.remaining_s
             s.geodesic(int(0.25 * left))
             s.effort.spend(s.bound.sharpen_late(s.upper_s, min(40_000, int(0.1 * left))) // 8)
+            if left > _BOARDS_FROM:
+                s.bound.sharpen_turns(s.upper_s)   # draws no path: no step is counted for it
         elif drifts and spent <= 0.35 * before and len(drifts) >= len(lattices):
             s.drift(*drifts.pop(0), 1.05 * s.upper_s)
         elif lattices and spent <= 0.35 * before:

@@ -16,6 +16,7 @@ import shapely
 
 from companion.planner.problem.parts import NO_GO_SLACK_RAD, TOUCH_M
 from companion.planner.problem.value import Problem
+from companion.planner.search.boards import make_boards
 from companion.planner.search.gauge import Gauge, make_gauge, velocities
 from companion.planner.search.kernels import Floats
 from companion.planner.search.visibility import circle_cuts, geodesics, graph_nodes
@@ -150,19 +151,20 @@ class Bound:
         self.progress_s = progress_s(world.problem, world.goal, world.goal_radius)
         self.metric_s = gauge.disc(gx, gy, world.goal_radius) if gauge.can_move else math.inf
         self.ends = circle_cuts(world.grid.edges, np.array([gx, gy, world.goal_radius]))
+        self.turns_s = 0.0
         self.path: Floats | None = None
         self.is_exact = False
 
     @property
     def tight_s(self) -> float:
         """Bound for paths that do not use the scorer's angular slack, as this planner's do not [s]."""
-        return max(self.metric_s, self.progress_s) + self.turning_s
+        return max(max(self.metric_s, self.progress_s) + self.turning_s, self.turns_s)
 
     @property
     def value_s(self) -> float:
         """Bound for every path that the scorer passes [s]; inf proves that there is none."""
         turning = max(0.0, self.turning_s - 4.0 * NO_GO_SLACK_RAD / self.world.boat.omega)
-        return max(self.metric_s / self.gauge.slack, self.progress_s) + turning
+        return max(max(self.metric_s / self.gauge.slack, self.progress_s) + turning, self.turns_s)
 
     def sharpen(self, upper_s: float, tests: int) -> int:
         """Search the visibility graph with at most about ``tests`` visibility tests; return those made."""
@@ -189,6 +191,12 @@ class Bound:
             self.is_exact = found
         return int(made)
 
+    def sharpen_turns(self, upper_s: float) -> None:
+        """Find how often every path below ``upper_s`` must turn among the obstacles within the fence."""
+        boards = make_boards(self.world, self.gauge, grows(self.world.problem))
+        if boards is not None and math.isfinite(upper_s):
+            sail_s = max(self.metric_s / self.gauge.slack, self.progress_s)
+            self.turns_s = max(self.turns_s, boards.bound_s(sail_s, upper_s))
 
     def sharpen_late(self, upper_s: float, tests: int) -> int:
         """Search the visibility graph with the metric of the zone near the end, where it grows; return the tests."""

@@ -54,6 +54,8 @@ def test_never_above_a_feasible_plan(raw):
     for share in (0.5, 1.0, 1.6):                              # the late metric bounds whatever moment it is taken at
         bound.sharpen_late(share * judged.time_s, 10**5)
         assert bound.value_s <= judged.time_s + 1e-9
+        bound.sharpen_turns(share * judged.time_s)
+        assert bound.value_s <= judged.time_s + 1e-9
 
 
 def test_the_late_metric_sees_obstacles_in_a_closing_wind():
