@@ -28,9 +28,8 @@ from companion.planner.search.world import World, make_world
 _LADDER = ((400, 2), (1_600, 2), (6_000, 2), (24_000, 2), (100_000, 2), (400_000, 2), (1_600_000, 2))
 _LATTICES = ((6_000, 3), (2_500, 3), (24_000, 2), (12_000, 3), (40_000, 3), (100_000, 2), (60_000, 3), (160_000, 2),
              (200_000, 3), (400_000, 2), (800_000, 2))
-
-_BOARDS_FROM = 80_000
-"""Visibility tests that could still be made when the bound on turns, which takes some 30 ms, is worth its time."""
+_TURNS_S, _TURNS_TESTS = 0.25, 60_000
+"""What must be left, in seconds or in visibility tests, for the bound on turns, which takes some 30 ms."""
 _DRIFTS = ((1_600, 1.45), (6_000, 4.0), (6_000, 2.5), (6_000, 1.45), (12_000, 4.0), (12_000, 2.5), (24_000, 4.0),
            (24_000, 1.45), (24_000, 2.5), (60_000, 2.5), (60_000, 1.45))
 
@@ -150,7 +149,7 @@ def _improve(s: Searcher) -> None:
             left = 8.0 * (s.effort.limit - s.effort.used) if s.effort.limit is not None else 2e6 * s.effort.remaining_s
             s.geodesic(int(0.25 * left))
             s.effort.spend(s.bound.sharpen_late(s.upper_s, min(40_000, int(0.1 * left))) // 8)
-            if left > _BOARDS_FROM:
+            if s.effort.remaining_s > _TURNS_S if s.effort.limit is None else left > _TURNS_TESTS:
                 s.bound.sharpen_turns(s.upper_s)   # draws no path: no step is counted for it
         elif drifts and spent <= 0.35 * before and len(drifts) >= len(lattices):
             s.drift(*drifts.pop(0), 1.05 * s.upper_s)

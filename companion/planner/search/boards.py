@@ -22,17 +22,18 @@ import shapely
 from companion.planner.problem.parts import NO_GO_SLACK_RAD
 from companion.planner.search.gauge import Gauge
 from companion.planner.search.kernels import Floats
+from companion.planner.search.visibility import least_through
 from companion.planner.search.world import World
 
 _STRIPS, _ROWS, _HEIGHTS = 200, 120, 400
-_WALLS = 24
-_BESIDE_M = 0.25
+_WALLS, _BESIDE_M = 24, 0.25
+"""Longest walls about whose ends there are narrow strips more, and how wide these are: a gap is a strip of its own."""
 _PAD_M = 3e-3
-"""What is taken off a solid on all sides [m]: more than the scorer's slack and the boundary's skin together."""
-_MOST_TURNS = 60
-_MOST_STEPS = 6
+"""Taken off a solid on all sides [m]: more than the scorer's slack and the boundary's skin; so is the goal widened."""
+_MOST_TURNS, _MOST_STEPS = 60, 6
 _STEEP_RAD, _LEAST_RAD = 1.5, 0.1
 _EDGES = 20_000
+"""Boundary segments above which the strips would take too long."""
 
 
 class Boards:
@@ -44,8 +45,8 @@ class Boards:
         self._least_rad = max(0.0, problem.no_go_min_rad - NO_GO_SLACK_RAD)
         self._cuts = _cuts(world)
         self._widths = np.diff(self._cuts)
-        self._middles = 0.5 * (self._cuts[1:] + self._cuts[:-1])
-        y0, y1 = world.box[1], world.box[3]
+        self._radius = 1.001 * world.goal_radius + _PAD_M
+        low, y0, y1 = world.goal[1] - self._radius, world.box[1], world.box[3]
         # By height: the earliest time there [s], the zone then, the least way across of a board from 0 to there [m].
         self._heights = np.linspace(0.0, max(y1, world.goal[1], 1.0), _HEIGHTS)
         step = float(self._heights[1])
@@ -66,11 +67,10 @@ class Boards:
         self._across = np.concatenate([[0.0], np.cumsum(slope[:-1] * step)])
         self._lost_s = boat.tack_s if boat.can_tack else math.inf
         self._round_s = math.pi / boat.omega
-        self._blocked = [(self._way(np.array(low)).tolist(), self._way(np.array(high)).tolist())
-                         for low, high in _solid(world, self._cuts)]
+        self._blocked = [(self._way(np.array(begin)).tolist(), self._way(np.array(end)).tolist())
+                         for begin, end in _solid(world, self._cuts)]
         self._rows = np.linspace(y0, y1, _ROWS)
         self._metric = self._sailing()
-        low = world.goal[1] - world.goal_radius
         self._goal = float(self._way(np.array([low]))[0])
         self._climb_s = float(np.interp(max(0.0, low), self._heights, self._times)) if low > 0.0 else 0.0
 
@@ -82,17 +82,11 @@ class Boards:
 
     def _sailing(self) -> Floats:
         """Return the least sailing time by way of each strip and row, obstacles apart [s], at its least about there."""
-        world, table = self.world, self.gauge.table
-
-        def least(d: Floats) -> Floats:
-            cell = ((np.arctan2(d[:, 0], d[:, 1]) + math.pi) / (2.0 * math.pi) * len(table)).astype(int) % len(table)
-            return np.asarray(table[cell] * np.hypot(d[:, 0], d[:, 1]), np.float64)
-
-        at = np.column_stack([np.repeat(self._middles, _ROWS), np.tile(self._rows, len(self._middles))])
-        steepest = self.gauge.table_max
-        through = least(at) + np.maximum(0.0, least(np.array([world.goal]) - at) - world.goal_radius * steepest)
+        middles = 0.5 * (self._cuts[1:] + self._cuts[:-1])
+        at = np.column_stack([np.repeat(middles, _ROWS), np.tile(self._rows, len(middles))])
+        through = least_through(self.gauge, at, (*self.world.goal, self._radius))
         reach = 0.5 * self._widths[:, None] + (self._rows[1] - self._rows[0])
-        return np.asarray(through.reshape(len(self._middles), _ROWS) - 2.0 * steepest * reach, np.float64)
+        return np.asarray(through.reshape(len(middles), _ROWS) - 2.0 * self.gauge.table_max * reach, np.float64)
 
     def _limits(self, sail_s: float) -> tuple[list[float], list[float]]:
         """Return the lowest and highest way in each strip that a path of ``sail_s`` can come to."""
@@ -112,7 +106,7 @@ class Boards:
         """
         low, high = self._limits(sail_s)
         widths, blocked, count = self._widths.tolist(), self._blocked, len(self._widths)
-        off_m = float(np.max(self.world.boat.mps)) * (1.0 + 1e-5) * max(0.0, sail_s - self._climb_s)
+        off_m = float(np.max(self.world.boat.mps)) * (1.0 + 1e-5) * max(0.0, sail_s - self._climb_s) + _PAD_M
 
         def lowest(i: int, y: float) -> float:
             """Return the lowest free height of strip i not below y; inf: none."""
@@ -130,9 +124,9 @@ class Boards:
 
         nearby = np.column_stack([np.searchsorted(self._cuts, self._cuts[:-1] - off_m, side="right") - 1,
                                   np.searchsorted(self._cuts, self._cuts[1:] + off_m)]).clip(0, count).ravel()
-        near_start, (gx, _), radius = within(0.0, 0.0), self.world.goal, self.world.goal_radius
+        near_start, gx = within(0.0, 0.0), self.world.goal[0]
         port = [math.inf] * count                     # boards that move towards +x
-        for i in within(gx - radius, gx + radius):
+        for i in within(gx - self._radius, gx + self._radius):
             port[i] = lowest(i, self._goal - widths[i])
         starboard = list(port)
         spent_s, most_s = 0.0, 0.5 * self._round_s if as_two else self._round_s
@@ -143,7 +137,7 @@ class Boards:
             for i in range(1, count):
                 starboard[i] = min(starboard[i], lowest(i, starboard[i - 1] - widths[i]))
             either = [min(a, b) for a, b in zip(port, starboard, strict=True)]
-            if min(either[i] for i in near_start) <= 0.0:
+            if min(either[i] for i in near_start) <= _PAD_M:
                 return spent_s + (self._first_s() if spent_s > 0.0 else 0.0)
             spent_s += min(most_s, self._turn_s(min(either)))
             lateral = np.minimum.reduceat([*(before if as_two else either), math.inf], nearby)[::2].tolist()

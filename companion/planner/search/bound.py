@@ -51,11 +51,11 @@ def turning_s(world: World) -> float:
         return abs((a - c + math.pi) % (2.0 * math.pi) - math.pi)
 
     lost = 0.0
-    if abs(course) + spread < least < 0.5 * math.pi:
+    if abs(course) + spread < least - NO_GO_SLACK_RAD and least < 0.5 * math.pi:   # a leg may be deeper by the slack
         ends = (least, -least)
         sweep = min(apart(world.h0, e) for e in ends) + 2.0 * least if b.can_tack else math.pi
         lost = min(b.tack_s, b.gybe_s) if b.can_tack else b.gybe_s
-    elif abs(course) - spread > most > 0.5 * math.pi:
+    elif abs(course) - spread > most + NO_GO_SLACK_RAD and most > 0.5 * math.pi:
         ends = (most, -most)
         sweep = min(apart(world.h0, e) for e in ends) + 2.0 * (math.pi - most)
         lost = min(b.tack_s, b.gybe_s) if b.can_tack else b.gybe_s
