@@ -59,7 +59,7 @@ def held(p):
     """Assert that the bound holds for every path found, at its own sailing time and above it."""
     boards = boards_of(p)
     if boards is None:
-        return 0
+        return
     ways = [found for found in (split(p, way) for way in paths(p)) if found is not None]
     for sail_s, turn_s in ways:
         for more in (1.0, 1.3):
@@ -68,10 +68,9 @@ def held(p):
         for upper in (1.0, 1.5):
             least = min(sail for sail, _ in ways)
             assert boards.bound_s(least, upper * (sail_s + turn_s)) <= sail_s + turn_s + 1e-6
-    return len(ways)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(random_problems(), st.floats(0, 8), st.floats(0, 8), st.booleans())
 def test_never_more_than_a_feasible_path_turns(raw, tack_s, gybe_s, can_tack):
     boat = raw["boat"] | {"tack_loss_s": tack_s, "gybe_loss_s": gybe_s, "can_tack": can_tack}
@@ -80,7 +79,7 @@ def test_never_more_than_a_feasible_path_turns(raw, tack_s, gybe_s, can_tack):
         held(p)
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.floats(6, 60), st.floats(10, 150), st.floats(-60, 60), st.floats(-45, 45), st.floats(0, 1.5),
        st.floats(0.2, 2.0))
 def test_never_more_than_is_turned_in_a_channel(width, length, x, wind, growth, rate):
