@@ -40,39 +40,43 @@ class Boards:
     """The water of a fenced problem in strips, and how high a board climbs across each."""
 
     def __init__(self, world: World, gauge: Gauge, grows: bool) -> None:
-        problem, boat = world.problem, world.boat
+        boat, box = world.boat, world.box
         self.world, self.gauge = world, gauge
-        self._least_rad = max(0.0, problem.no_go_min_rad - NO_GO_SLACK_RAD)
+        self._least_rad = max(0.0, world.problem.no_go_min_rad - NO_GO_SLACK_RAD)
+        self._lost_s = boat.tack_s if boat.can_tack else math.inf
+        self._round_s = math.pi / boat.omega
+        self._radius = 1.001 * world.goal_radius + _PAD_M
         self._cuts = _cuts(world)
         self._widths = np.diff(self._cuts)
-        self._radius = 1.001 * world.goal_radius + _PAD_M
-        low, y0, y1 = world.goal[1] - self._radius, world.box[1], world.box[3]
-        # By height: the earliest time there [s], the zone then, the least way across of a board from 0 to there [m].
-        self._heights = np.linspace(0.0, max(y1, world.goal[1], 1.0), _HEIGHTS)
-        step = float(self._heights[1])
+        self._rows = np.linspace(box[1], box[3], _ROWS)
+        self._heights = np.linspace(0.0, max(box[3], world.goal[1], 1.0), _HEIGHTS)
+        self._times, self._halves = self._climb(grows)
+        slope = np.tan(np.minimum(self._halves, _STEEP_RAD))
+        self._across = np.concatenate([[0.0], np.cumsum(slope[:-1] * self._heights[1])])
+        self._blocked = [(self._way(np.array(begin)).tolist(), self._way(np.array(end)).tolist())
+                         for begin, end in _solid(world, self._cuts)]
+        self._metric = self._sailing()
+        low = world.goal[1] - self._radius
+        self._goal = float(self._way(np.array([low]))[0])
+        self._climb_s = float(np.interp(low, self._heights, self._times))
+
+    def _climb(self, grows: bool) -> tuple[Floats, Floats]:
+        """Return for each height the earliest time there [s], and the zone's half angle then [rad]."""
+        boat = self.world.boat
         nodes = boat.twa[(boat.twa > self._least_rad) & (boat.twa < 0.5 * math.pi)]
         angles = np.unique(np.concatenate([np.linspace(self._least_rad, 0.5 * math.pi, 721), nodes]))
         speeds = np.interp(angles, boat.twa, boat.mps) * (1.0 + 1e-5)
         made = np.maximum(speeds[:-1], speeds[1:]) * np.cos(angles[:-1])        # at its largest between two angles
         best = np.maximum.accumulate(made[::-1])[::-1]
-        times, halves = [0.0], []
+        t, times, halves = 0.0, [], []
         for _ in self._heights:
-            half = problem.no_go_half_rad(times[-1]) - NO_GO_SLACK_RAD if grows else self._least_rad
+            half = self.world.problem.no_go_half_rad(t) - NO_GO_SLACK_RAD if grows else self._least_rad
             half = min(max(half, self._least_rad), 0.5 * math.pi)
+            times.append(t)
             halves.append(half)
             k = min(max(0, int(np.searchsorted(angles, half)) - 1), len(best) - 1)
-            times.append(min(1e12, times[-1] + step / max(float(best[k]), 1e-12)))
-        self._times, self._halves = np.array(times[:-1]), np.array(halves)
-        slope = np.tan(np.minimum(self._halves, _STEEP_RAD))
-        self._across = np.concatenate([[0.0], np.cumsum(slope[:-1] * step)])
-        self._lost_s = boat.tack_s if boat.can_tack else math.inf
-        self._round_s = math.pi / boat.omega
-        self._blocked = [(self._way(np.array(begin)).tolist(), self._way(np.array(end)).tolist())
-                         for begin, end in _solid(world, self._cuts)]
-        self._rows = np.linspace(y0, y1, _ROWS)
-        self._metric = self._sailing()
-        self._goal = float(self._way(np.array([low]))[0])
-        self._climb_s = float(np.interp(max(0.0, low), self._heights, self._times)) if low > 0.0 else 0.0
+            t = min(1e12, t + float(self._heights[1]) / max(float(best[k]), 1e-12))
+        return np.array(times), np.array(halves)
 
     def _way(self, y: Floats) -> Floats:
         """Return the way across [m] from height 0 to heights ``y``, below 0 negative."""
