@@ -80,10 +80,11 @@ def plan(
         budget_s = DEFAULT_BUDGET_S
     warm(algorithm)
     effort = Effort(SEARCHED * budget_s if budget_s is not None and expansions is None else budget_s, expansions)
-    empty = Plan(status=PlanStatus.INVALID, reason=defect_of(problem) or "", waypoints_en=np.empty((0, 2)),
+    defect = defect_of(problem)
+    empty = Plan(status=PlanStatus.INVALID, reason=defect or "", waypoints_en=np.empty((0, 2)),
                  algorithm=algorithm, seed=seed, elapsed_s=effort.elapsed_s)
-    if defect_of(problem) is not None:
-        return replace(empty, why=Why(text=f"Cannot be planned: {defect_of(problem)}."))
+    if defect is not None:
+        return replace(empty, why=Why(text=f"Cannot be planned: {defect}."))
     try:
         # Numbers that overflow or underflow on the way (1e-180 m in a WKT) end as inf or NaN, which no check passes.
         with np.errstate(all="ignore"):

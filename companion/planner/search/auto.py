@@ -28,15 +28,16 @@ from companion.planner.search.world import World, make_world
 _LADDER = ((400, 2), (1_600, 2), (6_000, 2), (24_000, 2), (100_000, 2), (400_000, 2), (1_600_000, 2))
 _LATTICES = ((6_000, 3), (2_500, 3), (24_000, 2), (12_000, 3), (40_000, 3), (100_000, 2), (60_000, 3), (160_000, 2),
              (200_000, 3), (400_000, 2), (800_000, 2))
-
-
+_TURNS_S, _TURNS_TESTS = 0.25, 60_000
+"""What must be left, in seconds or in visibility tests, for the bound on turns, which takes some 30 ms."""
 _DRIFTS = ((1_600, 1.45), (6_000, 4.0), (6_000, 2.5), (6_000, 1.45), (12_000, 4.0), (12_000, 2.5), (24_000, 4.0),
            (24_000, 1.45), (24_000, 2.5), (60_000, 2.5), (60_000, 1.45))
 
 
 def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
     """Return the best path found within ``effort``, or what was proved."""
-    reason = no_course(problem)
+    gauge = make_gauge(problem)
+    reason = None if gauge.can_move else no_course(problem)
     if reason:
         return Outcome(waypoints_en=None, status=PlanStatus.INFEASIBLE, reason=reason)
     world = make_world(problem)
@@ -50,7 +51,6 @@ def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
         if target_hit(problem, problem.start_en, problem.start_en, 0.0, 0.0) == i:
             name = target.name or f"target {i}"
             return Outcome(waypoints_en=None, status=PlanStatus.INFEASIBLE, reason=f"the start is inside {name}")
-    gauge = make_gauge(problem)
     bound = Bound(world, gauge)
     if not math.isfinite(bound.value_s):
         return Outcome(waypoints_en=None, status=PlanStatus.INFEASIBLE, reason=_hopeless(problem))
@@ -149,6 +149,8 @@ def _improve(s: Searcher) -> None:
             left = 8.0 * (s.effort.limit - s.effort.used) if s.effort.limit is not None else 2e6 * s.effort.remaining_s
             s.geodesic(int(0.25 * left))
             s.effort.spend(s.bound.sharpen_late(s.upper_s, min(40_000, int(0.1 * left))) // 8)
+            if s.effort.remaining_s > _TURNS_S if s.effort.limit is None else left > _TURNS_TESTS:
+                s.bound.sharpen_turns(s.upper_s)   # draws no path: no step is counted for it
         elif drifts and spent <= 0.35 * before and len(drifts) >= len(lattices):
             s.drift(*drifts.pop(0), 1.05 * s.upper_s)
         elif lattices and spent <= 0.35 * before:

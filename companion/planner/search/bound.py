@@ -16,6 +16,7 @@ import shapely
 
 from companion.planner.problem.parts import NO_GO_SLACK_RAD, TOUCH_M
 from companion.planner.problem.value import Problem
+from companion.planner.search.boards import make_boards
 from companion.planner.search.gauge import Gauge, make_gauge, velocities
 from companion.planner.search.kernels import Floats
 from companion.planner.search.visibility import circle_cuts, geodesics, graph_nodes
@@ -50,11 +51,11 @@ def turning_s(world: World) -> float:
         return abs((a - c + math.pi) % (2.0 * math.pi) - math.pi)
 
     lost = 0.0
-    if abs(course) + spread < least < 0.5 * math.pi:
+    if abs(course) + spread < least - NO_GO_SLACK_RAD and least < 0.5 * math.pi:   # a leg may be deeper by the slack
         ends = (least, -least)
         sweep = min(apart(world.h0, e) for e in ends) + 2.0 * least if b.can_tack else math.pi
         lost = min(b.tack_s, b.gybe_s) if b.can_tack else b.gybe_s
-    elif abs(course) - spread > most > 0.5 * math.pi:
+    elif abs(course) - spread > most + NO_GO_SLACK_RAD and most > 0.5 * math.pi:
         ends = (most, -most)
         sweep = min(apart(world.h0, e) for e in ends) + 2.0 * (math.pi - most)
         lost = min(b.tack_s, b.gybe_s) if b.can_tack else b.gybe_s
@@ -89,9 +90,7 @@ def progress_s(problem: Problem, goal: tuple[float, float], radius_m: float) -> 
     bearings = np.concatenate([np.linspace(-math.pi, math.pi, _NORMALS, endpoint=False), [0.0, heading]])
     n = np.column_stack([np.sin(bearings), np.cos(bearings)])
     need = n @ np.asarray(goal) - radius_m
-    side = np.maximum(np.sin(angle)[None, :] * n[:, :1], -np.sin(angle)[None, :] * n[:, :1])
-    reachable = v[None, :] * (side + np.cos(angle)[None, :] * n[:, 1:])
-    best_from = np.maximum.accumulate(reachable[:, ::-1], axis=1)[:, ::-1]      # over all angles >= this one
+    n, need = n[need > 0.0], need[need > 0.0]
     # Time steps that stretch, up to where sigma has settled or closed everything.
     scale = max(1.0, math.hypot(*goal) / max(1e-9, float(v.max())))
     times = np.concatenate([[0.0], np.geomspace(scale / 500.0, 1e4 * scale, _STEPS)])
@@ -99,13 +98,15 @@ def progress_s(problem: Problem, goal: tuple[float, float], radius_m: float) -> 
     index = np.searchsorted(angle, half, side="left")
     index = np.maximum(0, index - 1)                                            # one sample wider: outer bound
     closed = half > top
-    rate = np.maximum(0.0, best_from[:, np.minimum(index, len(angle) - 1)])
+    # The best progress along n of all angles from each moment's on: the best between two moments' angles, gathered.
+    parts, place = np.unique(np.minimum(index, len(angle) - 1), return_inverse=True)
+    reachable = v[None, :] * (np.sin(angle)[None, :] * np.abs(n[:, :1]) + np.cos(angle)[None, :] * n[:, 1:])
+    between = np.maximum.reduceat(reachable, parts, axis=1)
+    rate = np.maximum(0.0, np.maximum.accumulate(between[:, ::-1], axis=1)[:, ::-1][:, place])
     rate[:, closed] = 0.0
     made = np.concatenate([np.zeros((len(n), 1)), np.cumsum(rate[:, :-1] * np.diff(times)[None, :], axis=1)], axis=1)
     worst = 0.0
     for k in range(len(n)):
-        if need[k] <= 0.0:
-            continue
         if made[k, -1] >= need[k]:
             i = int(np.searchsorted(made[k], need[k]))
             worst = max(worst, float(times[i - 1] + (need[k] - made[k, i - 1]) / max(rate[k, i - 1], 1e-12)))
@@ -150,19 +151,20 @@ class Bound:
         self.progress_s = progress_s(world.problem, world.goal, world.goal_radius)
         self.metric_s = gauge.disc(gx, gy, world.goal_radius) if gauge.can_move else math.inf
         self.ends = circle_cuts(world.grid.edges, np.array([gx, gy, world.goal_radius]))
+        self.turns_s = 0.0
         self.path: Floats | None = None
         self.is_exact = False
 
     @property
     def tight_s(self) -> float:
         """Bound for paths that do not use the scorer's angular slack, as this planner's do not [s]."""
-        return max(self.metric_s, self.progress_s) + self.turning_s
+        return max(max(self.metric_s, self.progress_s) + self.turning_s, self.turns_s)
 
     @property
     def value_s(self) -> float:
         """Bound for every path that the scorer passes [s]; inf proves that there is none."""
         turning = max(0.0, self.turning_s - 4.0 * NO_GO_SLACK_RAD / self.world.boat.omega)
-        return max(self.metric_s / self.gauge.slack, self.progress_s) + turning
+        return max(max(self.metric_s / self.gauge.slack, self.progress_s) + turning, self.turns_s)
 
     def sharpen(self, upper_s: float, tests: int) -> int:
         """Search the visibility graph with at most about ``tests`` visibility tests; return those made."""
@@ -189,6 +191,12 @@ class Bound:
             self.is_exact = found
         return int(made)
 
+    def sharpen_turns(self, upper_s: float) -> None:
+        """Find how often every path below ``upper_s`` must turn among the obstacles within the fence."""
+        boards = make_boards(self.world, self.gauge, grows(self.world.problem))
+        if boards is not None and math.isfinite(upper_s):
+            sail_s = max(self.metric_s / self.gauge.slack, self.progress_s)
+            self.turns_s = max(self.turns_s, boards.bound_s(sail_s, upper_s))
 
     def sharpen_late(self, upper_s: float, tests: int) -> int:
         """Search the visibility graph with the metric of the zone near the end, where it grows; return the tests."""

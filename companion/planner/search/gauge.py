@@ -21,6 +21,7 @@ from companion.planner.search.kernels import Floats
 _SAMPLES = 1800
 _OUT = 1.0 + 2e-6
 _TABLE = 2048
+_STRIDE = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,15 +87,33 @@ def _hull(points: Floats) -> Floats:
 
 @kernel
 def _tabulate(normals: Floats, size: int) -> Floats:
-    """Return max(normals @ u) for unit vectors u at the ``size`` + 1 directions of a table over [-π, π]."""
+    """Return max(normals @ u) for unit vectors u at the ``size`` + 1 directions of a table over [-π, π].
+
+    The normals stand counter-clockwise: between two directions ``_STRIDE`` apart the largest is one from the first's
+    to the other's; two more on each side are for rounding. ``size`` is a multiple of the stride.
+    """
     out = np.zeros(size + 1)
-    for i in range(size + 1):
+    n = normals.shape[0]
+    before = 0
+    for i in range(0, size + 1, _STRIDE):
         a = -math.pi + 2.0 * math.pi * i / size
         x, y = math.sin(a), math.cos(a)
-        best = 0.0
-        for k in range(normals.shape[0]):
-            best = max(best, normals[k, 0] * x + normals[k, 1] * y)
+        best, at = 0.0, before
+        for k in range(n):
+            value = normals[k, 0] * x + normals[k, 1] * y
+            if value > best:
+                best, at = value, k
         out[i] = best
+        first, count = before + 2, min(n, (before - at) % max(1, n) + 5)
+        for j in range(max(0, i - _STRIDE + 1), i):
+            a = -math.pi + 2.0 * math.pi * j / size
+            x, y = math.sin(a), math.cos(a)
+            best = 0.0
+            for m in range(first, first - count, -1):
+                k = m % n
+                best = max(best, normals[k, 0] * x + normals[k, 1] * y)
+            out[j] = best
+        before = at
     return out
 
 
@@ -124,16 +143,16 @@ def make_gauge(p: Problem) -> Gauge:
     with_rest = np.vstack([points, np.zeros((1, 2))])
     hull = _hull(with_rest)
     # Normals: of every hull edge that has the origin strictly inside; an edge through the origin blocks.
-    step = np.roll(hull, -1, axis=0) - hull
-    outward = np.column_stack([step[:, 1], -step[:, 0]])
-    size = np.hypot(outward[:, 0], outward[:, 1])
+    x, y = np.ascontiguousarray(hull.T)
+    out_x, out_y = np.roll(y, -1) - y, -(np.roll(x, -1) - x)
+    size = np.hypot(out_x, out_y)
     keep = size > 1e-12
-    unit = outward[keep] / size[keep][:, None]
-    support = np.sum(unit * hull[keep], axis=1)
-    fast = float(np.max(np.hypot(hull[:, 0], hull[:, 1])))
+    out_x, out_y = out_x[keep] / size[keep], out_y[keep] / size[keep]
+    support = out_x * x[keep] + out_y * y[keep]
+    fast = float(np.max(np.hypot(x, y)))
     open_ = support > 1e-7 * fast
-    normals = np.ascontiguousarray(unit[open_] / support[open_][:, None])
-    blocked = np.ascontiguousarray(unit[~open_])
+    normals = np.column_stack([out_x[open_] / support[open_], out_y[open_] / support[open_]])
+    blocked = np.column_stack([out_x[~open_], out_y[~open_]])
     thin = _thin(normals)
     values = _tabulate(thin, _TABLE)
     # Between two table directions the convex γ may dip below both by about |γ| Δ²: taken off.

@@ -19,7 +19,7 @@ from companion.planner.search.lattice import run_lattice
 from companion.planner.search.proposals import MOST_POINTS
 from companion.planner.search.rounds import fitted, rounded
 from companion.planner.search.tacks import check_path, follow, zigzag
-from companion.planner.search.visibility import crossings, geodesics, graph_nodes
+from companion.planner.search.visibility import crossings, geodesics, graph_nodes, least_through
 from companion.planner.search.world import World
 
 LEG_PRICE = 8e-5
@@ -274,19 +274,12 @@ class Searcher:
         xs, ys = np.linspace(x0, x1, side), np.linspace(y0, y1, side)
         gx, gy = np.meshgrid(xs, ys)
         q = np.column_stack([gx.ravel(), gy.ravel()])
-        goal = self.goal[None, :2]
-        least = self._metric(q) + np.maximum(0.0, self._metric(goal - q) - self.goal[2] * self.gauge.table_max)
-        inside = q[least <= upper * 1.001]
+        inside = q[least_through(self.gauge, q, (*self.world.goal, self.world.goal_radius)) <= upper * 1.001]
         if len(inside) == 0:
             return x0, y0, x1, y1
         px, py = (x1 - x0) / (side - 1), (y1 - y0) / (side - 1)
         return (max(x0, float(inside[:, 0].min()) - px), max(y0, float(inside[:, 1].min()) - py),
                 min(x1, float(inside[:, 0].max()) + px), min(y1, float(inside[:, 1].max()) + py))
-
-    def _metric(self, d: Floats) -> Floats:
-        table = self.gauge.table
-        cell = ((np.arctan2(d[:, 0], d[:, 1]) + math.pi) / (2.0 * math.pi) * len(table)).astype(int) % len(table)
-        return np.asarray(table[cell] * np.hypot(d[:, 0], d[:, 1]), np.float64)
 
     def left(self) -> tuple[float, float]:
         """Return (expansions, seconds) that a search for other paths may take: the end belongs to the best path."""

@@ -165,6 +165,9 @@ def circle_cuts(edges: Floats, goal: Floats) -> Floats:
     """Return the points where boundary segments cut the goal's circle, (k, 2)."""
     if len(edges) == 0 or goal[2] <= 0.0:
         return np.empty((0, 2))
+    near = ((np.minimum(edges[:, 0], edges[:, 2]) <= goal[0] + goal[2])
+            & (np.maximum(edges[:, 0], edges[:, 2]) >= goal[0] - goal[2]))
+    edges = edges[near]
     p, d = edges[:, :2] - goal[:2], edges[:, 2:] - edges[:, :2]
     a, b = np.sum(d * d, axis=1), np.sum(p * d, axis=1)
     root = b * b - a * (np.sum(p * p, axis=1) - goal[2] ** 2)
@@ -183,11 +186,14 @@ def graph_nodes(corners: Floats, gauge: Gauge, goal: tuple[float, float, float],
         return np.zeros((1, 2))
     keep = np.ones(len(corners), bool)
     if math.isfinite(bound_s):
-        least = _table_time(gauge, corners) + np.maximum(
-            0.0, _table_time(gauge, np.array([[goal[0], goal[1]]]) - corners) - goal[2] * gauge.table_max
-        )
-        keep = least <= bound_s
+        keep = least_through(gauge, corners, goal) <= bound_s
     return np.vstack([np.zeros((1, 2)), corners[keep]])
+
+
+def least_through(gauge: Gauge, points: Floats, goal: tuple[float, float, float]) -> Floats:
+    """Return the least sailing time [s] from the start to the goal's disc by way of each point, obstacles apart."""
+    to_go = _table_time(gauge, np.array([goal[:2]]) - points) - goal[2] * gauge.table_max
+    return np.asarray(_table_time(gauge, points) + np.maximum(0.0, to_go), np.float64)
 
 
 def _table_time(gauge: Gauge, d: Floats) -> Floats:

@@ -54,6 +54,16 @@ def test_never_above_a_feasible_plan(raw):
     for share in (0.5, 1.0, 1.6):                              # the late metric bounds whatever moment it is taken at
         bound.sharpen_late(share * judged.time_s, 10**5)
         assert bound.value_s <= judged.time_s + 1e-9
+        bound.sharpen_turns(share * judged.time_s)
+        assert bound.value_s <= judged.time_s + 1e-9
+
+
+def test_a_goal_whose_edge_lies_close_hauled_is_fetched_without_a_tack():
+    raw = simple(start={"x": 0, "y": 0, "heading_deg": 0}, goal={"x": 2, "y": 310, "radius": 2},
+                 wind={"from_deg": 45, "speed_mps": 5}, boat=simple()["boat"] | {"turn_rate_rad_s": 0.25})
+    p, s, bound = searched(raw)
+    assert s.best is not None
+    assert bound.value_s <= evaluate(p, s.world.to_en(s.best.points)).time_s < 1.01 * bound.value_s
 
 
 def test_the_late_metric_sees_obstacles_in_a_closing_wind():
