@@ -88,8 +88,10 @@ def main(argv=None):
     args = parser.parse_args(argv)
     compile_ahead()
     with tempfile.TemporaryDirectory() as folder:
-        ways = [(f"{w} workers", Means(workers=w)) for w in args.workers]
+        ways = [(f"{w} workers", Means(workers=w)) for w in args.workers if w > 1]
         ways += [(f"{w} workers, dask", Means(workers=w, dask="local")) for w in args.workers]
+        # Last, for one sails in this process: what it held once is counted of each worker that it begins.
+        ways += [("1 worker", Means(workers=1))] if 1 in args.workers else []
         print("jobs that do nothing")
         added_s = {}
         for name, means in ways:

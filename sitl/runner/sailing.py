@@ -28,7 +28,8 @@ JobT = TypeVar("JobT")
 # Sees what there is of each job, in their order (None: nothing yet, {}: lost), when a run begins and after each result.
 # Returns what is known so far, in words, and whether that is enough.
 Watch = Callable[[Sequence[dict[str, Any] | None]], tuple[str, bool]]
-TOLD = 10   # of the jobs that were lost
+TOLD = 10             # of the jobs that were lost
+LOG_EVERY_S = 30.0    # a line of how far it is, where that is no terminal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,16 +167,21 @@ def _scenarios(job: Any) -> list[Path]:
 
 
 class _Progress:
-    """The line on the terminal: how many, how long."""
+    """The line on the terminal: how many, how long; elsewhere a line now and then, for a log is read afterwards."""
 
     def __init__(self, of: int) -> None:
         self._of, self._done, self._failed, self._widest = of, 0, 0, 0
-        self._began_s = time.monotonic()
+        self._began_s = self._said_s = time.monotonic()
+        self._is_terminal, self._unsaid = sys.stderr.isatty(), ""
         self._strange: set[str] = set()
+
+    @property
+    def _back(self) -> str:
+        return "\r" if self._is_terminal else ""
 
     def line(self, text: str) -> None:
         """Say something of the run."""
-        sys.stderr.write(f"\r{text}\n")
+        sys.stderr.write(f"{self._back}{text}\n")
         sys.stderr.flush()
 
     def processor(self, facts: Mapping[str, Any]) -> None:
@@ -186,21 +192,35 @@ class _Progress:
 
     def clear(self) -> None:
         """Leave the line to what is printed."""
-        sys.stderr.write("\r")
+        sys.stderr.write(self._back)
 
     def add(self, *, is_failed: bool, words: str = "") -> None:
         """Count one; ``words`` is what is known so far, of a run that may end before all are done."""
         self._done += 1
         self._failed += is_failed
-        left_s = (time.monotonic() - self._began_s) / self._done * (self._of - self._done)
+        now_s = time.monotonic()
+        left_s = (now_s - self._began_s) / self._done * (self._of - self._done)
         line = f"{self._done}/{self._of} sailed, {self._failed} failed, {left_s:.0f} s left"
         if words:
             line = f"{self._done} sailed, {self._of - self._done} at most to come; {words}"
-        self._widest = max(self._widest, len(line) + 3)
-        sys.stderr.write(f"\r{line.ljust(self._widest)}")
-        sys.stderr.flush()
+        if self._is_terminal:
+            self._widest = max(self._widest, len(line) + 3)
+            sys.stderr.write(f"\r{line.ljust(self._widest)}")
+            sys.stderr.flush()
+            return
+        self._unsaid = line
+        if now_s - self._said_s >= LOG_EVERY_S:
+            self._said_s = now_s
+            self._say()
+
+    def _say(self) -> None:
+        if self._unsaid:
+            sys.stderr.write(f"{self._unsaid}\n")
+            sys.stderr.flush()
+        self._unsaid = ""
 
     def end(self) -> None:
         """End the line."""
-        if self._of:
+        if self._is_terminal and self._of:
             sys.stderr.write("\n")
+        self._say()
