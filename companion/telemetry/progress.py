@@ -11,13 +11,14 @@ import shutil
 import textwrap
 from datetime import UTC, datetime
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.messages import CompanionStatus, Mode
 from companion.skipper.step import Announce, Phase, Route, Severity
 from companion.telemetry.folder.records import sigma_ahead_rad
+from companion.telemetry.standing import Stream
 
 # Without a terminal a line is written this often [s of the voyage], and whenever the phase changes.
 PLAIN_EVERY_S = 15.0
@@ -25,22 +26,6 @@ SILENT_S = 5.0           # without a heartbeat
 LOUD = Severity.NOTICE   # what is said more quietly than this is in the records only
 COLUMNS_MOST = 120       # longer lines are hard to read
 DISK = "disk"   # the alert of trouble with the disk, which no state of the voyage tells
-
-
-class Stream(Protocol):
-    """What lines are written to: a file, or the console of a voyage."""
-
-    def write(self, text: str, /) -> object:
-        """Write ``text``."""
-        ...
-
-    def flush(self) -> object:
-        """Let it be seen."""
-        ...
-
-    def isatty(self) -> bool:
-        """Return whether it is a terminal."""
-        ...
 
 
 class ProgressLine:

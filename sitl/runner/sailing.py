@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from companion.errors import JobError
+from companion.telemetry.standing import StandingLine
 from companion.words import counted
 from sitl.means import Means
 from sitl.runner.cargo import Cargo
@@ -167,22 +168,14 @@ def _scenarios(job: Any) -> list[Path]:
 
 
 class _Progress:
-    """The line on the terminal: how many, how long; elsewhere a line now and then, for a log is read afterwards."""
+    """How many are sailed, and how long the others take."""
 
     def __init__(self, of: int) -> None:
-        self._of, self._done, self._failed, self._widest = of, 0, 0, 0
-        self._began_s = self._said_s = time.monotonic()
-        self._is_terminal, self._unsaid = sys.stderr.isatty(), ""
+        self._of, self._done, self._failed = of, 0, 0
+        self._began_s = time.monotonic()
         self._strange: set[str] = set()
-
-    @property
-    def _back(self) -> str:
-        return "\r" if self._is_terminal else ""
-
-    def line(self, text: str) -> None:
-        """Say something of the run."""
-        sys.stderr.write(f"{self._back}{text}\n")
-        sys.stderr.flush()
+        standing = StandingLine(sys.stderr, LOG_EVERY_S)
+        self._show, self.line, self.clear, self.end = standing.show, standing.stay, standing.give_way, standing.end
 
     def processor(self, facts: Mapping[str, Any]) -> None:
         """Say once of a host that its processor is of another kind."""
@@ -190,37 +183,10 @@ class _Progress:
             self._strange.add(facts["host"])
             self.line(f"{facts['host']} has a processor of another kind: the last bit of a figure may be another there")
 
-    def clear(self) -> None:
-        """Leave the line to what is printed."""
-        sys.stderr.write(self._back)
-
     def add(self, *, is_failed: bool, words: str = "") -> None:
         """Count one; ``words`` is what is known so far, of a run that may end before all are done."""
         self._done += 1
         self._failed += is_failed
-        now_s = time.monotonic()
-        left_s = (now_s - self._began_s) / self._done * (self._of - self._done)
+        left_s = (time.monotonic() - self._began_s) / self._done * (self._of - self._done)
         line = f"{self._done}/{self._of} sailed, {self._failed} failed, {left_s:.0f} s left"
-        if words:
-            line = f"{self._done} sailed, {self._of - self._done} at most to come; {words}"
-        if self._is_terminal:
-            self._widest = max(self._widest, len(line) + 3)
-            sys.stderr.write(f"\r{line.ljust(self._widest)}")
-            sys.stderr.flush()
-            return
-        self._unsaid = line
-        if now_s - self._said_s >= LOG_EVERY_S:
-            self._said_s = now_s
-            self._say()
-
-    def _say(self) -> None:
-        if self._unsaid:
-            sys.stderr.write(f"{self._unsaid}\n")
-            sys.stderr.flush()
-        self._unsaid = ""
-
-    def end(self) -> None:
-        """End the line."""
-        if self._is_terminal and self._of:
-            sys.stderr.write("\n")
-        self._say()
+        self._show(f"{self._done} sailed, {self._of - self._done} at most to come; {words}" if words else line)

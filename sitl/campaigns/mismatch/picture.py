@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 GROUPS = (("as planned", "#1f5fa8", "o"), ("another boat and water", "#b3541e", "s"))
 _LEAST = 1e-3       # what is less is drawn at this: the axes are of tenths and hundredths
-FEW = 10            # voyages of a group that is drawn
+LEAST_VOYAGES = 10  # of a group, or its interval would be all that is seen
 
 
 def save_reliability(records: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -51,7 +51,7 @@ def reliability_figure(records: Sequence[Mapping[str, Any]]) -> Figure:
     left.set(xscale="log", yscale="log", xlim=(0.7 * _LEAST, 1.3), ylim=(0.7 * _LEAST, 1.3), xlabel="promised",
              ylabel="came", title="In the no-go zone, half way along a leg; late")
     floors = floor_curve(records)
-    floors = [b for b in floors if b.of >= FEW] or floors   # an interval of next to nothing would be all that is seen
+    floors = [b for b in floors if b.of >= LEAST_VOYAGES] or floors
     _bars(middle, list(range(len(floors))), floors, GROUPS[1][1], GROUPS[1][2], "")
     middle.axhline(0.01, color="black", lw=0.8, ls=":")
     middle.set(ylim=(0.0, None), xlabel="how many things are not the plan's", ylabel="share of voyages",
