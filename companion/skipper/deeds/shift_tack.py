@@ -15,7 +15,7 @@ from companion.skipper.deeds.short_tack import LEAST_MPS
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, tacks_fail
 from companion.skipper.step.shifting import shifting
 from companion.skipper.step.turn import Turn
-from companion.skipper.way.geometry import bearing_rad, cross_track_m
+from companion.skipper.way.geometry import along_m, bearing_rad, cross_track_m, distance_m
 
 APART_S = 10.0       # between two tacks that are asked for
 LAST_S = 20.0        # so near the leg's end the layline decides, which the autopilot sees
@@ -37,7 +37,7 @@ def shift_tack(turn: Turn) -> None:
     if abs(difference_rad(wind[0], bearing_rad(boat, leg[1]))) >= half_rad or (
             abs(abs(off_rad) - half_rad) > TURNING * half_rad):
         return
-    beat = shifting(turn, bearing_rad(*leg))
+    beat = shifting(turn, bearing_rad(*leg), distance_m(*leg) - along_m(boat, *leg))
     if beat is None:
         return
     to_go_s = math.dist(boat, leg[1]) / beat.table.made_good_mps
@@ -49,5 +49,7 @@ def shift_tack(turn: Turn) -> None:
     if gain_s <= 0.0 or not is_left_to_beat(turn, boat, leg[1]):
         return
     headed_deg = math.degrees(shift_rad if is_port else -shift_rad)
-    words = f"headed {headed_deg:.0f}°" if headed_deg >= 0.5 else f"lifted {-headed_deg:.0f}°, near the corridor's edge"
+    edge = "layline" if beat.table.corridor_m < turn.tack_corridor_m - 0.1 else "corridor's edge"
+    words = f"headed {headed_deg:.0f}°" if headed_deg >= 0.5 else (
+        f"lifted {max(0.0, -headed_deg):.0f}°, near the {edge}")
     tack(turn, "shift tack", f"{words}: tack; expected gain {gain_s:.1f} s of {to_go_s:.0f} to go")

@@ -17,7 +17,8 @@ from companion.skipper.way.voyage import PointEn
 
 IRONS_MEMORY_S = 600.0
 TACKS_FAIL_AFTER = TRIES    # failures in a row, or times in irons within IRONS_MEMORY_S, before tacks are left
-WIDEST_M = 50.0         # a wider corridor is no corridor
+WIDEST_M = 50.0         # a wider corridor is no corridor ...
+WIDEST_BY_SHIFTS_M = 200.0   # ... but where she tacks on the shifts: then its edges are seldom met
 CARRIED_S = 2.5         # of a tack, at the corridor's edge: where the water takes her meanwhile
 OFF_LINE_M = 2.0        # so near the line a leg that begins anew is the same leg
 FOLLOWS_RAD = math.radians(10.0)   # this far outside its no-go zone the autopilot keeps to the line
@@ -31,22 +32,32 @@ def tacks_fail(turn: Turn) -> bool:
     return max(len(recent), in_a_row) >= TACKS_FAIL_AFTER
 
 
-def corridor_room_m(turn: Turn) -> float | None:
-    """Return how far from everything solid a closed leg must be for the autopilot's beat about it [m].
+def boards_within_m(turn: Turn) -> float | None:
+    """Return what the boards of the autopilot's beat keep within, to either side of the leg [m].
 
-    What its boards keep within, the overshoot of a tack at the corridor's edge included; where the current sets her
-    meanwhile; the hull's reach; the margin's floor beyond that. None without a corridor: the autopilot then sails to
-    the layline, wherever that is. Whether each board keeps the floor in the wind's spread is the planner's to say
-    (``companion.planner.track``).
+    The overshoot of a tack at the corridor's edge is in it, and where the current sets her meanwhile. None without a
+    corridor: the autopilot then sails to the layline, wherever that is.
     """
     corridor, wind = turn.tack_corridor_m, turn.wind_mean
-    if wind is None or not 0.0 < corridor <= WIDEST_M or not turn.config.sails:
+    widest = WIDEST_BY_SHIFTS_M if turn.config.shifts else WIDEST_M
+    if wind is None or not 0.0 < corridor <= widest or not turn.config.sails:
         return None
     boat = turn.voyage.boat
     limits = turn.snapshot.limits or AutopilotLimits(sail_xtrack_max_m=corridor)
     helm = replace(Helm.of(limits), corridor_m=corridor, no_go_half_rad=turn.no_go_half_rad)
-    band_m = beat_band_m(helm, boat.polar, tws_mps=wind[1])
-    return band_m + boat.hull.reach_m + CARRIED_S * math.hypot(*turn.current_en_mps) + turn.config.margin_floor_m
+    return beat_band_m(helm, boat.polar, tws_mps=wind[1]) + CARRIED_S * math.hypot(*turn.current_en_mps)
+
+
+def corridor_room_m(turn: Turn) -> float | None:
+    """Return how far from everything solid a closed leg must be for the autopilot's beat about it [m].
+
+    What its boards keep within, the hull's reach, and the margin's floor beyond that; None where that is none. Whether
+    each board keeps the floor in the wind's spread is the planner's to say (``companion.planner.track``).
+    """
+    within_m = boards_within_m(turn)
+    if within_m is None:
+        return None
+    return within_m + turn.voyage.boat.hull.reach_m + turn.config.margin_floor_m
 
 
 def room_m(turn: Turn) -> float | None:
@@ -90,3 +101,17 @@ def is_left_to_beat(turn: Turn, a: PointEn, b: PointEn) -> bool:
     """Return whether the autopilot may beat from a to b: the water is clear by ``room_m``."""
     room = room_m(turn)
     return room is not None and turn.voyage.area.path_clearance_m([a, b]) >= room
+
+
+def beaten_within_m(turn: Turn) -> float:
+    """Return how far off the present leg the autopilot's own beat takes her [m]; 0 where it does not beat.
+
+    It beats where the leg lies in the no-go zone, by the wind that there is or by its mean: a lift does not end a beat.
+    """
+    leg, within_m = turn.leg(), boards_within_m(turn)
+    if leg is None or within_m is None or not is_left_to_beat(turn, *leg):
+        return 0.0
+    bearing = bearing_rad(*leg)
+    is_closed = any(wind is not None and abs(difference_rad(wind[0], bearing)) < turn.no_go_half_rad
+                    for wind in (turn.wind_now, turn.wind_mean))
+    return within_m if is_closed else 0.0

@@ -15,6 +15,7 @@ NARROWEST_M = 20.0             # in a narrower corridor she meets the edge befor
 LEG_RAD = math.radians(25.0)   # a leg farther off the mean wind is sailed on one tack for the most part
 SOON_S, LONG_S = 30.0, 300.0   # horizons: mean and spread are read by the longer, how fast it shifts by both
 TAU_S = (15.0, 600.0)
+NARROWING = 0.8                # from table to table, as the laylines close in on the leg's end
 GROWN = 0.1, 0.995             # of the spread after the shorter of the later one, at the least and at the most
 
 
@@ -31,8 +32,10 @@ class Shifting:
         return max(0.0, self.table.crossing_s * (self.table.straight_mps / self.table.made_good_mps - 1.0))
 
 
-def shifting(turn: Turn, leg_rad: float | None = None) -> Shifting | None:
+def shifting(turn: Turn, leg_rad: float | None = None, ahead_m: float = math.inf) -> Shifting | None:
     """Return what the shifts are worth on a leg with this bearing; without one, on a leg into the mean wind.
+
+    ``ahead_m`` of it are left.
 
     None where the mission does not ask for it, or as ``shifts_of``.
     """
@@ -42,17 +45,21 @@ def shifting(turn: Turn, leg_rad: float | None = None) -> Shifting | None:
     half_rad = turn.no_go_half_rad
     return shifts_of(
         forecast, corridor_m=turn.tack_corridor_m, speed_mps=boat.polar.speed_mps(half_rad, wind[1]),
-        half_rad=half_rad, tack_s=2.0 * half_rad / boat.turn_rate_radps + boat.tack_loss_s, leg_rad=leg_rad)
+        half_rad=half_rad, tack_s=2.0 * half_rad / boat.turn_rate_radps + boat.tack_loss_s, leg_rad=leg_rad,
+        ahead_m=ahead_m)
 
 
 def shifts_of(
     forecast: WindForecast, *, corridor_m: float, speed_mps: float, half_rad: float, tack_s: float,
-    leg_rad: float | None = None,
+    leg_rad: float | None = None, ahead_m: float = math.inf,
 ) -> Shifting | None:
     """Return what a forecast's shifts are worth; None where it is too little, or not for this corridor or leg.
 
-    ``speed_mps`` is hers close-hauled at ``half_rad``, ``tack_s`` what a tack costs.
+    ``speed_mps`` is hers close-hauled at ``half_rad``, ``tack_s`` what a tack costs, ``ahead_m`` what is left of the
+    leg: to go wider than the laylines through its end is to sail too far, so they narrow the corridor.
     """
+    while NARROWEST_M <= corridor_m > ahead_m * math.tan(half_rad):
+        corridor_m *= NARROWING
     far = _by(forecast, LONG_S)
     spread_rad, mean_rad = float(forecast.sigma_twd_rad[far]), float(forecast.mean_twd_from_rad[far])
     off_rad = 0.0 if leg_rad is None else difference_rad(leg_rad, mean_rad)

@@ -9,6 +9,7 @@ from companion.geo.angles import difference_rad
 from companion.geo.sun import sun_height_rad
 from companion.skipper.deeds.adrift import meets_in_s, sails
 from companion.skipper.deeds.by_field import meets_in
+from companion.skipper.planning.autopilot_beats import beaten_within_m
 from companion.skipper.planning.errands import Kind, errand, is_composed
 from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.snapshot import WindHealth
@@ -101,7 +102,7 @@ def corridor_m(turn: Turn) -> float:
 
 
 def _corridor(turn: Turn) -> float | None:
-    """Share of the corridor used; in open water the grid size bounds it, not the margin."""
+    """Share of the corridor used; in open water the grid size bounds it, not the margin, and a beat its own boards."""
     boat, leg = turn.boat_en, turn.leg()
     if boat is None or leg is None or not turn.ahead() or turn.state.own_mode in STOPPING or is_composed(turn):
         return None      # stopped, or by a field of her own, she follows no leg
@@ -113,7 +114,7 @@ def _corridor(turn: Turn) -> float | None:
     else:
         off = abs(cross_track_m(boat, *leg))
     clearance = turn.voyage.area.path_clearance_m([boat, leg[1]])
-    allowed = turn.config.grid_size_m
+    allowed = max(turn.config.grid_size_m, beaten_within_m(turn))
     if clearance < turn.config.margin_floor_m:
         allowed = min(allowed, corridor_m(turn))
     return off / allowed

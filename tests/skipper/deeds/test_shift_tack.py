@@ -40,6 +40,35 @@ def test_elsewhere_the_autopilot_tacks_as_it_does(how):
     assert not tacks(world)
 
 
+@pytest.mark.parametrize("shifts", [True, False])
+def test_a_board_within_the_corridor_is_not_off_the_leg(shifts):
+    """Planned again there, the leg would begin at the boat, and the corridor with it."""
+    world = beating(shifts=shifts)
+    assert world.run(1500, is_done)
+    assert max(abs(x) for x, _ in world.track) > 30.0
+    assert not said(world, "off the corridor")
+    assert not [a for _, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.OFF_LEG]
+
+
+def test_beyond_the_corridor_she_is_off_the_leg():
+    world = beating()
+    assert world.run(200, lambda w: w.position[1] > 100.0)
+    x, y = world.position
+    world.position = (x + math.copysign(100.0, x), y)
+    world.run(60, lambda w: bool(said(w, "off the corridor")))
+    assert said(world, "off the corridor")
+
+
+@pytest.mark.parametrize("shifts", [True, False])
+def test_a_corridor_that_is_too_wide_without_them_is_sailed_in_by_the_shifts(shifts):
+    world = beating(shifts=shifts, corridor=200.0)
+    world.run(100, lambda w: w.armed)
+    places = {(item.lat_e7, item.lon_e7) for item in world.mission}
+    assert (len(places) == 1) == shifts      # without them each board is planned
+    assert world.run(1500, is_done)
+    assert bool(tacks(world)) == shifts
+
+
 def test_tacks_that_are_asked_for_are_apart():
     world = beating(seed=1)
     assert world.run(1500, is_done)

@@ -36,6 +36,18 @@ def test_a_spread_that_is_all_there_or_that_hardly_begins_stays_within_limits():
     assert shift_time_s(forecast(np.where(HORIZONS_S < 300.0, 0.0, 9.0))) == TAU_S[1]
 
 
+@pytest.mark.parametrize(("ahead_m", "least_m", "most_m"), [(1000.0, 200.0, 200.0), (100.0, 80.0, 100.0)])
+def test_near_the_legs_end_the_laylines_are_the_corridor(ahead_m, least_m, most_m):
+    beat = shifts_of(forecast(grown(28.0)), corridor_m=200.0, speed_mps=1.2, half_rad=math.radians(45.0), tack_s=1.0,
+                     leg_rad=0.0, ahead_m=ahead_m)
+    assert least_m <= beat.table.corridor_m <= most_m + 0.1
+
+
+def test_at_the_legs_end_there_is_no_room_left():
+    assert shifts_of(forecast(grown(28.0)), corridor_m=200.0, speed_mps=1.2, half_rad=math.radians(45.0), tack_s=1.0,
+                     leg_rad=0.0, ahead_m=15.0) is None
+
+
 @pytest.mark.parametrize(("sigma_deg", "corridor_m", "leg_deg", "pays"), [
     (grown(28.0), 50.0, 0.0, True), (grown(28.0), 15.0, 0.0, False), (grown(28.0), 50.0, 40.0, False),
     (0.0, 50.0, 0.0, False),
