@@ -39,7 +39,8 @@ from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Truth as Now
 from sitl.run.embedded import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.run.live import run_live
-from sitl.scene import EventSpec, Truth, Verdict, count_tacks, load_scenario, own_polar, scenario_wind
+from sitl.run.variation import Variation
+from sitl.scene import EventSpec, Scenario, Truth, Verdict, count_tacks, own_polar, scenario_wind
 from sitl.world import Wind
 
 # Measured to be its best (ArduPilot 4.7): margins that a tacking boat needs, the fence itself without action.
@@ -49,8 +50,6 @@ DIJKSTRA = {
 }
 # Its fence holds 84 points: the obstacles' outlines are made simpler by at most the first of these that fits [m].
 FENCE_PLAYS_M = (4.0, 6.0, 8.0)
-# A voyage of ArduRover alone that takes this long is stuck [s].
-LIMIT_S = 900.0
 # A companion with a fixed plan dies so long after the start: it is on board, and no leg of it is sailed [s].
 DIES_S = 45.0
 # The companion has watched the wind for about this long when it sets sail: everybody meets the same weather [s].
@@ -157,18 +156,18 @@ class Voyage:
 
 
 # ------------------------------------------------------------------------------------------- voyages
-def sail_companion(path: Path, seed: int) -> Voyage:
-    """Sail with the companion on the embedded autopilot."""
-    scenario = load_scenario(path)
+def sail_companion(scenario: Scenario, path: Path, seed: int, *, shifts: bool | None, told: str) -> Voyage:
+    """Sail with the companion on the embedded autopilot; ``shifts``: by them or not, None: as the mission says."""
+    variation = None if shifts is None else Variation(tables={"skipper": {"shifts": shifts}})
     track = Track(load_mission(scenario.mission_path(path)))
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
-        verdict = run_virtual(run_embedded(scenario, path, seed, Path(folder) / "voyage", observer=track.observe()))
-    return Voyage(track=track, record={**track.record("companion", scenario.name, seed), **_promises(verdict)})
+        verdict = run_virtual(run_embedded(
+            scenario, path, seed, Path(folder) / "voyage", observer=track.observe(), variation=variation))
+    return Voyage(track=track, record={**track.record(told, scenario.name, seed), **_promises(verdict)})
 
 
-def sail_fixed(path: Path, seed: int) -> Voyage:
+def sail_fixed(scenario: Scenario, path: Path, seed: int) -> Voyage:
     """Sail the companion's first plan on the embedded autopilot: nobody plans again."""
-    scenario = load_scenario(path)
     dies = EventSpec(at_s=DIES_S, kind="kill_companion")
     track = Track(load_mission(scenario.mission_path(path)))
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
@@ -178,9 +177,8 @@ def sail_fixed(path: Path, seed: int) -> Voyage:
     return Voyage(track=track, record=track.record("fixed plan", scenario.name, seed))
 
 
-def sail_companion_ardurover(path: Path, seed: int, speedup: float) -> Voyage:
+def sail_companion_ardurover(scenario: Scenario, path: Path, seed: int, speedup: float) -> Voyage:
     """Sail with the companion, as a process of its own, on the real ArduRover."""
-    scenario = load_scenario(path)
     track, noted = Track(load_mission(scenario.mission_path(path))), Truth()
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
         verdict = run_live(
@@ -199,9 +197,8 @@ def _promises(verdict: Verdict) -> dict[str, Any]:
     return {key: verdict.figures.get(key) for key in ("promised_risk", "no_go_entries", "replans")}
 
 
-def sail_alone(path: Path, seed: int) -> Voyage:
+def sail_alone(scenario: Scenario, path: Path, seed: int) -> Voyage:
     """Sail with one waypoint per goal on the embedded autopilot."""
-    scenario = load_scenario(path)
     track = Track(load_mission(scenario.mission_path(path)))
 
     async def voyage() -> None:
@@ -216,20 +213,20 @@ def sail_alone(path: Path, seed: int) -> Voyage:
             Pilot(link) as pilot,
         ):
             wind.release()
-            await _sail(pilot, track, lambda: autopilot.truth)
+            await _sail(pilot, track, lambda: autopilot.truth, scenario.limit_s)
 
     run_virtual(voyage())
     return Voyage(track=track, record=track.record("alone, embedded", scenario.name, seed))
 
 
 def sail_ardurover(
-    path: Path, seed: int, who: str, speedup: float, set_sail: tuple[float, float, float] | None = None,
+    scenario: Scenario, path: Path, seed: int, who: str, speedup: float,
+    set_sail: tuple[float, float, float] | None = None,
 ) -> Voyage:
     """Sail with the real ArduRover, "alone" or with its own "dijkstra".
 
     ``set_sail`` is where, in place of the mission's start: latitude, longitude, heading [deg].
     """
-    scenario = load_scenario(path)
     mission = load_mission(scenario.mission_path(path))
     track = Track(mission)
     has_obstacles = bool(mission.area.solids or mission.area.fence.inclusions)
@@ -266,7 +263,7 @@ def sail_ardurover(
                     return None
 
             wind.release()
-            await _sail(pilot, track, now)
+            await _sail(pilot, track, now, scenario.limit_s)
 
     run(voyage(), speedup=speedup)
     return Voyage(track=track, record=track.record(f"{who}, ArduRover", scenario.name, seed))
@@ -276,7 +273,7 @@ def _heading_rad(mission: Mission) -> float:
     return math.radians(mission.options.start.heading_deg) if mission.options.start else 0.0
 
 
-async def _sail(pilot: Pilot, track: Track, now: Callable[[], Now | None]) -> None:
+async def _sail(pilot: Pilot, track: Track, now: Callable[[], Now | None], limit_s: float) -> None:
     """Upload a waypoint per goal, arm, set AUTO, and watch until the last goal or the limit.
 
     The last waypoint is there twice: the mission then ends beyond the goal's radius for nobody.
@@ -293,7 +290,7 @@ async def _sail(pilot: Pilot, track: Track, now: Callable[[], Now | None]) -> No
         if look is not None and look.is_armed and look.mode is Mode.AUTO:
             break
         await asyncio.sleep(1.0)
-    until_s = now_s() + LIMIT_S
+    until_s = now_s() + limit_s
     while now_s() < until_s and not track.is_done:
         look = now()
         if look is not None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import number, out_file, whole
-from sitl.commands.baselines import SAILORS
+from sitl.commands.baselines import SAILORS, add_winds
 from sitl.means import add_options, means_of
 
 
@@ -32,6 +32,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the table's figures")
     parser.add_argument("--plot", type=out_file, metavar="FILE",
                         help="draw seed 0 of the first scenario: what each sailor sailed over the clairvoyant's track")
+    add_winds(parser)
     add_options(parser, workers=1)
     parser.set_defaults(run=run)
 
@@ -47,4 +48,4 @@ def run(args: argparse.Namespace) -> int:
         require_judged(path)
     compile_ahead()
     return run_regret(who=args.who, scenarios=scenarios, seeds=args.seeds, means=means_of(args), speedup=args.speedup,
-                      json_path=args.json, plot=args.plot)
+                      json_path=args.json, plot=args.plot, winds=args.winds, against=args.against)

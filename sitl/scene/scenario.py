@@ -238,6 +238,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     boat: HullSpec | None = None
     sensors: SensorsSpec | None = None
     parameters: dict[str, float] = {}
+    without_shifts: dict[str, float] = {}     # beside those, of who does not tack on the shifts (sitl baselines)
     events: tuple[EventSpec, ...] = ()
     expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)
 

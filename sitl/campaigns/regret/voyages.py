@@ -14,7 +14,8 @@ from companion.errors import InputError
 from companion.geofence import Mission, load_mission
 from sitl.autopilot import TACK_RETRY_S, no_go_half_rad, settled_polar, tack_loss_s
 from sitl.campaigns.baselines import Track
-from sitl.campaigns.figures import Job, key_of, latest, voyage_of
+from sitl.campaigns.figures import NAMES, Job, WindOf, jobs_of, key_of, latest, scenario_of, voyage_of
+from sitl.campaigns.pairs import pairs
 from sitl.campaigns.regret.table import figures_of, told
 from sitl.clairvoyant import Best, Craft, Goal, Race, Weather, best
 from sitl.means import Means
@@ -72,7 +73,7 @@ def best_of(scenario: Scenario, track: Track) -> Best | None:
 def sail_one(job: Job) -> dict[str, Any]:
     """Sail a job; return what is told of it, and the best."""
     voyage = voyage_of(job)
-    ideal = best_of(load_scenario(job.scenario), voyage.track)
+    ideal = best_of(scenario_of(job), voyage.track)
     if ideal is None:
         return voyage.record
     return {**voyage.record, "best_s": ideal.time_s, "bound_s": ideal.bound_s, "coarser_s": ideal.coarser_s,
@@ -81,20 +82,20 @@ def sail_one(job: Job) -> dict[str, Any]:
 
 def run_regret(
     *, who: Sequence[str], scenarios: Sequence[Path], seeds: int, means: Means, speedup: float,
-    json_path: Path | None, plot: Path | None,
+    json_path: Path | None, plot: Path | None, winds: Sequence[WindOf] | None, against: str | None,
 ) -> int:
     """Sail everything that has no result yet, print the table of all that there is; return the exit code."""
-    jobs = [Job(who=w, scenario=p, seed=s, speedup=speedup) for w in who for s in range(seeds) for p in scenarios]
-    sailed = sail("regret", sail_one, jobs, means, key=key_of)
+    sailed = sail("regret", sail_one, jobs_of(who, scenarios, seeds, speedup, winds), means, key=key_of)
     records = latest([result for _, result in sailed.held.pairs()])
     print(told(records))
+    if against is not None:
+        print(pairs(records, NAMES[against]))
     if json_path is not None:
         json_path.write_text(json.dumps(figures_of(records), indent=1) + "\n", encoding="utf-8")
     if plot is not None:
         from sitl.campaigns.regret.picture import save_regret
 
-        drawn = [voyage_of(Job(who=w, scenario=scenarios[0], seed=0, speedup=speedup)) for w in who]
-        scenario = load_scenario(scenarios[0])
-        save_regret([(voyage, best_of(scenario, voyage.track)) for voyage in drawn], plot)
+        drawn = [(job, voyage_of(job)) for job in jobs_of(who, scenarios[:1], 1, speedup, winds and winds[:1])]
+        save_regret([(voyage, best_of(scenario_of(job), voyage.track)) for job, voyage in drawn], plot)
         print(f"drawn in {plot}")
     return sailed.exit_code(is_good=True)
