@@ -30,6 +30,7 @@ from companion.wind import Forecaster
 from sitl.autopilot.boat.kernel import LOOP_S, S_TACKING, S_TACKS, S_TWD_COS, S_TWD_SIN, S_TWS, S_V, S_YAW
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import Vehicle
+from sitl.commands.baselines import STEADY, wind_of
 from sitl.world import AR1, Constant
 
 HALF_RAD = math.radians(45.0)
@@ -109,15 +110,15 @@ def main(argv=None):
     parser.add_argument("--seeds", type=int, default=24)
     parser.add_argument("--length", type=float, default=500.0, metavar="M")
     parser.add_argument("--corridor", type=float, default=200.0, metavar="M", help="the wider one's")
-    parser.add_argument("--winds", nargs="+", default=["0,60", "9,28", "18.6,28", "9,120", "9,600"], metavar="DEG,S")
+    parser.add_argument("--winds", nargs="+", type=wind_of, metavar="DEG,S",
+                        default=[STEADY, (9.0, 28.0), (18.6, 28.0), (9.0, 120.0), (9.0, 600.0)])
     parser.add_argument("--tack", type=float, default=1.0, metavar="S", help="what a tack is believed to cost")
     args = parser.parse_args(argv)
     wide = f"{args.corridor:g} m"
     print(f"| wind | {BASE_M:g} m, s | {wide}, edges alone | {wide}, by shifts | tacks | worst pair |\n"
           "|---|--:|--:|--:|--:|--:|", flush=True)
-    for text in args.winds:
-        spread_deg, tau_s = map(float, text.split(","))
-        print(f"| {' | '.join(row((spread_deg, tau_s), args))} |", flush=True)
+    for wind in args.winds:
+        print(f"| {' | '.join(row(wind, args))} |", flush=True)
     return 0
 
 

@@ -90,7 +90,7 @@ def sail(
         words, is_enough = watch(there) if watch is not None else ("", False)
         left = {} if is_enough else {n: job for n, job in enumerate(mine) if there[n] is None}
         progress = _Progress(len(left))
-        for n, done in stack.enter_context(contextlib.closing(_settled(work, left, means, progress.line))):
+        for n, done in stack.enter_context(contextlib.closing(_settled(work, left, means, progress.stay))):
             if isinstance(done, UnfitError | NoRoomError):
                 kept = f"; {means.file} holds {len(held.results)} results" if means.file is not None else ""
                 raise JobError(f"{done}{kept}") from done
@@ -107,7 +107,7 @@ def sail(
                 ledger.add(names[n], done.result, done.facts)
             now, there[n] = now + 1, done.result
             if on_record is not None:
-                progress.clear()
+                progress.give_way()
                 on_record(done.result)
             if watch is not None:
                 words, is_enough = watch(there)
@@ -167,21 +167,20 @@ def _scenarios(job: Any) -> list[Path]:
     return [v for v in values if isinstance(v, Path) and v.suffix == ".toml" and v.is_file()]
 
 
-class _Progress:
+class _Progress(StandingLine):
     """How many are sailed, and how long the others take."""
 
     def __init__(self, of: int) -> None:
+        super().__init__(sys.stderr, LOG_EVERY_S)
         self._of, self._done, self._failed = of, 0, 0
         self._began_s = time.monotonic()
         self._strange: set[str] = set()
-        standing = StandingLine(sys.stderr, LOG_EVERY_S)
-        self._show, self.line, self.clear, self.end = standing.show, standing.stay, standing.give_way, standing.end
 
     def processor(self, facts: Mapping[str, Any]) -> None:
         """Say once of a host that its processor is of another kind."""
         if facts["processor"] != processor() and facts["host"] not in self._strange:
             self._strange.add(facts["host"])
-            self.line(f"{facts['host']} has a processor of another kind: the last bit of a figure may be another there")
+            self.stay(f"{facts['host']} has a processor of another kind: the last bit of a figure may be another there")
 
     def add(self, *, is_failed: bool, words: str = "") -> None:
         """Count one; ``words`` is what is known so far, of a run that may end before all are done."""
@@ -189,4 +188,4 @@ class _Progress:
         self._failed += is_failed
         left_s = (time.monotonic() - self._began_s) / self._done * (self._of - self._done)
         line = f"{self._done}/{self._of} sailed, {self._failed} failed, {left_s:.0f} s left"
-        self._show(f"{self._done} sailed, {self._of - self._done} at most to come; {words}" if words else line)
+        self.show(f"{self._done} sailed, {self._of - self._done} at most to come; {words}" if words else line)

@@ -34,8 +34,7 @@ def shift_tack(turn: Turn) -> None:
         return
     half_rad = turn.no_go_half_rad
     off_rad = difference_rad(wind[0], vehicle.heading_rad)
-    if abs(difference_rad(wind[0], bearing_rad(boat, leg[1]))) >= half_rad or (
-            abs(abs(off_rad) - half_rad) > TURNING * half_rad):
+    if not turn.is_closed(boat, leg[1], wind) or abs(abs(off_rad) - half_rad) > TURNING * half_rad:
         return
     beat = shifting(turn, bearing_rad(*leg), distance_m(*leg) - along_m(boat, *leg))
     if beat is None:

@@ -18,7 +18,7 @@ from companion.messages import Mode
 from companion.skipper.deeds.helm import TACK, is_busy, tack
 from companion.skipper.planning.autopilot_beats import tacks_fail
 from companion.skipper.step.turn import Turn
-from companion.skipper.way.geometry import bearing_rad, moved
+from companion.skipper.way.geometry import moved
 from companion.skipper.way.voyage import PointEn
 
 LEAD_S = 3.5         # a step to see it, the command, and the turn until the boat goes no farther that way
@@ -40,7 +40,7 @@ def short_tack(turn: Turn) -> None:
         return
     if turn.t_s - turn.state.tacked_s < APART_S or is_busy(turn, TACK) or turn.state.pending_upload is not None:
         return
-    if abs(difference_rad(wind[0], bearing_rad(boat, leg[1]))) >= turn.no_go_half_rad:
+    if not turn.is_closed(boat, leg[1], wind):
         return   # the leg is open: the autopilot follows it
     off = difference_rad(wind[0], vehicle.heading_rad)
     if not 0.5 * turn.no_go_half_rad < abs(off) < 1.5 * turn.no_go_half_rad:

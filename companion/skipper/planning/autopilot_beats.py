@@ -108,10 +108,7 @@ def beaten_within_m(turn: Turn) -> float:
 
     It beats where the leg lies in the no-go zone, by the wind that there is or by its mean: a lift does not end a beat.
     """
-    leg, within_m = turn.leg(), boards_within_m(turn)
-    if leg is None or within_m is None or not is_left_to_beat(turn, *leg):
+    leg = turn.leg()
+    if leg is None or not any(turn.is_closed(*leg, wind) for wind in (turn.wind_now, turn.wind_mean)):
         return 0.0
-    bearing = bearing_rad(*leg)
-    is_closed = any(wind is not None and abs(difference_rad(wind[0], bearing)) < turn.no_go_half_rad
-                    for wind in (turn.wind_now, turn.wind_mean))
-    return within_m if is_closed else 0.0
+    return (boards_within_m(turn) or 0.0) if is_left_to_beat(turn, *leg) else 0.0

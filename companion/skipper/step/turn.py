@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from companion.frozen import changed
+from companion.geo.angles import difference_rad
 from companion.mavlink.wire import MEMORY_S
 from companion.messages import AutopilotStatus, Mode
 from companion.skipper.step.actions import (
@@ -35,6 +36,7 @@ from companion.skipper.step.state import Phase, Retry, SkipperState, is_given_up
 from companion.skipper.step.still_air import still_air
 from companion.skipper.way.circle import Circle, circle_of
 from companion.skipper.way.gates import Approach, Gate, gates_of
+from companion.skipper.way.geometry import bearing_rad
 from companion.skipper.way.stemming import Water
 from companion.skipper.way.voyage import PointEn, Voyage
 
@@ -256,6 +258,10 @@ class Turn:
             return 0.0
         limits = self.snapshot.limits
         return self.config.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
+
+    def is_closed(self, a: PointEn, b: PointEn, wind: tuple[float, float] | None) -> bool:
+        """Return whether a to b lies where the autopilot does not follow the line in ``wind`` (from [rad], [m/s])."""
+        return wind is not None and abs(difference_rad(wind[0], bearing_rad(a, b))) < self.no_go_half_rad
 
     @property
     def planned_no_go_rad(self) -> float:

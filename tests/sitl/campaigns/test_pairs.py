@@ -5,6 +5,7 @@ import pytest
 from sitl import cli
 from sitl.campaigns.figures import HERE, NAMES, Job, key_of, scenario_of
 from sitl.campaigns.pairs import pairs
+from sitl.commands.baselines import SAILORS
 from sitl.scene import load_scenario
 
 BEAT = HERE / "figures" / "beat-500.toml"
@@ -13,6 +14,10 @@ BEAT = HERE / "figures" / "beat-500.toml"
 def record(who, seed, time_s, **more):
     return {"who": who, "scenario": "a", "seed": seed, "arrived": True, "contacts": 0, "time_s": time_s, "tacks": 3,
             **more}
+
+
+def test_the_command_knows_the_sailors_that_there_are():
+    assert set(SAILORS) == set(NAMES)
 
 
 def test_only_clean_pairs_of_a_seed_count():
