@@ -33,7 +33,7 @@ Track = NDArray[np.float64]
 
 def failed_tack(
     corner_en: tuple[float, float], *, course_rad: float, speed_mps: float, twd_from_rad: float, tws_mps: float,
-    current_en_mps: tuple[float, float] = (0.0, 0.0),
+    current_en_mps: tuple[float, float] = (0.0, 0.0), irons_s: float = IRONS_S,
 ) -> tuple[Track, Track]:
     """Return two tracks (n, 2) [m] of one failed tack: blown back while she lies, and not.
 
@@ -41,8 +41,8 @@ def failed_tack(
     """
     up = course_rad + 0.5 * wrap_pi(twd_from_rad - course_rad)
     shot = _moved(np.asarray(corner_en, dtype=np.float64), up, SHOOT_S * speed_mps)
-    blown = _moved(shot, twd_from_rad + math.pi, BLOWN_SHARE * tws_mps * IRONS_S)
-    carried = IRONS_S * np.asarray(current_en_mps)
+    blown = _moved(shot, twd_from_rad + math.pi, BLOWN_SHARE * tws_mps * irons_s)
+    carried = irons_s * np.asarray(current_en_mps)
     ends = [_moved(place, course_rad, FILL_S * speed_mps) for place in (blown + carried, shot + carried)]
     corner = np.asarray(corner_en, dtype=np.float64)
     return np.array([corner, shot, blown + carried, ends[0]]), np.array([corner, shot, shot + carried, ends[1]])

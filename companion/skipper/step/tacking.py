@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-PRIOR_TACKS = 10.0    # a dozen of the voyage's own say as much as the mission
+PRIOR_TACKS = 5.0    # a dozen of the voyage's own say as much as the mission
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +26,10 @@ class Tacking:
         slowest_mps: the least since the tack that is being tried began.
         began_s: since when a tack is being tried, None: none is.
         is_counted: that one was counted as failed: she lies in irons.
+        began_en_m: where she was then, None: not known.
+        irons_s: the longest that she has lain.
+        lee_mps: how fast she was set then, beside the current that is believed and abeam to her lee: on starboard
+            tack, and on port.
 
     """
 
@@ -40,6 +44,9 @@ class Tacking:
     slowest_mps: float = math.inf
     began_s: float | None = None
     is_counted: bool = False
+    began_en_m: tuple[float, float] | None = None
+    irons_s: float = 0.0
+    lee_mps: tuple[float, float] = (0.0, 0.0)
 
     def chance(self, given: float) -> float:
         """Return the chance that the next tack fails; ``given`` is the mission's, and 0 asks for none."""

@@ -12,12 +12,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from companion.boat.failed_tack import SHOOT_S
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.planning.autopilot_beats import TACKS_FAIL_AFTER
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.tacking import Tacking
 from companion.skipper.step.turn import Turn
+from companion.skipper.way.voyage import PointEn
 
 SETTLED_RAD = math.radians(30.0)
 NEAR_RAD = math.radians(20.0)      # of the wind, of which the mean of 5 s is known
@@ -28,6 +30,7 @@ LIES_S = 8.0                       # as the watchdog "in irons" has it
 FORGET_S = 20.0                    # settled longer ago than this, whatever follows is no tack from there
 LEAST_TWS_MPS = 1.5                # in less she does as she likes
 NEAR_SOLID_M = 60.0                # a tack that failed so near something asks for a new plan
+MOST_LEE_MPS = 1.0                 # more is a position that has jumped
 TACK_FAILED = "a tack failed"
 
 
@@ -42,6 +45,10 @@ def watch_tacks(turn: Turn) -> None:
         return
     through_mps = math.dist(vehicle.velocity_en_mps, turn.snapshot.current.en_mps)   # as it is believed to move
     then = followed(now, turn.t_s, vehicle.heading_rad, wind[0], through_mps)
+    if then.began_s is not None and now.began_s is None:
+        then = replace(then, began_en_m=turn.boat_en)
+    elif now.began_s is not None and then.began_s is None and (now.is_counted or then.failed > now.failed):
+        then = lain(now, then, turn.t_s, turn.boat_en, wind[0], turn.snapshot.current.en_mps)
     if then != now:
         turn.update(tacking=then)
     if then.failed > now.failed:
@@ -72,6 +79,29 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, 
     if fresh and now.began_s is None and is_near and turned >= TURNED_RAD:
         return replace(now, began_s=t_s, slowest_mps=speed_mps)
     return replace(now, slowest_mps=min(now.slowest_mps, speed_mps)) if now.began_s is not None else now
+
+
+def lain(
+    now: Tacking, then: Tacking, t_s: float, boat_en_m: PointEn | None, twd_from_rad: float, current_en_mps: PointEn,
+) -> Tacking:
+    """Return ``then`` with what the failure that it ends has told: how long she lay, how fast she was set to lee.
+
+    What the believed current and her way on (``companion.boat.failed_tack``) explain is not counted.
+    """
+    if now.began_s is None or t_s <= now.began_s:
+        return then
+    span_s = t_s - now.began_s
+    then = replace(then, irons_s=max(then.irons_s, span_s))
+    if boat_en_m is None or now.began_en_m is None or span_s < LIES_S:
+        return then
+    abeam_rad = twd_from_rad - math.copysign(0.5 * math.pi, now.side)
+    shot_m = SHOOT_S * now.settled_mps
+    up_rad = now.settled_rad + 0.5 * difference_rad(twd_from_rad, now.settled_rad)
+    east_m = boat_en_m[0] - now.began_en_m[0] - shot_m * math.sin(up_rad) - span_s * current_en_mps[0]
+    north_m = boat_en_m[1] - now.began_en_m[1] - shot_m * math.cos(up_rad) - span_s * current_en_mps[1]
+    lee_mps = min(MOST_LEE_MPS, max(0.0, (east_m * math.sin(abeam_rad) + north_m * math.cos(abeam_rad)) / span_s))
+    starboard, port = then.lee_mps
+    return replace(then, lee_mps=(max(starboard, lee_mps), port) if now.side > 0 else (starboard, max(port, lee_mps)))
 
 
 def _counted(now: Tacking, t_s: float, *, failed: bool) -> Tacking:
