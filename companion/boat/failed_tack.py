@@ -48,10 +48,10 @@ def failed_tack(
     return np.array([corner, shot, blown + carried, ends[0]]), np.array([corner, shot, shot + carried, ends[1]])
 
 
-def lee_set(*, course_rad: float, twd_from_rad: float, tws_mps: float) -> tuple[float, float]:
-    """Return how a hull with leeway is set while she lies (east, north) [m/s]: abeam, to the lee of her old tack."""
+def lee_set(*, course_rad: float, twd_from_rad: float, lee_mps: float) -> tuple[float, float]:
+    """Return how a hull that is set at ``lee_mps`` is while she lies (east, north) [m/s]: abeam, to her old lee."""
     abeam = twd_from_rad - math.copysign(0.5 * math.pi, wrap_pi(twd_from_rad - course_rad))
-    return SET_SHARE * tws_mps * math.sin(abeam), SET_SHARE * tws_mps * math.cos(abeam)
+    return lee_mps * math.sin(abeam), lee_mps * math.cos(abeam)
 
 
 def _moved(place: NDArray[np.float64], course_rad: float, length_m: float) -> NDArray[np.float64]:

@@ -2,8 +2,9 @@
 
 The search plans as ever. Where a tack's failure would touch (``companion.planner.risk.tacks``) it looks again in water
 that is narrower by the room that is missing, and by other shares of that: she then tacks earlier; and as a boat that
-does not tack. Of what is within ``DEARER`` of the first path's time the least risky is handed out. What no such path
-avoids stays, and is counted in the path's risk. Only a path with such a tack costs more than the search itself.
+does not tack. Of what is within ``DEARER`` of the first path's time the least risky is handed out. A slower one is where
+the risk that it spares, with a contact for ``CONTACT_S``, is worth more than the time. What no such path avoids stays,
+and is counted in the path's risk. Only a path with such a tack costs more than the search itself.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from companion.planner.problem.value import Problem
 from companion.planner.risk.tacks import Tack, of_risky, tacks_at_risk
 
 DEARER = 1.10          # of the first path's time: what another may take
+CONTACT_S = 1800.0     # what a contact counts as
 AGAIN_SHARE = 0.15     # of the search's expansions, for each of the others
 AGAIN_TIME_SHARE = 0.04   # of its seconds: together they stay within a fifth of the budget
 NARROWER = (1.0, 2.0, 3.0, 0.5)   # of the room that is missing: more of it lets more failures in a row pass
@@ -44,16 +46,23 @@ def with_contingency(search: Search) -> Search:
                 continue
             # in the problem itself: what is narrower for the search is not narrower for the path
             seen = evaluate(problem, found.waypoints_en)
-            if not seen.is_feasible or seen.time_s > limit_s:
+            if not seen.is_feasible:
                 continue
             key = (of_risky(tacks_at_risk(problem, seen.legs)), seen.time_s)
-            if key < best_key:
+            is_worth_it = key < best_key if seen.time_s <= limit_s else _counted_s(key) < _counted_s(best_key)
+            if is_worth_it:
                 best, best_key = found, key
-            if key[0] == 0.0:
+            if best_key[0] == 0.0:
                 break
         return replace(best, lower_bound_s=outcome.lower_bound_s)
 
     return careful
+
+
+def _counted_s(key: tuple[float, float]) -> float:
+    """Return a path's time, with what its risk counts as [s]."""
+    risk, time_s = key
+    return time_s + CONTACT_S * risk
 
 
 def _again(effort: Effort) -> Effort:

@@ -88,7 +88,7 @@ def test_a_current_carries_her_while_she_lies():
 @given(course=st.floats(-math.pi, math.pi), twd=st.floats(-math.pi, math.pi), tws=st.floats(0.0, 15.0))
 def test_she_is_set_abeam_to_the_lee_of_her_old_tack(course, twd, tws):
     assume(abs(math.sin(twd - course)) > 1e-6)
-    east, north = lee_set(course_rad=course, twd_from_rad=twd, tws_mps=tws)
+    east, north = lee_set(course_rad=course, twd_from_rad=twd, lee_mps=SET_SHARE * tws)
     assert math.hypot(east, north) == pytest.approx(SET_SHARE * tws)
     assert east * math.sin(twd) + north * math.cos(twd) == pytest.approx(0.0, abs=1e-9)
     assert east * math.sin(course) + north * math.cos(course) >= -1e-9      # farther on, never back

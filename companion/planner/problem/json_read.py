@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import shapely
 
+from companion.boat.failed_tack import IRONS_S
 from companion.errors import InputError
 from companion.planner.problem.parts import (
     SIGMA_MODELS,
@@ -207,6 +208,8 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
             max_tws_mps=boat.maybe("max_tws_mps"),
             min_tws_mps=boat.maybe("min_tws_mps"),
             tack_fails=boat.number("tack_fails", 0.0),
+            irons_s=boat.number("irons_s", IRONS_S),
+            lee_mps=boat.numbers("lee_mps", (0.0, 0.0)),
         ),
         delta_s=top.number("delta_s"),
         current=_parse_current(_Reader(raw.get("current") or {}, source, "current")),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import shapely
 
+from companion.boat.failed_tack import IRONS_S
 from companion.planner.problem.json_read import HELM_KEYS
 from companion.planner.problem.value import LEG_SAVING, Problem
 
@@ -71,6 +72,8 @@ def to_dict(p: Problem) -> dict[str, Any]:
             **{name: value for name in ("gybe_room_m", "max_tws_mps", "min_tws_mps")
                if (value := getattr(p.boat, name)) is not None},
             **({"tack_fails": p.boat.tack_fails} if p.boat.tack_fails else {}),
+            **({"irons_s": p.boat.irons_s} if p.boat.irons_s != IRONS_S else {}),
+            **({"lee_mps": list(p.boat.lee_mps)} if any(p.boat.lee_mps) else {}),
             **({} if p.boat.speeds is None else {"speeds": {
                 "tws_mps": list(p.boat.speeds.tws_mps), "twa_deg": [deg(a) for a in p.boat.speeds.twa_rad],
                 "v_mps": [list(row) for row in p.boat.speeds.v_mps]}}),

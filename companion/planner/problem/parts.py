@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from companion.boat.failed_tack import IRONS_S
+
 if TYPE_CHECKING:
     from companion.planner.problem.strength import Speeds, Strength
     from companion.traffic.occupancy import Spread
@@ -78,7 +80,8 @@ class BoatLimits:
     ``can_tack`` False: no turn goes through the wind's eye, so the boat gybes round. ``gybe_room_m`` is the leg that
     turning round the long way needs; None: five turning radii at full speed. ``speeds`` is the polar in other winds.
     More wind than ``max_tws_mps``, or less than ``min_tws_mps``, she is not to be out in (None: no limit).
-    ``tack_fails`` is the chance that a tack fails, below 1; 0: what then comes is not looked at.
+    ``tack_fails`` is the chance that a tack fails, below 1; 0: what then comes is not looked at. She then lies for
+    ``irons_s``, set to lee at ``lee_mps`` (on starboard tack, on port) beside what the water does.
     """
 
     no_go_half_rad: float
@@ -94,6 +97,8 @@ class BoatLimits:
     max_tws_mps: float | None = None
     min_tws_mps: float | None = None
     tack_fails: float = 0.0
+    irons_s: float = IRONS_S
+    lee_mps: tuple[float, ...] = (0.0, 0.0)
 
     @property
     def room_m(self) -> float:

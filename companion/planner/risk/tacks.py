@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.boat.failed_tack import AGAIN_SHARE, RISKY, TRIES, failed_tack
+from companion.boat.failed_tack import AGAIN_SHARE, RISKY, TRIES, failed_tack, lee_set
 from companion.boat.tracking import stated_error_m
 from companion.geo.angles import wrap_pi
 from companion.planner.plan import Leg
@@ -131,6 +131,7 @@ class _Solids:
         if tracking is not None:
             best = max(problem.boat.polar_mps)
             self.need_m = tracking.reach_m + stated_error_m(best, has_short=not tracking.is_known)
+        self.irons_s, self.most_lee_mps = problem.boat.irons_s, max(problem.boat.lee_mps)
         self._tree = tracking.tree if tracking is not None else shore_of(problem).tree
 
     def distance_m(self, shape: shapely.Geometry) -> float:
@@ -143,8 +144,9 @@ class _Solids:
     def far_m(self, speed_mps: float, tws_mps: float) -> float:
         """Return how far from a corner the failures of a tack can lead, and need room."""
         first = np.concatenate(failed_tack((0.0, 0.0), course_rad=0.0, speed_mps=speed_mps, twd_from_rad=0.0,
-                                           tws_mps=tws_mps))
-        return MOST_FAILURES * float(np.max(np.hypot(*first.T))) + self.need_m
+                                           tws_mps=tws_mps, irons_s=self.irons_s))
+        lee_m = self.irons_s * self.most_lee_mps
+        return MOST_FAILURES * (float(np.max(np.hypot(*first.T))) + lee_m) + self.need_m
 
     def tack(
         self, problem: Problem, leg: int, at: Place, course_rad: float, speed_mps: float, chance: float,
@@ -156,9 +158,15 @@ class _Solids:
         speed, place = speed_mps, at
         (east, north), (east_too, north_too) = problem.current.en_mps, problem.adrift.en_mps
         carried = (east + east_too, north + north_too)
+        lee_mps = problem.boat.lee_mps[0 if wrap_pi(problem.wind.twd_from_rad - course_rad) > 0.0 else 1]
+        lee = lee_set(course_rad=course_rad, twd_from_rad=problem.wind.twd_from_rad, lee_mps=lee_mps)
         for failures in range(1, MOST_FAILURES + 1):
-            tracks = failed_tack(place, course_rad=course_rad, speed_mps=speed,
-                                 twd_from_rad=problem.wind.twd_from_rad, tws_mps=tws, current_en_mps=carried)
+            tracks: tuple[NDArray[np.float64], ...] = failed_tack(place, course_rad=course_rad, speed_mps=speed, twd_from_rad=problem.wind.twd_from_rad,
+                                 tws_mps=tws, current_en_mps=carried, irons_s=problem.boat.irons_s)
+            if lee_mps > 0.0:
+                tracks += failed_tack(place, course_rad=course_rad, speed_mps=speed, tws_mps=tws, current_en_mps=(
+                    carried[0] + lee[0], carried[1] + lee[1]), twd_from_rad=problem.wind.twd_from_rad,
+                    irons_s=problem.boat.irons_s)
             room = min(self.distance_m(shapely.LineString(track)) for track in tracks) - self.need_m
             if room <= 0.0:
                 lack = max(-room, self._lack_m(at, np.concatenate(tracks)))
@@ -188,8 +196,8 @@ class _Solids:
 
 
 def _point(tracks: Sequence[NDArray[np.float64]]) -> Place:
-    """Return where she tries again: the farther on of the two."""
-    return float(tracks[1][-1][0]), float(tracks[1][-1][1])
+    """Return where she tries again: the farthest on."""
+    return float(tracks[-1][-1][0]), float(tracks[-1][-1][1])
 
 
 def in_words(problem: Problem, tacks: Sequence[Tack]) -> Iterator[str]:

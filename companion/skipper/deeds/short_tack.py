@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from companion.boat.failed_tack import AGAIN_SHARE, IRONS_S, RISKY, failed_tack, lee_set
+from companion.boat.failed_tack import AGAIN_SHARE, IRONS_S, RISKY, SET_SHARE, TRIES, failed_tack, lee_set
 from companion.current import UNTOLD_MPS
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Mode
@@ -27,7 +27,6 @@ APART_S = 6.0        # between two tacks: the autopilot's own 5 s, and a step
 LOOK_S = 8.0         # of the other tack, which must be better
 GAIN_M = 1.0
 HAIR_M = 0.5
-ROW = 3              # failures in a row, at most, that there is to be room for
 NEXT_S = 2.0         # the tack that is asked for in the next step begins so far on
 
 
@@ -73,11 +72,10 @@ def _may_fail(turn: Turn, boat: PointEn, wind: tuple[float, float], floor_m: flo
     there = _there(turn, boat, course, NEXT_S)
     irons_s = max(IRONS_S, turn.state.tacking.irons_s)
     need_m = floor_m + irons_s * min(water.sigma_mps, UNTOLD_MPS)
-    lee = lee_set(course_rad=course, twd_from_rad=wind[0], tws_mps=wind[1])
     learned_mps = turn.state.tacking.lee_mps[0 if difference_rad(wind[0], course) > 0.0 else 1]
-    more = max(1.0, learned_mps / max(math.hypot(*lee), 1e-6))
-    set_en_mps = (water.en_mps[0] + more * lee[0], water.en_mps[1] + more * lee[1])
-    for failures in range(1, ROW + 1):
+    lee = lee_set(course_rad=course, twd_from_rad=wind[0], lee_mps=max(learned_mps, SET_SHARE * wind[1]))
+    set_en_mps = (water.en_mps[0] + lee[0], water.en_mps[1] + lee[1])
+    for failures in range(1, TRIES + 1):
         blown, still = _failed(there, course, speed, wind, water.en_mps, irons_s)
         _, aside = _failed(there, course, speed, wind, set_en_mps, irons_s)
         if min(turn.voyage.area.path_clearance_m(way) for way in (blown, still, aside)) < need_m:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
+from companion.boat.failed_tack import IRONS_S
 from companion.current import over_ground
 from companion.errors import InputError
 from companion.messages import Mode
@@ -57,7 +59,7 @@ def request(
             turn.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
             delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
             beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk, current=current,
-            tack_fails=turn.state.tacking.chance(turn.voyage.boat.tack_fails),
+            failing=_failing(turn),
             is_wind_known=turn.snapshot.wind.health is not WindHealth.UNTRUSTED,
             doubt=turn.snapshot.doubt if turn.config.sails else None,
             zone_half_rad=turn.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
@@ -95,6 +97,15 @@ def request(
     return True
 
 
+def _failing(turn: Turn) -> dict[str, Any]:
+    """Return what is known of tacks that fail, as a problem's boat has it; of how she is set nothing before the first."""
+    tacking, given = turn.state.tacking, turn.voyage.boat.tack_fails
+    failing: dict[str, Any] = {"tack_fails": tacking.chance(given)}
+    if given > 0.0 and tacking.failed:
+        failing |= {"irons_s": max(IRONS_S, tacking.irons_s), "lee_mps": list(tacking.lee_mps)}
+    return failing
+
+
 def _start(turn: Turn, from_index: int | None) -> Start | None:
     boat, vehicle, route = turn.boat_en, turn.snapshot.vehicle, turn.state.route
     if boat is None or vehicle is None:
@@ -108,6 +119,9 @@ def _start(turn: Turn, from_index: int | None) -> Start | None:
         place = moved(boat, heading, vehicle.speed_mps * ahead)
         # In a current a plan's headings are through the water.
         bow = vehicle.heading_rad if turn.snapshot.current.is_significant else heading
+        tacking = turn.state.tacking
+        if tacking.is_counted:
+            bow = tacking.settled_rad   # she lies in irons, and falls off to her old tack
         return Start(en_m=place, heading_rad=bow, after_s=ahead)
     if route is None or not turn.state.index <= from_index < len(route.items):
         return None

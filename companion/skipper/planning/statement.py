@@ -192,13 +192,13 @@ def problem_dict(
     extra_obstacles: Sequence[str] = (), title: str = "", beat: dict[str, Any] | None = None,
     max_path_risk: float | None = None, tracking: dict[str, Any] | None = None,
     current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0, doubt: Doubt | None = None,
-    tack_fails: float = 0.0, is_wind_known: bool = True,
+    failing: dict[str, Any] | None = None, is_wind_known: bool = True,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
 
     A ``current`` that is significant is planned with: the wind is then that over the water. ``zone_half_rad`` is how
     far off the wind over the ground, which is the autopilot's, a course must be there for it to be followed.
-    ``tack_fails`` is the chance that a tack does.
+    ``failing`` is what is known of tacks that fail, as the problem's boat has it.
 
     Raises:
         ValueError: when no water is left inside the fence at this margin.
@@ -231,8 +231,8 @@ def problem_dict(
                          delta_s=delta_s, is_known=is_wind_known)
     boat = dict(voyage.boat.problem_boat(wind["speed_mps"]))
     boat["speeds"] = voyage.boat.problem_speeds()
-    boat["tack_fails"] = tack_fails
-    if not current.is_significant and tack_fails > 0.0:
+    boat.update(failing or {})
+    if not current.is_significant and failing and failing["tack_fails"] > 0.0:
         water["adrift"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
     boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(half_rad, wind["speed_mps"]))
     return {

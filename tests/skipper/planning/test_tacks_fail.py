@@ -48,7 +48,7 @@ def test_a_failure_is_said_with_what_it_taught_and_asks_for_a_plan_near_somethin
     assert turn.state.tacking.failed == turn.state.tacking.tried == 1
     [text] = [a.text for a in turn.actions if getattr(a, "code", "") == "tack failed"]
     assert "1 of 1" in text
-    assert "18 %" in text                  # (0.1 * 10 + 1) / 11
+    assert "25 %" in text                  # (0.1 * 5 + 1) / 6
     assert turn.state.asked == TACK_FAILED
 
 
@@ -77,7 +77,7 @@ def test_what_was_learned_is_in_the_next_problem():
     turn = turn_of(world)
     assert request(turn, ReplanReason.ORDER)
     [asked] = [a for a in turn.actions if isinstance(a, RequestPlan)]
-    assert asked.problem.boat.tack_fails == pytest.approx((1.0 + 4.0) / 15.0)
+    assert asked.problem.boat.tack_fails == pytest.approx((0.5 + 4.0) / 10.0)
     assert asked.problem.wind.strength.is_known
     assert min(asked.problem.wind.strength.sigma_mps) > 0.0
 
