@@ -16,7 +16,6 @@ from companion.current import UNTOLD_MPS
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Mode
 from companion.skipper.deeds.helm import TACK, is_busy, tack
-from companion.skipper.planning.autopilot_beats import tacks_fail
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import moved
 from companion.skipper.way.voyage import PointEn
@@ -36,7 +35,7 @@ def short_tack(turn: Turn) -> None:
     status = turn.autopilot
     if boat is None or leg is None or wind is None or vehicle is None or status is None or not turn.ahead():
         return
-    if status.mode is not Mode.AUTO or turn.speed_mps < LEAST_MPS or not turn.voyage.boat.can_tack or tacks_fail(turn):
+    if status.mode is not Mode.AUTO or turn.speed_mps < LEAST_MPS or not turn.voyage.boat.can_tack:
         return
     if turn.t_s - turn.state.tacked_s < APART_S or is_busy(turn, TACK) or turn.state.pending_upload is not None:
         return

@@ -25,6 +25,7 @@ from companion.traffic.plans import MIN_INTERVAL_S
 
 TOO_LATE_S = 2.0             # a plan asked for this shortly before the waypoint cannot be there in time
 BEND_RAD = math.radians(6.0)     # a smaller change of course at a waypoint is not worth a plan of its own ...
+BENDS_RAD = math.radians(25.0)   # a greater one, in all, ends a board
 BEND_PLAN_AGE_S = 60.0           # ... unless the last one is this old
 FORECAST_SHARE = 0.5         # of the interval that the plan used: a smaller change of the mean does not matter
 FORECAST_RAD = math.radians(5.0)
@@ -118,13 +119,23 @@ def _traffic(turn: Turn) -> Trigger | None:
     return Trigger(reason=ReplanReason.OBSTACLE, text=text, interval_s=interval_s, urgent=True)
 
 
+def _board_end(turn: Turn, leg: tuple[PointEn, PointEn]) -> PointEn:
+    """Return where she turns next: a board is a chain of short legs where the zone that it keeps out of grows."""
+    course, before, end = bearing_rad(*leg), *leg
+    for point in turn.ahead()[1:]:
+        before, end = end, point
+        if distance_m(before, end) > 1e-6 and abs(difference_rad(course, bearing_rad(before, end))) > BENDS_RAD:
+            return before
+    return end
+
+
 def _no_go(turn: Turn) -> Trigger | None:
     """The present wind has closed the leg: the autopilot will beat in its corridor. How far, and is that clear?"""
     boat, leg, wind, vehicle = turn.boat_en, turn.leg(), turn.wind_now, turn.snapshot.vehicle
     if boat is None or leg is None or wind is None or vehicle is None or not turn.ahead():
         turn.update(no_go_since_s=None)
         return None
-    target = leg[1]
+    target = _board_end(turn, leg)
     twa = abs(difference_rad(wind[0], bearing_rad(boat, target)))
     is_near = distance_m(boat, target) < turn.config.announce_m + turn.speed_mps
     if twa >= turn.no_go_half_rad or is_near or is_left_to_beat(turn, *leg):
