@@ -2,9 +2,9 @@
 
 The search plans as ever. Where a tack's failure would touch (``companion.planner.risk.tacks``) it looks again in water
 that is narrower by the room that is missing, and by other shares of that: she then tacks earlier; and as a boat that
-does not tack. Of what is within ``DEARER`` of the first path's time the least risky is handed out. A slower one is where
-the risk that it spares, with a contact for ``CONTACT_S``, is worth more than the time. What no such path avoids stays,
-and is counted in the path's risk. Only a path with such a tack costs more than the search itself.
+does not tack. Of what is within ``DEARER`` of the first path's time the least risky is handed out; a slower one where
+the risk that it spares, a contact taken for ``CONTACT_S``, is worth the time. What no such path avoids stays, and is
+counted in the path's risk. Only a path with such a tack costs more than the search itself.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def defect_of(p: Problem) -> str | None:
         ((b.gybe_room_m or 0.0) >= 0.0, "gybe_room_m is negative"),
         (0.0 <= b.tack_fails < 1.0, f"tack_fails {b.tack_fails:g} is outside 0 <= tack_fails < 1"),
         (b.irons_s >= 0.0, "irons_s is negative"),
-        (len(b.lee_mps) == 2 and min(b.lee_mps) >= 0.0, "lee_mps is not two speeds of 0 or more: on starboard, on port"),
+        (len(b.lee_mps) == 2 and min(b.lee_mps) >= 0.0, "lee_mps is not two speeds, each 0 or more"),
         (all(limit is None or 0.0 < limit < math.inf for limit in (b.max_tws_mps, b.min_tws_mps)),
          "a limit of wind is not above zero"),
         (b.max_tws_mps is None or b.min_tws_mps is None or b.min_tws_mps < b.max_tws_mps,

@@ -157,16 +157,15 @@ class _Solids:
             return None
         speed, place = speed_mps, at
         (east, north), (east_too, north_too) = problem.current.en_mps, problem.adrift.en_mps
-        carried = (east + east_too, north + north_too)
-        lee_mps = problem.boat.lee_mps[0 if wrap_pi(problem.wind.twd_from_rad - course_rad) > 0.0 else 1]
-        lee = lee_set(course_rad=course_rad, twd_from_rad=problem.wind.twd_from_rad, lee_mps=lee_mps)
+        carried, twd = (east + east_too, north + north_too), problem.wind.twd_from_rad
+        starboard_mps, port_mps = problem.boat.lee_mps
+        lee_mps = starboard_mps if wrap_pi(twd - course_rad) > 0.0 else port_mps
+        lee = lee_set(course_rad=course_rad, twd_from_rad=twd, lee_mps=lee_mps)
+        waters = [carried] if lee_mps == 0.0 else [carried, (carried[0] + lee[0], carried[1] + lee[1])]
         for failures in range(1, MOST_FAILURES + 1):
-            tracks: tuple[NDArray[np.float64], ...] = failed_tack(place, course_rad=course_rad, speed_mps=speed, twd_from_rad=problem.wind.twd_from_rad,
-                                 tws_mps=tws, current_en_mps=carried, irons_s=problem.boat.irons_s)
-            if lee_mps > 0.0:
-                tracks += failed_tack(place, course_rad=course_rad, speed_mps=speed, tws_mps=tws, current_en_mps=(
-                    carried[0] + lee[0], carried[1] + lee[1]), twd_from_rad=problem.wind.twd_from_rad,
-                    irons_s=problem.boat.irons_s)
+            tracks = [track for water in waters for track in failed_tack(
+                place, course_rad=course_rad, speed_mps=speed, twd_from_rad=twd, tws_mps=tws, current_en_mps=water,
+                irons_s=problem.boat.irons_s)]
             room = min(self.distance_m(shapely.LineString(track)) for track in tracks) - self.need_m
             if room <= 0.0:
                 lack = max(-room, self._lack_m(at, np.concatenate(tracks)))

@@ -71,7 +71,8 @@ def _may_fail(turn: Turn, boat: PointEn, wind: tuple[float, float], floor_m: flo
     there = _there(turn, boat, course, NEXT_S)
     irons_s = max(IRONS_S, turn.state.tacking.irons_s)
     need_m = floor_m + irons_s * min(water.sigma_mps, UNTOLD_MPS)
-    learned_mps = turn.state.tacking.lee_mps[0 if difference_rad(wind[0], course) > 0.0 else 1]
+    tacking, is_starboard = turn.state.tacking, difference_rad(wind[0], course) > 0.0
+    learned_mps = tacking.starboard_lee_mps if is_starboard else tacking.port_lee_mps
     lee = lee_set(course_rad=course, twd_from_rad=wind[0], lee_mps=max(learned_mps, SET_SHARE * wind[1]))
     set_en_mps = (water.en_mps[0] + lee[0], water.en_mps[1] + lee[1])
     for failures in range(1, TRIES + 1):

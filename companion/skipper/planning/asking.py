@@ -98,11 +98,12 @@ def request(
 
 
 def _failing(turn: Turn) -> dict[str, Any]:
-    """Return what is known of tacks that fail, as a problem's boat has it; of how she is set nothing before the first."""
+    """Return what is known of tacks that fail, as a problem's boat has it: before the first, the chance alone."""
     tacking, given = turn.state.tacking, turn.voyage.boat.tack_fails
     failing: dict[str, Any] = {"tack_fails": tacking.chance(given)}
     if given > 0.0 and tacking.failed:
-        failing |= {"irons_s": max(IRONS_S, tacking.irons_s), "lee_mps": list(tacking.lee_mps)}
+        failing |= {"irons_s": max(IRONS_S, tacking.irons_s),
+                    "lee_mps": [tacking.starboard_lee_mps, tacking.port_lee_mps]}
     return failing
 
 

@@ -20,6 +20,7 @@ from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import half_width_rad, predicted_beat
+from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
 from companion.traffic.plans import MIN_INTERVAL_S
 

@@ -28,8 +28,8 @@ class Tacking:
         is_counted: that one was counted as failed: she lies in irons.
         began_en_m: where she was then, None: not known.
         irons_s: the longest that she has lain.
-        lee_mps: how fast she was set then, beside the current that is believed and abeam to her lee: on starboard
-            tack, and on port.
+        starboard_lee_mps, port_lee_mps: the fastest that she was set then, abeam to the lee of that tack, beside the
+            current that is believed.
 
     """
 
@@ -46,7 +46,8 @@ class Tacking:
     is_counted: bool = False
     began_en_m: tuple[float, float] | None = None
     irons_s: float = 0.0
-    lee_mps: tuple[float, float] = (0.0, 0.0)
+    starboard_lee_mps: float = 0.0
+    port_lee_mps: float = 0.0
 
     def chance(self, given: float) -> float:
         """Return the chance that the next tack fails; ``given`` is the mission's, and 0 asks for none."""

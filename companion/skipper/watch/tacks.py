@@ -100,8 +100,9 @@ def lain(
     east_m = boat_en_m[0] - now.began_en_m[0] - shot_m * math.sin(up_rad) - span_s * current_en_mps[0]
     north_m = boat_en_m[1] - now.began_en_m[1] - shot_m * math.cos(up_rad) - span_s * current_en_mps[1]
     lee_mps = min(MOST_LEE_MPS, max(0.0, (east_m * math.sin(abeam_rad) + north_m * math.cos(abeam_rad)) / span_s))
-    starboard, port = then.lee_mps
-    return replace(then, lee_mps=(max(starboard, lee_mps), port) if now.side > 0 else (starboard, max(port, lee_mps)))
+    if now.side > 0:
+        return replace(then, starboard_lee_mps=max(then.starboard_lee_mps, lee_mps))
+    return replace(then, port_lee_mps=max(then.port_lee_mps, lee_mps))
 
 
 def _counted(now: Tacking, t_s: float, *, failed: bool) -> Tacking:

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from companion.boat.failed_tack import RISKY
 from companion.planner import Problem, plan
-from companion.planner.contingency import DEARER
+from companion.planner.contingency import CONTACT_S, DEARER
 from companion.planner.problem import evaluate
 from companion.planner.problem.defects import defect_of
 from companion.planner.problem.json_write import to_dict
-from companion.planner.risk.tacks import tacks_at_risk
+from companion.planner.risk.tacks import of_risky, tacks_at_risk
 from companion.planner.risk.wind import path_risk
 
 BOAT = {"no_go_half_deg": 45.0, "max_twa_deg": 180.0, "turn_rate_rad_s": 0.5, "tack_loss_s": 3.0,
@@ -52,16 +52,25 @@ def test_a_boat_whose_tacks_fail_tacks_earlier_within_a_tenth_of_the_time():
     assert again.tack_risk == careful.tack_risk > 0.0
 
 
-def test_where_nothing_else_is_within_a_tenth_the_risk_is_counted_and_limited():
-    narrow = channel(0.2, width_m=16.0, length_m=120.0)
+def test_a_slower_way_is_taken_where_the_contact_that_it_spares_is_worth_the_time():
+    careless = plan(channel(0.0, width_m=16.0, length_m=120.0), expansions=20_000)
+    for fails, is_slow in ((0.003, False), (0.2, True)):
+        found = plan(channel(fails, width_m=16.0, length_m=120.0), expansions=20_000)
+        assert (found.cost_s > DEARER * careless.cost_s) is is_slow
+        at_risk = of_risky(tacks_at_risk(channel(fails, width_m=16.0, length_m=120.0), careless.legs))
+        assert found.cost_s + CONTACT_S * found.tack_risk <= careless.cost_s + CONTACT_S * at_risk + 0.1
+
+
+def test_where_nothing_else_is_worth_it_the_risk_is_counted_and_limited():
+    narrow = channel(0.003, width_m=16.0, length_m=120.0)
     found = plan(narrow, expansions=20_000)
     assert found.has_path
-    assert found.tack_risk > 0.2
+    assert found.tack_risk > 0.02
     assert found.risk == pytest.approx(min(1.0, found.tack_risk))
     assert found.risk == pytest.approx(min(1.0, sum(leg.risk for leg in found.legs)), abs=1e-6)
     from companion.planner.problem import RiskLimit
 
-    limited = plan(replace(narrow, risk=RiskLimit(max_path_risk=0.05)), expansions=20_000)
+    limited = plan(replace(narrow, risk=RiskLimit(max_path_risk=0.01)), expansions=20_000)
     assert not limited.has_path
     assert "risk" in limited.reason
 
