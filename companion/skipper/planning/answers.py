@@ -10,7 +10,7 @@ import numpy as np
 from companion.planner import Plan, PlanStatus
 from companion.planner.problem import evaluate, resolved
 from companion.skipper.board.uploads import upload
-from companion.skipper.planning.asking import request
+from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.errands import Kind, errand
 from companion.skipper.planning.not_found import asks_again, not_found
@@ -59,12 +59,19 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
         turn.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
         return
     if pending.reason in AT_WAYPOINT and is_begun_risky(pending.problem, plan.legs) and may_restart_leg(turn) and (
-            pending.from_index is not None
+            pending.from_index is not None and _may_still_turn_before(turn, pending.start_en_m)
             and request(turn, pending.reason, text="the tack at the next waypoint may touch when it fails")):
         return   # no plan from that waypoint takes its tack away
     if _keep_old(turn, pending, plan):
         return
     put_in_place(turn, pending, plan, keep, set_current)
+
+
+def _may_still_turn_before(turn: Turn, waypoint_en: PointEn) -> bool:
+    """Return whether a plan from the boat begins well before a waypoint: else she would turn beyond it."""
+    boat = turn.boat_en
+    begins_m = turn.speed_mps * (turn.config.plan_budget_s + UPLOAD_LATENCY_S)
+    return boat is not None and distance_m(boat, waypoint_en) > 2.0 * begins_m
 
 
 def _place(turn: Turn, pending: PendingPlan) -> tuple[int | None, int | None]:
