@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 import pytest
@@ -14,11 +14,13 @@ from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, Mode, StatusText
 from companion.planner import PlanStatus
 from companion.planner.worker import failed
+from companion.skipper.planning.triggers import board_end
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
 from companion.skipper.step.missions import effective, ends_safely, is_same_mission
 from companion.skipper.step.snapshot import AutopilotRebooted, UploadResult, WindHealth
 from companion.skipper.step.state import Phase
+from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.manoeuvre import is_tack
 from companion.skipper.way.voyage import Goal, Side
@@ -162,6 +164,24 @@ def test_a_header_that_closes_the_leg_is_answered_within_seconds():
     assert world.run(25, lambda w: any(
         isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.NO_GO for _, a in w.actions))
     assert world.run(900, is_done)
+
+
+@pytest.mark.parametrize("step_m", [8.0, 60.0])
+def test_a_board_of_short_legs_is_watched_as_one(step_m):
+    """A zone that grows makes a chain of a board: each waypoint of it is near, the end of it is not."""
+    world = make(Goal(en_m=(300.0, 330.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0))
+    assert world.run(40, is_sailing)
+    here, route = world.position, world.state.route
+    bends = [math.radians(50.0 + 1.5 * n) for n in range(round(120.0 / step_m))]
+    points = list(accumulate(bends, lambda at, course: moved(at, course, step_m), initial=here))
+    points.append(moved(points[-1], math.radians(-50.0), 60.0))     # she tacks there
+    item = route.items[0]
+    chain = replace(
+        route, items=(item,) * len(points), points_en_m=(*points[1:], route.points_en_m[-1]),
+        leg_from_en_m=tuple(points), gate_of=(-1,) * len(points))
+    state = replace(world.state, route=chain, index=0)
+    turn = Turn(world.skipper.voyage, world.skipper.config, state, world.snapshot())
+    assert board_end(turn, (points[0], points[1])) == points[-2]
 
 
 def test_speed_is_not_lost_by_replanning():

@@ -120,7 +120,7 @@ def _traffic(turn: Turn) -> Trigger | None:
     return Trigger(reason=ReplanReason.OBSTACLE, text=text, interval_s=interval_s, urgent=True)
 
 
-def _board_end(turn: Turn, leg: tuple[PointEn, PointEn]) -> PointEn:
+def board_end(turn: Turn, leg: tuple[PointEn, PointEn]) -> PointEn:
     """Return where she turns next: a board is a chain of short legs where the zone that it keeps out of grows."""
     course, before, end = bearing_rad(*leg), *leg
     for point in turn.ahead()[1:]:
@@ -136,7 +136,7 @@ def _no_go(turn: Turn) -> Trigger | None:
     if boat is None or leg is None or wind is None or vehicle is None or not turn.ahead():
         turn.update(no_go_since_s=None)
         return None
-    target = _board_end(turn, leg)
+    target = board_end(turn, leg)
     twa = abs(difference_rad(wind[0], bearing_rad(boat, target)))
     is_near = distance_m(boat, target) < turn.config.announce_m + turn.speed_mps
     if twa >= turn.no_go_half_rad or is_near or is_left_to_beat(turn, *leg):

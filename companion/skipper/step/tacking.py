@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-PRIOR_TACKS = 5.0    # a dozen of the voyage's own say as much as the mission
+PRIOR_TACKS = 5.0    # so many of the voyage's own say as much as the mission
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

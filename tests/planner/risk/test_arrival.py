@@ -136,8 +136,9 @@ def test_the_boats_limits_are_chance_constraints():
 
 
 def test_a_problem_is_written_and_read_the_same():
-    p = problem(max_tws_mps=10.0, min_tws_mps=2.0, tack_fails=0.1)
+    p = problem(max_tws_mps=10.0, min_tws_mps=2.0, tack_fails=0.1, irons_s=14.0, lee_mps=[0.5, 0.25])
     again = Problem.from_json(to_dict(p))
+    assert (again.boat.irons_s, again.boat.lee_mps) == (14.0, (0.5, 0.25))
     assert again.wind.strength == p.wind.strength
     assert again.boat.speeds.v_mps == p.boat.speeds.v_mps
     assert (again.boat.max_tws_mps, again.boat.min_tws_mps, again.boat.tack_fails) == (10.0, 2.0, 0.1)
@@ -145,7 +146,8 @@ def test_a_problem_is_written_and_read_the_same():
 
 @pytest.mark.parametrize(("change", "said"), [
     ({"tack_fails": 1.0}, "tack_fails"), ({"max_tws_mps": 0.0}, "limit of wind"),
-    ({"max_tws_mps": 3.0, "min_tws_mps": 4.0}, "min_tws_mps"),
+    ({"max_tws_mps": 3.0, "min_tws_mps": 4.0}, "min_tws_mps"), ({"irons_s": -1.0}, "irons_s"),
+    ({"lee_mps": [0.1]}, "lee_mps"), ({"lee_mps": [0.1, -0.1]}, "lee_mps"),
 ])
 def test_nonsense_is_a_defect(change, said):
     assert said in defect_of(problem(**change))

@@ -96,6 +96,23 @@ def test_a_tack_is_the_riskier_the_nearer_the_wall(gap, chance):
     assert bool(near) or gap > 3.0
 
 
+def test_how_long_she_lies_and_how_she_is_set_is_in_the_room_of_a_tack_on_that_side_alone():
+    p = channel(0.3, width_m=90.0)
+    p = replace(p, boat=replace(p.boat, turn_rate_radps=0.02))     # no room to gybe: the row goes on to the wall
+    legs = evaluate(p, [(0, 0), (40, 40), (0, 80), (-40, 120), (0, 160)]).legs
+
+    def failures(**boat):
+        found = {tack.leg: tack.failures for tack in tacks_at_risk(replace(p, boat=replace(p.boat, **boat)), legs)}
+        return found[1], found[3]   # to the right on port tack, to the left on starboard
+
+    right, left = failures()
+    assert right == left > 2
+    longer = failures(irons_s=20.0, lee_mps=(0.3, 0.3))
+    assert max(longer) < left
+    assert failures(lee_mps=(0.6, 0.0)) == (right, failures(lee_mps=(0.6, 0.6))[1])
+    assert failures(lee_mps=(0.6, 0.0))[1] < left
+
+
 def test_room_to_gybe_ends_the_row_of_failures():
     wide = channel(0.3, width_m=200.0)
     legs = evaluate(wide, [(0, 0), (93, 93), (-12, 198), (0, 300)]).legs

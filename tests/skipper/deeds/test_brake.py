@@ -107,6 +107,14 @@ def test_where_tacks_can_fail_there_is_room_for_one_that_does():
     assert doubtful.clearance() > certain.clearance() + 1.0
 
 
+def test_a_boat_whose_tacks_have_failed_is_asked_too_for_the_leg_that_she_was_to_gybe_on_has_closed():
+    world = in_the_narrows(tack_fails=0.03)
+    world.state = replace(world.state, tacking=replace(world.state.tacking, tried=4, failed=2, in_a_row=2,
+                                                       failed_s=world.t))
+    world.run(10)
+    assert said(world, "short tack")
+
+
 def test_in_open_water_the_autopilot_beats_as_it_likes():
     world = make(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(), wind=lambda t: (0.1 * math.sin(t / 20.0), 5.0),
                  config={"autopilot_beats": True})

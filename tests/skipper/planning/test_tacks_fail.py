@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 import shapely
 
+from companion.boat.failed_tack import IRONS_S
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import tacks_fail
 from companion.skipper.step.actions import ReplanReason, RequestPlan
@@ -80,6 +81,24 @@ def test_what_was_learned_is_in_the_next_problem():
     assert asked.problem.boat.tack_fails == pytest.approx((0.5 + 4.0) / 10.0)
     assert asked.problem.wind.strength.is_known
     assert min(asked.problem.wind.strength.sigma_mps) > 0.0
+
+
+def test_how_she_lay_is_in_the_next_problem_and_before_a_failure_is_not():
+    for failed, irons_s, lee_mps in ((0, IRONS_S, (0.0, 0.0)), (1, 14.0, (0.4, 0.0))):
+        world = under_way(0.1, tried=3, failed=failed, irons_s=14.0, starboard_lee_mps=0.4)
+        turn = turn_of(world)
+        assert request(turn, ReplanReason.ORDER)
+        [asked] = [a for a in turn.actions if isinstance(a, RequestPlan)]
+        assert (asked.problem.boat.irons_s, asked.problem.boat.lee_mps) == (irons_s, lee_mps)
+
+
+def test_a_plan_of_a_boat_in_irons_begins_on_the_tack_that_she_falls_off_to():
+    world = under_way(0.1, tried=1, failed=1)
+    lies = replace(world.state.tacking, is_counted=True, side=1, settled_rad=math.radians(-50.0), began_s=world.t - 9.0)
+    turn = turn_of(world, tacking=lies)
+    assert request(turn, ReplanReason.ORDER)
+    [asked] = [a for a in turn.actions if isinstance(a, RequestPlan)]
+    assert math.degrees(asked.problem.start_heading_rad) % 360.0 == pytest.approx(310.0)
 
 
 def test_what_was_counted_survives_a_restart_and_nonsense_does_not():

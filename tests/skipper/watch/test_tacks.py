@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from companion.boat.failed_tack import SHOOT_S
 from companion.skipper.step.tacking import NO_TACKS, PRIOR_TACKS, Tacking
-from companion.skipper.watch.tacks import followed
+from companion.skipper.watch.tacks import LIES_S, MOST_LEE_MPS, followed, lain
 
 D = math.radians
 
@@ -62,6 +63,33 @@ def test_a_wind_that_heads_her_is_no_tack_and_one_that_she_follows_is_none():
 def test_what_is_counted_does_not_hang_on_where_the_wind_is_from(turn, headings):
     assert seen([h + turn for h in headings], turn).tried == seen(headings).tried
     assert seen([h + turn for h in headings], turn).failed == seen(headings).failed
+
+
+@given(twd=st.floats(-math.pi, math.pi), is_starboard=st.booleans(), span_s=st.floats(LIES_S, 30.0),
+       lee_mps=st.floats(0.0, 0.9), east_mps=st.floats(-0.5, 0.5), north_mps=st.floats(-0.5, 0.5))
+def test_a_failure_tells_how_long_she_lay_and_how_she_was_set_beside_the_current_and_her_way(
+        twd, is_starboard, span_s, lee_mps, east_mps, north_mps):
+    side = 1 if is_starboard else -1
+    course, way_mps = twd - side * D(45.0), 2.0
+    up, abeam = course + side * D(22.5), twd - side * D(90.0)
+    shot_m = SHOOT_S * way_mps
+    east_m = 7.0 + shot_m * math.sin(up) + span_s * (east_mps + lee_mps * math.sin(abeam))
+    north_m = -3.0 + shot_m * math.cos(up) + span_s * (north_mps + lee_mps * math.cos(abeam))
+    began = Tacking(side=side, settled_rad=course, settled_mps=way_mps, began_s=100.0, began_en_m=(7.0, -3.0))
+
+    def ended(boat_en_m):
+        return lain(began, NO_TACKS, 100.0 + span_s, boat_en_m, twd, (east_mps, north_mps))
+
+    now = ended((east_m, north_m))
+    told, other = (now.starboard_lee_mps, now.port_lee_mps)[::side]
+    assert now.irons_s == pytest.approx(span_s)
+    assert told == pytest.approx(lee_mps, abs=1e-9)
+    assert other == 0.0
+    assert ended(None).irons_s == now.irons_s                      # no position: how long, and nothing more
+    assert ended((1e6, 1e6)).starboard_lee_mps <= MOST_LEE_MPS     # it jumped
+    shorter = lain(began, now, 101.0, (7.0, -3.0), twd, (0.0, 0.0))
+    assert (shorter.irons_s, shorter.starboard_lee_mps, shorter.port_lee_mps) == (
+        now.irons_s, now.starboard_lee_mps, now.port_lee_mps)      # the longest and the fastest of the voyage
 
 
 def test_a_row_of_failures_ends_with_a_tack_that_comes_off():

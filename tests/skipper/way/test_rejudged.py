@@ -125,6 +125,17 @@ def test_a_tack_at_the_next_waypoint_that_has_become_too_risky_is_planned_away_f
         assert [a.from_seq for a in turn.actions if isinstance(a, RequestPlan)] == from_seq
 
 
+def test_so_near_that_waypoint_no_plan_is_made_from_the_boat_for_it_would_turn_beyond_it():
+    world = sailing()
+    for budget_s, from_seq in ((0.5, [None]), (30.0, [])):
+        world.skipper = replace(world.skipper, config=replace(world.skipper.config, plan_budget_s=budget_s))
+        turn = turn_of(world, tacking=replace(world.state.tacking, **LEARNED))
+        problem = asked(turn, ReplanReason.WAYPOINT, from_index=turn.state.index)
+        take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id,
+                                    plan=plan(problem, expansions=8000)))
+        assert [a.from_seq for a in turn.actions if isinstance(a, RequestPlan)] == from_seq
+
+
 def test_the_tack_that_begins_a_plan_is_gybed_round_too_after_two_that_failed():
     world = sailing(obstacles=())
     turn = turn_of(world, tacking=replace(world.state.tacking, tried=2, failed=2, in_a_row=2, failed_s=world.t))
