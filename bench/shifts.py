@@ -23,8 +23,9 @@ import numpy as np
 
 from companion.boat.library import ardurover_sitl
 from companion.geo.angles import difference_rad, mean_direction_rad
-from companion.skipper.deeds.shift_tack import APART_S, LAST_S, TURNING
+from companion.skipper.deeds.shift_tack import LAST_S, TURNING
 from companion.skipper.deeds.short_tack import LEAST_MPS
+from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.shifting import shifts_of
 from companion.wind import Forecaster
 from sitl.autopilot.boat.kernel import LOOP_S, S_TACKING, S_TACKS, S_TWD_COS, S_TWD_SIN, S_TWS, S_V, S_YAW
@@ -48,7 +49,7 @@ def sail(seed, wind, length_m, corridor_m, *, by_shifts, tack_s):
     vehicle = Vehicle(weather, Parameters({"SAIL_XTRACK_MAX": corridor_m}), heading_rad=math.radians(60.0),
                       is_moored=True, seed=seed)
     forecaster, state, heard = Forecaster(), vehicle.state, deque(maxlen=NOW_S)
-    asked_s = -math.inf
+    asked_s, apart_s = -math.inf, SkipperConfig().shift_tacks_apart_s
     for t in range(1, READY_S + 3 * round(length_m)):
         loops = round(1.0 / LOOP_S)
         while loops > 0:
@@ -63,7 +64,7 @@ def sail(seed, wind, length_m, corridor_m, *, by_shifts, tack_s):
         to_go_m = math.hypot(x, length_m - y)
         if to_go_m <= RADIUS_M:
             return t - READY_S - (RADIUS_M - to_go_m) / max(0.1, state[S_V]), int(state[S_TACKS])
-        if by_shifts and t > READY_S and t - asked_s >= APART_S and state[S_V] >= LEAST_MPS and not state[S_TACKING]:
+        if by_shifts and t > READY_S and t - asked_s >= apart_s and state[S_V] >= LEAST_MPS and not state[S_TACKING]:
             now_rad = mean_direction_rad(np.array(heard))
             if pays(forecaster.table(float(t)), now_rad, state, (x, length_m - y), corridor_m, tack_s):
                 vehicle.ask_tack()

@@ -38,6 +38,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "plan_budget_s": options.planning_budget_s,
         "first_plan_budget_s": options.planning_budget_s,
         "autopilot_beats": options.autopilot_beats, "shifts": options.shifts,
+        "shift_tacks_apart_s": 60.0 / options.tacks_per_minute,
         "replan_policy": ReplanPolicy(options.replan),
         "guidance": Guidance(options.guidance),
         "station_s": options.station_s,

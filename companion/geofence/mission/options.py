@@ -199,6 +199,8 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Where the water is clear by its corridor, leave the beat to the autopilot: it follows each shift at once."""
     shifts: bool = False
     """On a beat so left, ask the autopilot for a tack where the wind's shifts make one worth it (docs/regret.md)."""
+    tacks_per_minute: Annotated[float, Meta(gt=0.0, le=6.0)] = 6.0
+    """Of these, at most: as far apart, and from the last that was asked for otherwise."""
     guidance: Literal["plan", "heading", "field"] = "plan"
     """Sail the plan's mission in AUTO; or steer in GUIDED, by the plan's headings or by vector fields.
 

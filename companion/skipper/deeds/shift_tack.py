@@ -17,7 +17,6 @@ from companion.skipper.step.shifting import shifting
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import along_m, bearing_rad, cross_track_m, distance_m
 
-APART_S = 10.0       # between two tacks that are asked for
 LAST_S = 20.0        # so near the leg's end the layline decides, which the autopilot sees
 TURNING = 0.5        # of her angle to the wind, more or less: then she is turning, or has borne away
 
@@ -30,7 +29,8 @@ def shift_tack(turn: Turn) -> None:
     if not turn.ahead() or status.mode is not Mode.AUTO or turn.speed_mps < LEAST_MPS or tacks_fail(turn) or (
             not turn.voyage.boat.can_tack):
         return
-    if turn.t_s - turn.state.tacked_s < APART_S or is_busy(turn, TACK) or turn.state.pending_upload is not None:
+    is_too_soon = turn.t_s - turn.state.tacked_s < turn.config.shift_tacks_apart_s
+    if is_too_soon or is_busy(turn, TACK) or turn.state.pending_upload is not None:
         return
     half_rad = turn.no_go_half_rad
     off_rad = difference_rad(wind[0], vehicle.heading_rad)

@@ -110,6 +110,7 @@ class SkipperConfig:
     tack_corridor_m: float = 10.0      # SAIL_XTRACK_MAX, its default, until it has been read
     autopilot_beats: bool = True       # where the water is clear by its corridor the autopilot beats by itself
     shifts: bool = False               # there it is asked for a tack where the wind's shifts make one worth it
+    shift_tacks_apart_s: float = 10.0  # ... and no sooner after the last that was asked for
     no_go_pad_rad: float = 0.034907    # legs at least 2 deg outside: then the autopilot adds no tacks of its own
     replan_policy: ReplanPolicy = ReplanPolicy.WAYPOINT
     announce_m: float = 5.0            # the autopilot announces a waypoint 3 to 5 m early

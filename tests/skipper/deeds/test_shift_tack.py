@@ -69,12 +69,13 @@ def test_a_corridor_that_is_too_wide_without_them_is_sailed_in_by_the_shifts(shi
     assert bool(tacks(world)) == shifts
 
 
-def test_tacks_that_are_asked_for_are_apart():
-    world = beating(seed=1)
+@pytest.mark.parametrize("apart_s", [10.0, 40.0])
+def test_tacks_that_are_asked_for_are_apart(apart_s):
+    world = beating(seed=1, shift_tacks_apart_s=apart_s)
     assert world.run(1500, is_done)
     asked = [t for t, a in world.actions if isinstance(a, act.Tack)]
     assert len(asked) >= 2
-    assert all(b - a >= 10.0 for a, b in itertools.pairwise(asked))
+    assert all(b - a >= apart_s for a, b in itertools.pairwise(asked))
 
 
 def test_beside_a_rock_within_the_corridor_none_is_asked_for():
