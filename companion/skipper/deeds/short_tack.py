@@ -69,9 +69,9 @@ def _may_fail(turn: Turn, boat: PointEn, wind: tuple[float, float], floor_m: flo
         return True
     course, speed = vehicle.heading_rad, math.hypot(*turn.through_en_mps)
     there = _there(turn, boat, course, NEXT_S)
-    irons_s = max(IRONS_S, turn.state.tacking.irons_s)
-    need_m = floor_m + irons_s * min(water.sigma_mps, UNTOLD_MPS)
     tacking, is_starboard = turn.state.tacking, difference_rad(wind[0], course) > 0.0
+    irons_s = max(IRONS_S, tacking.irons_s)
+    need_m = floor_m + irons_s * min(water.sigma_mps, UNTOLD_MPS)
     learned_mps = tacking.starboard_lee_mps if is_starboard else tacking.port_lee_mps
     lee = lee_set(course_rad=course, twd_from_rad=wind[0], lee_mps=max(learned_mps, SET_SHARE * wind[1]))
     set_en_mps = (water.en_mps[0] + lee[0], water.en_mps[1] + lee[1])
