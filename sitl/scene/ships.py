@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import secrets
 import socket
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -24,6 +26,7 @@ BEAM_SHARE = 0.16
 BOAT_BEAM_SHARE = 0.35
 BOAT_M = 12.0              # up to here the beam is a boat's
 FIRST_MMSI = 211_000_001
+PORTS = range(20_000, 32_000)
 KEEP_M = 15.0              # what the second boat's field keeps between hulls
 REPULSIVE_M = 30.0         # its Gaussian beyond that: Schmitt's 100 m would send her round by 200 m
 
@@ -151,10 +154,18 @@ def send_datagram(data: bytes, port: int) -> None:
 
 
 def free_port() -> int:
-    """Return a UDP port of this machine that nobody listens on."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """Return a port of this machine that nobody has, of UDP and of TCP.
+
+    Not one of those that the system gives to whoever connects (32768 and above, as Linux has it): it would be given
+    away before its user listens there.
+    """
+    while True:
+        port = PORTS[secrets.randbelow(len(PORTS))]
+        with (contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
+              socket.socket() as tcp):
+            udp.bind(("127.0.0.1", port))
+            tcp.bind(("127.0.0.1", port))
+            return port
 
 
 def ship_of(event: EventSpec, number: int) -> Ship:

@@ -1,11 +1,14 @@
 """Scenario files: bad ones are one line that names file, place and remedy; all of ours load."""
 
+import socket
+from itertools import chain, count
 from pathlib import Path
 
 import pytest
 
 from companion.errors import InputError
 from sitl.scene.scenario import load_scenario
+from sitl.scene.ships import PORTS, free_port
 from sitl.scene.weather import scenario_wind
 
 OURS = sorted(Path("sitl/scenarios").glob("*.toml"))
@@ -51,3 +54,15 @@ def test_a_missing_file_is_one_line(tmp_path):
 def test_a_mission_is_a_scenario():
     scenario = load_scenario(Path("missions/open-water.toml"))
     assert scenario.mission == "open-water.toml"
+
+
+def test_a_free_port_is_nobodys_of_udp_and_of_tcp_and_none_that_the_system_gives_away(monkeypatch):
+    taken, numbers = free_port(), count(free_port() - PORTS.start)
+    for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):
+        drawn = chain([taken - PORTS.start], numbers)
+        monkeypatch.setattr("sitl.scene.ships.secrets.randbelow", lambda among, drawn=drawn: next(drawn) % among)
+        with socket.socket(socket.AF_INET, kind) as other:
+            other.bind(("127.0.0.1", taken))
+            assert free_port() != taken
+        assert next(drawn) != taken - PORTS.start     # that one was drawn
+    assert PORTS.stop <= 32_768
