@@ -30,6 +30,7 @@ LIES_S = 8.0                       # as the watchdog "in irons" has it
 FORGET_S = 20.0                    # settled longer ago than this, whatever follows is no tack from there
 LEAST_TWS_MPS = 1.5                # in less she does as she likes
 NEAR_SOLID_M = 60.0                # a tack that failed so near something asks for a new plan
+MOST_IRONS_S = 60.0                # more is a lull that she waited in: no room of a tack would be enough ever after
 MOST_LEE_MPS = 1.0                 # more is a position that has jumped
 TACK_FAILED = "a tack failed"
 
@@ -91,7 +92,7 @@ def lain(
     if now.began_s is None or t_s <= now.began_s:
         return then
     span_s = t_s - now.began_s
-    then = replace(then, irons_s=max(then.irons_s, span_s))
+    then = replace(then, irons_s=max(then.irons_s, min(span_s, MOST_IRONS_S)))
     if boat_en_m is None or now.began_en_m is None or span_s < LIES_S:
         return then
     abeam_rad = twd_from_rad - math.copysign(0.5 * math.pi, now.side)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from companion.boat.failed_tack import SHOOT_S
 from companion.skipper.step.tacking import NO_TACKS, PRIOR_TACKS, Tacking
-from companion.skipper.watch.tacks import LIES_S, MOST_LEE_MPS, followed, lain
+from companion.skipper.watch.tacks import LIES_S, MOST_IRONS_S, MOST_LEE_MPS, followed, lain
 
 D = math.radians
 
@@ -87,6 +87,7 @@ def test_a_failure_tells_how_long_she_lay_and_how_she_was_set_beside_the_current
     assert other == 0.0
     assert ended(None).irons_s == now.irons_s                      # no position: how long, and nothing more
     assert ended((1e6, 1e6)).starboard_lee_mps <= MOST_LEE_MPS     # it jumped
+    assert lain(began, NO_TACKS, 1000.0, None, twd, (0.0, 0.0)).irons_s == MOST_IRONS_S    # a lull
     shorter = lain(began, now, 101.0, (7.0, -3.0), twd, (0.0, 0.0))
     assert (shorter.irons_s, shorter.starboard_lee_mps, shorter.port_lee_mps) == (
         now.irons_s, now.starboard_lee_mps, now.port_lee_mps)      # the longest and the fastest of the voyage
