@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test test-long draws check docs slowest campaign nightly nightly-reference bench figures deb release clean
+.PHONY: env demo test test-long test-faults draws check docs slowest campaign nightly nightly-reference bench figures deb release clean
 env: $(ENV)
 
 # What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
@@ -61,6 +61,10 @@ test: $(ENV)
 test-long: $(ENV)
 	@$(KERNELS)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m long
+
+# What every change sails: the first 300 of the thousand faulty voyages, each seed the same every time.
+test-faults: $(ENV)
+	$(BIN)/sitl faults --runs 300
 
 # The tests that draw their examples, on new draws each time: what it finds is a defect, with the example that shows it.
 draws: $(ENV)

@@ -6,12 +6,12 @@ import math
 from dataclasses import replace
 
 from companion.messages import Mode, StatusText
-from companion.skipper.board.uploads import take_upload
 from companion.skipper.deeds.failsafe import note
 from companion.skipper.deeds.helm import MOTOR_OFF, MOTOR_ON
 from companion.skipper.passing import pass_gates
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.errands import errand, is_composed
+from companion.skipper.planning.uploads import take_upload
 from companion.skipper.planning.waits import utc_s
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.config import Guidance

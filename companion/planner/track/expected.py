@@ -45,6 +45,7 @@ class Expected:
         at_en: Where, and ``leg`` on which leg of the path.
         is_kept: Whether the floor is, everywhere; at a start that is nearer she only comes no nearer.
         lack_m: How far the worst place is below what it needs [m], 0 where none is.
+        error_m: The prediction's own stated error that was taken off there [m].
         worst_en: Where that is, and ``near_en`` the place of something solid that it is near to.
         worst_leg: On which leg.
         is_beat: The worst place is on a leg that is left to the autopilot.
@@ -56,10 +57,16 @@ class Expected:
     leg: int = 0
     is_kept: bool = True
     lack_m: float = 0.0
+    error_m: float = 0.0
     worst_en: tuple[float, float] | None = None
     near_en: tuple[float, float] | None = None
     worst_leg: int = 0
     is_beat: bool = False
+
+    @property
+    def is_within_error(self) -> bool:
+        """Whether the floor is kept, or lacks no more than the prediction's own error."""
+        return self.lack_m <= self.error_m
 
 
 @lru_cache(maxsize=8)   # by identity
@@ -122,7 +129,8 @@ def _expected(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...], ha
     worst, least = int(np.argmax(lack)), int(np.argmin(judged))
     found = Expected(
         clearance_m=float(judged[least]), at_en=_point(en[least]), leg=int(leg[least]), is_kept=not lack[worst] > 0.0,
-        lack_m=float(lack[worst]), worst_en=_point(en[worst]), near_en=_nearest(tracking, en[worst]),
+        lack_m=float(lack[worst]), error_m=float(error[worst]), worst_en=_point(en[worst]),
+        near_en=_nearest(tracking, en[worst]),
         worst_leg=int(leg[worst]))
     return _with_boards(problem, tracking, whole, first, beats, found) if has_boards and bool(beats.any()) else found
 
@@ -163,8 +171,8 @@ def _with_boards(
                 out = _changed(out, clearance_m=room, at_en=place, leg=int(n))
             lack = tracking.floor_m - room
             if lack > max(out.lack_m, 1e-9):
-                out = _changed(out, is_kept=False, lack_m=lack, worst_en=place, worst_leg=int(n), is_beat=True,
-                               near_en=_nearest(tracking, np.asarray(place)))
+                out = _changed(out, is_kept=False, lack_m=lack, error_m=0.0, worst_en=place, worst_leg=int(n),
+                               is_beat=True, near_en=_nearest(tracking, np.asarray(place)))
     return out
 
 

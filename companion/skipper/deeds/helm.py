@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from companion.messages import MissionState, Mode
-from companion.skipper.board.uploads import upload
+from companion.skipper.planning.uploads import upload
 from companion.skipper.step.actions import Action, Arm, RunMotor, SetCurrent, SetMode, Severity, Tack
 from companion.skipper.step.turn import SHOWS_S, Turn
+from companion.skipper.way.geometry import is_past
 
 ARMING, CURRENT = "arming", "set current"
 TACK = "tack"
@@ -77,6 +78,26 @@ def check_current(turn: Turn) -> None:
         turn.update(asked_seq=None)
         return
     make_current(turn, asked)
+
+
+def leave_passed(turn: Turn) -> None:
+    """Make the first item ahead current where the boat passed its own while the list was on its way.
+
+    The list was made for a boat that had not come so far; sent back it would turn round in whatever water there is.
+    """
+    state, route, boat = turn.state, turn.state.route, turn.boat_en
+    if route is None or boat is None or state.pending_upload is not None or turn.t_s - state.uploaded_s > CHECK_S:
+        return
+    area, floor_m, index = turn.voyage.area, turn.config.margin_floor_m, state.index
+    while index < turn.last_waypoint() and route.gate_of[index] < 0 and is_past(
+            boat, route.leg_from_en_m[index], route.points_en_m[index]):
+        back_m, on_m = (area.path_clearance_m([boat, route.points_en_m[n]]) for n in (index, index + 1))
+        if on_m < min(floor_m, back_m):
+            break
+        index += 1
+    if index > state.index and make_current(turn, index + 1):
+        turn.say(Severity.NOTICE, "passed", f"item {state.index + 1} was passed while it was on its way: "
+                 f"sailing for item {index + 1}", every_s=0.0)
 
 
 def repair(turn: Turn) -> bool:

@@ -7,11 +7,11 @@ import math
 from companion.boat import required_margin
 from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode
-from companion.skipper.board.uploads import upload
 from companion.skipper.deeds.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.ends import announcement
 from companion.skipper.planning.errands import fenced_off, home_trouble
+from companion.skipper.planning.uploads import upload
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import SafeEnd
 from companion.skipper.step.snapshot import WindHealth

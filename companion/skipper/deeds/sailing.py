@@ -13,7 +13,7 @@ from companion.skipper.deeds.by_field import last_resort
 from companion.skipper.deeds.doubt import stands_off
 from companion.skipper.deeds.failsafe import waits_for
 from companion.skipper.deeds.headings import desired_heading_rad
-from companion.skipper.deeds.helm import check_current, hand_back, is_busy, make_current, repair, set_mode
+from companion.skipper.deeds.helm import check_current, hand_back, is_busy, leave_passed, make_current, repair, set_mode
 from companion.skipper.deeds.rest import comes_to_rest, rest
 from companion.skipper.deeds.shift_tack import shift_tack
 from companion.skipper.deeds.short_tack import short_tack
@@ -77,6 +77,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
                  "not permitted: by plan", every_s=600.0)
         check_current(turn)
     else:
+        leave_passed(turn)
         check_current(turn)
         short_tack(turn)
         shift_tack(turn)

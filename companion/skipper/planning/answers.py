@@ -9,12 +9,12 @@ import numpy as np
 
 from companion.planner import Plan, PlanStatus
 from companion.planner.problem import evaluate, resolved
-from companion.skipper.board.uploads import upload
 from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.errands import Kind, errand
 from companion.skipper.planning.not_found import asks_again, not_found
 from companion.skipper.planning.track import of_way, said
+from companion.skipper.planning.uploads import upload
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step.actions import Change, ReplanReason, Severity
 from companion.skipper.step.missions import Tail, splice
@@ -64,7 +64,9 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
         return   # no plan from that waypoint takes its tack away
     if _keep_old(turn, pending, plan):
         return
-    put_in_place(turn, pending, plan, keep, set_current)
+    refused = put_in_place(turn, pending, plan, keep, set_current)
+    if refused:
+        not_found(turn, pending, refused)
 
 
 def _may_still_turn_before(turn: Turn, waypoint_en: PointEn) -> bool:
@@ -137,8 +139,8 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     return True
 
 
-def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> None:
-    """Splice a plan into the route and ask for its upload."""
+def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> str:
+    """Splice a plan into the route and ask for its upload; return why it may not be, in words; empty: it may."""
     planned = _apart([(float(e), float(n)) for e, n in plan.waypoints_en])
     points = [*pending.lead_in, *planned[1:]]
     start = pending.start_en_m
@@ -175,14 +177,15 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
         turn.update(
             missed_s=None, route=replace(route, items=turn.state.route.items, points_en_m=turn.state.route.points_en_m))
         turn.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
-        return
+        return ""
     way = route.points_en_m[turn.state.index if set_current is None else set_current - 1:-1]
     met = meetings(turn)
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
     change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
     _look_at_time(turn, route)
     clear = said(expected_m, turn.config.margin_floor_m)
-    upload(turn, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change)
+    return upload(
+        turn, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change, planned=pending)
 
 
 def _gybed_round(turn: Turn, pending: PendingPlan, start: PointEn, points: list[PointEn]) -> tuple[PointEn, ...]:

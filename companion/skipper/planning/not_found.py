@@ -5,19 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from companion.messages import Command, waypoint
-from companion.skipper.board.uploads import upload
+from companion.skipper.planning.admission import is_on_board_sound, is_sound, leads_there
 from companion.skipper.planning.asking import request
-from companion.skipper.planning.autopilot_beats import room_m
 from companion.skipper.planning.track import of_way, steps
+from companion.skipper.planning.uploads import upload
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.missions import loiter_place
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.step.turn import Turn
-from companion.skipper.way.judge import judge
 from companion.skipper.way.rejudged import too_risky
 from companion.skipper.way.stemming import waiting_place
-from companion.skipper.way.voyage import PointEn
 
 FOUL = "current too strong"   # the code under which it is said
 UNDER_WAY_TRIES, ASHORE_TRIES = 2, 5   # of a planner that does not answer, before the next step of the ladder
@@ -41,18 +39,12 @@ def asks_again(turn: Turn, pending: PendingPlan, reason: str) -> bool:
     return True
 
 
-def is_old_plan_sound(turn: Turn) -> bool:
-    """Return whether the mission sailed now is still good for the present wind and keeps the margin's floor."""
-    boat, ahead = turn.boat_en, turn.ahead()
-    return boat is not None and bool(ahead) and _is_sound(turn, [boat, *ahead])
-
-
 def _keeps_floor(turn: Turn, pending: PendingPlan) -> bool:
-    """Return whether the track of what is left of the mission keeps the floor."""
+    """Return whether the track of what is left of the mission keeps the floor, within the prediction's own error."""
     boat, vehicle, leg, ahead = turn.boat_en, turn.snapshot.vehicle, turn.leg(), turn.ahead()
     if boat is None or vehicle is None or leg is None or not ahead:
         return True
-    return of_way(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad, before_en=None).is_kept
+    return of_way(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad, before_en=None).is_within_error
 
 
 def _risk_of_old(turn: Turn, pending: PendingPlan) -> str:
@@ -63,21 +55,6 @@ def _risk_of_old(turn: Turn, pending: PendingPlan) -> str:
     return too_risky(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad)
 
 
-def _is_sound(turn: Turn, way: list[PointEn]) -> bool:
-    """Return whether a way is good for the mean wind and for the present one, and keeps the margin's floor.
-
-    After a shift the mean is of a wind that blows no more; only the leg that is sailed now is held against the present.
-    """
-    mean, now = turn.wind_mean, turn.wind_now
-    if mean is None or now is None:
-        return False
-    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
-    return all(
-        judge(part, boat=turn.voyage.boat, no_go_half_rad=turn.no_go_half_rad, twd_from_rad=wind[0], tws_mps=wind[1],
-              area=turn.voyage.area, beat_room_m=room_m(turn), current_en_mps=turn.current_en_mps).is_sound(floor_m)
-        for part, wind in ((way, mean), (way[:2], now)))
-
-
 def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
     """Keep the old plan while it is sound, else take the next step of the ladder, at last hold."""
     ladder = steps(turn)
@@ -85,8 +62,8 @@ def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
     where = ladder[min(pending.rung, len(ladder) - 1)].name or "as configured"
     met = meetings(turn) if state.route is not None else ()
     if (
-        pending.rung == 0 and state.route is not None and not met and is_old_plan_sound(turn)
-        and _keeps_floor(turn, pending) and not _risk_of_old(turn, pending)
+        (pending.rung == 0 or leads_there(turn, pending)) and state.route is not None and not met
+        and is_on_board_sound(turn) and _keeps_floor(turn, pending) and not _risk_of_old(turn, pending)
     ):
         turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
         turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
@@ -105,11 +82,11 @@ def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
             return
     turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
     risk = _risk_of_old(turn, pending)
-    if risk and state.route is not None and not met and is_old_plan_sound(turn) and _keeps_floor(turn, pending):
+    if risk and state.route is not None and not met and is_on_board_sound(turn) and _keeps_floor(turn, pending):
         turn.say(Severity.WARNING, "no plan",
                  f"no plan on any step of the ladder ({reason}): the old one stays; {risk}", every_s=0.0)
         return
-    if met and is_old_plan_sound(turn):
+    if met and is_on_board_sound(turn):
         # Loitering in a vessel's way is no better than sailing on through it: the operator must know.
         turn.say(
             Severity.CRITICAL, "no way clear",
@@ -151,7 +128,7 @@ def _wait_against(turn: Turn, pending: PendingPlan, foul: str, *, count: int) ->
 def _tail_only(turn: Turn) -> bool:
     """Return whether the way to the present target is sound by itself, so that only the tail needs a plan."""
     boat, leg = turn.boat_en, turn.leg()
-    return boat is not None and leg is not None and _is_sound(turn, [boat, leg[1]])
+    return boat is not None and leg is not None and is_sound(turn, [boat, leg[1]])
 
 
 def hold(turn: Turn, why: str, *, anew: bool = False) -> None:

@@ -5,18 +5,27 @@ from __future__ import annotations
 from dataclasses import replace
 
 from companion.skipper.board.mark import marked
+from companion.skipper.planning.admission import refusal
 from companion.skipper.step.actions import Change, Severity, UploadMission
 from companion.skipper.step.missions import common_prefix, stopgap
 from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import UploadOutcome, UploadResult
-from companion.skipper.step.state import PendingUpload, Retry
+from companion.skipper.step.state import PendingPlan, PendingUpload, Retry
 from companion.skipper.step.turn import Turn
 
 
 def upload(
     turn: Turn, route: Route, set_current: int | None, text: str, *, whole: bool = False, change: Change | None = None,
-) -> None:
-    """Ask for the upload of a route, with our mark; without permission it stays ready and the status says so."""
+    planned: PendingPlan | None = None,
+) -> str:
+    """Ask for the upload of a route, with our mark; without permission it stays ready and the status says so.
+
+    A route that was ``planned`` must be admitted (``companion.skipper.planning.admission``). Return why it is not, in
+    words; empty: it is.
+    """
+    refused = "" if planned is None else refusal(turn, route, set_current, planned)
+    if refused:
+        return refused
     route = replace(route, items=marked(route.items))
     old = turn.state.route
     known = old is not None and not turn.state.foreign and turn.state.checked_mission and not whole
@@ -35,10 +44,11 @@ def upload(
     if not turn.act(action):
         turn.update(ready_route=route)
         turn.say(Severity.WARNING, "upload not permitted", "a plan is ready; uploading is not permitted")
-        return
+        return ""
     # A read that is still under way will tell of the mission before this upload: its answer is not wanted.
     turn.update(pending_read=None, ready_route=None, pending_upload=PendingUpload(
         upload_id=number, t_s=turn.t_s, route=route, set_current=set_current, keep_first=action.keep_first))
+    return ""
 
 
 def take_upload(turn: Turn, outcome: UploadOutcome) -> None:

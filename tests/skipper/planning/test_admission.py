@@ -1,0 +1,133 @@
+"""What may go to the autopilot: nothing below the floor, and nothing that promises less than what is on board."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from companion.planner import plan
+from companion.skipper.deeds.helm import leave_passed
+from companion.skipper.planning.admission import refusal
+from companion.skipper.planning.answers import take_plan
+from companion.skipper.planning.asking import request
+from companion.skipper.planning.not_found import not_found
+from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, SetCurrent, UploadMission
+from companion.skipper.step.snapshot import PlanOutcome
+from companion.skipper.way.voyage import Goal
+from tests.skipper.planning.test_tacks_fail import turn_of
+from tests.skipper.test_voyage import make
+
+GOAL = (0.0, 220.0)
+ROCK = shapely.box(-30.0, 80.0, -10.0, 120.0)   # its eastern side is 10 m west of the straight way
+MARGIN_M, FLOOR_M = 14.0, 4.0
+
+
+def sailing(way=((0.0, 60.0), GOAL), *, rock=ROCK, **config):
+    """Return a boat under way to the north on a beam reach, past a rock to port, on ``way``."""
+    world = make(Goal(en_m=GOAL, radius_m=6.0, name="the goal"), obstacles=(rock,), wind=lambda t: (math.pi / 2, 5.0),
+                 config={"margin_m": MARGIN_M, "margin_floor_m": FLOOR_M, **config})
+    assert world.run(150, lambda w: w.state.sailing and w.position[1] > 10.0)
+    route, boat = world.state.route, world.position
+    end = route.points_en_m[-1]
+    points = (*way, end)
+    world.state = replace(world.state, index=0, own_index=0, pending_plan=None, pending_upload=None, route=replace(
+        route, items=(*route.items[:1] * len(way), route.items[-1]), points_en_m=points,
+        leg_from_en_m=(boat, *points[:-1]), gate_of=(*(-1,) * (len(way) - 1), 0, -1), margin_m=MARGIN_M))
+    return world
+
+
+def offered(turn, way, *, reason=ReplanReason.ORDER, rung=0):
+    """Let the planner answer a request from the boat with the waypoints ``way``; return the actions that follow."""
+    assert request(turn, reason, rung=rung)
+    pending = turn.state.pending_plan
+    turn.actions.clear()
+    found = plan(pending.problem, expansions=4000)
+    answer = replace(found, waypoints_en=np.asarray([pending.problem.start_en, *way]), cost_s=1.0)
+    take_plan(turn, PlanOutcome(request_id=pending.request_id, plan=answer))
+    return turn.actions
+
+
+def uploads(actions):
+    return [a for a in actions if isinstance(a, UploadMission)]
+
+
+def test_a_plan_that_keeps_what_is_asked_goes_on_board():
+    turn = turn_of(sailing())
+    assert uploads(offered(turn, [(8.0, 100.0), GOAL]))
+
+
+def test_nothing_below_the_floor_goes_on_board_from_a_place_that_is_not():
+    """What is on board is closed by a rock here, and that is no reason: the ladder's next answer is asked for."""
+    turn = turn_of(sailing(way=((-20.0, 100.0), GOAL)))
+    actions = offered(turn, [(-9.0, 100.0), GOAL])
+    assert uploads(actions) == []
+    [ladder] = [a for a in actions if isinstance(a, Announce) and a.code.startswith("ladder")]
+    assert "clear, the floor is 4 m" in ladder.text
+    assert any(isinstance(a, RequestPlan) for a in actions)
+
+
+@pytest.mark.parametrize(("way", "is_open"), [(((12.0, 100.0), GOAL), True), (((-20.0, 100.0), GOAL), False)])
+def test_a_smaller_margin_goes_on_board_only_where_what_is_there_is_closed(way, is_open):
+    turn = turn_of(sailing(way=way))
+    assert request(turn, ReplanReason.ORDER, rung=1)
+    assert turn.state.pending_plan.facts.margin_m < MARGIN_M
+    actions = offered(turn, [(3.0, 100.0), GOAL], rung=1)
+    assert bool(uploads(actions)) is not is_open
+    if is_open:
+        assert not any(isinstance(a, RequestPlan) for a in actions)   # it stays: no further step down the ladder
+        assert turn.state.route.points_en_m[:2] == way
+
+
+def test_a_way_that_lacks_less_than_the_predictions_error_stays_when_nothing_better_is_found():
+    """A tenth of a metre at the floor is no reason to give up margin, and to change course before a waypoint."""
+    for east, stays in ((-4.8, True), (-9.5, False)):
+        turn = turn_of(sailing(way=((east, 100.0), GOAL)))
+        assert request(turn, ReplanReason.ORDER)
+        turn.actions.clear()
+        not_found(turn, turn.state.pending_plan, "none")
+        asks_for_less = any(isinstance(a, RequestPlan) for a in turn.actions)
+        assert asks_for_less is not stays
+
+
+def test_from_below_the_floor_only_what_comes_no_nearer_goes_on_board():
+    world = sailing()
+    beside = (-7.0, 100.0)   # 3 m from the rock, on its eastern side, heading along it
+    world.position, world.state = beside, replace(world.state, last_seen=None)
+    turn = turn_of(world)
+    assert request(turn, ReplanReason.OFF_LEG)
+    pending = turn.state.pending_plan
+
+    def refused(*points):
+        ways = (*points, GOAL, turn.state.route.points_en_m[-1])
+        route = replace(turn.state.route, points_en_m=ways, items=turn.state.route.items[:1] * len(ways),
+                        leg_from_en_m=(beside, *ways[:-1]), gate_of=(*(-1,) * len(points), 0, -1))
+        return refusal(turn, route, 1, replace(pending, start_en_m=beside))
+
+    assert refused((20.0, 120.0)) == ""
+    assert "the boat is" in refused((-14.0, 115.0))
+
+
+def test_an_item_that_was_passed_during_its_upload_is_not_turned_back_for():
+    """An upload of six seconds brought a list that begins behind the boat, and a rock lay where it turned round."""
+    way = ((0.0, 20.0), (3.0, 26.0), (4.0, 60.0), GOAL)
+    world = sailing(way=way)
+    world.position, world.state = (0.0, 34.0), replace(world.state, last_seen=None)
+    for uploaded_s, wanted in ((world.t, [3]), (world.t - 30.0, [])):
+        turn = turn_of(world)
+        turn.update(uploaded_s=uploaded_s)
+        leave_passed(turn)
+        assert [a.seq for a in turn.actions if isinstance(a, SetCurrent)] == wanted
+
+
+def test_a_gate_is_never_left_out_as_passed():
+    world = sailing(way=((0.0, 20.0), (4.0, 60.0), GOAL))
+    world.position = (0.0, 34.0)
+    route = replace(world.state.route, gate_of=(0, -1, -1, -1))
+    world.state = replace(world.state, uploaded_s=world.t, last_seen=None, route=route)
+    turn = turn_of(world)
+    leave_passed(turn)
+    assert turn.actions == []
