@@ -40,12 +40,12 @@ def failed_tack(
     Both end where she tries again, on the old course. ``course_rad`` and ``speed_mps`` are hers before the corner.
     """
     up = course_rad + 0.5 * wrap_pi(twd_from_rad - course_rad)
-    shot = _moved(np.asarray(corner_en, dtype=np.float64), up, SHOOT_S * speed_mps)
+    shot = _moved(corner_en, up, SHOOT_S * speed_mps)
     blown = _moved(shot, twd_from_rad + math.pi, BLOWN_SHARE * tws_mps * irons_s)
-    carried = irons_s * np.asarray(current_en_mps)
-    ends = [_moved(place, course_rad, FILL_S * speed_mps) for place in (blown + carried, shot + carried)]
-    corner = np.asarray(corner_en, dtype=np.float64)
-    return np.array([corner, shot, blown + carried, ends[0]]), np.array([corner, shot, shot + carried, ends[1]])
+    east, north = irons_s * current_en_mps[0], irons_s * current_en_mps[1]
+    lain = (blown[0] + east, blown[1] + north), (shot[0] + east, shot[1] + north)
+    ends = [_moved(place, course_rad, FILL_S * speed_mps) for place in lain]
+    return np.array([corner_en, shot, lain[0], ends[0]]), np.array([corner_en, shot, lain[1], ends[1]])
 
 
 def lee_set(*, course_rad: float, twd_from_rad: float, lee_mps: float) -> tuple[float, float]:
@@ -54,5 +54,5 @@ def lee_set(*, course_rad: float, twd_from_rad: float, lee_mps: float) -> tuple[
     return lee_mps * math.sin(abeam), lee_mps * math.cos(abeam)
 
 
-def _moved(place: NDArray[np.float64], course_rad: float, length_m: float) -> NDArray[np.float64]:
-    return place + length_m * np.array([math.sin(course_rad), math.cos(course_rad)])
+def _moved(place: tuple[float, float], course_rad: float, length_m: float) -> tuple[float, float]:
+    return place[0] + length_m * math.sin(course_rad), place[1] + length_m * math.cos(course_rad)

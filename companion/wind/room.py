@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from companion.frozen import changed
 from companion.geo.angles import wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindForecast, WindQuality, WindSample, WindSource
 from companion.wind.estimators.catalogue import Forecaster
@@ -88,9 +88,9 @@ class WindRoom:
         status = self._watch.judge(sample)
         if sample.source is WindSource.AUTOPILOT_TRUE:
             extra = self._lost_to_filter(sample)
-            status = replace(status, extra_sigma_rad=math.hypot(status.extra_sigma_rad, extra))
+            status = changed(status, extra_sigma_rad=math.hypot(status.extra_sigma_rad, extra))
         judged = status.sample or sample
-        self._status = replace(status, sample=replace(judged, quality=_quality(judged, status)))
+        self._status = changed(status, sample=changed(judged, quality=_quality(judged, status)))
         # A reading that is not believed is not fed at all: the forecast then ages, and widens, by itself.
         if max(status.weight, status.speed_weight) > 0.0:
             self._estimator.update(
@@ -121,9 +121,9 @@ class WindRoom:
             return None
         age_s = max(0.0, t_s - status.t_s)
         if age_s <= SILENT_S:
-            return replace(status, age_s=age_s)
+            return changed(status, age_s=age_s)
         verdicts = (*(v for v in status.verdicts if v is not Verdict.GOOD), Verdict.SILENT)
-        return replace(status, age_s=age_s, verdicts=verdicts, reason=f"no wind for {age_s:.0f} s")
+        return changed(status, age_s=age_s, verdicts=verdicts, reason=f"no wind for {age_s:.0f} s")
 
     def forecast_table(
         self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None,
@@ -135,7 +135,7 @@ class WindRoom:
         status = self._status
         sigma = np.hypot(status.widening * table.sigma_twd_rad, status.extra_sigma_rad)
         factor = sigma / table.sigma_twd_rad
-        return replace(
+        return changed(
             table, sigma_twd_rad=np.minimum(sigma, SIGMA_MAX_RAD),
             half_width_rad=np.minimum(table.half_width_rad * factor[:, None], math.pi),
         )

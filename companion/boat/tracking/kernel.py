@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat.tracking.scurve import leg_s, on_leg, top_speed_mps
+from companion.boat.tracking.scurve import leg_s, on_leg, rise_s, top_speed_mps
 from companion.kernels.jit import kernel
 
 STEP_S = 0.05
@@ -48,7 +48,12 @@ RUDDER_MAX_RAD = math.radians(35.0)
 @kernel
 def turn_to(angle_rad: float) -> float:
     """Return the angle on -pi to pi."""
-    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+    angle = angle_rad + math.pi
+    if 0.0 <= angle < 2.0 * math.pi:     # what a remainder comes to within a turn either way, without its division
+        return angle - math.pi
+    if -2.0 * math.pi < angle < 0.0:
+        return (angle + 2.0 * math.pi) - math.pi
+    return angle % (2.0 * math.pi) - math.pi
 
 
 @kernel
@@ -57,6 +62,19 @@ def polar_at(curve: NDArray[np.float64], twa_rad: float) -> float:
     place = abs(twa_rad) / math.pi * (curve.shape[0] - 1)
     i = min(int(place), curve.shape[0] - 2)
     return float(curve[i] + (curve[i + 1] - curve[i]) * (place - i))
+
+
+@kernel
+def remembered(noise: NDArray[np.float64], first: NDArray[np.float64], phi: float) -> NDArray[np.float64]:
+    """Return (count, steps) processes x' = phi x + noise, from their ``first`` values and (steps, count) noise."""
+    steps, count = noise.shape
+    out = np.empty((count, steps))
+    for j in range(count):
+        x = first[j]
+        for i in range(steps):
+            out[j, i] = x
+            x = phi * x + noise[i, j]
+    return out
 
 
 @kernel
@@ -76,9 +94,10 @@ def sail(
     leg, last, looked_at = 0, points.shape[0] - 2, -1
     oe, on, de, dn, ue, un, length, v_this, whole = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     ge, gn, after, v_next, whole_next = 0.0, 0.0, 0.0, 0.0, 0.0
+    rise, rise_next = 0.0, 0.0
     accel, jerk, fastest = h[H_ACCEL], h[H_JERK], h[H_WP_SPEED]
     t_prev, t_this, t_next = 0.0, 0.0, 0.0      # along the curves of the leg before, this one, the next
-    l_prev, v_prev, pe, pn = 0.0, 1.0, 0.0, 0.0
+    l_prev, v_prev, rise_prev, whole_prev, pe, pn = 0.0, 1.0, 0.0, 0.0, 0.0, 0.0
     scale, pace = 0.0, 0.0
     he, hn, te, tn = 0.0, 0.0, points[0, 0], points[0, 1]
     want_speed = 0.0
@@ -94,17 +113,19 @@ def sail(
         twd = wind_rad[i] + share * turn_to(wind_rad[j] - wind_rad[i])
         heard += dt / max(h[H_WIND_LAG_S], dt) * turn_to(twd - heard)
         # what the autopilot believes of its place is a little old
-        ve, vn = v * math.sin(yaw), v * math.cos(yaw)
+        sin, cos = math.sin(yaw), math.cos(yaw)
+        ve, vn = v * sin, v * cos
         be, bn = e - ve * h[H_LATENCY_S], n - vn * h[H_LATENCY_S]
         if leg != looked_at:
             oe, on, de, dn = points[leg, 0], points[leg, 1], points[leg + 1, 0], points[leg + 1, 1]
             xe, xn = (points[leg + 2, 0], points[leg + 2, 1]) if leg < last else (de, dn)
             length = math.hypot(de - oe, dn - on)
-            ue, un = ((de - oe) / length, (dn - on) / length) if length > 1e-6 else (math.sin(yaw), math.cos(yaw))
+            ue, un = ((de - oe) / length, (dn - on) / length) if length > 1e-6 else (sin, cos)
             after = max(math.hypot(xe - de, xn - dn), 1e-6)
             ge, gn = (xe - de) / after, (xn - dn) / after
             v_this, v_next = top_speed_mps(length, fastest, accel, jerk), top_speed_mps(after, fastest, accel, jerk)
-            whole, whole_next = leg_s(length, v_this, accel, jerk), leg_s(after, v_next, accel, jerk)
+            rise, rise_next = rise_s(v_this, accel, jerk), rise_s(v_next, accel, jerk)
+            whole, whole_next = leg_s(length, v_this, rise), leg_s(after, v_next, rise_next)
             looked_at = leg
         # --- the point on the legs waits for the boat, or hurries with her
         want = 1.0
@@ -115,12 +136,12 @@ def sail(
         scale += (want - scale) * min(1.0, dt * jerk / accel)
         ahead_s = scale * dt
         t_this += ahead_s
-        s1, w1, a1 = on_leg(t_this, length, v_this, accel, jerk)
+        s1, w1, a1 = on_leg(t_this, length, v_this, rise, whole, accel, jerk)
         te, tn, he, hn, ae, an = oe + s1 * ue, on + s1 * un, w1 * ue, w1 * un, a1 * ue, a1 * un
         if l_prev > 0.0:
             # what is left of the leg before is sailed at the same time: that is the corner
             t_prev += ahead_s
-            s0, w0, a0 = on_leg(t_prev, l_prev, v_prev, accel, jerk)
+            s0, w0, a0 = on_leg(t_prev, l_prev, v_prev, rise_prev, whole_prev, accel, jerk)
             te, tn = te + (s0 - l_prev) * pe, tn + (s0 - l_prev) * pn
             he, hn, ae, an = he + w0 * pe, hn + w0 * pn, ae + a0 * pe, an + a0 * pn
         arrived = t_this >= whole
@@ -128,8 +149,8 @@ def sail(
             left = whole - t_this
             if t_next <= 0.0 and left < 0.5 * min(whole, whole_next):
                 # the next leg may begin when the middle of the corner is within the radius, slow and soft enough
-                s1, w1, a1 = on_leg(t_this + 0.5 * left, length, v_this, accel, jerk)
-                s2, w2, a2 = on_leg(0.5 * left, after, v_next, accel, jerk)
+                s1, w1, a1 = on_leg(t_this + 0.5 * left, length, v_this, rise, whole, accel, jerk)
+                s2, w2, a2 = on_leg(0.5 * left, after, v_next, rise_next, whole_next, accel, jerk)
                 turn_m = math.hypot((s1 - length) * ue + s2 * ge, (s1 - length) * un + s2 * gn)
                 if (
                     turn_m < h[H_WP_RADIUS] and math.hypot(w1 * ue + w2 * ge, w1 * un + w2 * gn) < min(v_this, v_next)
@@ -138,16 +159,15 @@ def sail(
                     t_next = 1e-9
             if t_next > 0.0:
                 t_next += ahead_s
-                s2, w2, a2 = on_leg(t_next, after, v_next, accel, jerk)
+                s2, w2, a2 = on_leg(t_next, after, v_next, rise_next, whole_next, accel, jerk)
                 te, tn, he, hn = te + s2 * ge, tn + s2 * gn, he + w2 * ge, hn + w2 * gn
                 ae, an = ae + a2 * ge, an + a2 * gn
                 arrived = arrived or t_next >= whole - t_this
         pace = math.hypot(he, hn)
         # --- reached?
-        dist = math.hypot(de - be, dn - bn)
         xtrack = (bn - on) * ue - (be - oe) * un    # to the left of the leg
         past = (be - oe) * ue + (bn - on) * un >= length
-        reached = arrived and (leg < last or dist <= h[H_WP_RADIUS] or past)
+        reached = arrived and (leg < last or math.hypot(de - be, dn - bn) <= h[H_WP_RADIUS] or past)
         # --- what is steered
         bearing = math.atan2(de - be, dn - bn)
         beats = tacking or abs(turn_to(heard - bearing)) <= h[H_NO_GO] + NO_GO_PAD_RAD
@@ -177,7 +197,6 @@ def sail(
             wanted = math.hypot(le, ln)
             if wanted > h[H_WP_SPEED]:
                 le, ln, wanted = le * h[H_WP_SPEED] / wanted, ln * h[H_WP_SPEED] / wanted, h[H_WP_SPEED]
-            sin, cos = math.sin(yaw), math.cos(yaw)
             lateral = h[H_VEL_P] * ((le - ve) * cos - (ln - vn) * sin) + ae * cos - an * sin
             slowest = min(wanted, math.sqrt(h[H_LATERAL] * h[H_TURN_RADIUS]))
             ahead = max(le * sin + ln * cos, slowest)
@@ -206,6 +225,7 @@ def sail(
             if leg == last:
                 break
             l_prev, v_prev, pe, pn, t_prev = length, v_this, ue, un, t_this
+            rise_prev, whole_prev = rise, whole
             t_this, t_next = t_next, 0.0
             leg += 1
     return rows

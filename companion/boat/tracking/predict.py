@@ -98,9 +98,4 @@ def drawn_winds(
     rng = np.random.default_rng(seed)
     phi = math.exp(-k.STEP_S * k.WIND_STEPS / tau_s) if tau_s > 0.0 else 1.0
     noise = rng.standard_normal((steps, count)) * math.sqrt(1.0 - phi * phi)
-    x = rng.standard_normal(count)
-    out = np.empty((count, steps))
-    for i in range(steps):
-        out[:, i] = x
-        x = phi * x + noise[i]
-    return np.ascontiguousarray(twd_from_rad + sigma_rad * out)
+    return np.asarray(twd_from_rad + sigma_rad * k.remembered(noise, rng.standard_normal(count), phi))

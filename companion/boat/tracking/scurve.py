@@ -31,16 +31,14 @@ def rise_s(v: float, accel: float, jerk: float) -> float:
 
 
 @kernel
-def leg_s(length_m: float, v: float, accel: float, jerk: float) -> float:
-    """Return how long a leg takes whose top speed is ``v``."""
-    rise = rise_s(v, accel, jerk)
+def leg_s(length_m: float, v: float, rise: float) -> float:
+    """Return how long a leg takes whose top speed is ``v``, gathered in ``rise``."""
     return 2.0 * rise + max(0.0, length_m - v * rise) / v
 
 
 @kernel
-def along(t: float, v: float, accel: float, jerk: float) -> tuple[float, float, float]:
-    """Return place, speed and acceleration ``t`` after setting off towards top speed ``v``."""
-    rise = rise_s(v, accel, jerk)
+def along(t: float, v: float, rise: float, accel: float, jerk: float) -> tuple[float, float, float]:
+    """Return place, speed and acceleration ``t`` after setting off towards top speed ``v``, gathered in ``rise``."""
     if t >= rise:
         return 0.5 * v * rise + v * (t - rise), v, 0.0
     ramp = accel / jerk if v >= accel * accel / jerk else 0.5 * rise
@@ -56,14 +54,18 @@ def along(t: float, v: float, accel: float, jerk: float) -> tuple[float, float, 
 
 
 @kernel
-def on_leg(t: float, length_m: float, v: float, accel: float, jerk: float) -> tuple[float, float, float]:
-    """Return place [m], speed and acceleration along a leg, ``t`` after its start; at its end at rest."""
-    whole = leg_s(length_m, v, accel, jerk)
+def on_leg(
+    t: float, length_m: float, v: float, rise: float, whole: float, accel: float, jerk: float,
+) -> tuple[float, float, float]:
+    """Return place [m], speed and acceleration along a leg, ``t`` after its start; at its end at rest.
+
+    ``rise`` and ``whole`` are ``rise_s`` and ``leg_s`` of it, which hold for the whole leg.
+    """
     if t >= whole:
         return length_m, 0.0, 0.0
     if t <= 0.0:
         return 0.0, 0.0, 0.0
     if t <= 0.5 * whole:
-        return along(t, v, accel, jerk)
-    s, w, a = along(whole - t, v, accel, jerk)
+        return along(t, v, rise, accel, jerk)
+    s, w, a = along(whole - t, v, rise, accel, jerk)
     return length_m - s, w, -a

@@ -46,19 +46,22 @@ class Throughput:
 
     def __init__(self) -> None:
         self._pieces: deque[tuple[float, int, int]] = deque()
+        self._received = self._sent = 0   # the sums of what is kept
 
     def note(self, t_s: float, *, received: int = 0, sent: int = 0) -> None:
         """Note bytes."""
         self._pieces.append((t_s, received, sent))
+        self._received += received
+        self._sent += sent
         self._forget(t_s)
 
     def bytes_per_s(self, t_s: float) -> tuple[float, float]:
         """Return what came in and went out [bytes/s]."""
         self._forget(t_s)
-        received = sum(n for _, n, _ in self._pieces)
-        sent = sum(n for _, _, n in self._pieces)
-        return received / RATE_WINDOW_S, sent / RATE_WINDOW_S
+        return self._received / RATE_WINDOW_S, self._sent / RATE_WINDOW_S
 
     def _forget(self, t_s: float) -> None:
         while self._pieces and t_s - self._pieces[0][0] > RATE_WINDOW_S:
-            self._pieces.popleft()
+            _, received, sent = self._pieces.popleft()
+            self._received -= received
+            self._sent -= sent

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from companion.boat.failed_tack import IRONS_S
 
@@ -27,6 +27,22 @@ ROUND_RADII = 5.0
 """Turning radii in the leg of a round: from close-hauled to dead down wind and on, 2 tan(135°/2) of them."""
 
 SIGMA_MODELS = ("none", "kalman", "ar1", "forecast")
+
+
+def interpolated(x: float, nodes: Sequence[float], values: Sequence[float]) -> float:
+    """Return what ``np.interp`` does, to the bit, of one number and increasing nodes: in a tenth of its time.
+
+    The scorer asks at every leg; numpy makes arrays of both tuples each time.
+    """
+    if math.isnan(x):
+        return x
+    i = bisect_right(nodes, x) - 1
+    if i < 0:
+        return float(values[0])
+    if i == len(nodes) - 1 or nodes[i] == x:
+        return float(values[i])
+    slope = (values[i + 1] - values[i]) / (nodes[i + 1] - nodes[i])
+    return float(slope * (x - nodes[i]) + values[i])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +72,7 @@ class Sigma:
             v0, vi = self.sigma0_rad**2, self.sigma_inf_rad**2
             return math.sqrt(vi + (v0 - vi) * math.exp(-2.0 * self.rho_hz * t_s))
         if self.model == "forecast":
-            return float(np.interp(t_s, self.horizon_s, self.sigma_rad))
+            return interpolated(t_s, self.horizon_s, self.sigma_rad)
         return 0.0
 
 
@@ -119,7 +135,7 @@ class BoatLimits:
 
     def speed_mps(self, twa_rad: float) -> float:
         """Return the speed [m/s] at the true wind angle."""
-        return float(np.interp(abs(twa_rad), self.polar_twa_rad, self.polar_mps))
+        return interpolated(abs(twa_rad), self.polar_twa_rad, self.polar_mps)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,6 @@ from pathlib import Path
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import shapely
 
 from companion.planner.problem.json_read import read_fields
@@ -30,6 +29,7 @@ from companion.planner.problem.parts import (
     Target,
     Wind,
     Zone,
+    interpolated,
 )
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ class Problem:
         """Return b(t): how much the no-go half angle is widened at ``t_s`` [rad]."""
         sigma = self.wind.sigma
         if sigma.model == "forecast" and sigma.half_width_rad is not None:
-            return float(np.interp(t_s, sigma.horizon_s, sigma.half_width_rad))
+            return interpolated(t_s, sigma.horizon_s, sigma.half_width_rad)
         return self.k_delta * sigma.at(t_s)
 
     def no_go_half_rad(self, t_s: float) -> float:

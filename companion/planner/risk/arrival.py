@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.boat.failed_tack import IRONS_S
+from companion.kernels.jit import kernel
 from companion.planner.plan import Arrival, Leg
 from companion.planner.problem.beat import beat_s
 from companion.planner.problem.strength import Speeds, Strength
@@ -93,12 +94,45 @@ class _Averaged:
 
     def drawn(self, noise: Floats) -> Floats:
         """Return unit processes (steps, winds) of independent draws."""
-        fresh = math.sqrt(max(0.0, 1.0 - self.keep * self.keep))
-        out = np.empty_like(noise)
-        x = out[0] = noise[0]
-        for i in range(1, len(noise)):
-            x = out[i] = self.keep * x + fresh * noise[i]
-        return out
+        return np.asarray(_drawn(noise, self.keep, math.sqrt(max(0.0, 1.0 - self.keep * self.keep))))
+
+
+@kernel
+def _drawn(noise: Floats, keep: float, fresh: float) -> Floats:
+    """Return x' = keep x + fresh noise, column by column, from the noise's first row on."""
+    out = np.empty_like(noise)
+    for j in range(noise.shape[1]):
+        x = noise[0, j]
+        out[0, j] = x
+        for i in range(1, noise.shape[0]):
+            x = keep * x + fresh * noise[i, j]
+            out[i, j] = x
+    return out
+
+
+@kernel
+def _sailed(
+    edges: Floats, table: Floats, at_wind: NDArray[np.int64], at_turn: NDArray[np.int64], step_s: float,
+) -> Floats:
+    """Return how long the path takes in each wind [s], inf where the steps end before it does.
+
+    ``edges`` are the ends of turns and legs in the plan's time, ``table`` how fast each goes in a wind and a turn of
+    it, and ``at_wind`` and ``at_turn`` (steps, winds) the places in it.
+    """
+    steps, winds = at_wind.shape
+    times = np.full(winds, np.inf)
+    for j in range(winds):
+        done, part = 0.0, 0
+        for i in range(steps):
+            while part < edges.shape[0] - 1 and edges[part] <= done:
+                part += 1
+            made = step_s * table[part, at_wind[i, j], at_turn[i, j]]
+            left = edges[-1] - done
+            if made >= left:
+                times[j] = (i + left / max(made, 1e-12)) * step_s
+                break
+            done = done + made
+    return times
 
 
 def _times_s(problem: Problem, legs: Sequence[Leg], strength: Strength, speeds: Speeds) -> Floats:
@@ -121,16 +155,7 @@ def _times_s(problem: Problem, legs: Sequence[Leg], strength: Strength, speeds: 
     at_wind = np.clip(np.rint((wind - winds[0]) / max(winds[1] - winds[0], 1e-9)), 0, NODES_MPS - 1).astype(np.int64)
     at_turn = np.clip(np.rint((turn - turns[0]) / (turns[1] - turns[0])), 0, NODES_RAD - 1).astype(np.int64)
     edges = np.array([t for leg in legs for t in (leg.start_s, leg.end_s)])
-    done, times = np.zeros(WINDS), np.full(WINDS, math.inf)
-    for i in range(noise.shape[1]):
-        part = np.minimum(np.searchsorted(edges, done, side="right"), len(edges) - 1)
-        made = step_s * table[part, at_wind[i], at_turn[i]]
-        left = edges[-1] - done
-        ends = (made >= left) & np.isinf(times)
-        times[ends] = (i + left[ends] / np.maximum(made[ends], 1e-12)) * step_s
-        done = done + made
-        if bool(np.all(np.isfinite(times))):
-            break
+    times = np.asarray(_sailed(edges, np.ascontiguousarray(table), at_wind, at_turn, step_s))
     return times + _lost_s(problem, legs, noise[2])
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -56,9 +57,14 @@ class Tack:
 
 def tacks_at_risk(problem: Problem, legs: Sequence[Leg]) -> tuple[Tack, ...]:
     """Return the tacks of a path whose failures would bring her onto something, the riskiest of each leg."""
-    chance = problem.boat.tack_fails
-    if chance <= 0.0 or not problem.boat.can_tack or not legs:
+    if problem.boat.tack_fails <= 0.0 or not problem.boat.can_tack or not legs:
         return ()
+    return _at_risk(problem, tuple(replace(leg, risk=0.0, clearance_m=0.0) for leg in legs))
+
+
+@lru_cache(maxsize=16)   # by identity and value: the search asks of its best path, and who writes the plan again
+def _at_risk(problem: Problem, legs: tuple[Leg, ...]) -> tuple[Tack, ...]:
+    chance = problem.boat.tack_fails
     solids = _Solids(problem)
     found = []
     for n, leg in enumerate(legs):
@@ -103,20 +109,23 @@ def _beaten(problem: Problem, solids: _Solids, n: int, leg: Leg, chance: float) 
     if solids.distance_m(line) > reach_m:
         return None   # the whole beat is far from everything
     steps = max(1, math.ceil(leg.length_m / EDGE_STEP_M))
-    worst: Tack | None = None
-    risk = 0.0
+    sides, places = [], []
     for k in range(steps):
         along = (k + 0.5) / steps * leg.length_m
         for side in (-1.0, 1.0):
-            # to the right of the line she comes on port tack, whose course is to the right of the wind
-            at = (leg.from_en[0] + along * ux + side * beat.corridor_m * uy,
-                  leg.from_en[1] + along * uy - side * beat.corridor_m * ux)
-            course = problem.wind.twd_from_rad + side * beat.no_go_half_rad
-            tack = solids.tack(problem, n, at, course, speed, chance)
-            if tack is not None:
-                risk += tack.risk / (2.0 * steps)
-                worst = tack if worst is None or tack.failures < worst.failures or (
-                    tack.failures == worst.failures and tack.lack_m > worst.lack_m) else worst
+            sides.append(side)
+            places.append((leg.from_en[0] + along * ux + side * beat.corridor_m * uy,
+                           leg.from_en[1] + along * uy - side * beat.corridor_m * ux))
+    worst: Tack | None = None
+    risk = 0.0
+    for side, at, distance_m in zip(sides, places, solids.distances_m(shapely.points(places)), strict=True):
+        # to the right of the line she comes on port tack, whose course is to the right of the wind
+        course = problem.wind.twd_from_rad + side * beat.no_go_half_rad
+        tack = solids.tack(problem, n, at, course, speed, chance, distance_m)
+        if tack is not None:
+            risk += tack.risk / (2.0 * steps)
+            worst = tack if worst is None or tack.failures < worst.failures or (
+                tack.failures == worst.failures and tack.lack_m > worst.lack_m) else worst
     if worst is None:
         return None
     return Tack(leg=n, at_en=worst.at_en, failures=worst.failures, risk=min(1.0, tacks * risk), lack_m=worst.lack_m)
@@ -133,27 +142,43 @@ class _Solids:
             self.need_m = tracking.reach_m + stated_error_m(best, has_short=not tracking.is_known)
         self.irons_s, self.most_lee_mps = problem.boat.irons_s, max(problem.boat.lee_mps)
         self._tree = tracking.tree if tracking is not None else shore_of(problem).tree
+        self._far_m: dict[tuple[float, float], float] = {}
 
     def distance_m(self, shape: shapely.Geometry) -> float:
         """Return how far something is from everything solid, inf where nothing is."""
+        return self.distances_m(np.array([shape]))[0]
+
+    def distances_m(self, shapes: NDArray[np.object_]) -> list[float]:
+        """Return how far each of some things is: asked for together, a query takes a fraction of its time."""
         if not len(self._tree.geometries):
-            return math.inf
-        _, distance = self._tree.query_nearest(shape, return_distance=True, all_matches=False)
-        return float(distance[0]) if len(distance) else math.inf
+            return [math.inf] * len(shapes)
+        (which, _), distance = self._tree.query_nearest(shapes, return_distance=True, all_matches=False)
+        out = [math.inf] * len(shapes)
+        for i, value in zip(which.tolist(), distance.tolist(), strict=True):
+            out[i] = value
+        return out
 
     def far_m(self, speed_mps: float, tws_mps: float) -> float:
         """Return how far from a corner the failures of a tack can lead, and need room."""
-        first = np.concatenate(failed_tack((0.0, 0.0), course_rad=0.0, speed_mps=speed_mps, twd_from_rad=0.0,
-                                           tws_mps=tws_mps, irons_s=self.irons_s))
-        lee_m = self.irons_s * self.most_lee_mps
-        return MOST_FAILURES * (float(np.max(np.hypot(*first.T))) + lee_m) + self.need_m
+        if (speed_mps, tws_mps) not in self._far_m:
+            first = np.concatenate(failed_tack((0.0, 0.0), course_rad=0.0, speed_mps=speed_mps, twd_from_rad=0.0,
+                                               tws_mps=tws_mps, irons_s=self.irons_s))
+            lee_m = self.irons_s * self.most_lee_mps
+            self._far_m[speed_mps, tws_mps] = (
+                MOST_FAILURES * (float(np.max(np.hypot(*first.T))) + lee_m) + self.need_m)
+        return self._far_m[speed_mps, tws_mps]
 
     def tack(
         self, problem: Problem, leg: int, at: Place, course_rad: float, speed_mps: float, chance: float,
+        distance_m: float | None = None,
     ) -> Tack | None:
-        """Return what a tack there comes to when it fails, None: she has room for what she does then."""
+        """Return what a tack there comes to when it fails, None: she has room for what she does then.
+
+        ``distance_m`` of the place from everything solid; None: it is asked for.
+        """
         tws = problem.wind.tws_mps or 0.0
-        if self.distance_m(shapely.Point(at)) > self.far_m(speed_mps, tws):
+        distance_m = self.distance_m(shapely.Point(at)) if distance_m is None else distance_m
+        if distance_m > self.far_m(speed_mps, tws):
             return None
         speed, place = speed_mps, at
         (east, north), (east_too, north_too) = problem.current.en_mps, problem.adrift.en_mps
@@ -166,7 +191,7 @@ class _Solids:
             tracks = [track for water in waters for track in failed_tack(
                 place, course_rad=course_rad, speed_mps=speed, twd_from_rad=twd, tws_mps=tws, current_en_mps=water,
                 irons_s=problem.boat.irons_s)]
-            room = min(self.distance_m(shapely.LineString(track)) for track in tracks) - self.need_m
+            room = min(self.distances_m(shapely.linestrings(np.array(tracks)))) - self.need_m
             if room <= 0.0:
                 lack = max(-room, self._lack_m(at, np.concatenate(tracks)))
                 return Tack(leg=leg, at_en=at, failures=failures, risk=chance**failures, lack_m=lack)

@@ -17,7 +17,7 @@ import shapely
 from companion.planner.problem.parts import NO_GO_SLACK_RAD, TOUCH_M
 from companion.planner.problem.value import Problem
 from companion.planner.search.boards import make_boards
-from companion.planner.search.gauge import Gauge, make_gauge, velocities
+from companion.planner.search.gauge import Courses, Gauge, make_gauge, velocities
 from companion.planner.search.kernels import Floats
 from companion.planner.search.visibility import circle_cuts, geodesics, graph_nodes
 from companion.planner.search.world import World, make_world, polygons
@@ -256,7 +256,7 @@ def cut_off(world: World) -> str | None:
 
 def no_course(problem: Problem) -> str | None:
     """Return why no course can be sailed at all, or None."""
-    points = velocities(problem, max(0.0, problem.no_go_min_rad - NO_GO_SLACK_RAD))
+    points = velocities(Courses.of(problem), max(0.0, problem.no_go_min_rad - NO_GO_SLACK_RAD))
     if len(points) == 0:
         return (f"no course is allowed: the no-go zone reaches {math.degrees(problem.no_go_min_rad):.1f} deg on "
                 f"each side and the deepest course is {math.degrees(problem.boat.max_twa_rad):.1f} deg")

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -117,23 +119,42 @@ def _tabulate(normals: Floats, size: int) -> Floats:
     return out
 
 
-def velocities(p: Problem, half_rad: float) -> Floats:
+class Courses(NamedTuple):
+    """What of a problem its metric is made of: the polar, the deepest course, the current in the wind frame."""
+
+    polar_twa_rad: tuple[float, ...]
+    polar_mps: tuple[float, ...]
+    max_twa_rad: float
+    drift_mps: float
+    set_rad: float
+
+    @classmethod
+    def of(cls, p: Problem) -> Courses:
+        """Return those of a problem."""
+        return cls(p.boat.polar_twa_rad, p.boat.polar_mps, p.boat.max_twa_rad, p.current.drift_mps,
+                   p.current.set_rad - p.wind.twd_from_rad)
+
+
+def velocities(p: Courses, half_rad: float) -> Floats:
     """Return velocities over the ground (n, 2) in the wind frame of all courses allowed at a no-go half angle."""
-    top = min(p.boat.max_twa_rad, math.pi)
+    top = min(p.max_twa_rad, math.pi)
     if half_rad > top:
         return np.empty((0, 2))
-    nodes = np.asarray([a for a in p.boat.polar_twa_rad if half_rad <= a <= top], np.float64)
+    nodes = np.asarray([a for a in p.polar_twa_rad if half_rad <= a <= top], np.float64)
     a = np.unique(np.concatenate([np.linspace(half_rad, top, _SAMPLES), nodes]))
-    v = np.interp(a, p.boat.polar_twa_rad, p.boat.polar_mps) * _OUT
-    drift = p.current.set_rad - p.wind.twd_from_rad
+    v = np.interp(a, p.polar_twa_rad, p.polar_mps) * _OUT
     half = np.column_stack([v * np.sin(a), v * np.cos(a)])
     both = np.vstack([half, half[::-1] * np.array([-1.0, 1.0])])
-    return both + p.current.drift_mps * np.array([math.sin(drift), math.cos(drift)])
+    return both + p.drift_mps * np.array([math.sin(p.set_rad), math.cos(p.set_rad)])
 
 
 def make_gauge(p: Problem) -> Gauge:
     """Return the gauge of ``p`` with the no-go zone at its narrowest."""
-    least = max(0.0, p.no_go_min_rad)
+    return _gauge(Courses.of(p), max(0.0, p.no_go_min_rad))
+
+
+@lru_cache(maxsize=16)   # by value: a plan asks for that of the same boat and wind in several waters
+def _gauge(p: Courses, least: float) -> Gauge:
     points = velocities(p, least)
     moving = len(points) > 0 and float(np.max(np.hypot(points[:, 0], points[:, 1]))) > 1e-9
     if not moving:
@@ -163,17 +184,16 @@ def make_gauge(p: Problem) -> Gauge:
                  least_half_rad=least, can_move=True, slack=_slack(p, thin, least))
 
 
-def _slack(p: Problem, normals: Floats, least_rad: float) -> float:
+def _slack(p: Courses, normals: Floats, least_rad: float) -> float:
     """Return the largest gauge of the velocities within the angular slack of the limits, at least 1."""
-    top = min(p.boat.max_twa_rad, math.pi)
+    top = min(p.max_twa_rad, math.pi)
     angles = np.array([max(0.0, least_rad - NO_GO_SLACK_RAD * f) for f in (1.0, 0.5)]
                       + [min(math.pi, top + NO_GO_SLACK_RAD * f) for f in (1.0, 0.5)])
-    v = np.interp(angles, p.boat.polar_twa_rad, p.boat.polar_mps)
-    drift = p.current.set_rad - p.wind.twd_from_rad
+    v = np.interp(angles, p.polar_twa_rad, p.polar_mps)
     worst = 1.0
     for sign in (1.0, -1.0):
         q = np.column_stack([sign * v * np.sin(angles), v * np.cos(angles)])
-        q = q + p.current.drift_mps * np.array([math.sin(drift), math.cos(drift)])
+        q = q + p.drift_mps * np.array([math.sin(p.set_rad), math.cos(p.set_rad)])
         worst = max(worst, float(np.max(q @ normals.T)) if len(normals) else 1.0)
     return worst * (1.0 + 1e-7)
 

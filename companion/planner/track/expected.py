@@ -84,7 +84,8 @@ def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray
         problem: With its tracking.
         waypoints_en: (n, 2), the start first.
         legs: What the scorer says of the path; None: it is asked.
-        has_boards: Look at the boards of legs that are left to the autopilot, which takes its time.
+        has_boards: Look at the boards of legs that are left to the autopilot, which takes its time. Without, what
+            is expected is no worse, and ``lack_m`` no greater.
 
     """
     tracking = problem.tracking
@@ -96,11 +97,13 @@ def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray
     if legs is None:
         legs = evaluate(problem, path).legs
     beats = tuple(leg.is_beat for leg in legs) if len(legs) == len(path) - 1 else (False,) * (len(path) - 1)
-    return _expected(problem, path.tobytes(), beats, has_boards)
+    asked = problem, path.tobytes(), beats
+    return _beaten(*asked) if has_boards and any(beats) else _sailed(*asked)
 
 
-@lru_cache(maxsize=8)   # by identity: a search's best path is asked for again when the plan is written
-def _expected(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...], has_boards: bool) -> Expected:
+@lru_cache(maxsize=16)   # by identity: a search's best path is asked for again when the plan is written
+def _sailed(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...]) -> Expected:
+    """Return what is expected of the legs that are sailed."""
     tracking = problem.tracking
     assert tracking is not None
     path, beats = np.frombuffer(path_bytes).reshape(-1, 2), np.array(is_beat)
@@ -127,12 +130,21 @@ def _expected(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...], ha
     judged = np.where(is_beaten, math.inf, room)
     lack = np.where(is_beaten, 0.0, np.maximum(0.0, need - room))
     worst, least = int(np.argmax(lack)), int(np.argmin(judged))
-    found = Expected(
+    return Expected(
         clearance_m=float(judged[least]), at_en=_point(en[least]), leg=int(leg[least]), is_kept=not lack[worst] > 0.0,
         lack_m=float(lack[worst]), error_m=float(error[worst]), worst_en=_point(en[worst]),
         near_en=_nearest(tracking, en[worst]),
         worst_leg=int(leg[worst]))
-    return _with_boards(problem, tracking, whole, first, beats, found) if has_boards and bool(beats.any()) else found
+
+
+@lru_cache(maxsize=8)
+def _beaten(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...]) -> Expected:
+    """Return what is expected of all legs, those that are left to the autopilot in drawn winds."""
+    tracking = problem.tracking
+    assert tracking is not None
+    whole, first = _with_run_up(tracking, np.frombuffer(path_bytes).reshape(-1, 2))
+    found = _sailed(problem, path_bytes, is_beat)
+    return _with_boards(problem, tracking, whole, first, np.array(is_beat), found)
 
 
 def _with_run_up(tracking: Tracking, path: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:

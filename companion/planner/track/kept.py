@@ -119,10 +119,10 @@ def _fewer(
                     limit_s, judged.time_s * (1.0 + SHORTER_SHARE) + SHORTER_S)
                 if not found.is_feasible or found.time_s > allowed_s:
                     continue
-                then = expected(problem, option, found.legs)
-                if then.lack_m > seen.lack_m + 1e-9:
-                    continue
-                if best is None or (then.lack_m, found.time_s) < (best[2].lack_m, best[1].time_s):
+                before = seen.lack_m + 1e-9, math.inf
+                then = _better(problem, option, found, before if best is None else min(
+                    before, (best[2].lack_m, best[1].time_s)))
+                if then is not None:
                     best = option, found, then
             if best is not None:
                 break
@@ -144,13 +144,26 @@ def _pushed(
             found = judge(option)
             if not found.is_feasible:
                 continue
-            then = expected(problem, option, found.legs)
-            if then.lack_m < seen.lack_m - 0.05 and (best is None or (then.lack_m, found.time_s) < best[:2]):
+            before = seen.lack_m - 0.05, -math.inf
+            then = _better(problem, option, found, before if best is None else min(before, best[:2]))
+            if then is not None:
                 best = then.lack_m, found.time_s, option, then
         if best is None:
             break
         _, _, path, seen = best
     return path, seen
+
+
+def _better(problem: Problem, path: Path, judged: Evaluation, than: tuple[float, float]) -> Expected | None:
+    """Return what is expected of a path that lacks less than another, or as much and takes less time; None: it is not.
+
+    ``than`` is the other's lack [m] and time [s]. Boards add to what a path lacks: of one that lacks more without them
+    they are not looked at, and they take most of the time.
+    """
+    if not (expected(problem, path, judged.legs, has_boards=False).lack_m, judged.time_s) < than:
+        return None
+    found = expected(problem, path, judged.legs)
+    return found if (found.lack_m, judged.time_s) < than else None
 
 
 def _pushes(problem: Problem, path: Path, seen: Expected) -> Iterator[Path]:

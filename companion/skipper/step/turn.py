@@ -110,14 +110,17 @@ class Turn:
 
     def say(self, severity: Severity, code: str, text: str, *, every_s: float | None = None) -> None:
         """Announce something; the same code not more often than every ``every_s`` (default: the configured)."""
-        interval = self.config.announce_interval_s if every_s is None else every_s
-        said = dict(self.state.announced)
-        if self.t_s - said.get(code, -math.inf) < interval:
+        if self.is_said(code, self.config.announce_interval_s if every_s is None else every_s):
             return
+        said = dict(self.state.announced)
         said[code] = self.t_s
         recent = sorted(said.items(), key=lambda item: item[1])[-64:]
         self.update(announced=tuple(recent))
         self.actions.append(Announce(severity=severity, code=code, text=text))
+
+    def is_said(self, code: str, within_s: float) -> bool:
+        """Return whether it was announced within that time: then it need not be worked out."""
+        return self.t_s - dict(self.state.announced).get(code, -math.inf) < within_s
 
     def phase(self, phase: Phase, why: str) -> None:
         """Set the phase and the sentence that says why."""

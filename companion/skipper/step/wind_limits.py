@@ -57,12 +57,14 @@ def winds_wanted(turn: Turn) -> list[str]:
 
 
 def _strong(turn: Turn) -> float | None:
-    limit, strength = turn.voyage.boat.max_tws_mps, _strength(turn)
+    limit = turn.voyage.boat.max_tws_mps
+    strength = None if limit is None else _strength(turn)
     return None if limit is None or strength is None else strength.over(limit, _until_s(turn))
 
 
 def _light(turn: Turn) -> float | None:
-    limit, strength = turn.voyage.boat.min_tws_mps, _strength(turn)
+    limit = turn.voyage.boat.min_tws_mps
+    strength = None if limit is None else _strength(turn)
     return None if limit is None or strength is None else strength.under(limit, _until_s(turn))
 
 

@@ -29,7 +29,7 @@ def speak_of_stop(turn: Turn) -> None:
     stop = turn.state.stop
     if stop is None or turn.autopilot is None or turn.t_s - stop.t_s <= (
         PATIENCE_S if is_answered(turn) else TOLD_S
-    ):
+    ) or turn.is_said("adrift", EVERY_S):
         return
     here, vehicle = turn.snapshot.position_en_m, turn.snapshot.vehicle
     ahead = None if here is None or vehicle is None else _ahead(turn, here, vehicle.velocity_en_mps)

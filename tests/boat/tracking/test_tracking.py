@@ -24,6 +24,7 @@ from companion.boat.tracking import (
     stated_error_m,
 )
 from companion.boat.tracking import scurve as s
+from companion.boat.tracking.kernel import turn_to
 
 POLAR = ardurover_sitl()
 HELM = Helm(wp_radius_m=3.0, wp_speed_mps=5.0)
@@ -171,8 +172,9 @@ def test_short_legs_taint_their_neighbours():
 @settings(max_examples=60)
 def test_the_point_runs_a_leg_from_rest_to_rest_without_a_leap(length, fastest, accel, jerk):
     top = s.top_speed_mps(length, fastest, accel, jerk)
-    whole = s.leg_s(length, top, accel, jerk)
-    rows = np.array([s.on_leg(t, length, top, accel, jerk) for t in np.linspace(0.0, whole, 400)])
+    rise = s.rise_s(top, accel, jerk)
+    whole = s.leg_s(length, top, rise)
+    rows = np.array([s.on_leg(t, length, top, rise, whole, accel, jerk) for t in np.linspace(0.0, whole, 400)])
     step = whole / 399.0
     assert rows[0, 0] == 0.0
     assert rows[-1, 0] == pytest.approx(length, rel=1e-6)
@@ -193,3 +195,8 @@ def test_the_helm_is_that_of_the_parameters():
     assert AutopilotLimits.from_params({"ATC_ACCEL_MAX": 1.5, "WP_ACCEL": 0.8, "WP_JERK": 2.0}).wp_accel_mps2 == 0.8
     with pytest.raises(ValueError, match="wp_speed_mps"):
         Helm(wp_speed_mps=0.0)
+
+
+@given(st.one_of(st.floats(-20.0, 20.0), st.sampled_from([math.pi, -math.pi, 3.0 * math.pi, -3.0 * math.pi, 0.0])))
+def test_an_angle_is_turned_to_the_bit_as_a_remainder_turns_it(angle_rad):
+    assert turn_to(angle_rad) == (angle_rad + math.pi) % (2.0 * math.pi) - math.pi

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.stats import norm
 
 from companion.errors import InputError
 from companion.planner import Plan, PlanStatus, Problem, plan
 from companion.planner.problem.json_write import to_dict
+from companion.planner.problem.parts import interpolated
 from tests.planner.problems import box, random_problems, simple
 
 
@@ -108,3 +111,11 @@ def test_a_plan_survives_json():
     assert again.cost_s == answer.cost_s
     assert again.legs[0].no_go_half_rad == pytest.approx(answer.legs[0].no_go_half_rad)
     assert again.waypoints_en.tolist() == answer.waypoints_en.tolist()
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=8, unique=True).map(sorted), st.data())
+def test_one_number_is_interpolated_to_the_bit_as_numpy_does(nodes, data):
+    values = data.draw(st.lists(st.floats(-1e3, 1e3), min_size=len(nodes), max_size=len(nodes)))
+    x = data.draw(st.one_of(st.floats(-2e3, 2e3), st.sampled_from(nodes), st.just(math.nan)))
+    got, wanted = interpolated(x, nodes, values), float(np.interp(x, nodes, values))
+    assert got == wanted or (math.isnan(got) and math.isnan(wanted))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -105,6 +106,14 @@ def test_the_gauge_is_exact_where_it_is_known():
 def test_the_gauge_obeys_the_triangle_inequality(ax, ay, bx, by):
     g = make_gauge(Problem.from_json(simple(boat=simple()["boat"] | {"speed": POLAR})))
     assert g.disc(ax + bx, ay + by, 0.0) <= g.disc(ax, ay, 0.0) + g.disc(bx, by, 0.0) + 1e-9
+
+
+def test_one_boat_in_one_wind_has_one_gauge_whatever_the_water():
+    p = Problem.from_json(simple())
+    elsewhere = replace(p, start_en=(3.0, 4.0), obstacles=(), fence=None, beat=None)
+    turned = replace(p, boat=replace(p.boat, max_twa_rad=2.0))
+    assert make_gauge(elsewhere) is make_gauge(p)
+    assert make_gauge(turned) is not make_gauge(p)
 
 
 def test_open_water_is_solved_to_the_bound():

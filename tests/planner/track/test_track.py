@@ -132,6 +132,9 @@ def test_boards_that_come_too_near_are_seen_and_those_with_room_are_kept():
     assert evaluate(narrow, path).legs[0].is_beat
     seen = expected(narrow, path)
     assert seen.is_beat
+    sailed = expected(narrow, path, has_boards=False)     # what paths are told apart by before their boards are sailed
+    assert sailed.lack_m <= seen.lack_m
+    assert not sailed.is_beat
     assert not seen.is_kept
     assert expected(roomy, path).is_kept
     assert expected(narrow, path, has_boards=False).is_kept    # the boards are what comes near
