@@ -59,7 +59,7 @@ def take_outcomes(turn: Turn) -> None:
     if state.pending_read is not None and turn.t_s - state.pending_read[1] > config.read_timeout_s:
         turn.update(pending_read=None, read_retry=turn.failed(state.read_retry))
     if state.pending_command is not None and turn.t_s - state.pending_command[1] > config.command_timeout_s:
-        turn.update(pending_command=None, command_retry=turn.failed(state.command_retry))
+        _command_failed(turn, state.pending_command[2])
 
 
 def _take_read(turn: Turn, outcome: ReadOutcome) -> None:
@@ -81,9 +81,18 @@ def _take_command(turn: Turn, outcome: CommandOutcome) -> None:
         if pending[2] in {MOTOR_ON, MOTOR_OFF}:
             turn.update(adrift=replace(turn.state.adrift, motor=pending[2] == MOTOR_ON))
         return
-    turn.update(pending_command=None, command_retry=turn.failed(turn.state.command_retry))
+    _command_failed(turn, pending[2])
     turn.say(Severity.WARNING, f"refused {pending[2]}",
              f"{pending[2]} {outcome.result.value}: {outcome.text or 'no reason given'}", every_s=0.0)
+
+
+def _command_failed(turn: Turn, what: str) -> None:
+    """Note an order that was refused or not answered; a mode that was not taken leaves her steered as she was."""
+    state, status = turn.state, turn.autopilot
+    turn.update(pending_command=None, command_retry=turn.failed(state.command_retry))
+    is_steered = turn.steers and status is not None and status.mode is Mode.GUIDED
+    if is_steered and state.own_mode is not None and state.own_mode.name == what:
+        turn.update(own_mode=Mode.GUIDED)
 
 
 def take_events(turn: Turn) -> None:

@@ -833,7 +833,7 @@ def test_by_headings_nothing_is_steered_to_the_buoys_side_of_what_is_wanted(side
 
     def look(w):
         place, seen = before[0]
-        if w.state.gate == 0 and 10.0 < distance_m(place, buoy) < 20.0:
+        if w.state.gate == 0 and 10.0 < distance_m(place, buoy) < 25.0:
             near.extend(hand * difference_rad(a.heading_rad, bearing_rad(place, buoy))
                         for _, a in w.actions[seen:] if isinstance(a, act.SteerHeading))
         before[0] = (w.position, len(w.actions))

@@ -181,7 +181,7 @@ MEANS: tuple[Means, ...] = (
 def stops_drift(turn: Turn) -> bool:
     """Hold a boat that is becalmed or drifts onto something; True while LOITER is ours and to be kept."""
     state, status = turn.state, turn.autopilot
-    if status is None or state.steering_until_s is not None or state.by_field.resort.engaged or turn.steers:
+    if status is None or state.steering_until_s is not None or state.by_field.resort.engaged:
         return False
     is_calm, is_danger = turn.is_raised("becalmed"), turn.is_raised("drifting")
     # What has been stopped stays so until there is a wind to sail by again.
@@ -260,7 +260,7 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
         turn.update(adrift=replace(memory, loitered=True, loiter_en_m=place))
         turn.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until she can sail")
         return True
-    if status.mode is not Mode.AUTO or memory.loitered or ahead is None or (ahead.is_clear and lies_in_loiter(turn)):
+    if status.mode is not turn.sails_in or memory.loitered or ahead is None or (ahead.is_clear and lies_in_loiter(turn)):
         return False
     if is_cramped(turn):
         return False

@@ -3,8 +3,10 @@
 Per leg the heading is that from the previous waypoint to the current one, not from the boat: the plan's angle to
 the wind is what makes it fast. Near the destination it is the course from the boat; near a buoy the course to the
 buoy plus 30 degrees, and no manoeuvre there leads to the buoy's side of what is wanted (section 3.2.4: "to the left of
-the desired heading", for a buoy to port). Drift is added as in equation 3 of chapter 2. Heading setpoints have no
-protection of ArduRover's against the no-go zone: ``sailable_rad`` is ours.
+the desired heading", for a buoy to port). Drift is added as in equation 3 of chapter 2. What plans promise of clearance
+is of the leg's line, and his heading leads along it from wherever the last turn ended: so she is led back to it
+(``back_to_line_rad``), which is ours. Heading setpoints have no protection of ArduRover's against the no-go zone
+either: ``sailable_rad`` is ours, too.
 
 [1] G.-A. Büsser, Design and Implementation of a Navigation Algorithm for an Autonomous Sailboat, ETH Zürich, 2009.
 """
@@ -16,13 +18,15 @@ import math
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
-from companion.skipper.way.geometry import bearing_rad, distance_m
+from companion.skipper.way.geometry import bearing_rad, cross_track_m, distance_m
 from companion.skipper.way.voyage import PointEn, Side
 
 DRIFT_LIMIT_RAD = math.radians(20.0)  # more is not leeway but a current or a compass error
 STEERAGE_MPS = 0.5                    # slower than this the drift angle means nothing
 AT_BUOY = 3.0                         # rounding radii
 TACK_HYSTERESIS_RAD = math.radians(10.0)
+BACK_S, BACK_M = 4.0, 8.0             # the line is aimed at so far ahead, in time and at the least
+BACK_LIMIT_RAD = math.radians(45.0)
 
 
 def drift_correction_rad(velocity_en_mps: tuple[float, float], heading_rad: float) -> float:
@@ -35,6 +39,16 @@ def drift_correction_rad(velocity_en_mps: tuple[float, float], heading_rad: floa
     if ahead < STEERAGE_MPS:
         return 0.0
     return max(-DRIFT_LIMIT_RAD, min(DRIFT_LIMIT_RAD, math.atan2(to_port, ahead)))
+
+
+def back_to_line_rad(off_m: float, speed_mps: float) -> float:
+    """Return what to add to a leg's course to come back to its line, ``off_m`` to the right of it [m].
+
+    >>> round(math.degrees(back_to_line_rad(8.0, 1.0)))
+    -45
+    """
+    wanted = -math.atan2(off_m, max(BACK_M, BACK_S * speed_mps))
+    return max(-BACK_LIMIT_RAD, min(BACK_LIMIT_RAD, wanted))
 
 
 def buoy_heading_rad(boat_en: PointEn, buoy_en: PointEn, side: Side, angle_rad: float) -> float:
@@ -75,18 +89,33 @@ def desired_heading_rad(turn: Turn) -> float | None:
     boat, leg, vehicle, wind, gate = turn.boat_en, turn.leg(), turn.snapshot.vehicle, turn.wind_now, turn.gate
     if boat is None or leg is None or vehicle is None or wind is None or not turn.ahead():
         return None
-    wanted, buoy = bearing_rad(*leg), Side.NONE
+    drift, half, twd = drift_correction_rad(vehicle.velocity_en_mps, vehicle.heading_rad), turn.no_go_half_rad, wind[0]
     if _is_at_buoy(gate, boat) and gate is not None and gate.buoy_en_m is not None:
-        wanted, buoy = bearing_rad(boat, leg[1]), gate.side
+        wanted = bearing_rad(boat, leg[1])
         if gate.is_first and distance_m(boat, gate.buoy_en_m) > distance_m(gate.en_m, gate.buoy_en_m):
             # The scheme is for the approach: kept up all the way round it would spiral into the buoy.
             clear = buoy_heading_rad(boat, gate.buoy_en_m, gate.side, turn.config.buoy_angle_rad)
             if _hand(gate.side) * difference_rad(clear, wanted) > 0.0:
                 wanted = clear
-    elif turn.state.index == turn.last_waypoint() or distance_m(*leg) < 1.0:
-        wanted = bearing_rad(boat, leg[1])
-    wanted = wrap_pi(wanted + drift_correction_rad(vehicle.velocity_en_mps, vehicle.heading_rad))
-    return sailable_rad(wanted, vehicle.heading_rad, wind[0], turn.no_go_half_rad, buoy)
+        return sailable_rad(wrap_pi(wanted + drift), vehicle.heading_rad, twd, half, gate.side)
+    if turn.state.index == turn.last_waypoint() or distance_m(*leg) < 1.0:
+        return sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), vehicle.heading_rad, twd, half)
+    along = wrap_pi(bearing_rad(*leg) + drift)
+    off_wind = difference_rad(along, twd)
+    if abs(off_wind) < half:
+        return sailable_rad(along, vehicle.heading_rad, twd, half)
+    # Back to the line on the leg's own tack: through the wind she would come to it sooner, and be on the wrong one.
+    back = back_to_line_rad(cross_track_m(boat, *leg), turn.speed_mps)
+    side = math.copysign(1.0, off_wind)
+    return wrap_pi(twd + side * max(half, side * off_wind + side * back))
+
+
+def course_rad(turn: Turn) -> float | None:
+    """Return the course over ground that she is steered on now, None when it cannot be told."""
+    heading, vehicle = desired_heading_rad(turn), turn.snapshot.vehicle
+    if heading is None or vehicle is None:
+        return None
+    return wrap_pi(heading - drift_correction_rad(vehicle.velocity_en_mps, vehicle.heading_rad))
 
 
 def _is_at_buoy(gate: Gate | None, boat: PointEn) -> bool:

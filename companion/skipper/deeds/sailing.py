@@ -162,7 +162,8 @@ def _send_heading(turn: Turn) -> None:
     if status.mode is not Mode.GUIDED:
         set_mode(turn, Mode.GUIDED, f"steering by {'field' if turn.guidance is Guidance.FIELD else 'headings'}")
         return
-    turn.update(own_mode=Mode.GUIDED)
+    if not turn.is_leaving:
+        turn.update(own_mode=Mode.GUIDED)
     if turn.guidance is Guidance.FIELD:
         told = by_field_heading(turn)
         if told is not None:
@@ -219,7 +220,8 @@ def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
         abs(difference_rad(wind[0], vehicle.heading_rad)) > SAILS_TWA_RAD)
     refused = status is not None and status.mode is Mode.AUTO and not is_busy(turn, Mode.GUIDED.name)
     over = out or refused or (until is not None and turn.t_s > until)
-    if over and (refused or set_mode(turn, Mode.AUTO, "sailing again" if out else "bearing away took too long")):
+    if over and (refused or turn.steers or set_mode(
+            turn, Mode.AUTO, "sailing again" if out else "bearing away took too long")):
         # The mode we asked for ourselves stays ours until AUTO shows.
         turn.update(
             steering_until_s=None, steering_heading_rad=None, asked=IN_IRONS,

@@ -275,8 +275,10 @@ class Turn:
 
     @property
     def tack_corridor_m(self) -> float:
-        """SAIL_XTRACK_MAX."""
+        """SAIL_XTRACK_MAX; 0, none, where she is steered in GUIDED: nothing tacks her at its edge there."""
         limits = self.snapshot.limits
+        if self.steers_plans:
+            return 0.0
         return self.config.tack_corridor_m if limits is None else limits.sail_xtrack_max_m
 
     @property
@@ -310,14 +312,19 @@ class Turn:
 
     @property
     def is_leaving(self) -> bool:
-        """Whether she shows a stop still that an order of ours, on its way or just accepted, ends."""
+        """Whether she shows a stop still, or GUIDED, that an order of ours, on its way or just accepted, ends."""
         status, state, own = self.autopilot, self.state, self.state.own_mode
-        if status is None or own is None or state.stop is None or status.mode is not state.stop.mode:
+        if status is None or own is None or own is status.mode:
             return False
+        since_s = -math.inf
+        if status.mode is not Mode.GUIDED:
+            if state.stop is None or status.mode is not state.stop.mode:
+                return False
+            since_s = state.stop.t_s
         if state.pending_command is not None:
-            return state.pending_command[2] == own.name and state.stop.t_s < state.pending_command[1]
+            return state.pending_command[2] == own.name and since_s < state.pending_command[1]
         name, accepted_s = state.accepted or ("", 0.0)
-        return name == own.name and state.stop.t_s < accepted_s and self.t_s < accepted_s + SHOWS_S
+        return name == own.name and since_s < accepted_s and self.t_s < accepted_s + SHOWS_S
 
     @property
     def guidance(self) -> Guidance:
@@ -327,8 +334,25 @@ class Turn:
     @property
     def steers(self) -> bool:
         """Whether the boat is steered by headings, a plan's or a field's (and may be)."""
+        return self.guidance is not Guidance.PLAN and self._may_guide
+
+    @property
+    def steers_plans(self) -> bool:
+        """Whether plans are sailed in GUIDED, and not by the autopilot's line following, its corridor and its tacks.
+
+        A goal's own field ends there: what is planned from it on is sailed as the mission says.
+        """
+        return self.config.guidance is not Guidance.PLAN and self._may_guide
+
+    @property
+    def _may_guide(self) -> bool:
         may = self.snapshot.permissions
-        return self.guidance is not Guidance.PLAN and may.may_steer and may.may_set_mode
+        return may.may_steer and may.may_set_mode
+
+    @property
+    def sails_in(self) -> Mode:
+        """The mode that she sails in: GUIDED where she is steered, else AUTO."""
+        return Mode.GUIDED if self.steers else Mode.AUTO
 
     def leg(self) -> tuple[PointEn, PointEn] | None:
         """Return the planned leg being sailed (from, to), None without a route."""
