@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import os
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 # A restart must find room for its state on a disk that records have filled: they stop at this much [bytes] ...
 RESERVE_BYTES = 8 << 20
@@ -19,6 +22,8 @@ RESERVE_BYTES = 8 << 20
 RESERVE_SHARE = 0.1
 NEW = ".new"
 
+_KINDS = ((stat.S_ISFIFO, "a FIFO"), (stat.S_ISSOCK, "a socket"), (stat.S_ISCHR, "a device"),
+          (stat.S_ISBLK, "a device"))
 # What a wrong name raises, and a sick disk does not.
 _MISTAKES = frozenset({errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP, errno.EISDIR})
 
@@ -65,16 +70,18 @@ class Disk:
                     os.ftruncate(fd, os.fstat(fd).st_size - done)
             raise
 
-    def replace(self, path: Path, data: bytes, *, is_durable: bool = True) -> None:
-        """Put ``data`` in the place of ``path``, whole or not at all.
+    def replace(self, path: Path, data: bytes, *, is_durable: bool = True, mode: int | None = None) -> None:
+        """Put ``data`` in the place of ``path``, whole or not at all; ``mode``: before there is anything in it.
 
         A new file beside it is written, synced and renamed, and then the folder is synced: only that makes the new
         name outlive a power cut.
         """
-        self.replace_all({path: data}, is_durable=is_durable)
+        self.replace_all({path: data}, is_durable=is_durable, mode=mode)
 
-    def replace_all(self, files: Mapping[Path, bytes], *, is_durable: bool = True) -> None:
-        """Put each of ``files`` in its place, all or none: they are renamed when all are written. Modes are kept.
+    def replace_all(self, files: Mapping[Path, bytes], *, is_durable: bool = True, mode: int | None = None) -> None:
+        """Put each of ``files`` in its place, all or none: they are renamed when all are written.
+
+        Modes are kept where none is given.
 
         Raises:
             OSError: one cannot be written, which its ``filename`` says; what was there is there.
@@ -85,11 +92,13 @@ class Disk:
             for path, data in files.items():
                 fd = self.create(beside[path])
                 try:
+                    if mode is not None:
+                        os.fchmod(fd, mode)
                     done = 0
                     while done < len(data):
                         done += self.write(fd, data[done:])
                     with contextlib.suppress(OSError):
-                        os.fchmod(fd, path.stat().st_mode & 0o777)
+                        os.fchmod(fd, path.stat().st_mode & 0o777 if mode is None else mode)
                     if is_durable:
                         self.sync(fd)
                 finally:
@@ -139,6 +148,40 @@ class Disk:
         status = os.statvfs(folder)
         share = int(status.f_blocks * status.f_frsize * RESERVE_SHARE)
         return Room(free_bytes=status.f_bavail * status.f_frsize, reserve_bytes=min(RESERVE_BYTES, share))
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a file for reading that is one: a FIFO or a device might never answer, or do something when it is opened.
+
+    Raises:
+        OSError: it is none (EINVAL), or cannot be opened.
+    """
+    _require_regular(path.stat().st_mode)   # before it is opened, which may do something to a device
+    return io.open(path, "rb", opener=_opened)  # noqa: UP020 - as pathlib calls it
+
+
+def _opened(path: str, flags: int) -> int:
+    fd = os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
+    try:
+        _require_regular(os.fstat(fd).st_mode)   # it may be another by now
+    except OSError:
+        os.close(fd)
+        raise
+    return fd
+
+
+def read_regular(path: Path, most_bytes: int = -1) -> bytes:
+    """Return what is in such a file, at most so much of it. Raises OSError."""
+    with open_regular(path) as file:
+        return file.read(most_bytes)
+
+
+def _require_regular(mode: int) -> None:
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if not stat.S_ISREG(mode):
+        kind = next((word for is_one, word in _KINDS if is_one(mode)), "something else")
+        raise OSError(errno.EINVAL, f"it is {kind} and no regular file")
 
 
 def reason(error: OSError) -> str:

@@ -12,6 +12,8 @@ Outcomes that are part of normal life (no plan found, an upload refused) are enu
 
 from __future__ import annotations
 
+import errno
+
 
 class CompanionError(Exception):
     """Root of everything this program raises on purpose."""
@@ -43,7 +45,8 @@ class UnreadableError(InputError):
 
 def unreadable(source: str, error: OSError, place: str = "", remedy: str = "check the path") -> InputError:
     """Return what to raise for a file that could not be read: tried again unless its name or its rights are wrong."""
-    is_wrong = isinstance(error, PermissionError | IsADirectoryError | NotADirectoryError)
+    is_wrong = isinstance(error, PermissionError | IsADirectoryError | NotADirectoryError) or (
+        error.errno == errno.EINVAL)   # a FIFO, a device: ``companion.disk.open_regular``
     problem = "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error.strerror or error})"
     return (InputError if is_wrong else UnreadableError)(source, place, problem, remedy)
 

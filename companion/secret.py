@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
 
+from companion.disk import open_regular
 from companion.errors import InputError, unreadable
+
+MOST_BYTES = 65_536
 
 
 def read_secret(path: Path, what: str, remedy: str) -> str:
@@ -17,7 +21,8 @@ def read_secret(path: Path, what: str, remedy: str) -> str:
         InputError: it cannot be read, is not text, or others may read it.
     """
     try:
-        mode, text = path.stat().st_mode, path.read_text("utf-8").strip()
+        with open_regular(path) as file:
+            mode, text = os.fstat(file.fileno()).st_mode, file.read(MOST_BYTES).decode("utf-8").strip()
     except OSError as error:
         raise unreadable(str(path), error, what, remedy) from error
     except UnicodeDecodeError as error:

@@ -49,12 +49,12 @@ class Adoption:
         """Carry the order out whenever it is given, and say what is in the way."""
         while True:
             await self._asked.wait()
+            self._asked.clear()
             trouble = await self._trouble()
             if not trouble:
                 self._done()
                 return
             self._autopilot.say(int(Severity.WARNING), f"the drawing is not adopted: {trouble}")
-            self._asked.clear()
 
     async def _trouble(self) -> str:
         """Return why what is on board cannot be sailed, empty when it can be."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from companion.disk import Disk, reason
+from companion.disk import Disk, read_regular, reason
 from companion.errors import InputError, TransferError, UnreadableError
 from companion.geofence import Document
 from companion.geofence.mission import Drawn, MissionOptions, drawing_of, drawn_mission, kept, read_kept
@@ -162,7 +162,7 @@ def _names(state_path: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def _kept_before(plan: Path) -> Document | None:
     try:
-        return read_kept(plan.read_text(encoding="utf-8"), str(plan))
+        return read_kept(read_regular(plan).decode("utf-8"), str(plan))
     except (OSError, ValueError, InputError):
         return None
 

@@ -31,7 +31,22 @@ MAX_LINE = 500     # bytes; an order is shorter
 MOST = 8           # connections at a time
 WATCH = b"watch"   # asks for the views
 STUCK_S = 10.0     # who does not read for so long is hung up on
+LOOK_S = 5.0       # whether it is still there
+PROBE_S = 0.5      # for a program that listens there and takes nobody
 EVENTS_KEPT = 100  # for who reads late; of the views there is only the newest
+
+
+async def take_orders(path: Path, crew: Crew, showing: Showing) -> None:
+    """Serve the socket until cancelled.
+
+    Raises:
+        InputError: it cannot be made, or was taken away.
+    """
+    async with served(path, crew, showing):
+        while True:
+            await asyncio.sleep(LOOK_S)
+            if not path.is_socket():
+                raise InputError("--socket", str(path), "was taken away", "leave it where it is")
 
 
 @contextlib.asynccontextmanager
@@ -61,8 +76,8 @@ async def served(path: Path, crew: Crew, showing: Showing) -> AsyncIterator[None
             writers.discard(writer)
             writer.close()
 
+    listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         listening.bind(str(path))
         path.chmod(0o600)   # before anybody can connect: it does not listen yet
         server = await asyncio.start_unix_server(talk, sock=listening, limit=MAX_LINE)
@@ -73,7 +88,8 @@ async def served(path: Path, crew: Crew, showing: Showing) -> AsyncIterator[None
         async with server:
             yield
     finally:
-        path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):   # a disk that has become read-only meanwhile
+            path.unlink(missing_ok=True)
         for writer in tuple(writers):
             writer.close()
 
@@ -109,6 +125,7 @@ def _clear(path: Path) -> None:
     if not path.is_socket():
         raise InputError("--socket", str(path), "is there already and no socket", "name another place")
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.settimeout(PROBE_S)
         try:
             probe.connect(str(path))
         except ConnectionRefusedError:

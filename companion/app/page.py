@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ import numpy as np
 from companion.app.crew import Crew
 from companion.app.executor import Planner
 from companion.app.showing import Showing
-from companion.errors import JobError
 from companion.fold import Step, VoyageFold
 from companion.orders import LOCAL, Answer, Verb, Wanted, permitted
 from companion.page import Address, Chart, Live, plan_figures, served
@@ -73,13 +71,15 @@ def _in_figures(plan: Plan) -> dict[str, Any]:
     return {"error": None, "way_en_m": np.round(plan.waypoints_en, 1).tolist(), **plan_figures(plan)}
 
 
-async def opened(
-    stack: contextlib.AsyncExitStack, address: Address, fold: VoyageFold, planner: Planner, crew: Crew,
-    showing: Showing, *, pace: float, charts: Sequence[Chart], refuse: Callable[[str, str], None],
+async def live_page(
+    address: Address, fold: VoyageFold, planner: Planner, crew: Crew, showing: Showing, *, pace: float,
+    charts: Sequence[Chart],
 ) -> None:
-    """Serve the page of a voyage for as long as ``stack``; where it cannot be she is sailed without it.
+    """Serve the page of a voyage until cancelled. ``pace``: seconds of the loop for each second.
 
-    ``pace``: seconds of the loop for each second. ``refuse`` hears why it is not served.
+    Raises:
+        JobError: it cannot be served there.
+        Exception: a step could not be shown.
     """
     verbs = fold.permissions.local_orders
     live = Live(name=fold.skipper.voyage.name, unix_s=showing.epoch_s, area=showing.area,
@@ -87,10 +87,19 @@ async def opened(
     page = LivePage(live, showing, fold, planner, crew)
     if address.token:
         live.ask, live.preview = page.ask, page.preview
-    try:
-        await stack.enter_async_context(served(address, live, pace=pace, charts=charts))
-    except JobError as error:
-        refuse("live page", f"{error}; she is sailed without a page")
-        return
-    stack.push_async_callback(page.end)
-    showing.watchers.append(page.show)
+    failed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+    def show(view: View, events: tuple[Event, ...], step: Step) -> None:
+        try:
+            page.show(view, events, step)
+        except Exception as error:   # a new page may do better
+            if not failed.done():
+                failed.set_exception(error)
+
+    async with served(address, live, pace=pace, charts=charts):
+        showing.watchers.append(show)
+        try:
+            await failed
+        finally:
+            showing.watchers.remove(show)
+            await page.end()

@@ -22,9 +22,9 @@ from companion.app.crew import Crew
 from companion.app.executor import Executor, Planner
 from companion.app.far import Mailbox
 from companion.app.keepers import keep_fence, keep_identity, keep_parameters
-from companion.app.local import served
+from companion.app.local import take_orders
 from companion.app.options import Far, SailOptions
-from companion.app.page import opened
+from companion.app.page import live_page
 from companion.app.showing import OnView, Showing
 from companion.clock import now_s
 from companion.compose import (
@@ -39,6 +39,7 @@ from companion.compose import (
 )
 from companion.fold import Step, VoyageFold, begun
 from companion.geofence import Mission
+from companion.guard import Auxiliary, Guard
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.transports import Transport
@@ -49,7 +50,7 @@ from companion.skipper import Skipper
 from companion.skipper.step import Phase, Severity, Snapshot
 from companion.telemetry.far import unix_of_boat
 from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, order_record, outcome_record
-from companion.telemetry.progress import DISK, left_behind
+from companion.telemetry.progress import DISK, GONE, left_behind
 from companion.telemetry.radio import Radio, speak_high_latency
 from companion.telemetry.state_file import StateFile
 from companion.telemetry.status import companion_status
@@ -63,25 +64,26 @@ CLOCK_OFF_S = 10.0        # from here on it is recorded
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0
 
+_AUXILIARIES = frozenset(Auxiliary)
 OnStatus = Callable[[CompanionStatus, Step], None]
 
 
 async def sail(
     mission: Mission, transport: Transport, planner: Planner, folder: Path, options: SailOptions,
     *, on_status: OnStatus | None = None, on_refusal: Callable[[str], None] | None = None,
-    on_view: OnView | None = None, stop: asyncio.Event | None = None,
+    on_view: OnView | None = None, stop: asyncio.Event | None = None, guard: Guard | None = None,
 ) -> dict[str, Any]:
     """Sail ``mission`` and watch the boat at its end until stopped or out of time; return the summary.
 
     ``on_status`` hears of every step, ``on_refusal`` of what was given and is not used (a saved state, a feed),
-    ``on_view`` of every step as a view.
+    ``on_view`` of every step as a view. ``guard`` knows what was gone already: it is told with this voyage.
 
     Raises:
         LinkError: no autopilot was heard within ``options.wait_s``.
         JobError: the folder's name cannot be one, or another companion is recording there.
     """
     with Recorder(folder, disk=options.disk, shelf=options.shelf, is_durable=options.is_durable) as recorder:
-        shell = _Shell(mission, planner, recorder, options, stop or asyncio.Event())
+        shell = _Shell(mission, planner, recorder, options, stop or asyncio.Event(), guard or Guard(seed=options.seed))
         shell.on_status, shell.on_refusal = on_status, on_refusal
         if on_view is not None:
             shell.showing.watchers.append(on_view)
@@ -93,15 +95,16 @@ class _Shell:
 
     def __init__(
         self, mission: Mission, planner: Planner, recorder: Recorder, options: SailOptions, stop: asyncio.Event,
+        guard: Guard,
     ) -> None:
         self.mission, self.recorder, self.options = mission, recorder, options
-        self.planner, self.stop = planner, stop
+        self.planner, self.stop, self.guard = planner, stop, guard
         self.on_status: OnStatus | None = None
         self.on_refusal: Callable[[str], None] | None = None
         self.voyage = voyage_of(mission)
         self.config = config_of(mission)
         self.log = Logbook(recorder, self.config, options.epoch_s)
-        self.showing = Showing(self.voyage, self.config, options.epoch_s, self._on_fault)
+        self.showing = Showing(self.voyage, self.config, options.epoch_s, guard)
         self.showing.is_kept = options.socket is not None
         self.state_file = StateFile(
             options.state_path or recorder.folder / STATE, disk=options.disk, offload=options.offload,
@@ -134,16 +137,19 @@ class _Shell:
                 ) as link,
                 contextlib.AsyncExitStack() as stack,
             ):
+                stack.push_async_callback(self.guard.end)
                 self._counted = link.stats
                 crew = self._crew = Crew(link, has_key=self.options.signing is not None)
                 link.subscribe(self._on_message)
                 if self.options.http is not None:
-                    await opened(stack, self.options.http, self.fold, self.planner, crew, self.showing,
-                                 pace=1.0 / self.options.budget_scale, charts=self.options.charts, refuse=self._refuse)
+                    self.guard.keep(Auxiliary.PAGE, functools.partial(
+                        live_page, self.options.http, self.fold, self.planner, crew, self.showing,
+                        pace=1.0 / self.options.budget_scale, charts=self.options.charts))
                 await self._wait_autopilot(link)
                 autopilot = self._autopilot = await stack.enter_async_context(
                     Autopilot(link, assembler=self.fold.assembler))
-                for text in await self.feeds.open(stack, feeds_of(self.mission), self.options.seed):
+                for text in await self.guard.wait(Auxiliary.FEEDS, functools.partial(
+                        self.feeds.open, stack, feeds_of(self.mission), self.options.seed)) or ():
                     self._refuse("AIS feed", text)
                 for text in self._refusals:
                     autopilot.say(int(Severity.WARNING), text)
@@ -152,30 +158,15 @@ class _Shell:
                                     expansions=self.options.expansions,
                                     budget_scale=self.options.budget_scale, config=self.config,
                                     on_adopt=adoption.ask, on_answer=crew.answered)
-                if self.options.socket is not None:
-                    await stack.enter_async_context(served(self.options.socket, crew, self.showing))
-                mailbox = () if self.options.far is None else (self._mailbox(self.options.far, autopilot, crew),)
-                radio = Radio(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble)
-                async with asyncio.TaskGroup() as group:
-                    tasks = [
-                        group.create_task(executor.run(), name="executor"),
-                        group.create_task(adoption.run(), name="adoption"),
-                        group.create_task(keep_identity(self.fold, autopilot), name="identity"),
-                        group.create_task(keep_parameters(self.fold, autopilot), name="parameters"),
-                        group.create_task(keep_fence(self.fold, autopilot, self.mission, self._record), name="fence"),
-                        group.create_task(radio.run(), name="radio"),
-                        group.create_task(
-                            speak_high_latency(autopilot, self._seen, lambda: crew.wants_high_latency),
-                            name="high latency"),
-                        *(group.create_task(box.run(), name="far") for box in mailbox),
-                        group.create_task(crew.watch(autopilot, self._record), name="crew"),
-                        group.create_task(self._tend_records(), name="records"),
-                        group.create_task(self._watch_loop(), name="loop watch"),
-                    ]
+                async with asyncio.TaskGroup() as group:   # what is worth the voyage
+                    orders = group.create_task(executor.run(), name="executor")
+                    self._keep_auxiliaries(autopilot, crew, adoption)
                     crew.begin()
-                    await self._steps(executor, link)
-                    for task in tasks:
-                        task.cancel()
+                    try:
+                        await self._steps(executor, link)
+                    finally:
+                        await self.guard.end()
+                    orders.cancel()
         except asyncio.CancelledError:
             self.end_reason = "interrupted"
             raise
@@ -183,6 +174,25 @@ class _Shell:
             summary = self._summary()
             self.recorder.summary(summary)
         return summary
+
+    def _keep_auxiliaries(self, autopilot: Autopilot, crew: Crew, adoption: Adoption) -> None:
+        """Begin what lives beside the voyage: of none of it the voyage ends."""
+        options, keep = self.options, self.guard.keep
+        if options.socket is not None:
+            keep(Auxiliary.SOCKET, functools.partial(take_orders, options.socket, crew, self.showing))
+        if options.far is not None:
+            keep(Auxiliary.FAR, self._mailbox(options.far, autopilot, crew).run)
+        keep(Auxiliary.ADOPTION, adoption.run)
+        keep(Auxiliary.IDENTITY, lambda: keep_identity(self.fold, autopilot))
+        keep(Auxiliary.PARAMETERS, lambda: keep_parameters(self.fold, autopilot))
+        keep(Auxiliary.FENCE, lambda: keep_fence(self.fold, autopilot, self.mission, self._record))
+        keep(Auxiliary.RADIO, Radio(
+            autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble).run)
+        keep(Auxiliary.HIGH_LATENCY, lambda: speak_high_latency(
+            autopilot, self._seen, lambda: crew.wants_high_latency))
+        keep(Auxiliary.CREW, lambda: crew.watch(autopilot, self._record))
+        keep(Auxiliary.RECORDS, self._tend_records)
+        keep(Auxiliary.LOOP_WATCH, self._watch_loop)
 
     def _mailbox(self, far: Far, autopilot: Autopilot, crew: Crew) -> Mailbox:
         """Return the mailbox of the satellite link."""
@@ -218,10 +228,13 @@ class _Shell:
         # Growing a jagged coast takes seconds; under way the loop must not wait for it.
         self.fold.skipper.prepare()
         t_s = self.log.now_s()
-        self.log.begin(t_s, self.mission, self.voyage, self.fold.permissions, persisted, known, {
-            "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
-            "expansions": options.expansions,
-        })
+        self.guard.call(Auxiliary.RECORDS, lambda: self.log.begin(
+            t_s, self.mission, self.voyage, self.fold.permissions, persisted, known, {
+                "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
+                "expansions": options.expansions}))
+        before, self.guard.told = dict(self.guard.gone), self._changed
+        for name, why in before.items():
+            self._changed(name, why, is_said=True)
         if self.state_file.refusal:
             self._refuse("saved state", self.state_file.refusal)
         elif persisted is not None and self.fold.state.adoptable is None and not options.is_again:
@@ -235,7 +248,22 @@ class _Shell:
 
     def _record(self, record: dict[str, Any]) -> None:
         """Record something that happened now."""
-        self.log.note(self.log.now_s(), record)
+        self._note(self.log.now_s(), record)
+
+    def _note(self, t_s: float, record: dict[str, Any]) -> None:
+        self.guard.call(Auxiliary.RECORDS, lambda: self.log.note(t_s, record))
+
+    def _changed(self, name: str, why: str, *, is_said: bool = False) -> None:
+        """Record, and say to the shore, what is gone beside the voyage and what is there again."""
+        severity = Severity.WARNING if why else Severity.NOTICE
+        text = f"sailing on without the {name}: {why}" if why else f"the {name} is there again"
+        if self._autopilot is None:
+            self._refusals.append(text)
+        else:
+            self._autopilot.say(int(severity), text)
+        self._record({"kind": "auxiliary", "what": name, "gone": bool(why), "text": text})
+        if self.on_refusal is not None and not is_said and name in _AUXILIARIES:   # an output speaks for itself
+            self.on_refusal(text)
 
     def _on_fault(self, text: str) -> None:
         """Record and say a fault of whoever listens on the link; the link itself goes on."""
@@ -245,7 +273,7 @@ class _Shell:
 
     def _on_outcome(self, outcome: Any) -> None:
         t_s = self.log.now_s()
-        self.log.note(t_s, outcome_record(outcome))
+        self.guard.call(Auxiliary.RECORDS, lambda: self.log.note(t_s, outcome_record(outcome)))
         self.fold.take_outcome(t_s, outcome)
 
     # --------------------------------------------------------------------------------------- steps
@@ -255,13 +283,13 @@ class _Shell:
             others = others_on(link, named=self._named)
             if others != self._others:
                 self._others = others
-                self.log.note(t_s, others.to_record())
+                self._note(t_s, others.to_record())
                 self.fold.others(others.neighbours, has_company=others.has_company, has_shore=others.has_shore)
         for report in self.feeds.take():
-            self.log.note(t_s, ais_record(report))
+            self._note(t_s, ais_record(report))
             self.fold.take(report)
         for order in () if self._crew is None else self._crew.take():
-            self.log.note(t_s, order_record(order))
+            self._note(t_s, order_record(order))
             self.fold.event(order)
         return self.fold.tick(t_s)
 
@@ -319,24 +347,28 @@ class _Shell:
 
     async def _after_step(self, step: Step, link: Link) -> None:
         """Record the step; nothing of it is carried out before what a restart needs is on the disk."""
-        snapshot = step.snapshot
-        clearance_m = None
-        if snapshot.position_en_m is not None and snapshot.vehicle is not None:
-            value = step.voyage.hull_clearance_m(snapshot.position_en_m, snapshot.vehicle.heading_rad)
-            clearance_m = value if math.isfinite(value) else None
-        self.log.step(step, clearance_m)
+        guard = self.guard
+        guard.look()
+        clearance_m = guard.call(Auxiliary.STATUS, lambda: _clearance_m(step))
+        guard.call(Auxiliary.RECORDS, lambda: self.log.step(step, clearance_m))
         if not self.options.dry_run:   # which must not take the place of a voyage that is interrupted
-            await self.state_file.save(self.fold.skipper.persisted(step.state))
-        self._compare_clocks(snapshot)
-        status = companion_status(step, step.voyage, self.log.figures, clearance_m, link.bytes_per_s()[1],
-                                  self.feeds.open_feeds, self.feeds.dropped)
-        trouble = self._trouble()
-        if trouble and not status.alert_code:
-            status = replace(status, alert_code=DISK, alert_text=trouble)
+            await guard.wait(Auxiliary.STATE, lambda: self.state_file.save(self.fold.skipper.persisted(step.state)))
+        guard.call(Auxiliary.RECORDS, lambda: self._compare_clocks(step.snapshot))
+        status = guard.call(Auxiliary.STATUS, lambda: self._status(step, clearance_m, link)) or CompanionStatus(
+            t_s=step.snapshot.t_s, state=step.state.phase.value, alert_code=GONE, alert_text=guard.sentence())
         self.status, self._step = status, step
         if self.on_status is not None:
             self.on_status(status, step)
         self.showing.take(step, status, self.log.figures)
+
+    def _status(self, step: Step, clearance_m: float | None, link: Link) -> CompanionStatus:
+        """Return the status at a step; where nothing else is wrong it tells what cannot be written, or is gone."""
+        status = companion_status(step, step.voyage, self.log.figures, clearance_m, link.bytes_per_s()[1],
+                                  self.feeds.open_feeds, self.feeds.dropped)
+        trouble, gone = self._trouble(), self.guard.sentence()
+        if status.alert_code or not (trouble or gone):
+            return status
+        return replace(status, alert_code=DISK if trouble else GONE, alert_text=trouble or gone)
 
     def _compare_clocks(self, snapshot: Snapshot) -> None:
         """Record once by how much this computer's clock, which stamps the records, is off the autopilot's by GPS.
@@ -368,7 +400,10 @@ class _Shell:
         while True:
             due_s = now_s() + LOOP_WATCH_S
             await asyncio.sleep(LOOP_WATCH_S)
-            self.loop_held_s = max(self.loop_held_s, now_s() - due_s)
+            self._held(now_s() - due_s)
+
+    def _held(self, late_s: float) -> None:
+        self.loop_held_s = max(self.loop_held_s, late_s)
 
     async def _tend_records(self) -> None:
         while True:
@@ -379,7 +414,7 @@ class _Shell:
     # ---------------------------------------------------------------------------------------- files
     def _refuse(self, what: str, text: str) -> None:
         """Record that something given is not used, and keep the sentence for the radio."""
-        self.log.note(self.log.now_s(), {"kind": "refusal", "what": what, "text": text})
+        self._record({"kind": "refusal", "what": what, "text": text})
         self._refusals.append(text)
         if self.on_refusal is not None:
             self.on_refusal(text)
@@ -407,6 +442,16 @@ class _Shell:
             "commands_unsigned": 0 if self._crew is None else self._crew.unsigned,
             "records_dropped": self.recorder.dropped,
             "disk_trouble": self._trouble(),
+            "gone": dict(self.guard.gone),
             "planner_restarts": self.planner.restarts,
             "loop_held_max_s": round(self.loop_held_s * self.options.budget_scale, 4),
         }
+
+
+def _clearance_m(step: Step) -> float | None:
+    """Return what the hull keeps clear of now [m], None where it is not known."""
+    snapshot = step.snapshot
+    if snapshot.position_en_m is None or snapshot.vehicle is None:
+        return None
+    value = step.voyage.hull_clearance_m(snapshot.position_en_m, snapshot.vehicle.heading_rad)
+    return value if math.isfinite(value) else None

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 from companion.fold import Step
+from companion.guard import Auxiliary, Guard
 from companion.messages import CompanionStatus
 from companion.skipper.step import SkipperConfig
 from companion.skipper.way import Voyage
@@ -17,17 +19,14 @@ OnView = Callable[[View, tuple[Event, ...], Step], None]
 class Showing:
     """Makes the view of each step and hands it to the watchers; none of them is worth the voyage.
 
-    ``epoch_s`` is the Unix time [s] of the loop's time 0; ``on_fault`` hears, once, of what went wrong with it.
+    ``epoch_s`` is the Unix time [s] of the loop's time 0; ``guard`` knows of what went wrong with it.
     """
 
-    def __init__(
-        self, voyage: Voyage, config: SkipperConfig, epoch_s: float, on_fault: Callable[[str], None],
-    ) -> None:
+    def __init__(self, voyage: Voyage, config: SkipperConfig, epoch_s: float, guard: Guard) -> None:
         self.epoch_s = epoch_s
         self._voyage, self._config = voyage, config
         self._made: ViewFold | None = None
-        self._on_fault = on_fault
-        self._faults: set[str] = set()
+        self._guard = guard
         self.watchers: list[OnView] = []
         self.is_kept = False   # made although nobody watches yet: who comes later wants to know of the plan in force
 
@@ -46,18 +45,9 @@ class Showing:
         """Show one step."""
         if not (self.watchers or self.is_kept):
             return
-        try:
-            view, events = self._fold.take(step, status, figures)
-        except Exception as error:
-            self._failed(f"the view of this step could not be made: {error!r}")
+        made = self._guard.call(Auxiliary.VIEW, lambda: self._fold.take(step, status, figures))
+        if made is None:
             return
+        view, events = made
         for watcher in tuple(self.watchers):
-            try:
-                watcher(view, events, step)
-            except Exception as error:
-                self._failed(f"a view could not be shown: {error!r}")
-
-    def _failed(self, text: str) -> None:
-        if text not in self._faults and len(self._faults) < 8:
-            self._faults.add(text)
-            self._on_fault(text)
+            self._guard.call(Auxiliary.VIEW, functools.partial(watcher, view, events, step))

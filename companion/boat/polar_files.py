@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.boat.polar import Polar
+from companion.disk import read_regular
 from companion.errors import InputError, unreadable
 from companion.geo.units import MPS_PER_KNOT
 
@@ -46,11 +47,12 @@ def read_polar(path: str | Path) -> PolarFile:
     """
     source = str(path)
     try:
-        raw = Path(path).read_bytes()
+        raw = read_regular(Path(path), MAX_FILE_BYTES + 1)
     except OSError as error:
         raise unreadable(source, error) from error
     if len(raw) > MAX_FILE_BYTES:
-        raise InputError(source, "", f"{len(raw)} bytes is no polar", "give a .pol or .csv file of boat speeds")
+        raise InputError(source, "", f"more than {MAX_FILE_BYTES} bytes is no polar",
+                         "give a .pol or .csv file of boat speeds")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:

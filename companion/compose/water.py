@@ -7,6 +7,7 @@ import math
 
 from companion.current import STILL, Prior, read_table
 from companion.current.prior import table_lines
+from companion.disk import read_regular
 from companion.errors import InputError, unreadable
 from companion.geofence import Mission
 
@@ -32,7 +33,7 @@ def water_of(mission: Mission) -> Prior:
         raise InputError(source, "[current] table", "a table and a constant current exclude one another",
                          "leave out set_deg and drift_mps, or the table")
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_regular(path).decode("utf-8-sig")
     except OSError as error:
         raise unreadable(source, error, f"[current] table {path}", "write a tide table beside the mission") from None
     except UnicodeDecodeError as error:

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import asyncio
 import errno
-import random
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
+from companion import guard
 from companion.clock import ended, now_s
+from companion.guard import Guard, kept
 
 T = TypeVar("T")
 Say = Callable[[str], None]
 
-BACKOFF_BASE_S, BACKOFF_CAP_S = 0.5, 15.0
-HELD_S = 30.0            # a connection that held for so long starts the pauses from their beginning
 SAY_AGAIN_S = 600.0      # the same words about a receiver are not said again sooner
 _WORDS = {
     errno.EADDRINUSE: "the port is in use", errno.ECONNREFUSED: "nobody listens there",
@@ -53,19 +52,21 @@ class Slot(Generic[T]):
 
 
 class Outlet(ABC, Generic[T]):
-    """One receiver. A context manager; ``serve`` is its life, begun anew when it ends."""
+    """One receiver, a context manager; ``serve`` is its life, begun anew when it ends. ``guard`` knows of it."""
 
     def __init__(self, name: str, say: Say, *, seed: int = 0) -> None:
         self.name, self.slot = name, Slot[T]()
+        self.guard = Guard()
         self.sent = 0              # values handed over
         self.is_open = False
         self.state = "not open yet"
-        self._say, self._rng = say, random.Random(seed)
+        self._say, self._seed = say, seed
         self._said: dict[str, float] = {}
         self._task: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Self:
-        self._task = asyncio.create_task(self._live(), name=f"output {self.name}")
+        self._task = asyncio.create_task(
+            kept(self._live, self._failed, seed=self._seed), name=f"auxiliary: {self.name}")
         return self
 
     async def __aexit__(
@@ -89,28 +90,22 @@ class Outlet(ABC, Generic[T]):
     def became(self, state: str, *, is_open: bool) -> None:
         """Note and say how it stands."""
         self.state, self.is_open = state, is_open
+        if is_open:
+            self.guard.found(self.name)
+        else:
+            self.guard.lost(self.name, state)
         t_s = now_s()
         if t_s - self._said.get(state, -SAY_AGAIN_S) >= SAY_AGAIN_S:
             self._said[state] = t_s
             self._say(f"{self.name}: {state}")
 
     async def _live(self) -> None:
-        attempt = 0
-        while True:
-            began_s = now_s()
-            why = "hung up"
-            try:
-                await self.serve()
-            except Exception as error:   # whatever a receiver does, it is not worth the voyage
-                why = reason(error)
-            attempt = 0 if self.is_open and now_s() - began_s >= HELD_S else attempt + 1
-            self.became(f"{why}; trying again", is_open=False)
-            await asyncio.sleep(self._rng.uniform(0.0, min(BACKOFF_CAP_S, BACKOFF_BASE_S * 2.0 ** min(attempt, 10))))
+        try:
+            await self.serve()
+        except OSError as error:
+            number = error.errno if isinstance(error.errno, int) else 0
+            raise OSError(_WORDS.get(number, guard.reason(error))) from error
+        raise ConnectionError("hung up")
 
-
-def reason(error: BaseException) -> str:
-    """Return an error in a few words."""
-    if isinstance(error, TimeoutError):
-        return "no answer"
-    number = getattr(error, "errno", None)
-    return _WORDS.get(number, "") if number in _WORDS else " ".join(str(error).split())[:120] or type(error).__name__
+    def _failed(self, why: str) -> None:
+        self.became(f"{why}; trying again", is_open=False)

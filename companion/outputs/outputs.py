@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -12,6 +12,7 @@ from typing import Any, Self
 from companion.addresses import Displays
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
+from companion.guard import Auxiliary, Guard
 from companion.outputs.deltas import Values, values_of
 from companion.outputs.nmea import Lines, lines_of
 from companion.outputs.nmea_outlets import TcpOutlet, UdpOutlet
@@ -31,15 +32,24 @@ class Wanted:
     token: str = field(default="", repr=False)
 
 
-def wanted(displays: Displays) -> Wanted:
-    """Return whom to tell, with the token that was read.
+def wanted(displays: Displays, guard: Guard) -> Wanted:
+    """Return whom to tell, with the token that was read; what cannot be, ``guard`` knows.
 
-    Raises:
-        InputError: the token cannot be read, or a library is missing.
+    A server is told without a token that cannot be read, and not at all without the library that its kind needs.
     """
-    if any(name.kind != "tcp" for name in displays.signalk):
-        require_websockets()
-    return Wanted(displays=displays, token="" if displays.token_file is None else read_token(displays.token_file))
+    try:
+        if any(name.kind != "tcp" for name in displays.signalk):
+            require_websockets()
+    except InputError as error:
+        guard.lost(Auxiliary.OUTPUTS, f"{error}", for_good=True)
+        displays = replace(displays, signalk=tuple(name for name in displays.signalk if name.kind == "tcp"))
+    token = ""
+    if displays.token_file is not None:
+        try:
+            token = read_token(displays.token_file)
+        except InputError as error:
+            guard.lost(Auxiliary.SIGNALK_TOKEN, f"{error}", for_good=True)
+    return Wanted(displays=displays, token=token)
 
 
 def read_token(path: Path) -> str:
@@ -51,11 +61,13 @@ def read_token(path: Path) -> str:
 
 
 class Outputs:
-    """The receivers that are wanted, while it is open. ``say`` hears how they stand, in words."""
+    """The receivers that are wanted, while it is open. ``say`` hears how they stand, in words; ``guard`` knows it."""
 
-    def __init__(self, chosen: Wanted, frame: LocalFrame, say: Say, *, seed: int = 0) -> None:
-        self._frame, self._say = frame, say
-        self._faults: set[str] = set()
+    def __init__(
+        self, chosen: Wanted, frame: LocalFrame, say: Say, *, seed: int = 0, guard: Guard | None = None,
+    ) -> None:
+        self._frame = frame
+        self._guard = guard or Guard(lambda name, why: say(f"{name}: {why}"))
         self.nmea: list[Outlet[Lines]] = [
             (UdpOutlet if name.kind == "udp" else TcpOutlet)(name, say, seed=seed + number)
             for number, name in enumerate(chosen.displays.nmea)]
@@ -64,6 +76,13 @@ class Outputs:
             WebSocketSignalK(name, say, token=chosen.token, seed=seed + number)
             for number, name in enumerate(chosen.displays.signalk, len(chosen.displays.nmea))]
         self._stack = contextlib.AsyncExitStack()
+        if guard is not None:
+            for outlet in self._outlets:
+                outlet.guard = guard
+
+    @property
+    def _outlets(self) -> tuple[Outlet[Any], ...]:
+        return (*self.nmea, *self.signalk)
 
     @property
     def are_any(self) -> bool:
@@ -71,8 +90,7 @@ class Outputs:
         return bool(self.nmea or self.signalk)
 
     async def __aenter__(self) -> Self:
-        outlets: list[Outlet[Any]] = [*self.nmea, *self.signalk]
-        for outlet in outlets:
+        for outlet in self._outlets:
             await self._stack.enter_async_context(outlet)
         return self
 
@@ -91,15 +109,8 @@ class Outputs:
         self._tell(self.signalk, lambda: values_of(view, self._frame))
 
     def _tell(self, outlets: Sequence[Outlet[Any]], made: Any) -> None:
-        if not outlets:
-            return
-        try:
-            value = made()
-        except Exception as error:   # a display is not worth the voyage
-            text = f"{outlets[0].name}: not told: {error!r}"
-            if text not in self._faults and len(self._faults) < 8:
-                self._faults.add(text)
-                self._say(text)
+        value = self._guard.call(Auxiliary.OUTPUTS, made) if outlets else None
+        if value is None:
             return
         for outlet in outlets:
             outlet.tell(value)

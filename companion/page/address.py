@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import ipaddress
-import os
 import re
 import secrets
 import socket
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from companion.disk import Disk, read_regular
 from companion.errors import InputError, unreadable
 from companion.secret import read_secret
 
 LEAST_TOKEN = 22      # characters: 128 bits in base64
+MOST_EMPTY = 65_536   # bytes of nothing that are looked through
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,14 +58,15 @@ def is_own(origin: str, host: str) -> bool:
 def read_token(path: Path) -> str:
     """Return the token in a file, which is made, with mode 0600, where there is none.
 
+    So is that of a file with nothing in it: a power cut left it, and nobody was given it.
+
     Raises:
-        InputError: others can read it, or what is in it is too short to be one.
+        InputError: it cannot be read or made, others can read it, or what is in it is too short to be one.
     """
     remedy = "name a file in a folder that is there"
     try:
-        if not path.exists():
-            with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-                file.write(secrets.token_urlsafe(24) + "\n")
+        if not path.exists() or not read_regular(path, MOST_EMPTY).strip(b"\0 \t\r\n"):
+            Disk().replace(path, f"{secrets.token_urlsafe(24)}\n".encode(), mode=0o600)
     except OSError as error:
         raise unreadable(str(path), error, "the token", remedy) from error
     text = read_secret(path, "the token", remedy)

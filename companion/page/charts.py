@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from companion.disk import open_regular
 from companion.errors import InputError, unreadable
 
 MOST_ZOOM = 24
@@ -87,7 +88,7 @@ def open_charts(paths: Sequence[Path]) -> tuple[Chart, ...]:
 def open_chart(path: Path) -> Chart:
     """Open a chart. Raises InputError: it is none, cannot be read, or has no pictures in it."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             head = file.read(16)
         stat = path.stat()
     except OSError as error:

@@ -26,6 +26,7 @@ SILENT_S = 5.0           # without a heartbeat
 LOUD = Severity.NOTICE   # what is said more quietly than this is in the records only
 COLUMNS_MOST = 120       # longer lines are hard to read
 DISK = "disk"   # the alert of trouble with the disk, which no state of the voyage tells
+GONE = "gone"   # ... and of what is gone beside it: a page, a socket, an output
 
 
 class ProgressLine:
@@ -60,7 +61,7 @@ class ProgressLine:
     def show(self, status: CompanionStatus, step: Step) -> None:
         """Show one step."""
         text = progress_text(step, status.next_tack_s)
-        if status.alert_code == DISK:
+        if status.alert_code in {DISK, GONE}:
             text += f" | {status.alert_text}"
         said, self._notes = self._notes, []
         said += [self._said(step.snapshot.t_s, a) for a in step.actions

@@ -14,7 +14,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from companion.clock import now_s
-from companion.disk import Disk, reason
+from companion.disk import Disk, read_regular, reason
 from companion.skipper.step import Persisted
 
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
@@ -117,8 +117,7 @@ def read_state(path: Path) -> Persisted:
         OSError: it is not there, or cannot be read.
         ValueError: it cannot be believed, whatever it holds.
     """
-    with path.open("rb") as file:
-        data = file.read(MAX_BYTES + 1)
+    data = read_regular(path, MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise ValueError(f"it is longer than {MAX_BYTES >> 20} MB")
     try:

@@ -13,15 +13,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import random
 import re
-import termios
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from typing import Any
 
 from companion.clock import ended, now_s
 from companion.errors import InputError, LinkError
+from companion.guard import kept
 from companion.messages import AisReport
 from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json
 
@@ -30,7 +29,6 @@ OnReport = Callable[[AisReport], None]
 DEFAULT_BAUD = 38400          # ITU-R M.1371 receivers: NMEA 0183-HS
 MAX_PARTIAL = 1024            # bytes without a line end: noise, dropped
 SILENT_S = 60.0               # a feed unheard for this long is stale: say so, AIS traffic or not
-_BACKOFF_BASE_S, _BACKOFF_CAP_S = 0.5, 15.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +65,7 @@ class AisFeed:
         self.name = name
         self._on_report = on_report
         self._decoder = NmeaDecoder()
-        self._rng = random.Random(seed)
+        self._seed = seed
         self._partial = b""
         self.connections = 0
         self.opened_s = now_s()
@@ -129,23 +127,21 @@ class AisFeed:
     # ------------------------------------------------------------------------------------------- life
     async def run_stream(self) -> None:
         """Connect, read to the end, connect again; for ever."""
-        attempt = 0
-        while True:
-            writer: asyncio.StreamWriter | None = None
-            try:
-                reader, writer = await self._open_stream()
-                self.connections += 1
-                attempt, self.last_error, self._partial = 0, "", b""
-                while data := await reader.read(4096):
-                    self.stream(data)
-                self.last_error = "closed by the other end"
-            except (OSError, TimeoutError, termios.error) as error:
-                self.last_error = str(error) or type(error).__name__
-            finally:
-                if writer is not None:
-                    writer.close()
-            await asyncio.sleep(self._rng.uniform(0.0, min(_BACKOFF_CAP_S, _BACKOFF_BASE_S * 2.0**min(attempt, 10))))
-            attempt += 1
+        def failed(why: str) -> None:
+            self.last_error = why
+
+        await kept(self._read_stream, failed, seed=self._seed)
+
+    async def _read_stream(self) -> None:
+        reader, writer = await self._open_stream()
+        try:
+            self.connections += 1
+            self.last_error, self._partial = "", b""
+            while data := await reader.read(4096):
+                self.stream(data)
+        finally:
+            writer.close()
+        raise ConnectionError("closed by the other end")
 
     async def _open_stream(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
         if self.name.kind == "tcp":

@@ -14,7 +14,7 @@ from companion.skipper.step import WindHealth
 from companion.skipper.watch.watchdogs import BY_NAME
 from companion.skipper.way import Goal, PointEn, Side, Voyage, gates_of
 from companion.telemetry.folder import VoyageFigures
-from companion.telemetry.progress import DISK
+from companion.telemetry.progress import DISK, GONE
 from companion.view import values
 from companion.view.company import alarms_of
 from companion.view.numbers import compass, metres, place, rounded, signed, tack_of
@@ -50,8 +50,8 @@ def alarms(step: Step, status: CompanionStatus, said: Mapping[str, str]) -> tupl
         text=said.get(raised.name, BY_NAME[raised.name].watches), age_s=rounded(t_s - raised.since_s, 1),
     ) for raised in step.state.raised]
     out += alarms_of(step)
-    if status.alert_code == DISK:
-        out.append(values.Alarm(code=DISK, level="warning", text=status.alert_text))
+    if status.alert_code in {DISK, GONE}:
+        out.append(values.Alarm(code=status.alert_code, level="warning", text=status.alert_text))
     return tuple(out)
 
 
@@ -182,6 +182,8 @@ def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
         values.Part(name="records", grade="bad" if status.alert_code == DISK else "good",
                     text=status.alert_text if status.alert_code == DISK else "written"),
     ]
+    if status.alert_code == GONE:
+        parts.append(values.Part(name="beside the voyage", grade="poor", text=status.alert_text))
     if status.traffic is not None:
         seen = status.traffic
         is_poor = seen.silent_feeds > 0 or seen.silence_s is None or seen.silence_s > FEED_SILENT_S

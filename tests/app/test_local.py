@@ -17,6 +17,7 @@ from companion.clock import run
 from companion.compose import config_of, voyage_of
 from companion.errors import InputError
 from companion.geofence import load_mission
+from companion.guard import Guard
 from companion.mavlink.link import Link
 from companion.orders import Result, Verb
 from companion.skipper.step import Acknowledge
@@ -25,9 +26,9 @@ from sitl.autopilot import MemoryLink
 from tests.terminal.test_dashboard import VIEW
 
 
-def showing(on_fault=print):
+def showing(guard=None):
     mission = load_mission("missions/archipelago.toml")
-    return Showing(voyage_of(mission), config_of(mission), 0.0, on_fault)
+    return Showing(voyage_of(mission), config_of(mission), 0.0, guard or Guard())
 
 
 def with_socket(path, talk, shown=None):
@@ -197,11 +198,12 @@ def test_who_watches_and_never_reads_is_hung_up_on(tmp_path, monkeypatch):
 
 def test_a_view_that_cannot_be_made_is_said_once_and_costs_nothing():
     faults, seen = [], []
-    shown = showing(faults.append)
+    shown = showing(Guard(lambda name, why: faults.append((name, why))))
     shown.take(None, None, None)             # nobody watches: nothing is made
     assert faults == []
     shown.watchers.append(lambda *told: seen.append(told))
     shown.take(None, None, None)
     shown.take(None, None, None)
     assert len(faults) == 1
-    assert "could not be made" in faults[0]
+    assert faults[0][0] == "view of the voyage"
+    assert "AttributeError" in faults[0][1]

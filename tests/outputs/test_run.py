@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import socket
 
 import pytest
@@ -76,10 +77,8 @@ def test_a_signal_k_server_that_is_not_there_is_told_of_once(tmp_path, capfd):
     ('nmea = ["udp:10110"]', (), "m.toml: [output] nmea: 'udp:10110' is no place to send NMEA 0183 to; write udp:HOST"),
     ('signalk = ["http://h"]', (), "m.toml: [output] signalk: 'http://h' is no Signal K server; write ws://HOST:3000"),
     ('signalk_token = "t"', (), "m.toml: [output] signalk_token: there is no WebSocket to use it on"),
-    ('signalk = ["ws://h"]\nsignalk_token = "t"', (), "the Signal K token: no such file"),
     ("", ("--nmea", "tcp:x"), "--nmea: tcp:x: is no place to send NMEA 0183 to"),
     ("", ("--signalk", "h:3000"), "--signalk: h:3000: is no Signal K server"),
-    ("", ("--signalk", "ws://h", "--signalk-token", "nowhere"), "nowhere: the Signal K token: no such file"),
 ])
 def test_what_cannot_be_told_is_refused_in_one_line(tmp_path, capfd, output, words, says):
     path = mission(tmp_path, f"[output]\n{output}" if output else "")
@@ -88,6 +87,28 @@ def test_what_cannot_be_told_is_refused_in_one_line(tmp_path, capfd, output, wor
     assert says in said
     assert said.count("\n") == 1
     assert not (tmp_path / "v").exists()
+
+
+def empty(path):
+    path.touch(mode=0o600)
+
+
+@pytest.mark.parametrize(("make", "says", "where"), [
+    (lambda path: None, "the Signal K token: no such file", "mission"), (empty, "holds no token", "option"),
+    (os.mkfifo, "the Signal K token: cannot be read (it is a FIFO and no regular file)", "option")])
+def test_without_a_token_that_can_be_used_a_server_is_told_without_one(tmp_path, capfd, make, says, where):
+    """It was exit code 2 or 66: the boat stayed ashore for a display."""
+    make(tmp_path / "t")
+    server = f"ws://127.0.0.1:{free_port()}"
+    path = mission(tmp_path, f'[output]\nsignalk = ["{server}"]\nsignalk_token = "t"' if where == "mission" else "")
+    words = ("--signalk", server, "--signalk-token", str(tmp_path / "t")) if where == "option" else ()
+    assert run(path, *words) == 1                  # for want of an autopilot
+    out, err = capfd.readouterr()
+    assert f"{tmp_path / 't'}: {says}" in err
+    assert f"note: Signal K {server}: nobody listens there; trying again" in out
+    records = (tmp_path / "v/decisions.jsonl").read_text()
+    assert '"what":"Signal K token","gone":true' in records
+    assert f'"what":"Signal K {server}","gone":true' in records
 
 
 def test_mission_check_sees_it_too(tmp_path):

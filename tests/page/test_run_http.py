@@ -1,6 +1,7 @@
 """``companion run --http`` and ``sitl run --http``: what is refused, and that no page is worth a voyage."""
 
 import argparse
+import os
 import socket
 import stat
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from companion import cli
+from companion.page import read_token
 from sitl import cli as sitl_cli
 from sitl.commands.run import page_words
 from sitl.scene.ships import free_port
@@ -22,7 +24,7 @@ def tried(tmp_path, *words):
 
 @pytest.mark.parametrize("words", [
     ("--http-token", "t"), ("--http-name", "boat.local"), ("--chart", "a.mbtiles"), ("--http", "x"),
-    ("--http", "127.0.0.1:99999"), ("--http", "80", "--http-token", "no/such/folder/t")])
+    ("--http", "127.0.0.1:99999")])
 def test_a_page_that_cannot_be_is_one_line(words, tmp_path, capfd):
     code = tried(tmp_path, *words)
     err = capfd.readouterr().err
@@ -30,12 +32,36 @@ def test_a_page_that_cannot_be_is_one_line(words, tmp_path, capfd):
     assert not (tmp_path / "v").exists()
 
 
-def test_a_token_that_others_can_read_is_one_line(tmp_path, capsys):
+def fifo(path):
+    os.mkfifo(path, 0o600)
+
+
+def readable(path):
+    path.write_text("a-token-of-enough-characters\n")
+    path.chmod(0o644)
+
+
+@pytest.mark.parametrize(("make", "says"), [
+    (readable, "chmod 600"), (fifo, "it is a FIFO and no regular file"), (Path.mkdir, "Is a directory"),
+    (lambda path: path.write_text("short"), "can be read by others"), (lambda path: None, "no such file")])
+def test_with_a_token_that_cannot_be_used_she_is_sailed_and_the_page_takes_no_orders(make, says, tmp_path, capfd):
+    """It was exit code 2 or 66: the boat stayed ashore for a page."""
+    token = tmp_path / ("token" if says != "no such file" else "no/such/folder/token")
+    make(token)
+    assert tried(tmp_path, "--http", free_port(), "--http-token", token) == 1   # for want of an autopilot
+    err = capfd.readouterr().err
+    assert err.count("note: sailed without the orders on the page: ") == 1
+    assert says in err
+    assert '"what":"orders on the page"' in (tmp_path / "v" / "decisions.jsonl").read_text()
+
+
+@pytest.mark.parametrize("left", [b"", b"\n", b"\0" * 33])
+def test_a_token_that_a_power_cut_left_empty_is_made_anew(left, tmp_path):
     token = tmp_path / "token"
-    token.write_text("a-token-of-enough-characters\n")
+    token.write_bytes(left)
     token.chmod(0o644)
-    assert tried(tmp_path, "--http", free_port(), "--http-token", token) == 2
-    assert "chmod 600" in capsys.readouterr().err
+    assert len(read_token(token)) >= 32
+    assert stat.S_IMODE(token.stat().st_mode) == 0o600
 
 
 def test_with_its_port_in_use_she_is_sailed_without_a_page(tmp_path, capfd):
@@ -45,7 +71,7 @@ def test_with_its_port_in_use_she_is_sailed_without_a_page(tmp_path, capfd):
         port = other.getsockname()[1]
         assert tried(tmp_path, "--http", port) == 1   # for want of an autopilot, not of a page
     out, err = capfd.readouterr()
-    assert out.count("she is sailed without a page") == 1
+    assert out.count("sailing on without the live page: ") == 1
     assert "in use" in out
     assert "no autopilot" in err or "heard" in err
     assert '"what":"live page"' in (tmp_path / "v" / "decisions.jsonl").read_text()

@@ -23,6 +23,7 @@ from companion.words import counted, file_name
 if TYPE_CHECKING:
     from companion.commands.starting import Sailed
     from companion.geofence.mission import MissionOptions
+    from companion.guard import Guard
     from companion.outputs import Wanted
     from companion.planner.nursery import Nursery
     from companion.planner.worker import PlannerWorker
@@ -64,6 +65,7 @@ def _run(args: argparse.Namespace) -> int:
     from companion.commands.starting import Sailed, settings_of
     from companion.geofence import load_mission
     from companion.geofence.mission import NO_NAME
+    from companion.guard import Guard
     from companion.mavlink.transports import parse_link
     from companion.planner.nursery import Nursery
     from companion.planner.worker import answer_requests
@@ -78,8 +80,8 @@ def _run(args: argparse.Namespace) -> int:
     for name in args.signalk:
         parse_signalk(name)
     parse_link(args.link)
-    far_of(args)
-    page_of(args)
+    far_of(args, Guard())   # here for mistakes of the command line; what cannot be used is told with the voyage
+    page_of(args, Guard())
     settings, sailed = settings_of(args.mission, is_drawn=args.from_autopilot, system=args.system), None
     if settings is None:
         named = require_sailable(load_mission(args.mission))
@@ -140,6 +142,7 @@ def _voyage(
     from companion.clock import run as run_loop
     from companion.commands.starting import asked
     from companion.compose import displays_of
+    from companion.guard import Guard
     from companion.mavlink.transports import open_link
     from companion.outputs import wanted
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
@@ -150,10 +153,12 @@ def _voyage(
         shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
     mission = sailed.mission.with_feeds(*args.feed).with_system(args.system).with_outputs(
         args.nmea, args.signalk, args.signalk_token)
-    told = wanted(displays_of(mission))
+    seed = mission.skipper.seed if args.seed is None else args.seed
+    guard = Guard(lambda name, why: err.write(f"companion run: note: sailed without the {name}: {why}\n"), seed=seed,
+                  pace=args.speedup)
+    told = wanted(displays_of(mission), guard)
     for finding in mission.findings:
         err.write(f"companion run: {finding.line(str(mission.path))}\n")
-    seed = mission.skipper.seed if args.seed is None else args.seed
     transport = open_link(args.link, seed=seed)
     again = args.again or sailed.is_new or asked(mission, state_path, err)
     if again is None:
@@ -167,12 +172,13 @@ def _voyage(
             expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
             wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
             exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
-            settings=sailed.settings, socket=args.socket, http=page_of(args),
-            charts=charts_of(args, err), far=far_of(args), command=" ".join(sys.argv),
+            settings=sailed.settings, socket=args.socket, http=page_of(args, guard),
+            charts=charts_of(args, guard), far=far_of(args, guard), command=" ".join(sys.argv),
             token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
-    summary = run_loop(_sail(mission, transport, folder, options, manager, nursery, out, told), speedup=args.speedup)
+    summary = run_loop(
+        _sail(mission, transport, folder, options, manager, nursery, out, told, guard), speedup=args.speedup)
     if summary is None:
         return INTERRUPTED
     if not summary["arrived_before"] and summary["end_reason"] != ADOPTED:   # the next voyage waits for no picture
@@ -208,7 +214,7 @@ def last_words(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 async def _sail(
     mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager,
-    nursery: Nursery | None, out: Console, told: Wanted,
+    nursery: Nursery | None, out: Console, told: Wanted, guard: Guard,
 ) -> dict[str, Any] | None:
     """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker
@@ -221,6 +227,7 @@ async def _sail(
     async with PlannerWorker(algorithm=mission.skipper.planner, nursery=nursery) as planner:
         # The child loads its kernels while this process imports the rest.
         from companion.app.sail import sail
+        from companion.guard import Auxiliary
         from companion.outputs import Outputs
         from companion.telemetry.far import unix_of_boat
         from companion.telemetry.progress import ProgressLine
@@ -230,17 +237,17 @@ async def _sail(
         chosen = options()
 
         with ProgressLine(out, chosen.epoch_s) as progress:
-            async with Outputs(told, mission.frame(), progress.note, seed=chosen.seed) as outputs:
+            async with Outputs(told, mission.frame(), progress.note, seed=chosen.seed, guard=guard) as outputs:
                 def show(status: Any, step: Any) -> None:
-                    progress.show(status, step)
                     manager.alive(f"{step.state.phase.value}: {step.state.why}")
+                    guard.call(Auxiliary.CONSOLE, lambda: progress.show(status, step))
 
                 def tell(view: Any, _: Any, step: Any) -> None:
                     outputs.tell(view, unix_of_boat(step.snapshot, step.snapshot.t_s), step.voyage.frame)
 
                 return await sail(
                     mission, transport, planner, folder, chosen, on_status=show, stop=stop, on_refusal=progress.note,
-                    on_view=tell if outputs.are_any else None)
+                    on_view=tell if outputs.are_any else None, guard=guard)
 
 
 async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, manager: ServiceManager) -> bool:

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.errors import InputError
+from companion.guard import Auxiliary
 
 if TYPE_CHECKING:
-    from companion.telemetry.console import Console
+    from companion.guard import Guard
 
 
 def signing_of(path: Path | None) -> Any:
@@ -22,8 +23,11 @@ def signing_of(path: Path | None) -> Any:
     return SigningStore(path, time.time())
 
 
-def page_of(args: argparse.Namespace) -> Any:
-    """Return where the page is served. Raises InputError: the token cannot be used."""
+def page_of(args: argparse.Namespace, guard: Guard) -> Any:
+    """Return where the page is served; with a token that cannot be used it takes no orders, which ``guard`` knows.
+
+    Raises InputError: what is named has no page to be used on.
+    """
     if args.http is None:
         named = "--http-token" if args.http_token is not None else "--http-name" if args.http_name else (
             "--chart" if args.chart else "")
@@ -33,25 +37,36 @@ def page_of(args: argparse.Namespace) -> Any:
     from companion.page import Address, read_token
 
     host, port = args.http
-    return Address(host=host, port=port, names=tuple(args.http_name),
-                   token="" if args.http_token is None else read_token(args.http_token))
+    token = ""
+    if args.http_token is not None:
+        try:
+            token = read_token(args.http_token)
+        except InputError as error:
+            guard.lost(Auxiliary.ORDERS_BY_PAGE, f"{error}", for_good=True)
+    return Address(host=host, port=port, names=tuple(args.http_name), token=token)
 
 
-def charts_of(args: argparse.Namespace, err: Console) -> Any:
+def charts_of(args: argparse.Namespace, guard: Guard) -> Any:
     """Return the charts; without one that is none, or that a card no longer has, she is sailed all the same."""
     from companion.page import open_charts
 
     charts: list[Any] = []
+    said: list[str] = []
     for path in args.chart:
         try:
             charts += open_charts([path])
         except InputError as error:
-            err.write(f"companion run: note: {error}; she is sailed without this chart\n")
+            said.append(f"{error}; she is sailed without this chart")
+    if said:
+        guard.lost(Auxiliary.CHARTS, "; ".join(said), for_good=True)
     return tuple(charts)
 
 
-def far_of(args: argparse.Namespace) -> Any:
-    """Return the folder of the satellite link with its key. Raises InputError: it cannot be used."""
+def far_of(args: argparse.Namespace, guard: Guard) -> Any:
+    """Return the folder of the satellite link with its key, None where it is not wanted or its key cannot be used.
+
+    Raises InputError: no key is named, or no folder.
+    """
     if args.far is None:
         if args.far_key is not None:
             raise InputError("--far-key", str(args.far_key), "there is no link to use it on",
@@ -64,4 +79,8 @@ def far_of(args: argparse.Namespace) -> Any:
     if key_file is None:
         raise InputError("--far", str(args.far), "has no key", "make one with `companion key new far.key` and name it "
                          "with --far-key")
-    return Far(folder=args.far, key=read_key(key_file), every_s=60.0 * args.far_every)
+    try:
+        return Far(folder=args.far, key=read_key(key_file), every_s=60.0 * args.far_every)
+    except InputError as error:
+        guard.lost(Auxiliary.FAR, f"{error}", for_good=True)
+        return None

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 import shapely
 
+from companion.disk import open_regular
 from companion.errors import InputError, unreadable
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
@@ -257,7 +258,7 @@ def assembled(
 def _require(path: Path, source: str, place: str, remedy: str) -> None:
     """Raise InputError, which names the place in the mission, when a file that it names cannot be read."""
     try:
-        path.open("rb").close()
+        open_regular(path).close()
     except OSError as error:
         raise unreadable(source, error, f"{place} {path}", remedy) from None
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import shapely
 
 from companion.boat.failed_tack import IRONS_S
+from companion.disk import read_regular
 from companion.errors import InputError
 from companion.planner.problem.parts import (
     SIGMA_MODELS,
@@ -150,7 +151,7 @@ def read_fields(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
         return _fields(source, str(source.get("id", "problem")))
     path = Path(source)
     try:
-        raw = json.loads(path.read_text(encoding="utf-8"))
+        raw = json.loads(read_regular(path))
     except OSError as error:
         raise InputError(str(path), "", f"cannot be read ({error.strerror})", "name a problem file") from error
     except (ValueError, RecursionError) as error:

@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
+from companion.disk import read_regular
 from companion.geofence import Mission
 from companion.geofence.mission import is_file
 from companion.telemetry.folder.names import COPIES
@@ -52,7 +53,7 @@ def write_copies(mission: Mission, recorder: Recorder) -> str:
         options["current"]["table"] = copied(mission.current.table)
     try:
         for kept, path in files.items():
-            recorder.whole(f"{COPIES}/{kept}", path.read_bytes())
+            recorder.whole(f"{COPIES}/{kept}", read_regular(path))
     except OSError:
         return ""
     recorder.whole(f"{COPIES}/{MISSION}", tomli_w.dumps(without_none(options)).encode())

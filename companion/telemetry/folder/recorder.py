@@ -24,7 +24,7 @@ from typing import Any, Self
 import numpy as np
 import tomli_w
 
-from companion.disk import Disk, is_mistake, reason
+from companion.disk import Disk, is_mistake, open_regular, reason
 from companion.errors import JobError
 from companion.lock import FolderLock
 from companion.telemetry.folder.names import DECISIONS, SUMMARY, TLOG, TRACK, VOYAGE
@@ -295,7 +295,7 @@ class Recorder:
 def _cut_torn_line(path: Path) -> None:
     """Cut off the half line that a power cut left: what is appended must not join it."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             size = file.seek(0, os.SEEK_END)
             begin = file.seek(max(0, size - TAIL_BYTES))
             tail = file.read()

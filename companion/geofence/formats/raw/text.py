@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 
+from companion.disk import read_regular
 from companion.errors import InputError, unreadable
 
 MAX_BYTES = 16 * 1024 * 1024  # a coast of 500,000 vertices; more is a mistake or an attack
@@ -18,8 +19,7 @@ _DECIMAL_COMMA = re.compile(r"(?<![\d,])(-?\d+),(\d+)(?![\d,])")
 def read_bytes(path: Path, *, max_bytes: int = MAX_BYTES) -> bytes:
     """Return the file's bytes. Raises InputError if it cannot be read or is over ``max_bytes``."""
     try:
-        with path.open("rb") as file:
-            data = file.read(max_bytes + 1)
+        data = read_regular(path, max_bytes + 1)
     except OSError as error:
         raise unreadable(str(path), error) from None
     if len(data) > max_bytes:
