@@ -437,7 +437,8 @@ class _Shell:
             "left_behind": "" if self._step is None else left_behind(self._step),
             "ais_feeds": [feed.sentence() for feed in self.feeds.open_feeds],
             "ais_dropped": self.feeds.dropped,
-            "frames_disbelieved": sum(self._counted.dropped[why] for why in (Drop.WRONG_CLOCK, Drop.OUT_OF_STEP)),
+            "frames_disbelieved": sum(self._counted.dropped[why] for why in (
+                Drop.WRONG_CLOCK, Drop.OUT_OF_STEP, Drop.HELD)),
             "listener_faults": dict(self._counted.faults),
             "commands_unsigned": 0 if self._crew is None else self._crew.unsigned,
             "records_dropped": self.recorder.dropped,

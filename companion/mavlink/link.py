@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
@@ -40,6 +41,9 @@ OnFrame = Callable[[float, bytes], None]
 OnCommand = Callable[[Message], int]
 # What ``on_command`` returns for a command that is answered later, with ``acknowledge``.
 LATER = -1
+# The loop's turn is noted so often; what is read this much later than the next was due has waited for us [s]. For so
+# long after that a frame that might be anybody's is not heard, unless one with a boot time that is right comes first.
+TURN_S, HELD_S, DOUBT_S = 0.2, 0.2, 1.0
 
 HEARTBEAT_S = 1.0
 # Without a heartbeat of the autopilot for this long the link is silent [s].
@@ -104,12 +108,15 @@ class Link:
         self._tasks: list[asyncio.Task[None]] = []
         self._system_status = wire.MAV_STATE_BOOT if is_starting else wire.MAV_STATE_ACTIVE
         self._signing_zero_s: float | None = None
+        self._turned_s, self._doubt_until_s = math.inf, -math.inf
 
     # -------------------------------------------------------------------------------------------- life
     async def __aenter__(self) -> Self:
+        self._turned_s = now_s()
         await self.transport.open(self._take_bytes)
         await self._group.__aenter__()
         self._tasks = [
+            self._group.create_task(self._turn(), name="link turns"),
             self._group.create_task(self._beat(), name="link heartbeat"),
             self._group.create_task(self._rates.keep(self._found), name="link rates"),
         ]
@@ -326,8 +333,16 @@ class Link:
             with contextlib.suppress(Exception):
                 self._on_fault(f"{whose} failed on what was heard, and goes on without it: {error!r}")
 
+    async def _turn(self) -> None:
+        """Note that the loop turns: what is read long after the last turn has waited for us, and nobody was silent."""
+        while True:
+            self._turned_s = now_s()
+            await asyncio.sleep(TURN_S)
+
     def _take_bytes(self, data: bytes) -> None:
         now = self._now()
+        if now - self._turned_s > TURN_S + HELD_S and self._signing is None:
+            self._doubt_until_s = now + DOUBT_S
         self._throughput.note(now, received=len(data))
         for message in self._codec.feed(data):
             try:   # as ``guard`` does; fifty messages a second, each to several listeners, are worth the lines
@@ -337,6 +352,9 @@ class Link:
 
     def _take(self, now: float, message: Message) -> None:
         if self._reception.is_repeat(message):
+            return
+        if now < self._doubt_until_s and self._reception.is_out_of_turn(message):
+            self.stats.dropped[Drop.HELD] += 1   # and not recorded: a replay knows nothing of our turns
             return
         self.stats.frames_in += 1
         if self._sink is not None:
@@ -348,6 +366,8 @@ class Link:
             return
         kind = message.get_type()
         if heard is Heard.OURS and message.get_srcComponent() == codec.AUTOPILOT_COMPONENT:
+            if now < self._doubt_until_s and getattr(message, "time_boot_ms", None) is not None:
+                self._doubt_until_s = -math.inf   # the count is known again
             self.monitor.heard(now, kind)
             self._notice_boot(kind, message)
             if kind == "HEARTBEAT" and codec.is_autopilot_heartbeat(message):

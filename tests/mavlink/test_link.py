@@ -57,6 +57,44 @@ def with_peer(main, *, peer_signing=None, **link_options):
     return run_virtual(whole())
 
 
+@pytest.mark.parametrize("held_s", [0.45, 0.6, 1.6, 3.0])
+def test_what_waited_while_the_loop_was_held_up_proves_no_silence(held_s):
+    """A computer that was busy for a moment, 0.15 s of it beside a simulator in a hurry, read at once what had come and
+    took its own absence for a silence of the autopilot: the first forged mode in the queue was believed."""
+    async def main(peer, link):
+        heard, forger, boot = [], Codec(1, 1), now_s()
+        link.subscribe(lambda _, message: heard.append((message.get_type(), getattr(message, "custom_mode", None))))
+
+        def speak(seconds):
+            """Say what the autopilot says in so long, at 50 Hz; every fifth frame has its boot time."""
+            nonlocal boot
+            for number in range(round(seconds * 50.0)):
+                boot += 0.02
+                peer.say(wire.MAVLink_wind_message(90.0, 5.0, 0.0) if number % 5 else
+                         wire.MAVLink_attitude_message(round(1e3 * boot), 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+
+        for _ in range(100):
+            speak(0.1)
+            await asyncio.sleep(0.1)
+        forged = wire.MAVLink_heartbeat_message(11, 3, 128, 5, 4, 3)
+        for ahead in (15, 27):   # it knows no count, and comes before the autopilot's own in the queue
+            forger._mav.seq = (peer.codec._mav.seq + ahead) % 256
+            peer.end.write(forger.pack(forged))
+        before = len(heard)
+        speak(held_s)
+        peer.say(BEAT)
+        asyncio.get_running_loop().jump(held_s)   # nothing of ours runs
+        await asyncio.sleep(0.3)
+        late = heard[before:]
+        assert ("HEARTBEAT", 5) not in late
+        assert ("HEARTBEAT", BEAT.custom_mode) in late
+        assert sum(kind == "WIND" for kind, _ in late) >= 0.9 * 40.0 * held_s
+        assert link.stats.dropped[Drop.HELD] == 2
+        return True
+
+    assert with_peer(main)
+
+
 def store(tmp_path):
     key = tmp_path / "key"
     key.write_text("0123456789abcdef" * 4)

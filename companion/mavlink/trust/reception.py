@@ -89,6 +89,18 @@ class Reception:
             del self._recent[next(iter(self._recent))]
         return False
 
+    def is_out_of_turn(self, message: Message) -> bool:
+        """Return whether a message of the autopilot's carries no time and is not the very next after the last heard.
+
+        That proves nothing of it while messages are lost. But where they only waited for us, they come in order.
+        """
+        system, component = message.get_srcSystem(), message.get_srcComponent()
+        if system != self.target or component != codec.AUTOPILOT_COMPONENT:
+            return False
+        last = self._stats.last_seq.get((system, component))
+        is_timed = getattr(message, "time_boot_ms", None) is not None
+        return not is_timed and last is not None and message.get_seq() != (last + 1) % 256
+
     def choose(self, t_s: float) -> None:
         """Take the autopilot that is ours, once it is known."""
         if self.is_decided:

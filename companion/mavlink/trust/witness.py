@@ -42,8 +42,8 @@ FIRST_RATE_HZ = 50.0
 STEP, RARE, SILENCE_S = 1, 1e-3, 0.5
 # Overtaken frames are late by this at most [s].
 LATE_S = 0.5
-# Rate and loss are those of this time [s].
-WINDOW_S = 1.0
+# Rate and loss are those of this time of the autopilot's own clock: ours may be held up, or hurried [s].
+WINDOW_S = 1.2
 # Messages with a right boot time that vouch for their stream.
 VOUCHERS = 3
 MAX_STREAMS = 4
@@ -101,8 +101,8 @@ class _Stream:
         self.last_s = t_s
         self.vouchers = 0
         self._seq = self._anchor_seq = seq
-        self._anchor_s = self._since_s = t_s
-        self._anchor_boot_s = -math.inf
+        self._anchor_s = t_s
+        self._anchor_boot_s, self._since_boot_s = -math.inf, math.nan
         self._rate_hz, self._step = FIRST_RATE_HZ, STEP + BURST
         self._counted = self._heard = 0
         self._seen_s = [-math.inf] * 256
@@ -136,11 +136,13 @@ class _Stream:
         self._counted += (seq - self._anchor_seq) % 256
         self._seq = self._anchor_seq = seq
         self._anchor_s, self._anchor_boot_s = t_s, boot_s
-        if t_s - self._since_s >= WINDOW_S:
-            self._rate_hz = max(1.0, self._counted / (t_s - self._since_s))
+        if math.isnan(self._since_boot_s):
+            self._since_boot_s, self._counted, self._heard = boot_s, 0, 0
+        if boot_s - self._since_boot_s >= WINDOW_S:
+            self._rate_hz = max(1.0, self._counted / (boot_s - self._since_boot_s))
             lost = min(0.9, max(0.0, 1.0 - self._heard / max(1, self._counted)))
             self._step = STEP + (math.ceil(math.log(RARE) / math.log(lost)) if lost > RARE else 0)
-            self._counted, self._heard, self._since_s = 0, 0, t_s
+            self._counted, self._heard, self._since_boot_s = 0, 0, boot_s
 
 
 class Witness:

@@ -49,6 +49,7 @@ class Drop(enum.Enum):
     STALE = "messages older than one already used"
     WRONG_CLOCK = "messages whose boot time is not the autopilot's"
     OUT_OF_STEP = "messages whose number is out of step with the autopilot's"
+    HELD = "messages that waited while we were held up, and were not the next of the autopilot's"
     LEAP = "positions that nothing before or after them agrees with"
 
 
