@@ -51,6 +51,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--live", action="store_true", help="separate processes over UDP, in (sped-up) real time")
     parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), metavar="N",
                         help="with --live or ardurover (default: the scenario's)")
+    parser.add_argument("--cpu", type=number(above=0.0, at_most=1.0), metavar="SHARE",
+                        help="companion and planner get this share of one core, in real time: a slow computer")
     parser.add_argument("--http", type=http_address, metavar="[HOST:]PORT",
                         help="with --live or ardurover: the companion serves its live page here")
     parser.add_argument("--http-token", type=Path, metavar="FILE", help="orders from the page, as of companion run")
@@ -82,12 +84,12 @@ def run(args: argparse.Namespace) -> int:
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
     page = page_words(args)
     compile_ahead(mission.skipper.planner)
-    if args.autopilot == "ardurover" or args.live:
+    if is_live(args):
         from sitl.run.live import run_live
 
         verdict = run_live(
             scenario, args.scenario, args.seed, folder, autopilot=args.autopilot, program=args.ardurover,
-            speedup=args.speedup, page=page,
+            speedup=args.speedup or (1.0 if args.cpu is not None else None), page=page, cpu=args.cpu,
         )
     else:
         with ProgressLine(sys.stdout) as progress:
@@ -99,6 +101,11 @@ def run(args: argparse.Namespace) -> int:
     return 0 if verdict.passed else 1
 
 
+def is_live(args: argparse.Namespace) -> bool:
+    """Return whether the scenario runs in real time, in processes of its own."""
+    return bool(args.live or args.autopilot == "ardurover" or args.cpu is not None)
+
+
 def page_words(args: argparse.Namespace) -> list[str]:
     """Return what the companion is told of its live page. Raises InputError: it cannot be served."""
     from companion.errors import InputError
@@ -108,7 +115,7 @@ def page_words(args: argparse.Namespace) -> list[str]:
             if value is not None:
                 raise InputError(name, str(value), "there is no page to use it on", "say --http PORT")
         return []
-    if not (args.live or args.autopilot == "ardurover"):
+    if not is_live(args):
         raise InputError("--http", "", "no browser can be waited for under the virtual clock", "say --live, too")
     host, port = args.http
     return ["--http", f"{f'[{host}]' if ':' in host else host}:{port}",

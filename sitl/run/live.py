@@ -24,6 +24,7 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
 from companion.telemetry.folder import DECISIONS, VERDICT
 from sitl.run.boats import Boat, RealBoat, SimulatedBoat
+from sitl.run.cpu_share import CpuShare, cpu_share
 from sitl.run.embedded import TRUTH_EVERY_S, ends_of, marks_of, solid_of
 from sitl.scene import (
     TRAFFIC,
@@ -50,8 +51,8 @@ OURS = TRAFFIC | ON_THE_LINK | {"kill_companion", "wind_shift", "wind_speed"}
 class _Companion:
     """The companion's process: started, killed and started again."""
 
-    def __init__(self, command: list[str]) -> None:
-        self._command = command
+    def __init__(self, command: list[str], share: CpuShare | None = None) -> None:
+        self._command, self._share = command, share
         self._process: asyncio.subprocess.Process | None = None
         self._is_over = asyncio.Event()
         self._expects_death = False
@@ -64,7 +65,11 @@ class _Companion:
     async def start(self) -> None:
         """Start it; its progress line is ours."""
         self._expects_death = False
-        self._process = await asyncio.create_subprocess_exec(*self._command)
+        share = self._share
+        self._process = await asyncio.create_subprocess_exec(
+            *self._command, preexec_fn=None if share is None else share.enter)
+        if share is not None:
+            self._holder = asyncio.create_task(share.hold(self._process.pid), name="share of a core")
         self._watcher = asyncio.create_task(self._watch(self._process), name="companion process")
 
     async def _watch(self, process: asyncio.subprocess.Process) -> None:
@@ -105,11 +110,12 @@ class _Companion:
 
 def run_live(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, autopilot: str, program: Path | None,
-    speedup: float | None, truth: Truth | None = None, page: Sequence[str] = (),
+    speedup: float | None, truth: Truth | None = None, page: Sequence[str] = (), cpu: float | None = None,
 ) -> Verdict:
     """Run ``scenario``; leaves a voyage folder with verdict.json. The judge's track is noted in ``truth``.
 
-    ``page`` is what the companion is told of its live page.
+    ``page`` is what the companion is told of its live page. ``cpu`` is the share of one core, 0 to 1, that it and its
+    planner get; None: all that there is.
 
     Raises:
         JobError: it has an event that this autopilot cannot play, or a boat that it cannot be, or the companion left
@@ -129,14 +135,14 @@ def run_live(
     pace = speedup or scenario.speedup
     track = Truth() if truth is None else truth
     try:
-        return run(_run(scenario, source, seed, folder, autopilot, program, pace, track, page), speedup=pace)
+        return run(_run(scenario, source, seed, folder, autopilot, program, pace, track, page, cpu), speedup=pace)
     except asyncio.CancelledError:   # SIGTERM
         raise KeyboardInterrupt from None
 
 
 async def _run(
     scenario: Scenario, source: Path, seed: int, folder: Path, kind: str, program: Path | None, pace: float,
-    truth: Truth, page: Sequence[str],
+    truth: Truth, page: Sequence[str], cpu: float | None,
 ) -> Verdict:
     mission_path = scenario.mission_path(source)
     mission = load_mission(mission_path)
@@ -156,12 +162,13 @@ async def _run(
             relay = await stack.enter_async_context(Relay(boat.link, seed=seed))
             link = relay.link
         feeds = ["--feed", f"udpin:127.0.0.1:{port}"] if any(e.kind in TRAFFIC for e in scenario.events) else []
+        share = None if cpu is None else await stack.enter_async_context(cpu_share(cpu))
         companion = _Companion([
             sys.executable, "-m", "companion.cli", "run", str(mission_path), "--link", link, "--out", str(folder),
             "--state", str(folder / "state.json"), "--seed", str(seed), "--speedup", f"{pace:g}",
             "--limit", f"{scenario.limit_s:g}", *feeds, *(["--exit-on-arrival"] if scenario.exit_on_arrival else []),
             *(["--dry-run"] if scenario.dry_run else []), *page,
-        ])
+        ], share)
         stack.push_async_callback(companion.stop)
         here = asyncio.current_task()
         assert here is not None

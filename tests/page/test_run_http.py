@@ -90,7 +90,7 @@ def test_without_a_chart_that_is_none_she_is_sailed_all_the_same(tmp_path, capfd
 def test_a_simulated_voyage_is_told_of_its_charts(tmp_path, capsys):
     assert sitl_cli.main(["run", "demo", "--live", "--chart", str(tmp_path / "a.mbtiles")]) == 2
     assert "--http PORT" in capsys.readouterr().err
-    args = argparse.Namespace(http=("127.0.0.1", 8765), http_token=None, live=True, autopilot="embedded",
+    args = argparse.Namespace(http=("127.0.0.1", 8765), http_token=None, live=True, autopilot="embedded", cpu=None,
                               chart=[Path("a.mbtiles"), Path("b.pmtiles")])
     assert page_words(args)[-4:] == ["--chart", "a.mbtiles", "--chart", "b.pmtiles"]
 

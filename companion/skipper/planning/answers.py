@@ -12,7 +12,7 @@ from companion.planner.problem import evaluate, resolved
 from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.errands import Kind, errand
-from companion.skipper.planning.not_found import asks_again, not_found
+from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.track import of_way, said
 from companion.skipper.planning.uploads import upload
 from companion.skipper.planning.vessels import apart_m, meetings
@@ -52,7 +52,7 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
         not_found(turn, pending, reason)
         return
     turn.update(
-        unanswered=0,
+        unanswered=0, effort=min(1.0, MORE * turn.state.effort),
         rung=0, ladder_reason=None, plan_retry=turn.failed(turn.state.plan_retry) if pending.rung > 0 else Retry())
     keep, set_current = _place(turn, pending)
     if keep is None:

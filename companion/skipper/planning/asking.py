@@ -90,7 +90,7 @@ def request(
     budget = turn.config.first_plan_budget_s if reason is ReplanReason.START else turn.config.plan_budget_s
     why = "; ".join(part for part in (text, start.text, f"step: {name}" if name else "") if part)
     turn.act(RequestPlan(
-        request_id=number, problem=problem, reason=reason, budget_s=budget, seed=number,
+        request_id=number, problem=problem, reason=reason, budget_s=turn.state.effort * budget, seed=number,
         from_seq=None if from_index is None else from_index + 1,
         planner=step.planner.about(turn.voyage.frame.origin), rung=name, text=why,
     ))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from companion.messages import Command, waypoint
+from companion.planner.settings import AUTO
 from companion.skipper.planning.admission import is_on_board_sound, is_sound, leads_there
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.track import of_way, steps
@@ -18,24 +19,36 @@ from companion.skipper.way.rejudged import too_risky
 from companion.skipper.way.stemming import waiting_place
 
 FOUL = "current too strong"   # the code under which it is said
-UNDER_WAY_TRIES, ASHORE_TRIES = 2, 5   # of a planner that does not answer, before the next step of the ladder
+TRIES = 3              # of a planner that does not answer, before the next step of the ladder
+LESS, LEAST_EFFORT = 0.5, 0.05   # of the planning budget: after each request that was not answered; never less
+MORE = 1.2             # ... and after each that was
 HOLD_ROOM = 2.0   # times the loiter's radius: she may lie here for hours, and a HOLD carries her off before help comes
 
 
 def asks_again(turn: Turn, pending: PendingPlan, reason: str) -> bool:
-    """Ask the same again of a planner that did not answer: that is no reason to give up margin or promise.
+    """Ask again, with less effort, of a planner that did not answer; False where the ladder is to be climbed.
 
-    Not for ever: a problem may be what it dies of. True when it is asked, or will be after a wait.
+    Want of a processor is no want of a way: it costs effort and time, neither margin nor promise, and what is on board
+    and sound is sailed on meanwhile. The ladder is climbed where what is on board is not sound or meets a vessel, for a
+    problem may be what the planner dies of; and for its first step where that is another planner.
     """
-    turn.update(unanswered=turn.state.unanswered + 1)
-    sails = turn.state.sailing and turn.state.route is not None
-    if turn.state.unanswered >= (UNDER_WAY_TRIES if sails else ASHORE_TRIES):
-        turn.update(unanswered=0)
+    state = turn.state
+    turn.update(unanswered=state.unanswered + 1, effort=max(LEAST_EFFORT, LESS * state.effort))
+    if turn.state.unanswered < TRIES and request(
+            turn, pending.reason, from_index=pending.from_index, rung=pending.rung, text=reason):
+        turn.say(Severity.WARNING, "no answer", f"{reason}: asked again, with less effort", every_s=0.0)
+        return True
+    turn.update(unanswered=0)
+    sails = state.sailing and state.route is not None
+    if pending.rung == 0 and turn.config.planner.algorithm != AUTO.algorithm:
         return False
-    turn.say(Severity.WARNING, "no answer", f"{reason}: asked again", every_s=0.0)
-    if sails:
-        return request(turn, pending.reason, from_index=pending.from_index, rung=pending.rung, text=reason)
-    turn.update(plan_retry=turn.failed(turn.state.plan_retry))
+    if sails and (meetings(turn) or not is_on_board_sound(turn)):
+        return False
+    turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
+    wait_s = turn.state.plan_retry.not_before_s - turn.t_s
+    stays = "what is on board is sound and stays; " if sails else ""
+    turn.say(Severity.WARNING, "no answer", f"{reason}: {stays}asked again in {wait_s:.0f} s, with less effort",
+             every_s=0.0)
     return True
 
 

@@ -221,6 +221,7 @@ class SkipperState:
     own_mode: Mode | None = None       # a mode other than AUTO that we asked for ourselves
     rung: int = 0                      # step of the ladder being tried
     unanswered: int = 0                # requests in a row that the planner did not answer
+    effort: float = 1.0                # share of the planning budget that is asked for: less on a slow processor
     ladder_reason: ReplanReason | None = None
     plan_retry: Retry = PATIENT
     upload_retry: Retry = PATIENT

@@ -7,8 +7,14 @@ import pytest
 import shapely
 
 from companion.messages import Mode
+from companion.planner import plan
+from companion.skipper.planning.answers import take_plan
+from companion.skipper.planning.asking import request
 from companion.skipper.step import actions as act
+from companion.skipper.step.actions import ReplanReason
+from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.way.voyage import Goal
+from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import FAST, is_done, is_sailing, make, nothing, said
 from tests.skipper.world import World, skipper, voyage
 
@@ -130,6 +136,31 @@ def test_a_planner_that_hangs_before_the_start_costs_no_margin():
     world.planner = None
     assert world.run(120, is_sailing)
     assert world.state.route.margin_m == world.skipper.config.margin_m
+
+
+def test_want_of_a_processor_costs_effort_and_neither_margin_nor_mission():
+    """Under way nothing is answered: less is asked of the planner each time, and what is on board stays."""
+    world = make(Goal(en_m=(200.0, 200.0), radius_m=8.0), obstacles=(), wind=lambda t: (-math.pi / 4.0, 5.0))
+    assert world.run(120, is_sailing)
+    sound, world.planner = world.state.route, lambda problem, seed: None
+    budgets = []
+    for _ in range(3):
+        turn = turn_of(world)
+        assert request(turn, ReplanReason.ORDER)
+        while turn.state.pending_plan is not None:
+            budgets += [a.budget_s for a in turn.actions if isinstance(a, act.RequestPlan)]
+            turn.actions.clear()
+            take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id, text="no answer"))
+        assert turn.state.route == sound
+        assert not any(isinstance(a, act.UploadMission | act.SetMode) for a in turn.actions)
+        world.state = turn.state
+    assert budgets == sorted(budgets, reverse=True)
+    assert budgets[-1] < 0.1 * budgets[0]
+    turn = turn_of(world)
+    assert request(turn, ReplanReason.ORDER)
+    pending = turn.state.pending_plan
+    take_plan(turn, PlanOutcome(request_id=pending.request_id, plan=plan(pending.problem, expansions=500)))
+    assert turn.state.effort > world.state.effort     # what is answered gives it back
 
 
 def test_an_old_plan_that_the_present_wind_has_closed_is_not_sound():

@@ -1,0 +1,60 @@
+"""A slow computer: what is put under a share of a core gets no more than that, its children too."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from sitl.run.cpu_share import CpuShare, cpu_share, family_of
+
+# A child of a child that turns for a second, and says which part of a core it had.
+BUSY = """
+import subprocess, sys
+code = "import time; b, c = time.monotonic(), time.process_time()\\nwhile time.monotonic() < b + 1.0: pass\\n" \
+    "print((time.process_time() - c) / (time.monotonic() - b))"
+subprocess.run([sys.executable, "-c", code])
+"""
+
+
+async def part_of_a_core(share: CpuShare) -> float:
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", BUSY, stdout=asyncio.subprocess.PIPE, preexec_fn=share.enter)
+    hold = asyncio.create_task(share.hold(process.pid))
+    told, _ = await process.communicate()
+    await hold
+    return float(told)
+
+
+@pytest.mark.parametrize("by_quota", [True, False])
+def test_a_child_of_a_child_gets_no_more_than_the_share(by_quota):
+    async def sail():
+        async with cpu_share(0.2) as share:
+            if by_quota and share.cgroup is None:
+                pytest.skip("no control group may be made here")
+            bounded = share if by_quota else replace(share, cgroup=None)
+            assert ("quota" in bounded.means) == by_quota
+            return await part_of_a_core(bounded)
+
+    assert asyncio.run(sail()) < 0.4
+
+
+def test_a_control_group_is_taken_away_again():
+    async def make():
+        async with cpu_share(0.5) as share:
+            assert share.cgroup is None or share.cgroup.is_dir()
+        return share.cgroup
+
+    folder = asyncio.run(make())
+    assert folder is None or not folder.exists()
+
+
+def test_the_family_of_a_process_are_those_that_live():
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
+        assert process.pid in family_of(os.getpid())
+        process.kill()
+    assert family_of(process.pid) == []
