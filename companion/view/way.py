@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.boat import AutopilotLimits
 from companion.fold import Step
 from companion.geo.angles import difference_rad, heading_of
-from companion.messages import Command
+from companion.messages import Command, Mode
 from companion.planner import Leg, Plan
 from companion.skipper.planning import next_tack_s
 from companion.skipper.step import Route
@@ -84,6 +84,7 @@ def predicted_of(step: Step, voyage: Voyage) -> tuple[values.Ahead, ...]:
     """Return where she is expected: along the legs left, at her polar's speed, beating where the wind asks for it.
 
     As the autopilot steers: straight to the waypoint where it can be sailed, else close-hauled within its corridor.
+    GUIDED has none.
     """
     snapshot, state, route = step.snapshot, step.state, step.state.route
     here, wind, vehicle = snapshot.position_en_m, snapshot.wind, snapshot.vehicle
@@ -92,6 +93,8 @@ def predicted_of(step: Step, voyage: Voyage) -> tuple[values.Ahead, ...]:
             or state.over:
         return ()
     limits = snapshot.limits or AutopilotLimits()
+    if snapshot.autopilot is not None and snapshot.autopilot.mode is Mode.GUIDED:
+        limits = replace(limits, sail_xtrack_max_m=0.0)
     legs = [(start, end) for item, start, end in zip(
         route.items[state.index:], route.leg_from_en_m[state.index:], route.points_en_m[state.index:], strict=True)
         if item.command == Command.NAV_WAYPOINT]

@@ -15,6 +15,7 @@ from typing import Any
 
 from companion.words import file_name
 from sitl.means import Means
+from sitl.run.variation import AS_IT_SAYS, Method, can_be_sailed
 from sitl.runner import Key, file_hash, sail
 
 FAILURES = Path("campaign-failures")
@@ -22,62 +23,74 @@ FAILURES = Path("campaign-failures")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """One run."""
+    """One run; ``method`` takes the place of the mission's guidance and planner."""
 
     scenario: Path
     seed: int
     keep: Path | None
+    method: Method = AS_IT_SAYS
 
 
 def sail_one(job: Job) -> dict[str, Any]:
     """Sail one seed; return its verdict as a record. Runs in a worker process."""
     from companion.clock import run_virtual
-    from sitl.run.embedded import run_embedded
+    from sitl.run.embedded import mission_of, run_embedded
     from sitl.scene import load_scenario
 
     scenario = load_scenario(job.scenario)
-    place = job.keep / f"{file_name(scenario.name)}-{job.seed:04d}" if job.keep else None
+    name = file_name(_name(scenario.name, job.method))
+    place = job.keep / f"{name}-{job.seed:04d}" if job.keep else None
     with tempfile.TemporaryDirectory(prefix="voyage-") as scratch:
         folder = place or Path(scratch) / "voyage"
         if place is not None:
             shutil.rmtree(place, ignore_errors=True)
         try:
-            verdict = run_virtual(run_embedded(scenario, job.scenario, job.seed, folder)).to_dict()
+            variation = job.method.variation(mission_of(scenario, job.scenario))
+            verdict = run_virtual(
+                run_embedded(scenario, job.scenario, job.seed, folder, variation=variation)).to_dict()
         except Exception as error:
             verdict = {"scenario": scenario.name, "seed": job.seed, "passed": False, "checks": [
                 {"name": "no unhandled error", "passed": False, "figure": repr(error), "required": []}], "figures": {}}
         if not verdict["passed"] and place is None:
-            kept = FAILURES / f"{file_name(scenario.name)}-{job.seed:04d}"
+            kept = FAILURES / f"{name}-{job.seed:04d}"
             shutil.rmtree(kept, ignore_errors=True)
             if folder.is_dir():
                 with contextlib.suppress(OSError):   # a seed repeats: its result is worth more than its folder
                     kept.parent.mkdir(exist_ok=True)
                     shutil.copytree(folder, kept)
-    return verdict
+    return {**verdict, "scenario": _name(scenario.name, job.method)}
+
+
+def _name(scenario: str, method: Method) -> str:
+    return f"{scenario}, {method.told}" if method.told else scenario
 
 
 def key_of(job: Job) -> Key:
     """Return what a run is known by."""
     from sitl.scene import load_scenario
 
-    return {"scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario), "seed": job.seed}
+    return {"scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario),
+            **({"method": job.method.told} if job.method.told else {}), "seed": job.seed}
 
 
 def run_campaign(
     scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, means: Means, json_path: Path | None = None,
-    keep: Path | None = None,
+    keep: Path | None = None, methods: Sequence[Method] = (AS_IT_SAYS,),
 ) -> int:
-    """Run and print; return the exit code."""
+    """Run each scenario by each method that its mission allows, and print; return the exit code."""
     from sitl.run.compiled import compile_ahead
     from sitl.run.embedded import mission_of
     from sitl.scene import load_scenario
 
     loaded = [load_scenario(path) for path in scenarios]
-    for scenario, path in zip(loaded, scenarios, strict=True):
-        mission_of(scenario, path)
-    compile_ahead()
-    names = [scenario.name for scenario in loaded]
-    jobs = [Job(scenario=p, seed=first_seed + k, keep=keep) for p in scenarios for k in range(runs)]
+    missions = [mission_of(scenario, path) for scenario, path in zip(loaded, scenarios, strict=True)]
+    for planner in dict.fromkeys(method.planner or "auto" for method in methods):
+        compile_ahead(planner)
+    ways = [(scenario.name, path, method) for scenario, path, mission in zip(loaded, scenarios, missions, strict=True)
+            for method in methods if method.guidance is None or can_be_sailed(mission, method.guidance)]
+    names = [_name(name, method) for name, _, method in ways]
+    jobs = [Job(scenario=path, seed=first_seed + k, keep=keep, method=method)
+            for _, path, method in ways for k in range(runs)]
     sailed = sail("campaign", sail_one, jobs, means, key=key_of,
                   on_record=lambda record: print(json.dumps(record, separators=(",", ":")), flush=True))
     records = sailed.records
@@ -112,6 +125,7 @@ def figures(name: str, records: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "time_p90_s": times[min(len(times) - 1, math.ceil(0.9 * len(times)) - 1)] if times else None,
         "tacks_median": _median(numbers("tacks")),
         "replans_median": _median(numbers("replans")),
+        "below_floor": sum(any(c["name"] == "clearance, m" and not c["passed"] for c in r["checks"]) for r in records),
         "clearance_min_m": min(numbers("min_clearance_m"), default=None),
         "clearance_median_m": _median(numbers("min_clearance_m")),
         "promised_risk": _median(numbers("promised_risk")),
@@ -131,7 +145,8 @@ def print_table(rows: Sequence[dict[str, Any]]) -> None:
     heads = {
         "scenario": "scenario", "runs": "runs", "passed": "passed", "arrived": "arrived", "touched": "touched",
         "time_median_s": "time s", "time_p90_s": "p90 s", "tacks_median": "tacks", "replans_median": "replans",
-        "clearance_min_m": "least clearance m", "clearance_median_m": "median m", "promised_risk": "promised risk",
+        "below_floor": "below floor", "clearance_min_m": "least clearance m",
+        "clearance_median_m": "median m", "promised_risk": "promised risk",
         "observed_no_go": "forced into no-go",
     }
     texts = [[_cell(row[key]) for key in heads] for row in rows]

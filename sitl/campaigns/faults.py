@@ -11,11 +11,13 @@ HOLD for half the voyage has done nothing wrong by being late.
 from __future__ import annotations
 
 import json
+import random
 import statistics
 import tempfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,7 @@ from sitl.campaigns.counterfactual import avoidable
 from sitl.campaigns.fault_draw import draw, draw_planner
 from sitl.campaigns.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
 from sitl.means import Means
+from sitl.run.variation import Method, drawn_method
 from sitl.runner import Key, file_hash, sail
 from sitl.scene import EventSpec, Scenario, is_all_ordinary, load_scenario
 
@@ -41,27 +44,49 @@ KNOWN: Mapping[int, str] = {
 WORKER_PACE = 2.0    # faster, two seconds of a busy machine would count as silence
 
 
-def sail_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[str, Any]:
-    """Draw the faults of one seed, sail them and return how it went; a voyage folder is left in ``keep``."""
-    return sail_faults(draw(seed, load_scenario(base)), seed, base, keep)
+def sail_seed(
+    seed: int, base: Path = BASE, keep: Path | None = None, *, draws: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Draw the faults of one seed, sail them and return how it went; a voyage folder is left in ``keep``.
+
+    ``draws`` as of ``method_of``.
+    """
+    scenario = load_scenario(base)
+    return sail_faults(draw(seed, scenario), seed, base, keep, method=method_of(seed, scenario, base, draws))
 
 
-def sail_worker_seed(seed: int, base: Path = BASE, keep: Path | None = None) -> dict[str, Any]:
+def sail_worker_seed(
+    seed: int, base: Path = BASE, keep: Path | None = None, *, draws: Sequence[str] = (),
+) -> dict[str, Any]:
     """Sail one seed with faults of the planner's real process, in real time ``WORKER_PACE`` times as fast."""
-    return sail_faults(draw_planner(seed, load_scenario(base)), seed, base, keep, worker_pace=WORKER_PACE)
+    scenario = load_scenario(base)
+    return sail_faults(draw_planner(seed, scenario), seed, base, keep, worker_pace=WORKER_PACE,
+                       method=method_of(seed, scenario, base, draws))
+
+
+def method_of(seed: int, scenario: Scenario, source: Path, draws: Sequence[str]) -> Method:
+    """Return by which guidance and planner a seed is sailed: ``draws`` names what is drawn of them, else the mission's.
+
+    They are drawn apart: what else a seed is does not depend on whether they are.
+    """
+    from sitl.run.embedded import mission_of
+
+    return drawn_method(random.Random(f"method {seed}"), draws, mission_of(scenario, source)) if draws else Method()
 
 
 def sail_faults(
     scenario: Scenario, seed: int, base: Path, keep: Path | None = None, *, worker_pace: float | None = None,
+    method: Method | None = None,
 ) -> dict[str, Any]:
     """Sail a scenario, read from ``base``, with what else a ``seed`` decides, and return how it went."""
+    method = method or Method()
     if keep is not None and keep.is_dir() and any(keep.iterdir()):
         raise InputError("--keep", str(keep), "is not empty", "a voyage's folder is taken up where it was left")
-    voyage = _sail(scenario, seed, base, keep, worker_pace)
+    voyage = _sail(scenario, seed, base, keep, worker_pace, method)
     watch, figures, errors = voyage.watch, voyage.figures, voyage.errors
 
     def touches(other: Scenario) -> float | None:
-        return next((t_s for t_s, _ in _sail(other, seed, base, None, worker_pace).watch.contacts()), None)
+        return next((t_s for t_s, _ in _sail(other, seed, base, None, worker_pace, method).watch.contacts()), None)
 
     contacts = []
     for t_s, excuse in watch.contacts():
@@ -89,7 +114,7 @@ def sail_faults(
         "seed": seed, "passed": not faults, "faults": faults,
         "events": [told(e) for e in scenario.events], "parameters": dict(scenario.parameters),
         "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}", "limit_s": scenario.limit_s,
-        "set_auto": scenario.set_auto, "system": scenario.system,
+        "set_auto": scenario.set_auto, "system": scenario.system, "method": method.told,
         "kinds": sorted({e.kind for e in scenario.events}),
         "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
         "contacts": contacts, "clearance_m": least and least[0], "clearance_t_s": least and least[1],
@@ -113,7 +138,7 @@ class _Voyage:
 
 
 def _sail(
-    scenario: Scenario, seed: int, base: Path, keep: Path | None, worker_pace: float | None = None,
+    scenario: Scenario, seed: int, base: Path, keep: Path | None, worker_pace: float | None, method: Method,
 ) -> _Voyage:
     """Sail a scenario on the embedded autopilot under the eyes of a watch."""
     from companion.clock import run_virtual
@@ -145,7 +170,7 @@ def _sail(
         folder = keep if keep is not None else Path(scratch) / "voyage"
         try:
             voyage = run_embedded(scenario, base, seed, folder, on_status=on_status, expansions=EXPANSIONS,
-                                  observer=watch, worker_pace=worker_pace)
+                                  observer=watch, worker_pace=worker_pace, variation=method.variation(mission))
             verdict = run_virtual(voyage) if worker_pace is None else run_from_zero(voyage, worker_pace)
             figures = verdict.figures
             seen = {check.name: check.figure for check in verdict.checks}
@@ -166,32 +191,36 @@ def told(event: EventSpec) -> str:
 
 def run_faults(
     *, runs: int, first_seed: int = 0, means: Means, json_path: Path | None = None, worker: bool = False,
+    draws: Sequence[str] = (),
 ) -> int:
     """Sail ``runs`` seeds, print those that failed and what was counted; return the exit code.
 
-    It is 1 where one failed that is not ``KNOWN`` to.
+    ``draws`` as of ``method_of``. It is 1 where one failed that is not ``KNOWN`` to.
     """
-    known = {} if worker else KNOWN
+    known = {} if worker or draws else KNOWN
     water = {"scenario": load_scenario(BASE).name, "hash": file_hash(BASE), "trouble": "worker" if worker else "all"}
 
     def key_of(seed: int) -> Key:
-        return {**water, "seed": seed}
+        return {**water, **({"draws": ", ".join(draws)} if draws else {}), "seed": seed}
 
     def tell(record: dict[str, Any]) -> None:
         if not record["passed"]:
-            drawn = record["events"] + [f"{name} {value:g}" for name, value in record["parameters"].items()]
+            method = [record["method"]] if record.get("method") else []
+            drawn = method + record["events"] + [f"{name} {value:g}" for name, value in record["parameters"].items()]
             word = "known to fail," if record["seed"] in known else "FAILED"
             print(f"{word} seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})", flush=True)
 
-    sailed = sail("faults", sail_worker_seed if worker else sail_seed, range(first_seed, first_seed + runs), means,
+    work = partial(sail_worker_seed if worker else sail_seed, draws=tuple(draws))
+    sailed = sail("faults", work, range(first_seed, first_seed + runs), means,
                   key=key_of, on_record=tell)
     records = sailed.records
+    drawing = f" --draw {','.join(draws)}" if draws else ""
     table = figures_of(records)
     print_figures(table)
     print(f"{table['simulated_s'] / 3600.0:.1f} h simulated; {sailed.took}")
     for record in records:
         if not record["passed"]:
-            print(f"again: sitl faults --first-seed {record['seed']} --keep DIR")
+            print(f"again: sitl faults{drawing} --first-seed {record['seed']} --keep DIR")
         elif record["seed"] in known:
             print(f"seed {record['seed']} passes, which was known to fail: {known[record['seed']]}")
     if json_path is not None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from companion.program.arguments import out_file, out_folder, whole
 from sitl.means import add_options, means_of
+from sitl.methods import add_methods, methods_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -25,6 +26,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="keep the voyage folders (default: failed ones only, "
                         "in campaign-failures/)")
+    add_methods(parser)
     add_options(parser)
     parser.set_defaults(run=run)
 
@@ -35,5 +37,5 @@ def run(args: argparse.Namespace) -> int:
 
     return run_campaign(
         args.scenarios, runs=args.runs, first_seed=args.first_seed, means=means_of(args), json_path=args.json,
-        keep=args.keep,
+        keep=args.keep, methods=methods_of(args),
     )

@@ -7,6 +7,7 @@ from typing import Any
 
 from companion.program.arguments import out_file, out_folder, whole
 from sitl.means import add_options, means_of
+from sitl.methods import add_draw, compile_planners
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -29,6 +30,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         help="sail only the first seed and keep its voyage folder")
     parser.add_argument("--worker", action="store_true",
                         help="the planner's real process, killed, stopped, out of memory: in real time (a minute each)")
+    add_draw(parser)
     add_options(parser)
     parser.set_defaults(run=run)
 
@@ -36,13 +38,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from sitl.campaigns.faults import run_faults, sail_seed, sail_worker_seed
-    from sitl.run.compiled import compile_ahead
 
-    compile_ahead()
+    compile_planners(args.draw)
     if args.keep is not None:
-        record = (sail_worker_seed if args.worker else sail_seed)(args.first_seed, keep=args.keep)
+        record = (sail_worker_seed if args.worker else sail_seed)(args.first_seed, keep=args.keep, draws=args.draw)
         for key, value in record.items():
             print(f"{key}: {value}")
         return 0 if record["passed"] else 1
     return run_faults(runs=args.runs, first_seed=args.first_seed, means=means_of(args), json_path=args.json,
-                      worker=args.worker)
+                      worker=args.worker, draws=args.draw)

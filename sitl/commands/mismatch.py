@@ -9,6 +9,7 @@ from typing import Any
 from companion.errors import InputError
 from companion.program.arguments import out_file, out_folder, whole
 from sitl.means import add_options, means_of
+from sitl.methods import add_draw, compile_planners
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -34,6 +35,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="sail only the first seed and keep its voyage folder")
+    add_draw(parser)
     add_options(parser)
     parser.set_defaults(run=run)
 
@@ -42,17 +44,17 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from sitl.campaigns.mismatch.draw import KINDS
     from sitl.campaigns.mismatch.voyages import Job, run_mismatch, sail_one
-    from sitl.run.compiled import compile_ahead
 
-    compile_ahead()
+    compile_planners(args.draw)
     only = () if args.as_planned else None if args.only is None else tuple(args.only)
     alien = next((kind for kind in only or () if kind not in KINDS), None)
     if alien is not None:
         raise InputError("--only", alien, "is not drawn", f"name one of: {', '.join(KINDS)}")
     if args.keep is not None:
-        record = sail_one(Job(seed=args.first_seed, planned=args.planned, only=only, keep=args.keep))
+        record = sail_one(Job(seed=args.first_seed, planned=args.planned, only=only, keep=args.keep,
+                              draws=args.draw))
         for key, value in record.items():
             print(f"{key}: {json.dumps(value)}")
         return 0 if record["passed"] else 1
     return run_mismatch(runs=args.runs, first_seed=args.first_seed, means=means_of(args), planned=args.planned,
-                        only=only, json_path=args.json)
+                        only=only, json_path=args.json, draws=args.draw)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,8 +11,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from companion.errors import InputError
 from companion.geofence import Mission
 from companion.messages import WindForecast
+from companion.sailable import require_sailable
 from companion.wind import Estimator, WindRoom
 from sitl.world import Wind
 
@@ -94,3 +97,59 @@ def unspread(_: Wind, estimator: Estimator) -> WindRoom:
 def foreknown(wind: Wind, estimator: Estimator) -> WindRoom:
     """Return the room that knows what will blow."""
     return Foreknown(wind, estimator)
+
+
+# ------------------------------------------------------------------------------------- guidance and planner
+GUIDANCES = ("plan", "heading", "field")    # [skipper] guidance
+PLANNERS = ("auto", "rrtstar", "astar")     # [skipper] planner
+DRAWABLE = ("guidance", "planner")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Method:
+    """By which guidance, and which planner's plans, a mission is sailed; None: as it says itself."""
+
+    guidance: str | None = None
+    planner: str | None = None
+
+    @property
+    def told(self) -> str:
+        """The method in words, empty where the mission's own is sailed."""
+        guidance = "" if self.guidance is None else "in AUTO" if self.guidance == "plan" else f"by {self.guidance}"
+        return ", ".join(part for part in (guidance, f"planner {self.planner}" if self.planner else "") if part)
+
+    def variation(self, mission: Mission, also: Variation | None = None) -> Variation | None:
+        """Return ``also`` with this method; None where nothing is another. GUIDED is permitted where it is needed.
+
+        The numbers of ``[planner]`` are those of the mission's own planner: another one is sailed with its defaults.
+        """
+        tables = {name: dict(keys) for name, keys in (also.tables if also is not None else {}).items()}
+        if self.guidance is not None:
+            tables.setdefault("skipper", {})["guidance"] = self.guidance
+        if self.guidance in {"heading", "field"}:
+            tables.setdefault("operator", {}).update(guided=True)
+        if self.planner is not None:
+            tables.setdefault("skipper", {})["planner"] = self.planner
+            if self.planner != mission.skipper.planner:
+                tables["planner"] = dict.fromkeys(mission.options.planner.__struct_fields__)
+        return Variation(tables=tables, room=also.room if also is not None else None) if tables else also
+
+
+AS_IT_SAYS = Method()
+
+
+def drawn_method(rng: random.Random, what: Sequence[str], mission: Mission) -> Method:
+    """Return a method for a mission: ``what`` of ``DRAWABLE`` is drawn, of those that it can be sailed by."""
+    guidance = rng.choice([g for g in GUIDANCES if can_be_sailed(mission, g)]) if "guidance" in what else None
+    return Method(guidance=guidance, planner=rng.choice(PLANNERS) if "planner" in what else None)
+
+
+def can_be_sailed(mission: Mission, guidance: str) -> bool:
+    """Return whether a mission can be sailed by a guidance: gates and fields of goals are not for each of them."""
+    variation = Method(guidance=guidance).variation(mission)
+    try:
+        if variation is not None:
+            require_sailable(variation.mission(mission))
+    except InputError:
+        return False
+    return True

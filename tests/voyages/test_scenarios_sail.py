@@ -98,9 +98,21 @@ def counts_tacks_that_fail(folder):
     assert all(p["arrival"]["p50_s"] > p["cost_s"] for p in plans[:3])
 
 
+def is_steered_and_plans_its_tacks(folder):
+    """Under way in GUIDED, and no leg of a plan is a beat of the autopilot's: it does not beat there."""
+    rows = list(csv.DictReader((folder / "track.csv").read_text().splitlines()))
+    assert sum(r["mode"] == "GUIDED" for r in rows) > 0.8 * sum(r["phase"] == "standard" for r in rows) > 100
+    decisions = [json.loads(line) for line in (folder / "decisions.jsonl").read_text().splitlines()]
+    plans = [d["plan"] for d in decisions if d["kind"] == "plan" and d["plan"]["status"] == "found"]
+    legs = [leg for plan in plans for leg in plan["legs"]]
+    assert legs
+    assert not any(leg["is_beat"] for leg in legs)
+
+
 # What the record of one must show besides.
 RECORDED = {"field-ring": goes_round, "field-square": leaves_when_entered,
             "foreign-mission": is_said_once_in_a_while, "out-of-time": ends_by_itself,
+            "by-heading": is_steered_and_plans_its_tacks,
             "by-astar": plans_by("astar"), "by-astar-flat": plans_by("astar"), "by-rrtstar": plans_by("rrtstar"),
             "crossing-by-rrtstar": risks_a_vessel, "wind-limits": waits_for_less_wind,
             "tacks-fail": counts_tacks_that_fail}

@@ -260,7 +260,7 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
         turn.update(adrift=replace(memory, loitered=True, loiter_en_m=place))
         turn.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until she can sail")
         return True
-    if status.mode is not turn.sails_in or memory.loitered or ahead is None:
+    if status.mode not in {Mode.AUTO, turn.sails_in} or memory.loitered or ahead is None:
         return False
     if ahead.is_clear and lies_in_loiter(turn):
         return False

@@ -13,7 +13,6 @@ from companion.messages import Mode
 from companion.skipper.deeds.headings import course_rad
 from companion.skipper.deeds.helm import is_busy, set_mode
 from companion.skipper.step.actions import Severity
-from companion.skipper.step.config import Guidance
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.drift import DriftAhead, drift_ahead
@@ -29,13 +28,15 @@ HAIR_M = 0.5
 def ahead_of(turn: Turn) -> DriftAhead | None:
     """Return what the way to the present waypoint meets within ``REACT_S``, None when nothing or nobody sails it."""
     boat, leg, status = turn.boat_en, turn.leg(), turn.autopilot
-    if boat is None or leg is None or status is None or status.mode is not turn.sails_in or not turn.ahead():
+    if boat is None or leg is None or status is None or not turn.ahead():
         return None
+    if status.mode not in {Mode.AUTO, turn.sails_in} or turn.is_by_field:
+        return None   # the field looks ahead by itself, and follows no leg
     speed, left_m = turn.speed_mps, distance_m(boat, leg[1])
     if speed < SLOW_MPS or left_m < 1.0:
         return None
     course = bearing_rad(boat, leg[1])
-    if turn.steers and turn.is_closed(boat, leg[1], turn.wind_now):
+    if status.mode is Mode.GUIDED and turn.is_closed(boat, leg[1], turn.wind_now):
         steered = course_rad(turn)   # nothing turns her there but another plan
         if steered is None:
             return None
@@ -53,8 +54,6 @@ def brakes(turn: Turn) -> bool:
     state = turn.state
     if state.steering_until_s is not None or state.by_field.resort.engaged:
         return False
-    if turn.steers and turn.guidance is Guidance.FIELD:
-        return False   # the field looks ahead by itself, and follows no leg
     if state.pending_upload is not None or not turn.snapshot.permissions.may_set_mode:
         return False
     met = ahead_of(turn)

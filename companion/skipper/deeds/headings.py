@@ -98,12 +98,12 @@ def desired_heading_rad(turn: Turn) -> float | None:
             if _hand(gate.side) * difference_rad(clear, wanted) > 0.0:
                 wanted = clear
         return sailable_rad(wrap_pi(wanted + drift), vehicle.heading_rad, twd, half, gate.side)
-    if turn.state.index == turn.last_waypoint() or distance_m(*leg) < 1.0:
-        return sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), vehicle.heading_rad, twd, half)
     along = wrap_pi(bearing_rad(*leg) + drift)
     off_wind = difference_rad(along, twd)
-    if abs(off_wind) < half:
-        return sailable_rad(along, vehicle.heading_rad, twd, half)
+    is_last = turn.state.index == turn.last_waypoint() and distance_m(boat, leg[1]) < turn.config.grid_size_m
+    if is_last or distance_m(*leg) < 1.0 or abs(off_wind) < half:
+        # On a leg that the wind has closed she goes about where the other tack is nearer to its end.
+        return sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), vehicle.heading_rad, twd, half)
     # Back to the line on the leg's own tack: through the wind she would come to it sooner, and be on the wrong one.
     back = back_to_line_rad(cross_track_m(boat, *leg), turn.speed_mps)
     side = math.copysign(1.0, off_wind)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from companion.boat import required_margin
 from companion.geo.angles import difference_rad
@@ -169,6 +170,7 @@ def _look_at_margin(turn: Turn) -> None:
     if limits is None or wind is None:
         return
     boat = turn.voyage.boat
+    limits = replace(limits, sail_xtrack_max_m=turn.tack_corridor_m)
     asked = required_margin(limits, speed_mps=boat.polar.max_speed_mps(wind[1]), hull=boat.hull)
     if asked.total_m > turn.config.margin_m + 0.5:
         turn.say(Severity.WARNING, "margin",

@@ -159,10 +159,13 @@ def _send_heading(turn: Turn) -> None:
     status = turn.autopilot
     if status is None:
         return
+    own = turn.state.own_mode
+    is_stopping = own in STOPPING and is_busy(turn, own.name)   # asked for, and not shown yet
     if status.mode is not Mode.GUIDED:
-        set_mode(turn, Mode.GUIDED, f"steering by {'field' if turn.guidance is Guidance.FIELD else 'headings'}")
+        if not is_stopping:
+            set_mode(turn, Mode.GUIDED, f"steering by {'field' if turn.guidance is Guidance.FIELD else 'headings'}")
         return
-    if not turn.is_leaving:
+    if not is_stopping:
         turn.update(own_mode=Mode.GUIDED)
     if turn.guidance is Guidance.FIELD:
         told = by_field_heading(turn)

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from companion.boat import AutopilotLimits, Polar
 from companion.geo.angles import difference_rad, heading_of
-from companion.messages import Command
+from companion.messages import Command, Mode
 from companion.skipper.step.snapshot import Snapshot
 from companion.skipper.step.state import SkipperState
 from companion.skipper.way.geometry import cross_track_m, moved
@@ -39,8 +39,9 @@ def next_tack_s(seen: Seen, polar: Polar) -> float | None:
     """Return the time until the next tack [s], planned or the autopilot's own; None: there is none, or no way on.
 
     On a leg inside its no-go zone the autopilot beats: it keeps the tack that it comes on until the edge of its
-    corridor, or until the other tack fetches the waypoint. The end of a mission, a loiter, is no course. Legs ahead
-    are sailed at the polar's speed, this one at the boat's own, once she has way on.
+    corridor, or until the other tack fetches the waypoint; in GUIDED it does not beat, and such a leg is planned anew.
+    The end of a mission, a loiter, is no course. Legs ahead are sailed at the polar's speed, this one at the boat's
+    own, once she has way on.
     """
     route, snapshot = seen.state.route, seen.snapshot
     vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
@@ -67,6 +68,8 @@ def next_tack_s(seen: Seen, polar: Polar) -> float | None:
         speed_mps = max(MIN_SPEED_MPS, polar.speed_mps(max(abs(off_rad), no_go_rad), tws_mps))
         has_way = number == 0 and vehicle.speed_mps > GATHERING_WAY * speed_mps
         if is_closed:
+            if snapshot.autopilot is not None and snapshot.autopilot.mode is Mode.GUIDED:
+                return None
             close_rad = wind_rad - no_go_rad if side else wind_rad + no_go_rad
             velocity_en = vehicle.velocity_en_mps if has_way else moved((0.0, 0.0), close_rad, speed_mps)
             own_s = _own_tack_s(start, velocity_en, leg, wind_rad, side=side, limits=limits)

@@ -350,6 +350,12 @@ class Turn:
         return may.may_steer and may.may_set_mode
 
     @property
+    def is_by_field(self) -> bool:
+        """Whether a field steers her now, in GUIDED."""
+        status = self.autopilot
+        return self.steers and self.guidance is Guidance.FIELD and status is not None and status.mode is Mode.GUIDED
+
+    @property
     def sails_in(self) -> Mode:
         """The mode that she sails in: GUIDED where she is steered, else AUTO."""
         return Mode.GUIDED if self.steers else Mode.AUTO

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import random
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from sitl.campaigns.mismatch.draw import Drawn, draw
 from sitl.campaigns.mismatch.promises import Legs, arrival_promised, legs_promised, promised_s
 from sitl.campaigns.mismatch.table import figures_of, told
 from sitl.means import Means
-from sitl.run.variation import Variation
+from sitl.run.variation import Variation, drawn_method
 from sitl.runner import Key, file_hash, sail
 
 CAMPAIGN = "mismatch"
@@ -32,12 +33,16 @@ ONE_GOAL = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """One voyage; with ``planned`` no beat is left to the autopilot; ``only`` as of ``draw``."""
+    """One voyage; with ``planned`` no beat is left to the autopilot; ``only`` as of ``draw``.
+
+    ``draws`` names what is drawn of guidance and planner, apart from all else; else they are the mission's.
+    """
 
     seed: int
     planned: bool = False
     only: tuple[str, ...] | None = None
     keep: Path | None = None
+    draws: tuple[str, ...] = ()
 
 
 def sail_one(job: Job) -> dict[str, Any]:
@@ -53,17 +58,18 @@ def sail_drawn(drawn: Drawn, job: Job) -> dict[str, Any]:
     if job.keep is not None and job.keep.is_dir() and any(job.keep.iterdir()):
         raise InputError("--keep", str(job.keep), "is not empty", "a voyage's folder is taken up where it was left")
     mission = mission_of(drawn.scenario, drawn.source)
+    method = drawn_method(random.Random(f"method {job.seed}"), job.draws, mission)
     legs = Legs(mission.frame())
     record: dict[str, Any] = {
         "seed": job.seed, "scenario": drawn.scenario.name, "planned": job.planned,
         "as_planned": job.only == (), "kinds": list(drawn.kinds),
-        "drawn": drawn.told(), "floor_m": mission.margin_floor_m}
+        "drawn": drawn.told(), "method": method.told, "floor_m": mission.margin_floor_m}
     with tempfile.TemporaryDirectory(prefix="mismatch-") as scratch:
         folder = job.keep if job.keep is not None else Path(scratch) / "voyage"
         try:
             verdict = run_virtual(run_embedded(
                 drawn.scenario, drawn.source, job.seed, folder, expansions=EXPANSIONS, observer=legs,
-                variation=PLANNED if job.planned else None))
+                variation=method.variation(mission, PLANNED if job.planned else None)))
         except Exception as error:
             return record | {"passed": False, "faults": [f"unhandled: {error!r}"]}
         summary = json.loads((folder / "summary.json").read_bytes())
@@ -88,18 +94,20 @@ def key_of(job: Job) -> Key:
     drawn = draw(job.seed)
     only = "any" if job.only is None else ", ".join(job.only)
     return {"scenario": drawn.scenario.name, "hash": file_hash(drawn.source), "planned": job.planned, "only": only,
-            "seed": job.seed}
+            **({"draws": ", ".join(job.draws)} if job.draws else {}), "seed": job.seed}
 
 
 def run_mismatch(
     *, runs: int, first_seed: int, means: Means, planned: bool, only: tuple[str, ...] | None, json_path: Path | None,
+    draws: tuple[str, ...] = (),
 ) -> int:
     """Sail what has no result yet, print what failed and the table; return the exit code."""
-    jobs = [Job(seed=seed, planned=planned, only=only) for seed in range(first_seed, first_seed + runs)]
+    jobs = [Job(seed=seed, planned=planned, only=only, draws=draws) for seed in range(first_seed, first_seed + runs)]
 
     def tell(record: dict[str, Any]) -> None:
         if not record["passed"]:
-            print(f"FAILED seed {record['seed']}, {record['scenario']}: {'; '.join(record['faults'])} "
+            method = f" {record['method']}" if record.get("method") else ""
+            print(f"FAILED seed {record['seed']}, {record['scenario']}{method}: {'; '.join(record['faults'])} "
                   f"({', '.join(record['kinds']) or 'as planned'})", flush=True)
 
     sailed = sail(CAMPAIGN, sail_one, jobs, means, key=key_of, on_record=tell)
@@ -108,7 +116,7 @@ def run_mismatch(
     table = figures_of(records)
     print(told(table))
     print(sailed.took)
-    how = " --planned" if planned else ""
+    how = (" --planned" if planned else "") + (f" --draw {','.join(draws)}" if draws else "")
     how += " --as-planned" if only == () else "".join(f' --only "{kind}"' for kind in only or ())
     for record in records:
         if not record["passed"] or record.get("below_floor"):

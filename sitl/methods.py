@@ -1,0 +1,67 @@
+"""Options of the boat's own ways: the guidance and the planner that a campaign sails by, given or drawn."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sitl.run.variation import Method
+
+
+def add_draw(parser: argparse.ArgumentParser) -> None:
+    """Add ``--draw``."""
+    parser.add_argument("--draw", type=_drawable, default=(), metavar="WHAT[,WHAT]",
+                        help="draw from each seed, too: guidance (in AUTO, by heading, by field), planner (auto, "
+                        "rrtstar, astar); what else a seed is stays the same (default: as the mission says)")
+
+
+def add_methods(parser: argparse.ArgumentParser) -> None:
+    """Add ``--guidance`` and ``--planner``."""
+    parser.add_argument("--guidance", type=_guidance, nargs="+", metavar="G",
+                        help="sail by each of these in place of the mission's own: plan (in AUTO), heading, field")
+    parser.add_argument("--planner", type=_planner, nargs="+", metavar="P",
+                        help="and by the plans of each of these: auto, rrtstar, astar")
+
+
+def methods_of(args: argparse.Namespace) -> list[Method]:
+    """Return the methods that were asked for, one of the mission's own where none was."""
+    from sitl.run.variation import Method
+
+    return [Method(guidance=guidance, planner=planner)
+            for guidance in args.guidance or [None] for planner in args.planner or [None]]
+
+
+def compile_planners(draws: Sequence[str]) -> None:
+    """Compile what the voyages need, and the planners where they are drawn."""
+    from sitl.run.compiled import compile_ahead
+    from sitl.run.variation import PLANNERS
+
+    for planner in PLANNERS if "planner" in draws else PLANNERS[:1]:
+        compile_ahead(planner)
+
+
+def _drawable(text: str) -> tuple[str, ...]:
+    from sitl.run.variation import DRAWABLE
+
+    wanted = tuple(_among(part.strip(), DRAWABLE) for part in text.split(","))
+    return tuple(part for part in DRAWABLE if part in wanted)
+
+
+def _guidance(text: str) -> str:
+    from sitl.run.variation import GUIDANCES
+
+    return _among(text, GUIDANCES)
+
+
+def _planner(text: str) -> str:
+    from sitl.run.variation import PLANNERS
+
+    return _among(text, PLANNERS)
+
+
+def _among(text: str, known: Sequence[str]) -> str:
+    if text not in known:
+        raise argparse.ArgumentTypeError(f"{text!r} is none of {', '.join(known)}")
+    return text
