@@ -244,3 +244,23 @@ def test_becalmed_by_headings_she_is_held_and_the_crew_called():
                        current=lambda t: (0.5 if t >= 60.0 else 0.0, 0.0))
     assert world.run(180, lambda w: w.mode is Mode.LOITER)
     assert world.run(120, lambda w: bool(said(w, CALL)))
+
+
+def test_out_of_irons_she_is_steered_on_and_not_given_to_auto():
+    world = by_heading(Goal(en_m=(0.0, 300.0)), obstacles=(), wind=BEAM)
+    assert world.run(60, is_steered)
+    world.run(5)
+    until, sail, before = world.t + 14.0, world.sail, len(world.actions)
+
+    def held(dt):
+        if world.t < until:
+            world.heading, world.speed = world.wind(world.t)[0], 0.05
+            return
+        sail(dt)
+
+    world.sail = held
+    assert world.run(30, lambda w: any(isinstance(a, act.SteerHeading) and a.text == "out of irons"
+                                       for _, a in w.actions[before:]))
+    world.run(40)
+    assert not any(isinstance(a, act.SetMode) and a.mode is Mode.AUTO for _, a in world.actions[before:])
+    assert world.speed > 1.0
