@@ -23,7 +23,7 @@ RESERVE_SHARE = 0.1
 NEW = ".new"
 
 _KINDS = ((stat.S_ISFIFO, "a FIFO"), (stat.S_ISSOCK, "a socket"), (stat.S_ISCHR, "a device"),
-          (stat.S_ISBLK, "a device"))
+          (stat.S_ISBLK, "a device"), (stat.S_ISLNK, "a link"))
 # What a wrong name raises, and a sick disk does not.
 _MISTAKES = frozenset({errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP, errno.EISDIR})
 
@@ -150,14 +150,15 @@ class Disk:
         return Room(free_bytes=status.f_bavail * status.f_frsize, reserve_bytes=min(RESERVE_BYTES, share))
 
 
-def open_regular(path: Path) -> BinaryIO:
+def open_regular(path: Path, *, follows_links: bool = True) -> BinaryIO:
     """Open a file for reading that is one: a FIFO or a device might never answer, or do something when it is opened.
 
     Raises:
-        OSError: it is none (EINVAL), or cannot be opened.
+        OSError: it is none (EINVAL), is a link where none is followed, or cannot be opened.
     """
-    _require_regular(path.stat().st_mode)   # before it is opened, which may do something to a device
-    return io.open(path, "rb", opener=_opened)  # noqa: UP020 - as pathlib calls it
+    _require_regular(path.stat(follow_symlinks=follows_links).st_mode)   # opening may do something to a device
+    more = 0 if follows_links else os.O_NOFOLLOW
+    return io.open(path, "rb", opener=lambda name, flags: _opened(name, flags | more))  # noqa: UP020 - as pathlib calls it
 
 
 def _opened(path: str, flags: int) -> int:
@@ -170,9 +171,9 @@ def _opened(path: str, flags: int) -> int:
     return fd
 
 
-def read_regular(path: Path, most_bytes: int = -1) -> bytes:
+def read_regular(path: Path, most_bytes: int = -1, *, follows_links: bool = True) -> bytes:
     """Return what is in such a file, at most so much of it. Raises OSError."""
-    with open_regular(path) as file:
+    with open_regular(path, follows_links=follows_links) as file:
         return file.read(most_bytes)
 
 

@@ -1,20 +1,32 @@
 """The mailbox of a satellite modem: whole files, orders once, what is no order, restarts, a folder that fails."""
 
 import asyncio
+import errno
 import json
+import os
 from types import SimpleNamespace
 
 import pytest
 
+from companion.app import far
 from companion.app.crew import Crew
-from companion.app.far import IN, LOOK_S, OUT, TAKEN, Mailbox
+from companion.app.far import ASIDE, IN, LOOK_S, MOST_ASIDE, OUT, TAKEN, TRIES, Mailbox
 from companion.app.options import Far, at_once
 from companion.clock import run_virtual
 from companion.disk import Disk
 from companion.mavlink.link import Link
 from companion.messages import AutopilotStatus, CompanionStatus
 from companion.orders import Result, Verb, Wanted
-from companion.orders.far import FarKey, FarOrder, Reply, minutes_of, pack_order, unpack_status
+from companion.orders.far import (
+    Beginning,
+    FarKey,
+    FarOrder,
+    Reply,
+    minutes_of,
+    pack_beginning,
+    pack_order,
+    unpack_status,
+)
 from companion.skipper.step import Acknowledge
 from sitl.autopilot import MemoryLink
 from sitl.trouble.sick_disk import SickDisk
@@ -24,8 +36,13 @@ KEY = FarKey(bytes(range(32)), 1)
 UTC_S = 1_790_000_000.0
 
 
-def sealed(counter=1, verb=Verb.HOLD, left_s=3600.0):
-    return pack_order(FarOrder(wanted=Wanted(verb=verb), counter=counter, expires_min=minutes_of(UTC_S + left_s)), KEY)
+def sealed(counter=1, verb=Verb.HOLD, left_s=3600.0, key=KEY):
+    return pack_order(FarOrder(wanted=Wanted(verb=verb), counter=counter, expires_min=minutes_of(UTC_S + left_s)), key)
+
+
+def beginning(ago_s=0.0):
+    began = minutes_of(UTC_S - ago_s)
+    return began, pack_beginning(Beginning(began=began, expires_min=minutes_of(UTC_S + 86_400.0)), KEY)
 
 
 def seen(t_s=0.0, utc_s=UTC_S):
@@ -170,3 +187,88 @@ def test_a_folder_that_is_taken_away_is_said_and_not_worth_the_voyage(tmp_path):
 
     voyage.sail(remove)
     assert len([text for text in voyage.said if "the folder of the satellite link" in text]) == 1
+
+
+def put_aside(folder):
+    return [path.name for path in (folder / ASIDE).iterdir()]
+
+
+def unreadable(kind, path):
+    if kind == "loop":
+        path.symlink_to(path.name)
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.write_bytes(sealed())
+
+
+@pytest.mark.parametrize("kind", ["loop", "pipe", "sick"])
+def test_a_message_that_cannot_be_read_is_put_aside_and_keeps_no_other_out(tmp_path, monkeypatch, kind):
+    """One unreadable file stood in the way of every order behind it (issue 43, point 7)."""
+    def sick(path, most_bytes, read=far.read_regular, **how):
+        if path.name == "000000\x1b[2J.sbd" and kind == "sick":
+            raise OSError(errno.EIO, "Input/output error", str(path))
+        return read(path, most_bytes)
+
+    monkeypatch.setattr(far, "read_regular", sick)
+    voyage = Voyage(tmp_path)
+    status = voyage.sail(lambda: unreadable(kind, tmp_path / IN / "000000\x1b[2J.sbd"), voyage.put(sealed()),
+                         *[lambda: None] * TRIES)
+    assert (status.order, status.reply, voyage.waiting) == (1, Reply.DONE, [])
+    assert put_aside(tmp_path) == ["000000\x1b[2J.sbd"]
+    said, = (text for text in voyage.said if ASIDE in text)
+    assert r"'000000\x1b[2J.sbd', cannot be read (" in said
+
+
+def test_a_message_that_cannot_be_judged_is_put_aside_too(tmp_path, monkeypatch):
+    voyage = Voyage(tmp_path)
+    ask = voyage.crew.ask
+
+    async def faulty(wanted, number, way):
+        if wanted.verb is Verb.HOME:
+            raise AssertionError("a fault of ours")
+        return await ask(wanted, number, way)
+
+    monkeypatch.setattr(voyage.crew, "ask", faulty)
+    status = voyage.sail(voyage.put(sealed(1, Verb.HOME), "0"), voyage.put(sealed(2)))
+    assert (status.order, status.reply, voyage.waiting) == (2, Reply.DONE, [])
+    assert put_aside(tmp_path) == ["0"]
+    assert any("cannot be judged (AssertionError('a fault of ours'))" in text for text in voyage.said)
+
+
+def test_what_cannot_even_be_put_aside_is_looked_at_no_more_and_what_is_kept_is_bounded(tmp_path):
+    (tmp_path / ASIDE).write_text("in the way")
+    voyage = Voyage(tmp_path)
+    status = voyage.sail(lambda: unreadable("loop", tmp_path / IN / "0"), *[lambda: None] * TRIES, voyage.put(sealed()))
+    assert (status.reply, voyage.waiting) == (Reply.DONE, ["0"])
+    (tmp_path / ASIDE).unlink()
+    flooded = Voyage(tmp_path)
+    flooded.sail(lambda: [unreadable("loop", tmp_path / IN / f"a{n}") for n in range(30)], *[lambda: None] * 9)
+    assert len(put_aside(tmp_path)) == MOST_ASIDE
+
+
+def test_a_counter_far_ahead_closes_no_door(tmp_path):
+    """After order 65535 no other was taken for ever (issue 43, point 7)."""
+    voyage = Voyage(tmp_path)
+    status = voyage.sail(voyage.put(sealed(65535)))
+    assert (status.order, status.reply, voyage.orders) == (65535, Reply.AHEAD, [])
+    assert voyage.sail(voyage.put(sealed(1))).reply is Reply.DONE
+
+
+def test_the_shore_begins_anew_and_nothing_of_before_counts_again(tmp_path):
+    """Where the door was closed, by the release before this one."""
+    closed = {"format": 1, "key": KEY.name, "replies": {"65535": ["00", "done"]}}
+    (tmp_path / TAKEN).write_text(json.dumps(closed))
+    first = Voyage(tmp_path)
+    old, (began, data) = sealed(70), beginning()
+    status = first.sail(first.put(old), first.put(data))
+    assert (status.order, status.reply, first.orders) == (None, Reply.BEGUN, [])
+    second = Voyage(tmp_path)
+    assert second.sail().reply is Reply.BEGUN, "it outlives a restart"
+    new = sealed(key=KEY.since(began))
+    status = second.sail(second.put(sealed(1, Verb.HOME)), second.put(old, "2"), second.put(data, "3"),
+                         second.put(new, "4"))
+    assert (status.order, status.reply, [o.wanted.verb for o in second.orders]) == (1, Reply.DONE, [Verb.HOLD])
+    assert second.sail(second.put(data), second.put(new, "n")).reply is Reply.DONE, "played back, it begins nothing"
+    assert len(second.orders) == 1
+    assert second.sail(second.put(beginning(ago_s=600.0)[1])).reply is Reply.OLD

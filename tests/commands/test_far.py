@@ -60,13 +60,36 @@ def test_what_cannot_be_ordered_is_one_line_and_uses_no_counter(key, tmp_path, c
     assert not (tmp_path / "far.key.far-counter").exists()
 
 
+def test_a_slip_of_the_counter_is_refused_ashore(key, tmp_path, capsys):
+    run(capsys, "order", "hold", "--key", key, "--expires", "2h")
+    code, _, err = run(capsys, "order", "hold", "--key", key, "--expires", "2h", "--counter", 65535)
+    assert (code, "more than 1024 ahead of the last, 1" in err, "companion far begin" in err) == (2, True, True)
+    assert (tmp_path / "far.key.far-counter").read_text() == "1\n"
+
+
+@pytest.mark.parametrize("kept", ["65535\n", "torn", "70000", "-3", "5 99999999"])
+def test_from_any_count_the_shore_begins_anew(key, tmp_path, capsys, kept):
+    counter, out = tmp_path / "far.key.far-counter", tmp_path / "begin.sbd"
+    counter.write_text(kept)
+    code, told, _ = run(capsys, "begin", "--key", key, "--expires", "1d", "--out", out)
+    counts = by_the_page.read("The beginning", out.read_bytes(), bytes(range(32)))
+    assert (code, told.splitlines()[0]) == (0, out.read_bytes().hex())
+    assert 0 <= minutes_of(time.time()) - counts["began"] <= 1
+    assert 0 <= counts["expires"] - minutes_of(time.time() + 86_400.0) <= 1
+    _, told, _ = run(capsys, "order", "hold", "--key", key, "--expires", "2h")
+    order = by_the_page.read("The order", bytes.fromhex(told.splitlines()[0]), bytes(range(32)), 1, counts["began"])
+    assert (order["counter"], counter.read_text()) == (1, f"1 {counts['began']}\n")
+    run(capsys, "begin", "--key", key, "--expires", "1d")
+    assert counter.read_text() == f"0 {counts['began'] + 1}\n", "later than the one before, within one minute too"
+
+
 def test_a_counter_that_is_lost_or_used_up_is_one_line(key, tmp_path, capsys):
     (tmp_path / "far.key.far-counter").write_text("torn")
     code, _, err = run(capsys, "order", "hold", "--key", key, "--expires", "2h")
     assert (code, "name one with --counter" in err) == (2, True)
     (tmp_path / "far.key.far-counter").write_text("65535")
     code, _, err = run(capsys, "order", "hold", "--key", key, "--expires", "2h")
-    assert (code, "make a new key" in err) == (1, True)
+    assert (code, "companion far begin" in err) == (1, True)
 
 
 def test_a_file_that_is_there_is_not_written_over(key, tmp_path, capsys):
@@ -81,6 +104,8 @@ def test_a_status_is_read_in_words_from_a_file_or_digits(key, tmp_path, capsys):
         standing=Verb.HOLD, position=GeoPoint(lat_deg=50.8195, lon_deg=-1.308), speed_mps=1.4, battery_v=12.4,
         watchdog="becalmed", order=17, reply=Reply.DONE, goal=1, goals=3, has_trouble=True)
     data = pack_status(status, FarKey(bytes(range(32)), 1))
+    begun = pack_status(FarStatus(phase="holding", reply=Reply.BEGUN), FarKey(bytes(range(32)), 1))
+    assert run(capsys, "status", begun.hex(), "--key", key)[1].endswith("\nbegun anew: counters count from 1\n")
     (tmp_path / "raw").write_bytes(data)
     (tmp_path / "hex").write_text(data.hex() + "\n")
     sources = (tmp_path / "raw", tmp_path / "hex", data.hex())

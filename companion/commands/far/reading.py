@@ -76,7 +76,8 @@ def lines_of(status: FarStatus, unix_s: float) -> list[str]:
     ]
     if s.has_trouble:
         lines.append("her disk does not keep what it should")
-    lines.append("no order has come" if s.order is None or s.reply is None else f"order {s.order}: {s.reply}")
+    lines.append("no order has come" if s.reply is None else
+                 str(s.reply) if s.order is None else f"order {s.order}: {s.reply}")
     return lines
 
 

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import os
 import re
 import secrets
 from pathlib import Path
 
-from companion.disk import Disk, reason
+from companion.disk import Disk, read_regular, reason
 from companion.errors import InputError
-from companion.mavlink.wire.frames import SigningState
+from companion.mavlink.wire.frames import MOST_TIMESTAMP, SigningState
 from companion.secret import read_secret
 
 # 2015-01-01T00:00:00Z in Unix seconds: the zero of MAVLink signing timestamps, which count 10 µs.
@@ -25,6 +26,10 @@ TICKS_PER_S = 100_000
 # Stored this far ahead, so that a power cut between two stores cannot repeat a timestamp [s]. An autopilot refuses a
 # newcomer that is more than 60 s behind the newest stamp it has seen, so we must not run that far ahead of others.
 AHEAD_S = 40.0
+# A stored timestamp beyond this is damage: of the 48 bits of a timestamp the last year is left to be signed in.
+_MOST_STORED = MOST_TIMESTAMP - 366 * 86_400 * TICKS_PER_S
+_MOST_BYTES = 64    # of the file: 15 digits are needed
+_LOG = logging.getLogger(__name__)
 
 
 def read_key(path: Path) -> bytes:
@@ -67,15 +72,16 @@ class SigningStore:
 
     def __init__(self, key_file: Path, unix_s: float, *, link_id: int = 0) -> None:
         self._path = key_file.with_name(key_file.name + ".timestamp")
-        stored = 0
-        try:
-            stored = int(self._path.read_text("ascii"))
-        except (OSError, ValueError):
-            stored = 0  # no file yet, or torn by a power cut: the clock has to do
-        clock = max(0, int((unix_s - EPOCH_S) * TICKS_PER_S))
+        stored, damage = _stored(self._path)
+        clock = min(max(0, int((unix_s - EPOCH_S) * TICKS_PER_S)), _MOST_STORED)
         self.state = SigningState(key=read_key(key_file), link_id=link_id, timestamp=max(clock, stored))
         self._stored = 0
         self.save()
+        if damage:
+            _LOG.warning(
+                "%s: %s: frames are signed by this computer's clock, and it is written anew; if the autopilot does not "
+                "answer, that clock is behind the last frame that it took: set it right, or take the key off over USB "
+                "and put it on again (companion key remove, set)", self._path, damage)
 
     def save(self) -> None:
         """Store the timestamp if what is stored is about to be reached."""
@@ -86,3 +92,16 @@ class SigningStore:
         with contextlib.suppress(OSError):
             Disk().replace(self._path, str(ahead).encode("ascii"))
             self._stored = ahead
+
+
+def _stored(path: Path) -> tuple[int, str]:
+    """Return the timestamp in a file, 0 without one, and why what is there is not used, empty: it is."""
+    try:
+        text = read_regular(path, _MOST_BYTES, follows_links=False).strip()
+    except FileNotFoundError:
+        return 0, ""    # the first start with this key
+    except OSError as error:
+        return 0, f"cannot be read ({reason(error)})"
+    if not re.fullmatch(rb"[0-9]{1,20}", text) or int(text) > _MOST_STORED:
+        return 0, f"holds {text[:20]!r}, which is no timestamp of a signature"
+    return int(text), ""

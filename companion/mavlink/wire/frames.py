@@ -21,6 +21,8 @@ from companion.mavlink.wire.dialect import Dialect
 Message = Any
 
 STX = 0xFD
+# A signature has 48 bits for its timestamp [10 µs since 2015-01-01 UTC]: until 2104.
+MOST_TIMESTAMP = (1 << 48) - 1
 _HEADER_BYTES = 10
 _CRC_BYTES = 2
 _SIGNATURE_BYTES = 13
@@ -68,6 +70,8 @@ class SigningState:
     def __post_init__(self) -> None:
         if len(self.key) != 32:
             raise ValueError(f"a signing key has 32 bytes, not {len(self.key)}")
+        if not 0 <= self.timestamp <= MOST_TIMESTAMP:
+            raise ValueError(f"a signing timestamp has 48 bits, and {str(self.timestamp)[:20]} does not fit")
 
 
 class Codec:
@@ -104,17 +108,20 @@ class Codec:
 
     def pack(self, message: Message) -> bytes:
         """Return ``message`` as the next frame of ours, signed if the link is."""
+        if self._signing is not None:
+            # The autopilot's own stamps move ours: behind the last that there is they would begin at 0 again.
+            self.set_signing_time(0)
         frame = self._mav.packed(message)
         self._mav.seq = (self._mav.seq + 1) % 256
         self.frames_out += 1
         if self._signing is not None:
-            self._signing.timestamp = self._mav.signing.timestamp
+            self._signing.timestamp = min(self._mav.signing.timestamp, MOST_TIMESTAMP)
         return frame
 
     def set_signing_time(self, timestamp: int) -> None:
-        """Move the signing timestamp forward to ``timestamp`` [10 µs since 2015]; never back."""
+        """Move the signing timestamp forward to ``timestamp`` [10 µs since 2015]; never back, nor beyond 48 bits."""
         state = self._mav.signing
-        state.timestamp = max(state.timestamp, timestamp)
+        state.timestamp = min(max(state.timestamp, timestamp), MOST_TIMESTAMP)
 
     def feed(self, data: bytes) -> list[Message]:
         """Return the messages completed by ``data``, oldest first; ``get_msgbuf()`` of each is its frame."""

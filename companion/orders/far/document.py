@@ -1,4 +1,4 @@
-"""The two layouts as they stand in docs/far.md: ``python -m companion.orders.far.document`` prints them."""
+"""The three layouts as they stand in docs/far.md: ``python -m companion.orders.far.document`` prints them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ MADE_BY = "<!-- made by python -m companion.orders.far.document -->"
 
 
 def tables() -> str:
-    """Return both tables."""
+    """Return the tables."""
     head = ["| byte | type | field | unit | not known | what |", "|---|---|---|---|---|---|"]
     parts = [MADE_BY]
-    for title, layout, size in (("The order", order.LAYOUT, order.SIZE), ("The status", status.LAYOUT, status.SIZE)):
+    for title, layout, size in (
+        ("The order", order.LAYOUT, order.SIZE), ("The beginning", order.BEGINNING_LAYOUT, order.BEGINNING_SIZE),
+        ("The status", status.LAYOUT, status.SIZE),
+    ):
         code = f"| {layout.size} | {SEAL_BYTES} bytes | `code` | - | - | the authentication code |"
         parts += ["", f"### {title}: {size} bytes", "", *head, *layout.rows(), code]
     return "\n".join([*parts, ""])

@@ -1,11 +1,14 @@
-"""An order in 24 bytes: what is wanted, until when it counts, its counter, and the code of who has the key."""
+"""An order in 24 bytes: what is wanted, until when it counts, its counter, and the code of who has the key.
+
+A beginning in 15 bytes: from then on the counters count from 1 again.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 from companion.orders.far.layout import Field, Layout
-from companion.orders.far.seal import ORDER, SEAL_BYTES, FarKey
+from companion.orders.far.seal import BEGINNING, ORDER, SEAL_BYTES, FarKey
 from companion.orders.order import Place, Wanted, mark_of
 from companion.orders.verbs import BY_VERB, Verb, verb_of
 
@@ -17,12 +20,18 @@ LAYOUT = Layout((
     Field(name="verb", size=1, says="its number, as in [orders](orders.md)"),
     Field(name="number", size=1, says="of a refuge in the mission, 0: the nearest, or by `lat`; else 0"),
     Field(name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"),
-    Field(name="counter", size=2, says="from 1, never twice with one key"),
+    Field(name="counter", size=2, says="from 1, never twice since one beginning"),
     Field(name="lat", size=4, is_signed=True, unit="1e-7 deg",
           says="of a goal; of a refuge the number of its name (`param3` in [orders](orders.md)) or 0; else 0"),
     Field(name="lon", size=4, is_signed=True, unit="1e-7 deg", says="of a goal; else 0"),
 ))
 SIZE = LAYOUT.size + SEAL_BYTES
+BEGINNING_LAYOUT = Layout((
+    Field(name="version", size=1, says=f"{VERSION}"),
+    Field(name="began", size=3, unit="min since 2020-01-01 UTC", says="when it was given: later than every one before"),
+    Field(name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"),
+))
+BEGINNING_SIZE = BEGINNING_LAYOUT.size + SEAL_BYTES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +45,35 @@ class FarOrder:
     counter: int
     expires_min: int
     mark: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beginning:
+    """Counters begin anew at the minute ``began``. It counts before the minute ``expires_min``; both since 2020."""
+
+    began: int
+    expires_min: int
+
+
+def pack_beginning(beginning: Beginning, key: FarKey) -> bytes:
+    """Return a beginning's 15 bytes. Raises ValueError: it lies at no time."""
+    try:
+        return key.sealed(BEGINNING, BEGINNING_LAYOUT.pack(
+            {"version": VERSION, "began": beginning.began, "expires": beginning.expires_min}))
+    except OverflowError:
+        raise ValueError("a moment is too far away for its field") from None
+
+
+def unpack_beginning(data: bytes, key: FarKey) -> Beginning:
+    """Return the beginning in 15 bytes.
+
+    Raises:
+        ValueError: it is none, or none of ours; the sentence says why.
+    """
+    counts = BEGINNING_LAYOUT.unpack(key.opened(BEGINNING, data, BEGINNING_SIZE))
+    if counts["version"] != VERSION:
+        raise ValueError(f"it is of version {counts['version']}, and this is {VERSION}: another release made it")
+    return Beginning(began=counts["began"], expires_min=counts["expires"])
 
 
 def pack_order(order: FarOrder, key: FarKey) -> bytes:

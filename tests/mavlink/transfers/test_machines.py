@@ -13,7 +13,8 @@ from companion.mavlink.transfers.lists import ListDownload, ListUpload
 from companion.mavlink.transfers.machines import Outcome, Party, Retry
 from companion.mavlink.transfers.params import ALIASES, ParamList, names_of
 from companion.mavlink.transports.signing import AHEAD_S, EPOCH_S, TICKS_PER_S, SigningStore, read_key
-from companion.mavlink.wire.frames import Codec
+from companion.mavlink.wire.codec import heartbeat
+from companion.mavlink.wire.frames import Codec, SigningState
 from companion.mavlink.wire.streams import Stream, StreamMonitor
 from companion.messages import MissionItem, MissionType
 
@@ -257,6 +258,34 @@ def test_a_signing_timestamp_that_cannot_be_stored_ends_nothing(tmp_path):
     (tmp_path / "key.timestamp").rmdir()
     store.save()
     assert int((tmp_path / "key.timestamp").read_text()) > store.state.timestamp
+
+
+@pytest.mark.parametrize("stored", ["9" * 20, "9" * 5000, str(2**48 - 1), "-5", "torn", b"\xff\xfe"])
+def test_a_damaged_signing_timestamp_is_said_and_repaired_and_frames_are_signed(tmp_path, caplog, stored):
+    """With 20 digits in the file every frame raised (issue 43, point 7)."""
+    key = tmp_path / "key"
+    key.write_text("ab" * 32)
+    key.chmod(0o600)
+    (tmp_path / "key.timestamp").write_bytes(stored if isinstance(stored, bytes) else stored.encode())
+    store = SigningStore(key, EPOCH_S + 1e8)
+    assert store.state.timestamp == int(1e8) * TICKS_PER_S
+    assert "key.timestamp: holds b'" in caplog.text
+    assert "written anew" in caplog.text
+    assert int((tmp_path / "key.timestamp").read_text()) == store.state.timestamp + int(AHEAD_S * TICKS_PER_S)
+    assert Codec(255, 190, store.state).pack(heartbeat(wire.MAV_STATE_ACTIVE))[2] == 1
+    caplog.clear()
+    SigningStore(key, EPOCH_S + 1e8)
+    assert not caplog.text
+
+
+def test_stamps_do_not_begin_anew_at_the_end_of_time():
+    """The stamps of an autopilot whose clock is out of its mind move ours."""
+    theirs, ours = (SigningState(key=bytes(32), timestamp=stamp) for stamp in (2**48 - 1, 0))
+    codec = Codec(255, 190, ours)
+    assert codec.feed(Codec(1, 1, theirs).pack(heartbeat(wire.MAV_STATE_ACTIVE)))
+    for _ in range(3):
+        assert codec.pack(heartbeat(wire.MAV_STATE_ACTIVE))[-12:-6] == b"\xff" * 6
+    assert ours.timestamp == 2**48 - 1
 
 
 def test_the_signing_clock_never_goes_back(tmp_path):

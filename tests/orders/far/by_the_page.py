@@ -17,26 +17,30 @@ def layout(title):
     return [(int(at), kind, name) for at, kind, name in rows]
 
 
-def code(key, purpose, system, body):
-    own = hmac.new(key, f"companion far {purpose} 1 system {system}".encode(), hashlib.sha256).digest()
+SIZES = {"The order": 16, "The beginning": 7, "The status": 34}
+
+
+def code(key, purpose, system, body, began=0):
+    since = f" began {began}" if began else ""
+    own = hmac.new(key, f"companion far {purpose} 1 system {system}{since}".encode(), hashlib.sha256).digest()
     return hmac.new(own, body, hashlib.sha256).digest()[:8]
 
 
-def write(title, key, system, **values):
-    """Return a message with these counts, 0 where there is none."""
-    body = bytearray(16 if title == "The order" else 34)
+def write(title, key, system, *, since=0, **values):
+    """Return a message with these counts, 0 where there is none; ``since``: the beginning that an order is of."""
+    body = bytearray(SIZES[title])
     for at, kind, name in layout(title):
         value = values.get(name, 1 if name == "version" else 0)
         if kind == "u24":
             body[at:at + 3] = struct.pack("<I", value)[:3]
         else:
             struct.pack_into(f"<{CODES[kind]}", body, at, value)
-    return bytes(body) + code(key, title.split()[1], system, bytes(body))
+    return bytes(body) + code(key, title.split()[1], system, bytes(body), since)
 
 
-def read(title, data, key, system=1):
+def read(title, data, key, system=1, since=0):
     """Return the counts of a message whose code is right."""
-    assert data[-8:] == code(key, title.split()[1], system, data[:-8])
+    assert data[-8:] == code(key, title.split()[1], system, data[:-8], since)
     counts = {}
     for at, kind, name in layout(title):
         counts[name] = struct.unpack("<I", data[at:at + 3] + b"\0")[0] if kind == "u24" else \

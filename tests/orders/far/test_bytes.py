@@ -9,15 +9,18 @@ from hypothesis import strategies as st
 from companion.messages import GeoPoint
 from companion.orders import Place, Verb, Wanted, mark_of
 from companion.orders.far import (
+    Beginning,
     FarKey,
     FarOrder,
     FarStatus,
     Reply,
     document,
     order,
+    pack_beginning,
     pack_order,
     pack_status,
     status,
+    unpack_beginning,
     unpack_order,
     unpack_status,
 )
@@ -113,9 +116,11 @@ def test_what_does_not_fit_is_the_nearest_that_does_and_never_unknown(name, valu
 GOOD_ORDER = pack_order(FarOrder(wanted=Wanted(verb=Verb.GOAL, place=Place(lat_deg=50.8, lon_deg=-1.3)), counter=7,
                                  expires_min=3_600_000), KEY)
 GOOD_STATUS = pack_status(FarStatus(phase="standard"), KEY)
+GOOD_BEGINNING = pack_beginning(Beginning(began=3_599_000, expires_min=3_600_000), KEY)
 
 
-@pytest.mark.parametrize(("data", "unpack"), [(GOOD_ORDER, unpack_order), (GOOD_STATUS, unpack_status)])
+@pytest.mark.parametrize(("data", "unpack"), [
+    (GOOD_ORDER, unpack_order), (GOOD_STATUS, unpack_status), (GOOD_BEGINNING, unpack_beginning)])
 def test_one_bit_changed_is_refused(data, unpack):
     unpack(data, KEY)
     for bit in range(8 * len(data)):
@@ -133,7 +138,7 @@ def test_one_bit_changed_is_refused(data, unpack):
 @example(bytes(24))
 @example(bytes(42))
 def test_what_is_not_ours_is_refused_in_one_line(data):
-    for unpack in (unpack_order, unpack_status):
+    for unpack in (unpack_order, unpack_status, unpack_beginning):
         with pytest.raises(ValueError, match=r"\Ait") as refusal:
             unpack(data, KEY)
         assert "\n" not in str(refusal.value)
@@ -162,6 +167,22 @@ def test_another_key_and_another_boat_are_refused(stranger):
     with pytest.raises(ValueError, match="another key, or not system"):
         unpack_order(GOOD_ORDER, stranger)
     assert all(secret not in repr(KEY) for secret in (KEY.key.hex(), repr(KEY.key), str(list(KEY.key))))
+
+
+@settings(max_examples=100)
+@given(ORDERS, st.integers(1, (1 << 24) - 1), st.integers(0, (1 << 24) - 1))
+def test_an_order_of_a_beginning_is_none_of_another(given_order, began, other):
+    since = KEY.since(began)
+    data = pack_order(given_order, since)
+    assert unpack_order(data, since).counter == given_order.counter
+    assert by_the_page.write(ORDER, KEY.key, 1, since=began, **by_the_page.read(ORDER, data, KEY.key, 1, began)) == data
+    if other != began:
+        with pytest.raises(ValueError, match="its code is wrong"):
+            unpack_order(data, KEY.since(other))
+    given_beginning = Beginning(began=began, expires_min=other)
+    sealed = pack_beginning(given_beginning, since)
+    assert unpack_beginning(sealed, KEY) == given_beginning, "it is read whatever counts before it"
+    assert by_the_page.read("The beginning", sealed, KEY.key) == {"version": 1, "began": began, "expires": other}
 
 
 def test_a_status_is_no_order_and_an_order_no_status():
@@ -203,4 +224,4 @@ def test_the_numbers_are_those_of_the_rooms_that_own_the_words():
 
 def test_the_page_has_the_tables_of_the_code():
     assert document.tables() in by_the_page.PAGE.read_text(), "python -m companion.orders.far.document"
-    assert (order.SIZE, status.SIZE) == (24, 42)
+    assert (order.SIZE, order.BEGINNING_SIZE, status.SIZE) == (24, 15, 42)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.orders import Verb, Wanted
-from companion.orders.far import WINDOW, FarOrder, Reply, Taken, judged, unix_of
+from companion.orders.far import MOST_JUMP, WINDOW, Beginning, FarOrder, Reply, Taken, begun, judged, unix_of
 
 NOW_MIN = 3_600_000
 NOW_S = unix_of(NOW_MIN)
@@ -53,6 +53,33 @@ def test_of_the_window_each_is_taken_late_and_what_is_older_is_not():
     assert judged(order(100 - WINDOW), taken, NOW_S)[0] is Reply.OVERTAKEN
 
 
+@pytest.mark.parametrize("highest", [0, 7, 40_000])
+def test_a_counter_more_than_a_jump_ahead_is_refused_and_moves_nothing(highest):
+    taken = Taken() if not highest else judged(order(highest), Taken({highest - 1: ("m", Reply.DONE)}), NOW_S)[1]
+    assert judged(order(highest + MOST_JUMP + 1), taken, NOW_S) == (Reply.AHEAD, taken)
+    assert judged(order(highest + MOST_JUMP), taken, NOW_S)[0] is None
+
+
+@pytest.mark.parametrize(("began", "left_min", "now_s", "reply"), [
+    (NOW_MIN, 30, NOW_S, Reply.BEGUN), (NOW_MIN - 9000, 1, NOW_S, Reply.BEGUN), (NOW_MIN + 60, 90, NOW_S, Reply.BEGUN),
+    (NOW_MIN + 61, 90, NOW_S, Reply.CLOCK), (NOW_MIN, 0, NOW_S, Reply.EXPIRED), (NOW_MIN, 30, None, Reply.NO_CLOCK),
+    (NOW_MIN, 8 * 1440, NOW_S, Reply.TOO_LONG), (NOW_MIN - 9001, 30, NOW_S, Reply.OLD)])
+def test_a_beginning_counts_once_and_only_behind_every_one_before(began, left_min, now_s, reply):
+    before = Taken({1: ("m", Reply.DONE)}, NOW_MIN - 9001 if reply is not Reply.OLD else NOW_MIN)
+    given = Beginning(began=began, expires_min=NOW_MIN + left_min)
+    said, taken = begun(given, before, now_s)
+    assert said is reply
+    assert taken == (Taken(began=began) if reply is Reply.BEGUN else before)
+    _, used = judged(order(1), taken, NOW_S)
+    assert begun(given, used, now_s)[1] == used, "come again it forgets nothing"
+    assert Taken.from_dict(json.loads(json.dumps(used.to_dict("k"))), "k") == used
+
+
+def test_the_words_of_a_refusal_have_the_figures_of_the_rule():
+    assert f"more than {MOST_JUMP} ahead" in Reply.AHEAD
+    assert f"more than {WINDOW - 1} behind" in Reply.OVERTAKEN
+
+
 @settings(max_examples=200)
 @given(st.lists(st.integers(1, 300), max_size=120), st.randoms(use_true_random=False))
 def test_no_counter_is_ever_taken_twice_whatever_comes_and_however_often_it_restarts(counters, lots: random.Random):
@@ -73,10 +100,12 @@ def test_with_another_key_the_counters_begin_anew():
 
 
 @pytest.mark.parametrize("data", [
-    None, [], {}, {"format": 2}, {"format": 1, "key": "k"}, {"format": 1, "key": "k", "replies": []},
+    None, [], {}, {"format": 3}, {"format": 1, "key": "k"}, {"format": 1, "key": "k", "replies": []},
     {"format": 1, "key": "k", "replies": {"x": ["m", "done"]}}, {"format": 1, "key": "k", "replies": {"1": "done"}},
     {"format": 1, "key": "k", "replies": {"1": ["m", "sunk"]}},
     {"format": 1, "key": "k", "replies": {"0": ["m", "done"]}},
+    {"format": 2, "key": "k", "replies": {}}, {"format": 2, "key": "k", "began": -1, "replies": {}},
+    {"format": 2, "key": "k", "began": "1", "replies": {}}, {"format": 2, "key": "k", "began": 1 << 24, "replies": {}},
     {"format": 1, "key": "k", "replies": {str(n): ["m", "done"] for n in range(1, 80)}},
 ])
 def test_a_damaged_memory_is_not_believed(data):
