@@ -25,10 +25,12 @@ from companion.disk import reason
 from companion.errors import InputError
 from companion.fold import Step
 from companion.orders import Answer, Result, phrase
+from companion.page import Guests
 from companion.view import Event, View
 
 MAX_LINE = 500     # bytes; an order is shorter
-MOST = 8           # connections at a time
+MOST = 8           # connections at a time: who has asked for nothing the longest makes room for the next
+MOST_WATCH = 6     # of them, who are shown the voyage: there is room for an order
 WATCH = b"watch"   # asks for the views
 STUCK_S = 10.0     # who does not read for so long is hung up on
 LOOK_S = 5.0       # whether it is still there
@@ -58,22 +60,26 @@ async def served(path: Path, crew: Crew, showing: Showing) -> AsyncIterator[None
     """
     _clear(path)
     numbers = itertools.count(1)
-    writers: set[asyncio.StreamWriter] = set()
+    guests, watching = Guests(MOST), set[asyncio.StreamWriter]()
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         number = next(numbers)
-        writers.add(writer)
         try:
             with contextlib.suppress(ConnectionError, ValueError, TimeoutError):   # gone, or a line without end
-                while len(writers) <= MOST and (line := await reader.readline()):
+                while guests.take(writer) and (line := await reader.readline()):
+                    guests.is_answered(writer)
                     if line.strip() == WATCH:
-                        await _show(writer, showing)
+                        if len(watching) < MOST_WATCH:
+                            watching.add(writer)
+                            await _show(writer, showing)
                         break
                     answer = await _answer(line, crew, number)
                     writer.write(json.dumps({"result": answer.result.value, "text": answer.text}).encode() + b"\n")
-                    await writer.drain()
+                    async with asyncio.timeout(STUCK_S):
+                        await writer.drain()
         finally:
-            writers.discard(writer)
+            watching.discard(writer)
+            guests.leave(writer)
             writer.close()
 
     listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -90,7 +96,7 @@ async def served(path: Path, crew: Crew, showing: Showing) -> AsyncIterator[None
     finally:
         with contextlib.suppress(OSError):   # a disk that has become read-only meanwhile
             path.unlink(missing_ok=True)
-        for writer in tuple(writers):
+        for writer in guests:
             writer.close()
 
 

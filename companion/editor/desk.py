@@ -48,8 +48,6 @@ class _Asked(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class Desk:
     """Serves the editor of one mission file; see ``companion.page.connections.App``."""
 
-    most_body = MOST_BODY
-
     def __init__(
         self, base: Base, token: str, previews: Previews, charts: Sequence[Chart] = (), disk: Disk | None = None,
     ) -> None:
@@ -61,6 +59,15 @@ class Desk:
         self._turn, self._newest = asyncio.Lock(), 0
         self._keep(base)
 
+    def admit(self, request: h11.Request, path: str) -> int:
+        """Let in who may ask for it; return how many bytes are read. Raises Refused."""
+        if request.method != b"POST":
+            return 0
+        if path != "/api/mission" and path not in self._acts():
+            raise Refused(404, "there is nothing to post to here")
+        require_token(request, self._token)
+        return MOST_BODY
+
     async def reply(self, request: h11.Request, path: str, body: bytes) -> Reply | Stream:
         """Answer a request. Raises Refused."""
         if request.method != b"POST":
@@ -71,9 +78,6 @@ class Desk:
                 raise Refused(404, "there is nothing here")
             return Reply(kind=file.kind, data=file.data, tag=file.tag, packed=file.packed)
         act = self._acts().get(path)
-        if act is None and path != "/api/mission":
-            raise Refused(404, "there is nothing to post to here")
-        require_token(request, self._token)
         try:
             if act is None:
                 return Reply(data=msgspec.json.encode(await self._load()))

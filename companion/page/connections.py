@@ -1,7 +1,9 @@
 """HTTP/1.1 by h11 on asyncio: connections, limits, and what every answer says. It never holds a voyage.
 
 What is asked of it from elsewhere is refused: by Host (names bent to this machine), by Origin (pages of others), by the
-content policy (nothing foreign is loaded). Who does not read is dropped; there is room for so many and no more.
+content policy (nothing foreign is loaded); all of that, and who it is, before a byte of a body is read. Who does not
+read is dropped, a request has to come in whole within a deadline however it drips, and there is room for so many: who
+has asked for nothing the longest makes room for the next.
 """
 
 from __future__ import annotations
@@ -11,23 +13,25 @@ import contextlib
 import gzip
 import hmac
 import re
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import h11
 import msgspec
 
+from companion.clock import now_s
 from companion.errors import JobError
 from companion.page.address import Address, is_known, is_own
 
 MOST_CONNECTIONS = 64
 MOST_HEAD = 16_384        # bytes of a request's head
-REQUEST_S = 10.0          # for a request to come in whole
+REQUEST_S = 10.0          # for a request to come in whole, from its first byte, or the connection's beginning
 IDLE_S = 30.0             # between two of one connection
 BLOCKED_S = 10.0          # a client that does not read for so long is dropped
 BUFFER = 65_536           # bytes that wait for a client
 LAST_S = 0.3              # at the end
+LINGER_S = 1.0            # for what a refused client still sends: hung up on at once it would not read why
 PACK_BYTES = 2_000        # less than that is not packed
 
 POLICY = ("default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'; "
@@ -86,10 +90,52 @@ Stream = Callable[[Channel], Awaitable[None]]
 class App(Protocol):
     """What is served: from a request that was let in comes a reply, or a stream of events."""
 
-    most_body: int         # bytes that are posted at most
+    def admit(self, request: h11.Request, path: str) -> int:
+        """Return how many bytes of body are read of a request, before any is. Raises Refused: it may not be asked."""
 
     async def reply(self, request: h11.Request, path: str, body: bytes) -> Reply | Stream:
-        """Answer. Raises Refused."""
+        """Answer what was let in. Raises Refused."""
+
+
+class Guests:
+    """Who is connected, at most so many: where it is full, who has waited the longest for nothing makes room.
+
+    A guest is idle until a request of his is whole, however it drips, and while he does not read what he asked for; the
+    former go first. Who is being answered stays.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._idle: dict[asyncio.StreamWriter, tuple[int, float] | None] = {}   # (rank, since when [s]); None: busy
+
+    def __iter__(self) -> Iterator[asyncio.StreamWriter]:
+        return iter(tuple(self._idle))
+
+    def take(self, writer: asyncio.StreamWriter) -> bool:
+        """Take one, idle from now on; False: all are busy, and there is no room."""
+        if writer not in self._idle and len(self._idle) >= self._most:
+            idle = [(since, each) for each, since in self._idle.items() if since is not None]
+            if not idle:
+                return False
+            _, longest = min(idle, key=lambda found: found[0])
+            del self._idle[longest]
+            longest.transport.abort()
+        self._idle[writer] = 0, now_s()
+        return True
+
+    def waits(self, writer: asyncio.StreamWriter, *, reads: bool = True) -> None:
+        """Note that one is idle from now on: he has to ask, or with ``reads`` false to take what he asked for."""
+        if writer in self._idle:
+            self._idle[writer] = int(not reads), now_s()
+
+    def is_answered(self, writer: asyncio.StreamWriter) -> None:
+        """Note that one is being answered."""
+        if writer in self._idle:
+            self._idle[writer] = None
+
+    def leave(self, writer: asyncio.StreamWriter) -> None:
+        """Forget one."""
+        self._idle.pop(writer, None)
 
 
 @contextlib.asynccontextmanager
@@ -123,7 +169,7 @@ class Server:
     def __init__(self, address: Address, app: App, pace: float) -> None:
         self.address, self.app, self._pace = address, app, pace
         self._talks: set[asyncio.Task[Any]] = set()
-        self._writers: set[asyncio.StreamWriter] = set()
+        self.guests = Guests(MOST_CONNECTIONS)
         self.dropped = 0
 
     def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -136,7 +182,7 @@ class Server:
         """End all connections; who watches has a moment to hear that it is over."""
         if self._talks:
             await asyncio.wait(self._talks, timeout=self.seconds(LAST_S))
-        for writer in tuple(self._writers):
+        for writer in self.guests:
             writer.transport.abort()
         for task in tuple(self._talks):
             task.cancel()
@@ -144,15 +190,14 @@ class Server:
 
     async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Answer one connection until it ends."""
-        self._writers.add(writer)
         writer.transport.set_write_buffer_limits(high=BUFFER)
         try:
-            if len(self._writers) <= MOST_CONNECTIONS:
+            if self.guests.take(writer):
                 await _Connection(self, reader, writer).run()
         except (OSError, TimeoutError, h11.ProtocolError):
             pass   # gone, or speaks something else: nobody to tell
         finally:
-            self._writers.discard(writer)
+            self.guests.leave(writer)
             writer.close()
             with contextlib.suppress(OSError, TimeoutError):
                 async with asyncio.timeout(self.seconds(BLOCKED_S)):
@@ -163,8 +208,12 @@ class Server:
         """Return seconds as those of the loop."""
         return seconds * self._pace
 
-    def check(self, request: h11.Request) -> None:
-        """Raise for a request that does not come from our own page, or from who typed its address."""
+    def admit(self, request: h11.Request) -> int:
+        """Return how many bytes of body are read of a request.
+
+        Raises:
+            Refused: it does not come from our own page, nor from who typed its address, or may not be asked.
+        """
         hosts = [v.decode("latin-1") for k, v in request.headers if k == b"host"]
         if len(hosts) != 1 or not is_known(hosts[0], self.address):
             raise Refused(421, "this is not the host that was asked for; name it with --http-name", closes=True)
@@ -175,6 +224,12 @@ class Server:
             raise Refused(405, "there is GET, and POST for orders", closes=True)
         if request.method == b"POST" and not origin:
             raise Refused(403, "an order names the page that it comes from (Origin)", closes=True)
+        if header(request, b"transfer-encoding"):   # of chunks of a byte each a body costs minutes of the loop
+            raise Refused(411, "what is posted says how long it is (Content-Length)", closes=True)
+        most = self.app.admit(request, path_of(request))
+        if int(header(request, b"content-length") or 0) > most:   # h11 has seen that it is a number
+            raise Refused(413, f"at most {most} bytes are taken", closes=True)
+        return most
 
 
 class _Connection:
@@ -189,16 +244,15 @@ class _Connection:
         wait_s = REQUEST_S
         while True:
             try:
-                async with asyncio.timeout(self._server.seconds(wait_s)):
-                    request = await self._event()
-                    if not isinstance(request, h11.Request):
-                        return
-                    body = await self._body()
-                self._server.check(request)
-                if await self._answer(request, body):
+                asked = await self._request(wait_s)
+                if asked is None:
+                    return
+                self._server.guests.is_answered(self._writer)
+                if await self._answer(*asked):
                     return
             except Refused as refused:
                 await self._send(refused.status, JSON, msgspec.json.encode({"error": refused.text}), closes=True)
+                await self._linger()
                 return
             except h11.RemoteProtocolError as error:
                 if self._h11.our_state in {h11.IDLE, h11.SEND_RESPONSE}:
@@ -208,7 +262,30 @@ class _Connection:
             if self._h11.our_state is not h11.DONE or self._h11.their_state is not h11.DONE:
                 return
             self._h11.start_next_cycle()
+            self._server.guests.waits(self._writer)
             wait_s = IDLE_S
+
+    async def _request(self, wait_s: float) -> tuple[h11.Request, bytes] | None:
+        """Return the next request that is let in and its body; None: there is none. Its first byte has ``wait_s``."""
+        loop = asyncio.get_running_loop()
+        async with asyncio.timeout(self._server.seconds(wait_s)) as limit:
+            if not self._h11.trailing_data[0]:
+                self._h11.receive_data(await self._reader.read(MOST_HEAD))
+            limit.reschedule(loop.time() + self._server.seconds(REQUEST_S))
+            request = await self._event()
+            if not isinstance(request, h11.Request):
+                return None
+            self._server.admit(request)
+            return request, await self._body()
+
+    async def _linger(self) -> None:
+        """Let a client that was refused read why: what it still sends is thrown away for a moment."""
+        self._server.guests.waits(self._writer)
+        with contextlib.suppress(OSError, TimeoutError):
+            self._writer.write_eof()
+            async with asyncio.timeout(self._server.seconds(LINGER_S)):
+                while await self._reader.read(MOST_HEAD):
+                    pass
 
     async def _event(self) -> Any:
         while True:
@@ -218,20 +295,14 @@ class _Connection:
             self._h11.receive_data(await self._reader.read(MOST_HEAD))
 
     async def _body(self) -> bytes:
-        body, most = b"", self._server.app.most_body
-        while True:
-            event = await self._event()
-            if isinstance(event, h11.Data):
-                body += bytes(event.data)
-                if len(body) > most:
-                    raise Refused(413, f"at most {most} bytes are taken")
-            else:
-                return body
+        body = bytearray()   # no longer than it said, and that is checked
+        while isinstance(event := await self._event(), h11.Data):
+            body += event.data
+        return bytes(body)
 
     async def _answer(self, request: h11.Request, body: bytes) -> bool:
         """Answer a request; True: the connection is used up."""
-        path = request.target.decode("latin-1").partition("?")[0]
-        reply = await self._server.app.reply(request, path, body)
+        reply = await self._server.app.reply(request, path_of(request), body)
         if not isinstance(reply, Reply):
             await self._stream(reply)
             return True
@@ -280,15 +351,17 @@ class _Connection:
         out += self._h11.send(h11.EndOfMessage()) or b""
         await self._write(out)
 
-    async def _write(self, data: bytes) -> None:
+    async def _write(self, data: bytes, *, is_stream: bool = False) -> None:
         self._writer.write(data)
+        if not is_stream and self._writer.transport.get_write_buffer_size():
+            self._server.guests.waits(self._writer, reads=False)
         async with asyncio.timeout(self._server.seconds(BLOCKED_S)):
             await self._writer.drain()
 
     async def _stream(self, stream: Stream) -> None:
         fields = [*HEADERS, ("Content-Type", "text/event-stream"), ("Cache-Control", "no-store"),
                   ("Connection", "close")]
-        await self._write(self._h11.send(h11.Response(status_code=200, headers=fields)) or b"")
+        await self._write(self._h11.send(h11.Response(status_code=200, headers=fields)) or b"", is_stream=True)
         gone = asyncio.create_task(self._gone(), name="page: is he still there")
         try:
             await stream(Channel(self._write_part, gone))
@@ -299,7 +372,7 @@ class _Connection:
             gone.cancel()
 
     async def _write_part(self, data: bytes) -> None:
-        await self._write(self._h11.send(h11.Data(data=data)) or b"")
+        await self._write(self._h11.send(h11.Data(data=data)) or b"", is_stream=True)
 
     async def _gone(self) -> None:
         """Return when the other side has hung up."""
@@ -316,6 +389,11 @@ def require_token(request: h11.Request, token: str) -> None:
     given = header(request, b"authorization")
     if not (token and hmac.compare_digest(given.encode(), f"Bearer {token}".encode())):
         raise Refused(401, "the token is missing or wrong")
+
+
+def path_of(request: h11.Request) -> str:
+    """Return what is asked for, without what is behind a question mark."""
+    return request.target.decode("latin-1").partition("?")[0]
 
 
 def header(request: h11.Request, name: bytes) -> str:

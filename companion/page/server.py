@@ -47,20 +47,27 @@ async def served(
 class Page:
     """One page over one source."""
 
-    most_body = MOST_BODY
-
     def __init__(self, address: Address, source: Live | Record, pace: float, charts: Sequence[Chart]) -> None:
         self._address, self._source, self._pace = address, source, pace
         self._charts = {chart.tag: chart for chart in charts}
         self._files = files()
         self._ordering = asyncio.Lock()
 
+    def admit(self, request: h11.Request, path: str) -> int:
+        """Let in who may ask for it; return how many bytes are read. Raises Refused."""
+        if request.method != b"POST":
+            return 0
+        if path not in {"/api/order", "/api/preview"}:
+            raise Refused(404, "there is nothing to post to here")
+        if not self._takes_orders:
+            raise Refused(403, "orders are not taken here: begin with --http-token FILE")
+        require_token(request, self._address.token)
+        return MOST_BODY
+
     async def reply(self, request: h11.Request, path: str, body: bytes) -> Reply | Stream:
         """Answer a request. Raises Refused."""
         if request.method == b"POST":
-            if path not in {"/api/order", "/api/preview"}:
-                raise Refused(404, "there is nothing to post to here")
-            return Reply(data=await self._order(request, body, is_preview=path == "/api/preview"))
+            return Reply(data=await self._order(body, is_preview=path == "/api/preview"))
         if path == "/api/stream" and isinstance(self._source, Live):
             return self._stream(request, self._source)
         file = self._files.get(path)
@@ -110,11 +117,10 @@ class Page:
                 "icon": "mdi-sail-boat", "company": "sailboat-companion", "version": __version__, "webpage": "",
                 "api": "/api/hello", "new_page": True, "avoid_iframes": True, "works_in_relative_paths": False}
 
-    async def _order(self, request: h11.Request, body: bytes, *, is_preview: bool) -> bytes:
-        """Take an order, or show what it would lead to; return the answer."""
-        if not self._takes_orders or not isinstance(self._source, Live) or self._source.ask is None:
-            raise Refused(403, "orders are not taken here: begin with --http-token FILE")
-        require_token(request, self._address.token)
+    async def _order(self, body: bytes, *, is_preview: bool) -> bytes:
+        """Take an order of one who was let in, or show what it would lead to; return the answer."""
+        assert isinstance(self._source, Live)
+        assert self._source.ask is not None
         try:
             words = msgspec.json.decode(body, type=dict[str, str])["order"]
             wanted = phrase(words.split())

@@ -208,7 +208,7 @@ def test_a_message_that_cannot_be_read_is_put_aside_and_keeps_no_other_out(tmp_p
     def sick(path, most_bytes, read=far.read_regular, **how):
         if path.name == "000000\x1b[2J.sbd" and kind == "sick":
             raise OSError(errno.EIO, "Input/output error", str(path))
-        return read(path, most_bytes)
+        return read(path, most_bytes, **how)
 
     monkeypatch.setattr(far, "read_regular", sick)
     voyage = Voyage(tmp_path)

@@ -92,11 +92,16 @@ def test_what_is_no_order_is_answered_and_the_next_is_heard(tmp_path, line):
 
 
 def test_a_line_without_end_is_hung_up_on_and_a_crowd_is_not_let_in(tmp_path):
-    async def talk(_):
+    async def talk(crew):
         assert await said(tmp_path / "s", b"x" * 3 * MAX_LINE) == [b""]
         crowd = [await asyncio.open_unix_connection(tmp_path / "s") for _ in range(MOST)]
+        for _, writer in crowd:
+            writer.write(b"hold\n")   # each waits for its answer
         await asyncio.sleep(0.05)
         late = await said(tmp_path / "s", b"jump\n")
+        for order in crew.take():
+            crew.answered(Acknowledge(way="local", system=0, component=order.source.component, command=0,
+                                      result=Result.DONE, text="so be it"))
         for _, writer in crowd:
             writer.close()
             await writer.wait_closed()
@@ -106,6 +111,21 @@ def test_a_line_without_end_is_hung_up_on_and_a_crowd_is_not_let_in(tmp_path):
     late, after = with_socket(tmp_path / "s", talk)
     assert late == [b""]
     assert after != [b""]
+
+
+@pytest.mark.parametrize("sent", [b"", b"watch\n"])
+def test_who_asks_for_nothing_and_who_watches_leave_room_for_an_order(tmp_path, sent):
+    async def talk(_):
+        crowd = [await asyncio.open_unix_connection(tmp_path / "s") for _ in range(MOST + 2)]
+        for _, writer in crowd:
+            writer.write(sent)
+        await asyncio.sleep(0.05)
+        answer = await said(tmp_path / "s", b"jump\n")
+        for _, writer in crowd:
+            writer.transport.abort()
+        return answer
+
+    assert json.loads(with_socket(tmp_path / "s", talk)[0])["result"] == "unknown"
 
 
 def test_a_place_that_is_taken_is_left_alone_and_what_a_kill_left_is_not(tmp_path):

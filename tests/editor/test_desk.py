@@ -4,6 +4,7 @@ import asyncio
 import base64
 import json
 import shutil
+import time
 from pathlib import Path
 
 import pytest
@@ -225,6 +226,31 @@ def test_who_may_not(bay, headers, status):
 
     assert with_editor(bay, talk) == [status] * 5
     assert bay.read_bytes() == before
+
+
+def test_who_may_not_is_told_so_before_the_four_megabytes_that_he_sends(bay):
+    async def talk(asker):
+        head = (f"POST /api/save HTTP/1.1\r\nHost: 127.0.0.1:{asker.port}\r\nContent-Length: 4000000\r\n"
+                f"Origin: http://127.0.0.1:{asker.port}\r\nContent-Type: application/json\r\nX-Companion: 1\r\n")
+        return [await asker.raw(f"{head}{more}\r\n".encode(), at_most_s=1.5) for more in (
+            "", f"Authorization: Bearer {TOKEN[:-1]}\r\n")]
+
+    assert [answer[:12] for answer in with_editor(bay, talk)] == [b"HTTP/1.1 401"] * 2
+
+
+def test_a_body_in_chunks_of_a_byte_does_not_hold_the_loop(bay):
+    """Each was put behind all before it: 20 ms of the sender's were seconds of the loop's (issue 43, point 9)."""
+    async def talk(asker):
+        head = (f"POST /api/check HTTP/1.1\r\nHost: 127.0.0.1:{asker.port}\r\nTransfer-Encoding: chunked\r\n"
+                f"Origin: http://127.0.0.1:{asker.port}\r\nContent-Type: application/json\r\nX-Companion: 1\r\n"
+                f"Authorization: Bearer {TOKEN}\r\n\r\n")
+        begun_s = time.thread_time()
+        answer = await asker.raw(head.encode() + b"1\r\n \r\n" * 30_000 + b"0\r\n\r\n", at_most_s=20.0)
+        return answer[:12], time.thread_time() - begun_s
+
+    answer, took_s = with_editor(bay, talk)
+    assert answer == b"HTTP/1.1 411"
+    assert took_s < 0.1
 
 
 def test_nothing_but_the_page_is_read_without_the_token(bay):

@@ -1,15 +1,17 @@
 """Each attack on the page that is known of such pages, tried on it."""
 
 import asyncio
+import contextlib
 import json
 import stat
 
 import pytest
 
+from companion.clock import run
 from companion.errors import InputError
 from companion.orders import Answer, Result
-from companion.page import connections, read_token
-from companion.page.connections import MOST_HEAD
+from companion.page import Live, connections, read_token
+from companion.page.connections import MOST_CONNECTIONS, MOST_HEAD
 from companion.page.server import MOST_BODY, MOST_WATCHERS
 from tests.page.asking import TOKEN, Asked, hang_up, taking_orders, view_at, with_page
 
@@ -251,3 +253,96 @@ def test_a_request_that_never_ends_is_hung_up_on(monkeypatch):
 
     answer, (status, _, _) = with_page(talk)
     assert (answer, status) == (b"", 200)
+
+
+def posting(browser, size=1000, host=None, origin=None, token=TOKEN, more=""):
+    """Return the head of a POST whose body does not come."""
+    own = f"127.0.0.1:{browser.port}"
+    return (f"POST /api/order HTTP/1.1\r\nHost: {host or own}\r\nOrigin: {origin or f'http://{own}'}\r\n"
+            f"Content-Type: application/json\r\nX-Companion: 1\r\nAuthorization: Bearer {token}\r\n"
+            f"{more or f'Content-Length: {size}'}\r\n\r\n").encode()
+
+
+@pytest.mark.parametrize(("wrong", "status"), [
+    ({"host": "evil.example"}, 421), ({"origin": "http://evil.example"}, 403), ({"token": "x" * 24}, 401),
+    ({"size": MOST_BODY + 1}, 413), ({"more": "Transfer-Encoding: chunked"}, 411)])
+def test_who_may_not_is_told_so_before_a_byte_of_the_body_is_read(wrong, status):
+    """A body was read to its end, four megabytes of the editor's, before it was looked at who sends it (issue 43)."""
+    async def talk(browser, *_):
+        return await browser.raw(posting(browser, **wrong), at_most_s=2.0)
+
+    answer, orders = taking_orders(talk)
+    assert (answer[:12], orders) == (f"HTTP/1.1 {status}".encode(), [])
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: ", "body"])
+def test_sixty_four_who_ask_for_nothing_shut_nobody_out_and_who_watches_stays(sent):
+    async def talk(browser, live, _):
+        live.show(view_at(1.0), (), None)
+        reader, watching = await asyncio.open_connection("127.0.0.1", browser.port)
+        watching.write(f"GET /api/stream HTTP/1.1\r\nHost: 127.0.0.1:{browser.port}\r\n\r\n".encode())
+        await reader.readuntil(b"event: view")
+        idle = []
+        for _ in range(MOST_CONNECTIONS):
+            _, writer = await asyncio.open_connection("127.0.0.1", browser.port)
+            writer.write(posting(browser) if sent == "body" else sent)
+            idle.append(writer)
+        statuses = [(await browser.get("/api/hello"))[0] for _ in range(3)]
+        live.show(view_at(2.0), (), None)
+        async with asyncio.timeout(2.0):
+            await reader.readuntil(b"event: view")
+        for writer in (*idle, watching):
+            writer.transport.abort()
+        return statuses
+
+    live = Live(name="test", ask=Asked().ask)
+    assert with_page(talk, live, TOKEN) == [200, 200, 200]
+
+
+def test_a_request_that_drips_is_hung_up_on_however_often_a_byte_comes(monkeypatch):
+    monkeypatch.setattr(connections, "REQUEST_S", 0.3)
+
+    async def talk(browser, *_):
+        reader, writer = await asyncio.open_connection("127.0.0.1", browser.port)
+        writer.write(posting(browser))
+        gone = asyncio.create_task(reader.read())
+        for _ in range(100):
+            with contextlib.suppress(ConnectionError):
+                writer.write(b" ")
+            await asyncio.sleep(0.02)
+            if gone.done():
+                break
+        await asyncio.gather(gone, return_exceptions=True)
+        writer.transport.abort()
+        return gone.done()
+
+    assert taking_orders(talk)[0]
+
+
+def test_who_has_waited_the_longest_makes_room_and_who_does_not_read_after_who_does_not_ask():
+    class Writer:
+        def __init__(self):
+            self.transport, self.is_gone = self, False
+
+        def abort(self):
+            self.is_gone = True
+
+    async def talk():
+        guests, (a, b, c, d, e) = connections.Guests(3), (Writer() for _ in range(5))
+        assert [guests.take(each) for each in (a, b, c)] == [True] * 3
+        await asyncio.sleep(0.01)
+        guests.is_answered(a)
+        guests.waits(a, reads=False)
+        guests.is_answered(b)
+        assert guests.take(d)
+        assert guests.take(e)
+        assert [each.is_gone for each in (a, b, c, d, e)] == [False, False, True, True, False]
+        guests.is_answered(e)
+        assert guests.take(c), "and he who does not read"
+        guests.is_answered(c)
+        assert a.is_gone
+        assert not guests.take(d), "who is answered stays"
+        guests.leave(b)
+        assert guests.take(d)
+
+    run(talk())
