@@ -54,8 +54,8 @@ class Disk:
         path.mkdir(parents=True, exist_ok=True)
 
     def open_to_append(self, path: Path) -> int:
-        """Open a file to be appended to, and make it if it is not there."""
-        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        """Open a file to be appended to, and make it if it is not there. Through a link nothing is written."""
+        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
 
     def append(self, fd: int, data: bytes) -> None:
         """Append ``data`` whole, or not at all: a disk that fills in the middle of it leaves no half record."""
@@ -98,7 +98,9 @@ class Disk:
                     while done < len(data):
                         done += self.write(fd, data[done:])
                     with contextlib.suppress(OSError):
-                        os.fchmod(fd, path.stat().st_mode & 0o777 if mode is None else mode)
+                        before = path.lstat().st_mode if mode is None else stat.S_IFREG | mode
+                        if stat.S_ISREG(before):   # the rights of what a link leads to are another file's
+                            os.fchmod(fd, before & 0o777)
                     if is_durable:
                         self.sync(fd)
                 finally:
@@ -117,8 +119,13 @@ class Disk:
 
     # ---------------------------------------------------------------------------------- what the above is made of
     def create(self, path: Path) -> int:
-        """Open a new, empty file."""
-        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
+        """Make and open a file. What has its name is removed, not written to: it may be a link to another's file."""
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+        try:
+            return os.open(path, flags, 0o644)
+        except FileExistsError:   # a power cut left it, or others did
+            path.unlink()
+            return os.open(path, flags, 0o644)
 
     def write(self, fd: int, data: bytes) -> int:
         """Write some of ``data``; return how many bytes."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from companion.disk import Disk
+from companion.disk import NEW, Disk
 from companion.errors import JobError
 from companion.telemetry.folder import recorder as module
 from companion.telemetry.folder.names import DECISIONS, TLOG
@@ -110,6 +110,34 @@ def test_a_failed_whole_file_leaves_the_old_one_and_no_rubbish(small):
         Disk().replace(path, bytes(1 << 20))
     assert path.read_bytes() == b"old"
     assert [p.name for p in small.iterdir()] == ["state.json"]
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_what_lies_beside_a_file_is_no_way_to_another(tmp_path, is_there):
+    """A link of the name under which the new file is written: what it led to was written over (issue 43, point 9)."""
+    path, victim = tmp_path / "state.json", tmp_path / "another's"
+    if is_there:
+        victim.write_bytes(b"theirs")
+        victim.chmod(0o666)
+    (tmp_path / f"state.json{NEW}").symlink_to(victim)
+    path.symlink_to(victim)
+    Disk().replace(path, b"ours")
+    assert (path.is_symlink(), path.read_bytes(), path.stat().st_mode & 0o777) == (False, b"ours", 0o644)
+    assert (victim.read_bytes() if victim.exists() else b"theirs") == b"theirs"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["another's"] * is_there + ["state.json"]
+
+
+def test_what_a_power_cut_left_half_written_is_in_nobodys_way(tmp_path):
+    (tmp_path / f"state.json{NEW}").write_bytes(b"half")
+    Disk().replace(tmp_path / "state.json", b"whole")
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [("state.json", b"whole")]
+
+
+def test_records_are_not_appended_through_a_link(tmp_path):
+    (tmp_path / "log").symlink_to(tmp_path / "another's")
+    with pytest.raises(OSError, match="symbolic links"):
+        Disk().open_to_append(tmp_path / "log")
+    assert not (tmp_path / "another's").exists()
 
 
 def test_a_read_only_disk_is_no_end_and_what_is_written_once_comes_when_it_can(small):
