@@ -22,7 +22,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 
 from companion.errors import JobError
-from companion.kernels.places import folder, looked_in, used, versions, written_to
+from companion.kernels.places import folder, looked_in, objection, refuse, used, versions, written_to
 from companion.kernels.stamp import name_of, stamp
 
 _LOG = logging.getLogger(__name__)
@@ -120,9 +120,14 @@ class KernelCache(_Cache):  # type: ignore[misc]
 
 
 def read(path: Path) -> bytes | None:
-    """Return what a file holds behind its digest; None: it is not there, or damaged."""
+    """Return what a file of ours holds behind its digest; None: it is not there, damaged, or others could write it."""
     try:
-        data = path.read_bytes()
+        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+            why = objection(os.fstat(file.fileno()), path.parent)   # of what is read, and no other
+            if why:
+                refuse(path, why)
+                return None
+            data = file.read()
     except OSError:
         return None
     if hashlib.sha256(data[_DIGEST_BYTES:]).digest() != data[:_DIGEST_BYTES]:

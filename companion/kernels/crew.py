@@ -80,7 +80,8 @@ def planned(packages: Sequence[str]) -> list[Work]:
 def _held(work: Work, place: Path) -> Iterator[bool]:
     """Hold a kernel while it is compiled; False when another process does."""
     path = place / f".{work.file}.lock"
-    with path.open("w") as file:
+    fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+    with os.fdopen(fd, "w") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:

@@ -4,13 +4,18 @@ Looked for in what the package carries, in a folder of the user's, and in memory
 ``$COMPANION_KERNELS``, the service manager's ``$CACHE_DIRECTORY``, or ``sailboat-companion/kernels`` under
 ``$XDG_CACHE_HOME`` (``~/.cache``); where that cannot be written, to memory: a Pi's card that fails is mounted read-only
 by the kernel, and a companion that starts again then must not compile for minutes at every start.
+
+What lies there is run. So a folder or a file that another user owns (root, and who owns the package, may as well change
+the program) or that others may write to is not used, and that is said once.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import functools
 import hashlib
+import logging
 import os
 import platform
 import stat
@@ -27,6 +32,9 @@ CARRIED = Path(__file__).resolve().parent / "carried"   # filled when a package 
 MADE_FOR = "made-for.txt"                               # in it: the versions that it was made for
 KEPT_S = 30 * 86_400.0     # a file that nobody has used for this long goes ...
 KEPT_BYTES = 200 * 2**20   # ... and the oldest beyond this, a dozen versions of everything
+_LOG = logging.getLogger(__name__)
+ROOT = 0                   # the user who may change everything
+_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _USED_S = 86_400.0         # the time of use is noted once a day: an SD card wears
 
 
@@ -42,7 +50,8 @@ def folder() -> Path:
 
 def looked_in() -> tuple[Path, ...]:
     """Return where machine code may lie, in the order in which it is looked for."""
-    return CARRIED, folder(), *(place for place in map(_of_user, IN_MEMORY) if _is_private(place))
+    places = [place for place in (CARRIED, folder()) if _is_ours(place)]
+    return *places, *(place for place in map(_of_user, IN_MEMORY) if _is_private(place))
 
 
 def written_to() -> Path:
@@ -62,6 +71,36 @@ def written_to() -> Path:
         raise error from None
 
 
+def objection(status: os.stat_result, place: Path) -> str:
+    """Return why a folder, ``place``, or a file in it is not believed to be ours, empty: it is.
+
+    Of what the package carries others may write what they may write of its code: they can be no worse.
+    """
+    code, is_carried = Path(__file__).stat(), place == CARRIED
+    if status.st_uid not in {os.geteuid(), ROOT, *([code.st_uid] if is_carried else [])}:
+        return f"it is another user's, of uid {status.st_uid}"
+    others = status.st_mode & _OTHERS & ~(code.st_mode if is_carried else 0)
+    return "others may write to it" if others else ""
+
+
+@functools.cache
+def refuse(path: Path, why: str) -> None:
+    """Say, once, that what lies at a place is not used."""
+    _LOG.warning("%s: %s: compiled kernels are run, so none of it is used; make it yours alone (chown, chmod go-w)",
+                 path, why)
+
+
+def _is_ours(place: Path) -> bool:
+    """Return whether a folder is ours, or not there."""
+    try:
+        why = objection(place.stat(), place)
+    except OSError:
+        return True
+    if why:
+        refuse(place, why)
+    return not why
+
+
 def _of_user(place: Path) -> Path:
     return place / f"companion-kernels-{os.getuid()}"
 
@@ -77,6 +116,8 @@ def _is_private(place: Path) -> bool:
 
 def _tried(place: Path) -> Path:
     place.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if not _is_ours(place):
+        raise OSError(errno.EPERM, "it is not ours alone", str(place))
     with tempfile.TemporaryFile(dir=place):
         return place
 
@@ -121,7 +162,8 @@ def used(path: Path, now_s: float) -> None:
 def sweep(now_s: float) -> int:
     """Remove what nobody has used for long, the oldest beyond the limit, and numba's own caches of before; count it."""
     held = removed = 0
-    for used_s, size, path in sorted((file for place in looked_in()[1:] for file in _files(place)), reverse=True):
+    kept = [place for place in looked_in() if place != CARRIED]
+    for used_s, size, path in sorted((file for place in kept for file in _files(place)), reverse=True):
         held += size
         if now_s - used_s > KEPT_S or held > KEPT_BYTES:
             with contextlib.suppress(OSError):

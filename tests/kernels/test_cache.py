@@ -137,6 +137,31 @@ def test_what_others_can_write_is_not_run(load, monkeypatch, tmp_path, caplog):
     assert "cannot be kept" in caplog.text
 
 
+@pytest.mark.parametrize(("mode", "uid"), [(0o770, None), (0o702, None), (0o700, 54321)])
+@pytest.mark.parametrize("what", ["folder", "file"])
+def test_kernels_that_others_may_have_written_are_not_run_and_that_is_said_once(
+        load, kept, monkeypatch, tmp_path, caplog, what, mode, uid):
+    """They were unpickled and run from any folder that was named (issue 43, point 9)."""
+    places.refuse.cache_clear()
+    load()(3.0)
+    files = list(kept.iterdir())
+    for path in [kept] if what == "folder" else files:
+        path.chmod(mode)
+        if uid is not None:
+            monkeypatch.setattr(places.os, "geteuid", lambda: uid)   # what was ours is another's
+            monkeypatch.setattr(places, "ROOT", uid)
+    before = {path: path.read_bytes() for path in files}
+    caplog.clear()
+    assert is_compiled_anew_after(load)
+    said = [r.message for r in caplog.records if "none of it is used" in r.message]
+    assert len(said) == len(set(said)) > 0
+    if what == "folder" or uid is not None:
+        assert {path: path.read_bytes() for path in kept.iterdir()} == before, "it is left alone"
+    if what == "folder" and uid is None:
+        kept.chmod(0o700)
+        assert not is_compiled_anew_after(load)
+
+
 def test_what_is_carried_or_kept_is_read_where_nothing_can_be_written(load, kept, monkeypatch, tmp_path):
     load()(3.0)
     monkeypatch.setattr(places, "CARRIED", kept)

@@ -98,6 +98,9 @@ def _loaded() -> tuple[ctypes.CDLL, dict[str, Any], Any]:
     index = json.loads((places.CARRIED / INDEX).read_text(encoding="utf-8"))
     parts = {name: _part(name) for name in PARTS}
     path = places.CARRIED / LIBRARY
+    for each in (places.CARRIED, path):
+        if why := places.objection(each.stat(), places.CARRIED):
+            raise ValueError(why)
     if hashlib.sha256(path.read_bytes()).hexdigest() != index["sha256"]:
         raise ValueError(f"{path} is damaged")
     library = ctypes.CDLL(str(path))
