@@ -32,7 +32,8 @@ class InputError(CompanionError):
     def __init__(self, source: str, place: str, problem: str, remedy: str = "") -> None:
         self.source, self.place, self.problem, self.remedy = source, place, problem, remedy
         where = f"{source}: {place}" if place else source
-        super().__init__(f"{where}: {problem}" + (f"; {remedy}" if remedy else ""))
+        text = f"{where}: {problem}" + (f"; {remedy}" if remedy else "")
+        super().__init__("\\n".join(text.split("\n")))   # a name may hold the end of a line
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
         """Return how it is made again in another process."""

@@ -1,8 +1,9 @@
-"""Words: what is counted, singular or plural; the words that an option may be."""
+"""Words: what is counted, singular or plural; the words that an option may be; and text that can be shown."""
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Sequence
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -25,6 +26,25 @@ def listed(names: Sequence[str]) -> str:
     ('A', 'A, B and C')
     """
     return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
+
+
+def printable(text: str) -> str:
+    r"""Return text that can do nothing to a terminal: controls, and marks that turn the reading round, are escaped.
+
+    Ends of lines and tabs stay.
+
+    >>> printable(chr(27) + "[2J" + chr(0x202E) + "Nab")
+    '\\x1b[2J\\u202eNab'
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" or unicodedata.category(c) == "Zs"
+                   else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def one_line(text: str) -> str:
+    """Return text that can do nothing to a terminal and stays on its line."""
+    return printable(text).replace("\n", "\\n").replace("\t", " ")
 
 
 def file_name(name: str) -> str:

@@ -6,6 +6,7 @@ import enum
 from dataclasses import dataclass
 
 from companion.errors import InputError
+from companion.words import one_line
 
 
 class Severity(enum.Enum):
@@ -59,7 +60,8 @@ class Finding:
     def line(self, source: str = "") -> str:
         """Return the finding as one line."""
         where = ": ".join(part for part in (source, self.place) if part)
-        return f"{where}: {self.severity.value}: {self.text}" + (f"; {self.remedy}" if self.remedy else "")
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return one_line(f"{where}: {self.severity.value}: {self.text}{remedy}")
 
     def as_error(self, source: str) -> InputError:
         """Return the finding as the error that ends a command."""

@@ -21,6 +21,8 @@ from companion import __version__
 from companion.disk import reason
 from companion.errors import CompanionError, InputError
 from companion.program.extras import missing
+from companion.program.printing import safe_streams
+from companion.words import one_line
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoints
@@ -116,6 +118,10 @@ class Program:
 
     def run(self, argv: Sequence[str] | None = None) -> int:
         """Run one command of ``argv`` (None: of this process) and return its exit code."""
+        with safe_streams():
+            return self._run(argv)
+
+    def _run(self, argv: Sequence[str] | None) -> int:
         if sys.maxsize < 2**32:
             sys.stderr.write(f"{self.name}: this is a 32-bit system, for which there are no libraries; install "
                              "a 64-bit one (Raspberry Pi OS 64-bit)\n")
@@ -148,7 +154,7 @@ class Program:
         except OSError as error:
             if error.filename is None:
                 raise
-            sys.stderr.write(f"{self.name} {args.command}: {error.filename}: {reason(error)}\n")
+            sys.stderr.write(f"{self.name} {args.command}: {one_line(str(error.filename))}: {reason(error)}\n")
             return CompanionError.exit_code
 
     def _unknown(self, word: str) -> InputError:

@@ -14,6 +14,8 @@ import threading
 from types import TracebackType
 from typing import Self, TextIO
 
+from companion.words import printable
+
 MOST_WAITING = 64     # lines; a reader that is this far behind misses the next
 _GONE = frozenset({errno.EPIPE, errno.EIO, errno.EBADF, errno.ENXIO})
 LAST_WORDS_S = 1.0    # what is still waiting at the end gets so long
@@ -46,7 +48,11 @@ class Console:
         self._thread.join(LAST_WORDS_S)
 
     def write(self, text: str) -> None:
-        """Print ``text`` some time soon, if anybody reads."""
+        """Print ``text`` some time soon, if anybody reads; it can do nothing to a terminal."""
+        self.control(printable(text))
+
+    def control(self, text: str) -> None:
+        """Print text as it is: what moves the cursor, and what has been made printable."""
         if self._fd is not None:
             with contextlib.suppress(queue.Full):
                 self._lines.put_nowait(text.encode(self._encoding, "replace"))

@@ -16,9 +16,11 @@ from typing import Self
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.messages import CompanionStatus, Mode
+from companion.program import control
 from companion.skipper.step import Announce, Phase, Route, Severity
 from companion.telemetry.folder.records import sigma_ahead_rad
 from companion.telemetry.standing import Stream
+from companion.words import one_line, printable
 
 # Without a terminal a line is written this often [s of the voyage], and whenever the phase changes.
 PLAIN_EVERY_S = 15.0
@@ -56,7 +58,7 @@ class ProgressLine:
 
     def note(self, text: str) -> None:
         """Say something that is not of a step, as a line that stays."""
-        self._notes.append(f"note: {text}")
+        self._notes.append(f"note: {one_line(text)}")
 
     def show(self, status: CompanionStatus, step: Step) -> None:
         """Show one step."""
@@ -73,7 +75,7 @@ class ProgressLine:
             stays = "".join(f"{line}\n" for line in wrapped(said, columns))
             standing = wrapped([text], columns)
             # one write: a line that waits for its rest would flicker
-            self._stream.write(f"{back}\x1b[J{stays}" + "\n".join(standing))
+            control(self._stream, f"{back}\x1b[J" + printable(stays + "\n".join(standing)))
             self._stream.flush()
             self._standing = len(standing)
             return
@@ -88,7 +90,7 @@ class ProgressLine:
     def _said(self, t_s: float, announced: Announce) -> str:
         clock = datetime.fromtimestamp(self._epoch_s + t_s, UTC).strftime("%H:%M:%S")
         loud = f"{announced.severity.name}: " if announced.severity <= Severity.WARNING else ""
-        return f"{clock} {loud}{announced.text}"
+        return f"{clock} {loud}{one_line(announced.text)}"
 
 
 def wrapped(lines: list[str], columns: int) -> list[str]:

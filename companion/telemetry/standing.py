@@ -6,6 +6,9 @@ import math
 import time
 from typing import Protocol
 
+from companion.program import control
+from companion.words import printable
+
 
 class Stream(Protocol):
     """What lines are written to: a file, or the console of a voyage."""
@@ -39,7 +42,7 @@ class StandingLine:
         self._last = text
         if self._is_terminal:
             self._widest = max(self._widest, len(text) + 3)
-            self._write(f"\r{text.ljust(self._widest)}")
+            self._write(text.ljust(self._widest), back="\r")
             return
         self._unsaid = text
         if time.monotonic() - self._said_s >= self._every_s:
@@ -48,7 +51,7 @@ class StandingLine:
     def give_way(self) -> None:
         """Leave the line to what is printed next."""
         if self._is_terminal:
-            self._write("\r")
+            self._write("", back="\r")
 
     def stay(self, text: str) -> None:
         """Write a line that stays, above the one that stands."""
@@ -66,6 +69,6 @@ class StandingLine:
         self._write(f"{self._unsaid}\n")
         self._unsaid, self._said_s = "", time.monotonic()
 
-    def _write(self, text: str) -> None:
-        self._stream.write(text)
+    def _write(self, text: str, *, back: str = "") -> None:
+        control(self._stream, back + printable(text))
         self._stream.flush()

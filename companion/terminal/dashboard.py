@@ -14,7 +14,7 @@ from companion.terminal.rows import body_of
 from companion.terminal.screen import Frame, Style
 from companion.terminal.strips import BIN_S, tape, wind_strip
 from companion.view import Event, View
-from companion.words import counted
+from companion.words import counted, one_line
 
 LEAST_COLUMNS, LEAST_ROWS = 40, 12
 STRIP_COLUMNS = (24, 36)      # of the wind's history: at least, at most
@@ -132,7 +132,7 @@ def _log(frame: Frame, row: int, rows: int, history: History) -> None:
 def event_words(event: Event) -> str:
     """Return an event as a line."""
     when = "" if event.unix_s is None else datetime.fromtimestamp(event.unix_s, UTC).strftime("%H:%M:%S ")
-    return f"{when}{event.title}{f': {event.text}' if event.text and event.text != event.title else ''}"
+    return one_line(f"{when}{event.title}{f': {event.text}' if event.text and event.text != event.title else ''}")
 
 
 def _help(frame: Frame, row: int, rows: int, what: Shown) -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 from companion.commands.view import read_record
 from companion.disk import Disk
 from companion.page import export
+from companion.program import control
 from sitl.rehearse.known import Known, clock, percent, reached, why_bad
 from sitl.rehearse.outcome import PICTURE, Outcome
 from sitl.rehearse.pairs import TOLD, Tried, is_sure, scaled, told_of
@@ -97,7 +98,7 @@ def _worst(outcome: Outcome, folder: Path) -> Iterable[str]:
     for record, place in outcome.folders:
         link = ""
         if place is not None:
-            sys.stderr.write(f"\rits page: seed {record['seed']}   ")
+            control(sys.stderr, f"\rits page: seed {record['seed']}   ")
             file = place.with_suffix(".html")
             Disk().replace(file, export(read_record(place)))
             link = f"<a href='{html.escape(str(file.relative_to(folder)))}'>look at it</a>"

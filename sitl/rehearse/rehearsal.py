@@ -13,6 +13,7 @@ from typing import Any
 
 from companion.disk import Disk, reason
 from companion.errors import CompanionError
+from companion.program import control
 from companion.program.extras import missing
 from companion.words import counted
 from sitl.means import Means
@@ -123,7 +124,7 @@ def _worst(known: Known, jobs: Sequence[Job], folder: Path) -> tuple[tuple[dict[
         shutil.rmtree(before) if before.is_dir() else before.unlink()
     for number, record in enumerate(known.worst(MOST_WORST), start=1):
         place = folder / WORST / f"{number}-seed-{record['seed']}"
-        sys.stderr.write(f"\rthe worst again: {number} of {min(MOST_WORST, len(known.records))}   ")
+        control(sys.stderr, f"\rthe worst again: {number} of {min(MOST_WORST, len(known.records))}   ")
         sys.stderr.flush()
         kept: Path | None = place
         try:

@@ -1,6 +1,7 @@
 """The command lines: help for everything, one line for what is wrong, the exit code that was promised."""
 
 import json
+import logging
 import re
 import socket
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from companion import cli
+from companion.program import control
 from sitl import cli as sitl_cli
 from sitl.scene.ships import free_port
 
@@ -211,3 +213,67 @@ def test_a_wrong_word_in_a_scenario_is_told_its_choices(wrong, choices, tmp_path
     (tmp_path / "s.toml").write_text(f'name = "x"\nmission = "m.toml"\n{wrong}')
     assert sitl_cli.main(["run", str(tmp_path / "s.toml")]) == 2
     assert choices in capsys.readouterr().err
+
+
+# What somebody else has named: a chart's island, a file, a vessel.
+NASTY = "Nab\x1b]0;owned\x07\x1b[2J\x9b2J\u202egnp\r\nerror: all is well"
+
+
+def test_no_name_of_a_chart_reaches_the_terminal_as_more_than_a_name(tmp_path, capsys):
+    """An island's name cleared the screen of who checked the file (issue 43, point 9)."""
+    lat, lon = 50.8203440, -1.3101419   # of the mission's goal
+    ring = [[lon + e * 1e-4, lat + n * 1e-4] for e, n in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
+    island = {"type": "FeatureCollection", "features": [
+        {"type": "Feature", "properties": {"name": NASTY}, "geometry": {"type": "Polygon", "coordinates": [ring]}}]}
+    (tmp_path / "bay.geojson").write_text(json.dumps(island))
+    (tmp_path / "bay.toml").write_text(f'name = "b"\n[[goal]]\nname = {json.dumps(NASTY)}\nlat = {lat}\nlon = {lon}\n'
+                                       '[area]\nobstacles = ["bay.geojson"]\n')
+    assert cli.main(["mission", "check", str(tmp_path / "bay.toml")]) != 0
+    told = capsys.readouterr()
+    assert "Nab" in told.out + told.err
+    assert all(line.isprintable() for line in (told.out + told.err).splitlines())
+    assert not [line for line in told.out.splitlines() if line.startswith("error: all is well")]
+
+
+@pytest.mark.parametrize("words", [["fence", "check"], ["mission", "check"], ["plan"], ["wind"], ["replay"], ["report"],
+                                   ["run", "--link", "udpin:127.0.0.1:1"], ["doctor", "--link"], ["order"], ["far"],
+                                   ["status", "--link"], ["watch", "--link"], ["view"], ["key", "new", "--x"], []])
+def test_no_file_name_and_no_option_does(words, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main([*words, f"none\udcff{NASTY}.toml"]) != 0
+    told = capsys.readouterr()
+    assert told.err.count("\n") == 1
+    assert (told.out + told.err).rstrip("\n").isprintable()
+
+
+def test_whatever_a_command_prints_is_safe_and_the_streams_are_as_they_were(capsys, monkeypatch):
+    before = sys.stdout, sys.stderr
+
+    def loud(_):
+        print(NASTY, "\tand\u00a0more", file=sys.stderr)
+        print(NASTY)
+        sys.stdout.writelines([NASTY])
+        logging.getLogger("companion.test").warning("%s", NASTY)
+        control(sys.stdout, "\x1b[K")
+        return 0
+
+    monkeypatch.setattr("companion.commands.replay.run", loud)
+    monkeypatch.setattr("companion.commands.replay.add_parser", lambda sub, summary: sub.add_parser(
+        "replay", help=summary).set_defaults(run=loud))
+    monkeypatch.setattr(logging.getLogger("companion.test"), "propagate", False)
+    assert cli.main(["replay"]) == 0
+    assert (sys.stdout, sys.stderr) == before
+    told = capsys.readouterr()
+    assert told.out.endswith("\x1b[K")
+    assert "\x1b" not in told.out[:-3] + told.err
+    assert "\tand\u00a0more" in told.err
+    assert told.err.count(r"\x1b[2J\x9b2J\u202egnp\r") == 2
+
+
+def test_nothing_writes_to_a_terminal_but_through_the_safe_streams():
+    """What goes round them: the console's thread and the dashboard, each with its own text made safe; see there."""
+    around = re.compile(
+        r"(stdout|stderr)\.buffer|os\.write\((1|2|self\._fd|self\._out)\b|__stdout__|__stderr__|/dev/tty['\"]")
+    found = {str(path) for folder in ("companion", "sitl") for path in Path(folder).rglob("*.py")
+             if around.search(path.read_text())}
+    assert found == {"companion/telemetry/console.py", "companion/terminal/tty.py"}

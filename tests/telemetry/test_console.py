@@ -38,6 +38,16 @@ def test_it_prints_in_order_and_waits_for_the_last_words():
         assert file.read().splitlines() == [f"line {k} ±" for k in range(10)]
 
 
+def test_what_is_printed_can_do_nothing_to_the_terminal():
+    reader, writer = os.pipe()
+    with Console(Stream(writer)) as console:
+        console.write("Nab\x1b[2J\udcff\n")
+        console.control("\x1b[J")
+    os.close(writer)
+    with os.fdopen(reader, encoding="utf-8") as file:
+        assert file.read() == "Nab\\x1b[2J\\udcff\n\x1b[J"
+
+
 def test_a_reader_that_has_gone():
     reader, writer = os.pipe()
     os.close(reader)

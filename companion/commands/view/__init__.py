@@ -9,6 +9,7 @@ from typing import Any
 
 from companion.commands.output import force_option, write_files
 from companion.errors import InputError
+from companion.program import control
 from companion.program.arguments import chart_option, host_name, http_address, out_file, system_id
 
 PORT = 8765
@@ -84,10 +85,10 @@ def read_record(folder: Path) -> Any:
     for number, (view, events) in enumerate(recorded.moments, start=1):
         record.take(view, events)
         if number % SAID_EVERY == 0 and sys.stderr.isatty():
-            sys.stderr.write(f"\rfolding the voyage again: {100 * number // recorded.count} %")
+            control(sys.stderr, f"\rfolding the voyage again: {100 * number // recorded.count} %")
     record.finish()
     if sys.stderr.isatty() and recorded.count >= SAID_EVERY:
-        sys.stderr.write("\r\x1b[K")
+        control(sys.stderr, "\r\x1b[K")
     if not record.times:
         raise InputError(str(folder), "track.csv", "has no step in it", "name a voyage that was sailed")
     if not recorded.is_whole:

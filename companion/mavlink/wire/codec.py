@@ -31,6 +31,7 @@ from companion.messages import (
     VehicleState,
     WindSample,
 )
+from companion.words import one_line
 
 AUTOPILOT_COMPONENT = 1
 MAX_WIND_MPS = 100.0
@@ -333,7 +334,7 @@ def heading_setpoint(target: tuple[int, int], boot_s: float, heading_rad: float,
 
 def status_texts(severity: int, text: str, text_id: int) -> list[Message]:
     """Return ``text`` as STATUSTEXT chunks of 50 bytes; one that fits has id 0. At most 250 bytes are sent."""
-    raw = text.encode("ascii", "replace")[:250]
+    raw = one_line(text).encode("ascii", "replace")[:250]   # many a station prints it as it comes
     if len(raw) <= 50:
         return [wire.MAVLink_statustext_message(severity, raw, 0, 0)]
     chunks = [raw[i:i + 50] for i in range(0, len(raw), 50)]
