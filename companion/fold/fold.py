@@ -169,7 +169,7 @@ class VoyageFold:
         elif isinstance(value, AisReport):
             own = self._vehicle
             self._targets = self._targets.heard(value) if own is None else self._targets.heard(
-                value, self.skipper.voyage.frame.en_from_geo(own.position))
+                value, self.skipper.voyage.frame.en_from_geo(own.position), own.velocity_en_mps)
 
     def take_outcome(self, t_s: float, outcome: Outcome) -> None:
         """Take the outcome of an earlier action, known at ``t_s``."""

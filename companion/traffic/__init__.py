@@ -16,7 +16,7 @@ Times are absolute [s] on the companion's clock, except in a ``Disc`` and a ``Ti
 the moment that the discs were made for (a plan's t = 0).
 """
 
-from companion.traffic.approach import LAKE, SEA, Alarm, AlarmLimits, Approach, OwnShip, cpa
+from companion.traffic.approach import LAKE, SEA, Alarm, AlarmLimits, Approach, OwnShip, cpa, peril_m
 from companion.traffic.assess import Assessment, assess
 from companion.traffic.colregs import Encounter, Policy, Role, Rule, classify
 from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json, decode_nmea
@@ -63,6 +63,7 @@ __all__ = [
     "decode_nmea",
     "motion_of",
     "path_distance_m",
+    "peril_m",
     "planning_discs",
     "predict",
     "time_matched_discs",

@@ -16,6 +16,10 @@ from companion.geo.units import M_PER_NM
 from companion.traffic.predict import predict
 from companion.traffic.vessel import Vessel
 
+# Of two vessels that come equally near the sooner one matters more: ten minutes count as 60 m. One that comes no nearer
+# than she is counts as if she were so much farther: it takes a turn of hers or ours.
+PERIL_MPS, OPENING_M = 0.1, 100.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnShip:
@@ -105,6 +109,25 @@ def cpa(own: OwnShip, vessel: Vessel, t_s: float) -> Approach:
         bearing_rad=wrap_two_pi(math.atan2(-ex, -ey)), is_closing=time_s > 0.0, crosses_ahead=ahead,
         sigma_m=max(later.sigma_along_m, later.sigma_across_m),
     )
+
+
+def peril_m(
+    own_en_m: tuple[float, float], own_velocity_en_mps: tuple[float, float], vessel: Vessel, t_s: float,
+) -> float:
+    """Return how much a vessel matters where not all can be kept [m]: less is more.
+
+    It is the distance of the closest approach if both go on as they do, and ``PERIL_MPS`` for each second until then,
+    or ``OPENING_M`` where it is now: a ship that comes straight at us from afar matters more than a hundred at their
+    moorings near by.
+    """
+    (ve, vn), since_s = vessel.velocity_en_mps, max(0.0, t_s - vessel.t_s)
+    we, wn = ve - own_velocity_en_mps[0], vn - own_velocity_en_mps[1]
+    e = vessel.antenna_en_m[0] + ve * since_s - own_en_m[0]
+    n = vessel.antenna_en_m[1] + vn * since_s - own_en_m[1]
+    v2 = we * we + wn * wn
+    time_s = max(0.0, -(e * we + n * wn) / v2) if v2 > 1e-9 else 0.0
+    gap_m = math.hypot(e + we * time_s, n + wn * time_s) - vessel.hull.half_diagonal_m
+    return max(0.0, gap_m) + (PERIL_MPS * time_s if time_s > 0.0 else OPENING_M)
 
 
 def alarm_of(approach: Approach, limits: AlarmLimits, growth_m: float = 0.0) -> Alarm:

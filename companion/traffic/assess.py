@@ -37,7 +37,7 @@ class Assessment:
 def assess(
     own: OwnShip, picture: TrafficPicture, limits: AlarmLimits, twd_from_rad: float | None = None
 ) -> tuple[Assessment, ...]:
-    """Return every vessel's assessment, the worst alarm first, then the nearest approach."""
+    """Return every vessel's assessment, the worst alarm first, then the nearest approach, then the soonest."""
     out = []
     for vessel in picture.vessels:
         approach = cpa(own, vessel, picture.t_s)
@@ -46,4 +46,5 @@ def assess(
         alarm = alarm_of(approach, limits, growth_m=approach.sigma_m if picture.age_s(vessel) > 30.0 else 0.0)
         out.append(Assessment(vessel=vessel, approach=approach, alarm=alarm, encounter=encounter,
                               age_s=picture.age_s(vessel)))
-    return tuple(sorted(out, key=lambda x: (-x.alarm, x.approach.distance_m, x.vessel.mmsi, x.vessel.branch)))
+    return tuple(sorted(out, key=lambda x: (
+        -x.alarm, x.approach.distance_m, x.approach.time_s, x.vessel.mmsi, x.vessel.branch)))

@@ -6,6 +6,7 @@ that cannot be. Everything refused is counted; nothing raises.
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -14,6 +15,7 @@ from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
 from companion.messages import AisReport
+from companion.traffic.approach import peril_m
 from companion.traffic.picture import Change, TrafficCounts, TrafficPicture
 from companion.traffic.predict import predict, risk_factor
 from companion.traffic.vessel import Vessel, hull_of
@@ -28,6 +30,11 @@ TURNED_RAD, TURNED_SHARE, TURNED_MPS = math.radians(10.0), 0.2, 0.5
 SURPRISE_RISK = 1e-3
 # The companion's clock never goes back; a replay's or a test's may. More than this is a jump, not disorder.
 CLOCK_BACK_S = 60.0
+# Who goes next where there are too many is judged for an eighth of them, and for so long [s]: a flood of new numbers
+# must not have all of them judged for each.
+SPARE_SHARE, SPARE_S = 8, 5.0
+
+Key = tuple[int, int]   # MMSI and branch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +42,7 @@ class TargetLimits:
     """Bounds of the fold.
 
     Attributes:
-        max_vessels: the farthest from our boat goes when one more appears.
+        max_vessels: when one more appears, the one goes that would come the least near (``peril_m``).
         max_branches: vessels kept apart under one MMSI.
         expire_s: a vessel unheard for this long is forgotten (ArduPilot's AIS_TIME_OUT).
         max_age_s: a report that was this old when it arrived is refused.
@@ -56,10 +63,12 @@ class Targets:
 
     frame: LocalFrame
     limits: TargetLimits = TargetLimits()
-    vessels: Mapping[tuple[int, int], Vessel] = field(default_factory=dict)
+    vessels: Mapping[Key, Vessel] = field(default_factory=dict)
     changes: tuple[tuple[float, int, Change], ...] = ()
     counts: TrafficCounts = field(default_factory=TrafficCounts)
     last_heard_s: float | None = None
+    spare: tuple[tuple[float, Key], ...] = ()   # who goes next: peril [m] and whose, the least perilous first
+    spare_s: float = -math.inf                  # when that was judged
 
     @classmethod
     def empty(cls, frame: LocalFrame, limits: TargetLimits | None = None) -> Targets:
@@ -72,14 +81,17 @@ class Targets:
         return TrafficPicture(t_s=t_s, vessels=tuple(alive), changes=self.changes, counts=self.counts,
                               last_heard_s=self.last_heard_s)
 
-    def heard(self, report: AisReport, own_en_m: tuple[float, float] = (0.0, 0.0)) -> Targets:
+    def heard(
+        self, report: AisReport, own_en_m: tuple[float, float] = (0.0, 0.0),
+        own_velocity_en_mps: tuple[float, float] = (0.0, 0.0),
+    ) -> Targets:
         """Return the fold after ``report``; ``report.t_s`` is when it arrived on our clock.
 
-        ``own_en_m`` is where our boat is: what is near and what is far is near to it or far from it.
+        ``own_en_m`` and ``own_velocity_en_mps`` are our boat's: what comes near comes near to it.
         """
-        return self._clock(report.t_s)._heard(report, own_en_m)  # noqa: SLF001 - the same class
+        return self._clock(report.t_s)._heard(report, (own_en_m, own_velocity_en_mps))  # noqa: SLF001 - the same class
 
-    def _heard(self, report: AisReport, own_en_m: tuple[float, float]) -> Targets:
+    def _heard(self, report: AisReport, own: _Own) -> Targets:
         now = report.t_s if self.last_heard_s is None else max(report.t_s, self.last_heard_s)
         counts = replace(self.counts, heard=self.counts.heard + 1)
         if not _is_sound(report):
@@ -91,9 +103,9 @@ class Targets:
         if report.age_s > self.limits.max_age_s:
             return self.counted(counts, now, stale=1)
         en = self.frame.en_from_geo(report.position)
-        if not (math.isfinite(en[0]) and math.isfinite(en[1])) or math.dist(en, own_en_m) > FAR_M:
+        if not (math.isfinite(en[0]) and math.isfinite(en[1])) or math.dist(en, own[0]) > FAR_M:
             return self.counted(counts, now, far=1)
-        return self._placed(report, en, own_en_m, counts, now)
+        return self._placed(report, en, own, counts, now)
 
     def in_frame(self, frame: LocalFrame) -> Targets:
         """Return the fold in the metres of another frame."""
@@ -132,8 +144,7 @@ class Targets:
         return replace(self, vessels=vessels, counts=counts, last_heard_s=now_s)
 
     def _placed(
-        self, report: AisReport, en: tuple[float, float], own_en_m: tuple[float, float], counts: TrafficCounts,
-        now_s: float,
+        self, report: AisReport, en: tuple[float, float], own: _Own, counts: TrafficCounts, now_s: float,
     ) -> Targets:
         t_s = report.t_s - max(0.0, report.age_s)
         known = self._branches(report.mmsi)
@@ -145,7 +156,7 @@ class Targets:
             return self.counted(counts, now_s, late=1)
         vessels = dict(self.vessels)
         if nearest is None:
-            return self._new(report, en, own_en_m, t_s, vessels, known, counts, now_s)
+            return self._new(report, en, own, t_s, vessels, known, counts, now_s)
         after = _moved(nearest, report, en, t_s, now_s)
         vessels[nearest.mmsi, nearest.branch] = after
         change = _change(nearest, after)
@@ -153,8 +164,8 @@ class Targets:
         return replace(self, vessels=vessels, changes=changes, counts=counts, last_heard_s=now_s)
 
     def _new(
-        self, report: AisReport, en: tuple[float, float], own_en_m: tuple[float, float], t_s: float,
-        vessels: dict[tuple[int, int], Vessel], known: list[Vessel], counts: TrafficCounts, now_s: float,
+        self, report: AisReport, en: tuple[float, float], own: _Own, t_s: float,
+        vessels: dict[Key, Vessel], known: list[Vessel], counts: TrafficCounts, now_s: float,
     ) -> Targets:
         expired = [k for k, v in vessels.items() if now_s - v.heard_s > self.limits.expire_s]
         for key in expired:
@@ -169,13 +180,26 @@ class Targets:
         free = [b for b in range(self.limits.max_branches) if (report.mmsi, b) not in vessels]
         branch = free[0] if free else min(known, key=lambda v: (v.t_s, v.branch)).branch
         vessels[report.mmsi, branch] = _first(report, branch, en, t_s, now_s, is_shared=shared)
+        spare, spare_s = self.spare, self.spare_s
         if len(vessels) > self.limits.max_vessels:
-            farthest = max(vessels, key=lambda k: (math.dist(vessels[k].antenna_en_m, own_en_m), k))
-            del vessels[farthest]
+            spare = tuple(s for s in spare if s[1] in vessels) if 0.0 <= now_s - spare_s < SPARE_S else ()
+            if not spare:
+                spare_s, spare = now_s, _least_perilous(vessels, own, now_s, self.limits.max_vessels // SPARE_SHARE + 1)
+            newcomer = peril_m(*own, vessels[report.mmsi, branch], now_s), (report.mmsi, branch)
+            del vessels[max(newcomer, spare[0])[1]]
             forgotten += 1
         changes = (*self.changes, (now_s, report.mmsi, Change.APPEARED))[-32:]
         counts = replace(counts, forgotten=counts.forgotten + forgotten)
-        return replace(self, vessels=vessels, changes=changes, counts=counts, last_heard_s=now_s)
+        return replace(self, vessels=vessels, changes=changes, counts=counts, last_heard_s=now_s, spare=spare,
+                       spare_s=spare_s)
+
+
+_Own = tuple[tuple[float, float], tuple[float, float]]   # place [m] and velocity [m/s] of our boat
+
+
+def _least_perilous(vessels: Mapping[Key, Vessel], own: _Own, t_s: float, count: int) -> tuple[tuple[float, Key], ...]:
+    """Return those that would come the least near, the least perilous first."""
+    return tuple(heapq.nlargest(count, ((peril_m(*own, vessel, t_s), key) for key, vessel in vessels.items())))
 
 
 def _is_sound(report: AisReport) -> bool:

@@ -14,16 +14,17 @@ MOST = 40   # vessels in a view, the worst first
 
 
 def vessels_of(step: Step) -> tuple[values.Vessel, ...]:
-    """Return the vessels, the worst first; without our own position those that are heard, with no approach."""
+    """Return the vessels, the worst first; without our own position those heard last, with no approach."""
     if step.state.watch:
         return tuple(_seen(step, seen) for seen in step.state.watch[:MOST])
     picture = step.snapshot.traffic
     if picture is None:
         return ()
+    newest = sorted(picture.vessels, key=picture.age_s)[:MOST]
     return tuple(values.Vessel(
         name=v.label, mmsi=v.mmsi, age_s=rounded(picture.age_s(v), 1), at_en_m=place(v.centre_en_m),
         course_deg=None if v.course_rad is None else compass(v.course_rad), speed_mps=rounded(v.speed_mps),
-        length_m=metres(v.hull.length_m), beam_m=metres(v.hull.beam_m)) for v in picture.vessels[:MOST])
+        length_m=metres(v.hull.length_m), beam_m=metres(v.hull.beam_m)) for v in newest)
 
 
 def _seen(step: Step, seen: Assessment) -> values.Vessel:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
@@ -133,6 +134,37 @@ def test_far_from_the_start_it_is_the_boats_own_surroundings_that_stay() -> None
     t = t.heard(report(6.0, (0.0, 70_000.0), mmsi=78), here)         # 70 km from the start, and 55 from us
     t = t.heard(report(6.0, (0.0, -46_000.0), mmsi=79), here)        # the other way round
     assert t.counts.far == 1
+
+
+@pytest.mark.parametrize("comes_first", [True, False])
+def test_four_hundred_at_their_moorings_do_not_push_out_a_ship_on_collision_course(comes_first: bool) -> None:
+    """The farthest went, and she was the farthest (issue 43, point 9). She comes at 8 m/s, we go north at 2."""
+    t, here, going = Targets.empty(FRAME), (0.0, 0.0), (0.0, 2.0)
+    ship = report(0.0, (0.0, 3000.0), mmsi=77, course_rad=math.pi, speed_mps=8.0)
+    if comes_first:
+        t = t.heard(ship, here, going)
+    for k in range(450):
+        angle, away_m = 0.7 * k, 300.0 + 5.0 * k
+        en = (away_m * math.sin(angle), -away_m * abs(math.cos(angle)))
+        t = t.heard(report(0.01 * k, en, mmsi=1000 + k, nav_status=5, speed_mps=0.0), here, going)
+    if not comes_first:
+        t = t.heard(replace(ship, t_s=5.0), here, going)
+    seen = {v.mmsi for v in t.picture(5.0).vessels}
+    assert 77 in seen
+    assert len(seen) == 400
+    assert {1000 + k for k in range(300)} <= seen, "else the nearest"
+
+
+def test_a_flood_of_new_numbers_pushes_out_no_ship_on_collision_course_and_costs_little() -> None:
+    t = Targets.empty(FRAME)
+    t = t.heard(report(0.0, (0.0, 3000.0), mmsi=77, course_rad=math.pi, speed_mps=8.0))
+    for k in range(400):
+        t = t.heard(report(0.0, (500.0 + k, -100.0), mmsi=1000 + k, speed_mps=0.0))
+    began = process_time()
+    for k in range(1000):
+        t = t.heard(report(1.0, (450.0 + 0.3 * k, -200.0), mmsi=5000 + k, speed_mps=0.0))
+    assert process_time() - began < 0.5     # 0.1 s; with all judged for each of them 1.5
+    assert 77 in {v.mmsi for v in t.picture(1.0).vessels}
 
 
 def test_the_voyage_tells_the_targets_where_its_boat_is() -> None:

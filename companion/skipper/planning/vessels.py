@@ -20,7 +20,7 @@ from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import LOST_MPS
 from companion.skipper.way.voyage import PointEn
-from companion.traffic import Conflict, Disc, Vessel, check_legs, path_distance_m, planning_discs, predict
+from companion.traffic import Conflict, Disc, Vessel, check_legs, path_distance_m, peril_m, planning_discs, predict
 from companion.traffic.encounters import expected
 from companion.traffic.occupancy import Keep
 from companion.traffic.plans import TimedLeg, pressing
@@ -34,7 +34,8 @@ HORIZON_S = 600.0            # the plan is made again long before
 ALIKE_S = 300.0              # successive ways are compared over this time
 SETTLED_M = 50.0             # discs this uncertain grow no more: else later ones would close a lake
 UNKNOWN_S = 30.0             # a vessel of unknown course could be anywhere soon: only the next moments count
-NEAREST = 12                 # vessels that a plan looks at: those that could be met soonest
+NEAREST = 12                 # vessels that a plan looks at: half of them those that come nearest, if both go on or we
+#                              stay; then those that could be met soonest, however she turns and we do
 OWN_MPS = 4.0                # no boat of ours closes faster by itself
 FAR_RISK = 1e-2              # that a vessel is nearer than counted when those that could be met are chosen
 HAIR_M = 1.0                 # a boat within a disc is let out of it: the disc ends this much before the boat
@@ -51,7 +52,11 @@ class Leg:
 
 
 def near(turn: Turn) -> tuple[Vessel, ...]:
-    """Return the vessels that could be met within the horizon, the soonest first."""
+    """Return the vessels that could be met within the horizon, the soonest first; of too many those that matter most.
+
+    Encounters that are held stay; then half of the places are of those that come nearest: a ship that comes straight at
+    us is not left out for a dozen at their moorings near by.
+    """
     picture, boat = turn.snapshot.traffic, turn.boat_en
     if picture is None or boat is None:
         return ()
@@ -62,7 +67,17 @@ def near(turn: Turn) -> tuple[Vessel, ...]:
         gap_m = distance_m(boat, there.mean_en_m) - there.radius_m(FAR_RISK) - turn.config.traffic_clearance_m
         if gap_m < closing_mps * HORIZON_S:
             soon.append((gap_m / closing_mps, vessel.mmsi, vessel.branch, vessel))
-    return tuple(vessel for *_, vessel in sorted(soon, key=lambda s: s[:3])[:NEAREST])
+    soon.sort(key=lambda s: s[:3])
+    if len(soon) > NEAREST:
+        own = turn.snapshot.vehicle
+        velocities = ((0.0, 0.0), own.velocity_en_mps if own is not None else (0.0, 0.0))
+        held = {(h.mmsi, h.branch) for h in turn.state.encounters}
+        by_peril = sorted(soon, key=lambda s: (
+            s[1:3] not in held, min(peril_m(boat, velocity, s[3], turn.t_s) for velocity in velocities), s[1:3]))
+        kept = {s[1:3] for s in by_peril[:NEAREST // 2]}
+        kept.update(s[1:3] for s in [s for s in soon if s[1:3] not in kept][:NEAREST - len(kept)])
+        soon = [s for s in soon if s[1:3] in kept]
+    return tuple(vessel for *_, vessel in soon)
 
 
 def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Disc, ...]:

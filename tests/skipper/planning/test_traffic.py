@@ -10,7 +10,7 @@ import pytest
 from companion.planner import plan
 from companion.planner.problem.sharing import sigmas_for, sized, vessel_count
 from companion.planner.worker import failed
-from companion.skipper.planning.vessels import HORIZON_S, UNKNOWN_S, meetings, near, shares
+from companion.skipper.planning.vessels import HORIZON_S, NEAREST, UNKNOWN_S, meetings, near, shares
 from companion.skipper.step import actions as act
 from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.state import Phase
@@ -225,3 +225,21 @@ def test_later_rungs_risk_more_for_vessels_and_say_so():
     assert later.delta_s < first.delta_s
     assert all(a.radius_m + a.growth_mps * a.from_s > b.radius_m + b.growth_mps * b.from_s
                for a, b in zip(shared_discs(first), shared_discs(later), strict=True))
+
+
+@pytest.mark.parametrize("comes_from", ["ahead", "abeam"])
+def test_of_too_many_a_plan_is_told_of_the_ship_on_collision_course(comes_from):
+    """Two dozen at their moorings near by were told of, and she was not (issue 43, point 9)."""
+    turn = turn_among()
+    here, (ve, vn) = turn.boat_en, turn.snapshot.vehicle.velocity_en_mps
+    moored = [vessel((here[0] - 60.0 - 5.0 * k, here[1] + 80.0), None, 0.0, mmsi=1000 + k, nav_status=5, t_s=60.0,
+                     heard_s=60.0) for k in range(24)]
+    met = here[0] + 400.0 * ve, here[1] + 400.0 * vn   # where we are in 400 s
+    ship = (vessel((met[0] + 2000.0, met[1]), 270.0, 5.0, mmsi=77, t_s=60.0, heard_s=60.0) if comes_from == "ahead" else
+            vessel((met[0], met[1] - 2000.0), 0.0, 5.0, mmsi=77, t_s=60.0, heard_s=60.0))
+    told = [v.mmsi for v in near(turn_among(*moored, ship))]
+    assert len(told) == NEAREST
+    assert 77 in told
+    assert told[:6] == [1000 + k for k in range(6)], "the soonest first, as ever"
+    few = near(turn_among(*moored[:11], ship))
+    assert [v.mmsi for v in few] == [*range(1000, 1011), 77], "where there is room nobody is left out"
