@@ -104,9 +104,10 @@ nightly: $(ENV)
 nightly-reference:
 	cp build/nightly.parquet bench/nightly.parquet
 
-# The planners on the problem set (OMPL too, after make env EXTRAS=bench), and risk against winds.
+# The planners on the problem set (OMPL too, after make env EXTRAS=bench), what answers take over their budget, risk against winds.
 bench: $(ENV)
 	$(BIN)/python -m bench
+	$(BIN)/python -m bench.budgets --overrun
 	$(BIN)/python -m bench.reliability
 
 # The papers' figures and the pictures of the rooms, into docs/figures.

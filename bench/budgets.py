@@ -3,6 +3,7 @@
     python -m bench.budgets                       0.1, 0.3 and 1 s: three minutes
     python -m bench.budgets --reference 10        looks for better paths first, 10 s each, into held_out.json
     python -m bench.budgets --kinds gate channel  some kinds only
+    python -m bench.budgets --overrun             what whole answers take, recorded requests included: three minutes
 
 The problems are drawn by kind and seed (``KINDS``), so there are as many as one likes. Times are processor seconds on
 warm kernels: what else the machine does matters little. Printed: cost over the best known (bench/held_out.json), the
@@ -27,9 +28,11 @@ import companion.planner.effort as clock
 from bench.__main__ import islands as board_of
 from bench.make_problems import BOAT, NONE, SHIP, ar1, coast, islands, kalman, wkt
 from companion.planner import Problem, plan
+from companion.planner.solve import warm
 
 KNOWN = Path(__file__).parent / "held_out.json"
 BUDGETS_S = (0.1, 0.3, 1.0)
+OVERRUN_S = (0.1, 0.3, 1.0, 2.0)
 
 
 def problem(name, start, goal, obstacles=(), fence=None, *, wind_from, sigma=NONE, boat=BOAT, delta=0.7):
@@ -170,6 +173,26 @@ def budgets(problems, seeds):
             print(f"| {kind} | {spread(gaps[kind, BUDGETS_S[-1]], 1)} |")
 
 
+def overrun(paths, budgets_s):
+    """Print what whole answers take of the processor, and how many take more than 1.1 times their budget and 50 ms."""
+    print("| requests | budget s | plans | found | taken over budget | over 1.1 B + 50 ms | the most over, ms |\n"
+          "|---|--:|--:|--:|--:|--:|--:|")
+    for folder in sorted({path.parent for path in paths}):
+        asked = [(path.stem, Problem.from_json(path)) for path in sorted(paths) if path.parent == folder]
+        for budget_s in budgets_s:
+            taken, over, found = [], [], 0
+            for name, problem in asked:
+                began_s = time.process_time()
+                found += plan(problem, budget_s=budget_s).has_path
+                taken.append(time.process_time() - began_s)
+                over.append(1e3 * (taken[-1] - 1.1 * budget_s - 0.05))
+                if over[-1] > 0.0:
+                    print(f"{name}, {budget_s:g} s: {over[-1]:.0f} ms over", file=sys.stderr)
+            shares = spread([t / budget_s for t in taken])
+            print(f"| {folder.name} | {budget_s:g} | {len(asked)} | {found} | {shares} | "
+                  f"{sum(o > 0.0 for o in over)} | {max(0.0, *over):.0f} |", flush=True)
+
+
 def firsts():
     """Print when the first path past many vertices comes, and what the plan took."""
     print("\n| obstacle vertices | first path ms | taken over 0.3 s |\n|--:|--:|--:|")
@@ -189,9 +212,16 @@ def main(argv=None):
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
     parser.add_argument("--count", type=int, default=3, help="problems of each kind")
     parser.add_argument("--seeds", type=int, default=2, help="of the planner")
+    parser.add_argument("--overrun", nargs="*", type=float, metavar="S",
+                        help="only what whole answers take, of bench/problems and the recorded bench/requests")
     parser.add_argument("--reference", type=float, metavar="S", help="look for better paths first, so long each")
     args = parser.parse_args(argv)
     clock.effort_s = time.process_time
+    if args.overrun is not None:
+        here = Path(__file__).parent
+        warm()
+        overrun([*here.glob("problems/*.json"), *here.glob("requests/*.json")], args.overrun or OVERRUN_S)
+        return 0
     problems = list(drawn(args.kinds, args.count))
     for _, _, held_out in problems[::args.count]:
         plan(held_out, budget_s=0.3)

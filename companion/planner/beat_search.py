@@ -28,7 +28,7 @@ def with_beats(search: Search, beat: Beat) -> Search:
 
         def bounded(outcome: Outcome) -> Outcome:
             either = replace(straight, clearance_floor_m=problem.clearance_floor_m)
-            bound_s = lower_bound_s(either, tests=0 if effort.is_over else BOUND_TESTS)
+            bound_s = 0.0 if effort.is_late else lower_bound_s(either, tests=0 if effort.is_over else BOUND_TESTS)
             return replace(outcome, lower_bound_s=min(bound_s, outcome.lower_bound_s))
 
         # Where the fence leaves no corridor there is nothing to search.
@@ -39,6 +39,8 @@ def with_beats(search: Search, beat: Beat) -> Search:
             judged = evaluate(problem, beating.waypoints_en)
             beating_s = judged.time_s if judged.is_feasible else math.inf
         if math.isfinite(beating_s) and beating_s <= lower_bound_s(closed):
+            return bounded(replace(beating, lower_bound_s=math.inf))
+        if math.isfinite(beating_s) and effort.is_late:
             return bounded(replace(beating, lower_bound_s=math.inf))
         sailing = search(closed, effort, seed)
         if sailing.waypoints_en is None and math.isinf(beating_s):

@@ -39,7 +39,9 @@ def with_contingency(search: Search) -> Search:
             return outcome
         best, best_key, limit_s = outcome, (of_risky(tacks), judged.time_s), DEARER * judged.time_s
         for other in _others(problem, tacks):
-            again = _again(effort)
+            again = effort.again(AGAIN_SHARE, AGAIN_TIME_SHARE)
+            if not effort.has_time(0.0 if math.isinf(again.budget_s) else again.budget_s):
+                break
             found = search(other, again, seed)
             effort.spend(again.used)
             if found.waypoints_en is None:
@@ -63,13 +65,6 @@ def _counted_s(key: tuple[float, float]) -> float:
     """Return a path's time, with what its risk counts as [s]."""
     risk, time_s = key
     return time_s + CONTACT_S * risk
-
-
-def _again(effort: Effort) -> Effort:
-    """Return what another search may spend."""
-    if effort.limit is not None:
-        return Effort(None, max(1, int(AGAIN_SHARE * effort.limit)))
-    return Effort(None if math.isinf(effort.budget_s) else AGAIN_TIME_SHARE * effort.budget_s, None)
 
 
 def _others(problem: Problem, tacks: tuple[Tack, ...]) -> Iterator[Problem]:

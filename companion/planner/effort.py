@@ -14,19 +14,26 @@ from companion.clock import effort_s
 from companion.planner.plan import PlanStatus
 from companion.planner.problem.value import Problem
 
+Judge = Callable[[NDArray[np.float64]], float]
+LATE = 1.1     # of the seconds: another path is not judged beyond
+
 
 class Effort:
     """What a search may spend: expansions, or seconds, or both (then the seconds are only a backstop).
 
     Algorithms call ``spend`` with what they did and stop when ``is_over``. ``fraction`` is the share used of the
     limit that decides (expansions when given), so a schedule made from it does not depend on the machine when
-    there is an expansion budget. ``after_s`` of the seconds are for what is done with the path afterwards.
+    there is an expansion budget. ``after_s`` of the seconds are for what is done with the path afterwards:
+    ``judging_s`` of it for the judgement that is left, of which ``needed_s`` cannot be left out.
     """
 
     def __init__(self, budget_s: float | None, expansions: int | None) -> None:
         self.limit = expansions
         self.budget_s = math.inf if budget_s is None else budget_s
-        self.after_s = 0.0
+        self.after_s = self.judging_s = self.needed_s = 0.0
+        self.has_answer = False
+        self._judge: Judge | None = None
+        self._judge_at_s = 0.0
         self.used = 0
         self.first_s: float | None = None
         self._began_s = effort_s()
@@ -60,6 +67,48 @@ class Effort:
         """Computing time left for the search [s]; inf without a budget in seconds."""
         return self.budget_s - self.after_s - self.elapsed_s
 
+    def has_time(self, seconds: float) -> bool:
+        """May what takes so long be begun, and the answer be judged in time? Always where expansions decide."""
+        return self.limit is not None or self.elapsed_s + seconds + self.needed_s <= self.budget_s
+
+    @property
+    def is_late(self) -> bool:
+        """Is there an answer, and no time to judge another path?"""
+        late_s = self.elapsed_s + self.needed_s - LATE * self.budget_s
+        return self.limit is None and self.has_answer and late_s > 0.0
+
+    def reserve(self, judging_s: float) -> None:
+        """Keep no more of the seconds back than what is left to be judged takes."""
+        if self.limit is None:
+            self.judging_s = self.after_s = judging_s
+
+    def listen(self, judge: Judge, *, from_s: float = 0.0) -> None:
+        """Have the best path judged while the search goes on, from a time on; never where expansions decide.
+
+        ``judge`` is called with the path (n, 2) and returns when it is to be called next [s].
+        """
+        if self.limit is None:
+            self._judge, self._judge_at_s = judge, from_s
+
+    def improved(self, path: Callable[[], NDArray[np.float64]]) -> bool:
+        """Have a path judged that is better than those before, if it is time; return whether it was."""
+        judge = self._judge
+        if judge is None or self.elapsed_s < self._judge_at_s:
+            return False
+        self._judge = None    # what the judge itself searches is not judged again
+        self._judge_at_s = judge(path())
+        self._judge = judge
+        return True
+
+    def again(self, share: float, share_s: float) -> Effort:
+        """Return an effort of its own for another search: a share of the expansions, or of the seconds and its
+        judgement; what it spends does not count here."""  # noqa: D205, D209
+        if self.limit is not None:
+            return Effort(None, max(1, int(share * self.limit)))
+        other = Effort(None if math.isinf(self.budget_s) else share_s * self.budget_s + self.needed_s, None)
+        other.after_s = other.judging_s = self.needed_s
+        return other
+
     def part(self, share: float) -> Effort:
         """Return an effort that ends when ``share`` of this one's limits is spent; what it spends counts here."""
         return _Part(self, share)
@@ -81,6 +130,10 @@ class _Part(Effort):
             None if whole.limit is None else max(1, int(share * (whole.limit - whole.used))))
         self._whole = whole
 
+    @property
+    def is_over(self) -> bool:
+        return super().is_over or self._whole.is_late
+
     def spend(self, expansions: int) -> None:
         super().spend(expansions)
         self._whole.spend(expansions)
@@ -88,6 +141,12 @@ class _Part(Effort):
     def found(self) -> None:
         super().found()
         self._whole.found()
+
+    def improved(self, path: Callable[[], NDArray[np.float64]]) -> bool:
+        began_s = self.elapsed_s
+        is_judged = self._whole.improved(path)
+        self.budget_s += self.elapsed_s - began_s    # what the judgement took is none of this part's
+        return is_judged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,6 +2,9 @@
 
 An algorithm is a function ``search(problem, effort, seed) -> Outcome``. It stops when ``effort`` says so and
 returns its best waypoints; cost and legs are then computed here by the exact scorer, never by the algorithm.
+
+A budget in seconds is that of the whole answer. ``auto``'s first path is judged as soon as it is there: then there is
+an answer, and what its judgement took is kept back from the search for the last one.
 """
 
 from __future__ import annotations
@@ -29,6 +32,10 @@ from companion.planner.warm import warm_problems
 
 DEFAULT_BUDGET_S = 1.0
 OPTIMAL_GAP = 1e-3
+TRIED = 0.1            # of a budget in seconds: for changes to a path so that its track keeps the floor
+MENDED = 0.25          # ... more where the first path's track does not, or a tack of it may fail onto something
+AGAIN = 0.6            # of what judging the first path takes: that of another, for which water and winds are at hand
+LATER = 2.0            # another path is judged after as many times as long, while somebody hears of it
 SEARCHED = 0.94        # of a budget in seconds: the last step of a search ends late, and its path is checked exactly
 
 ALGORITHMS: Mapping[str, tuple[str, str]] = {
@@ -50,18 +57,21 @@ def plan(
     seed: int = 0,
     algorithm: str = "auto",
     settings: Settings | None = None,
+    on_better: Callable[[Plan], None] | None = None,
 ) -> Plan:
     """Plan ``problem``; never raises for a bad problem, that is ``PlanStatus.INVALID``.
 
     Args:
         problem: what to plan.
-        budget_s: computing time [s]; 1 s when neither budget is given. The first plan of a process loads the
-            compiled kernels first (on a new machine: compiles them); that time is not counted.
+        budget_s: computing time [s] of the whole answer; 1 s when neither budget is given. The first plan of a
+            process loads the compiled kernels first (on a new machine: compiles them); that time is not counted.
         expansions: effort in the algorithm's own steps; with it and a seed the plan does not depend on the
             machine, unless ``budget_s`` is given too and ends the search first.
         seed: of every random choice.
         algorithm: one of ``ALGORITHMS``.
         settings: the algorithm's numbers, None: its defaults.
+        on_better: is told of plans that can be sailed while better ones are looked for, each better than the one
+            before; by ``auto`` with a budget in seconds alone.
 
     Raises:
         InputError: the algorithm is unknown, the settings are another's, or a budget is not positive.
@@ -88,7 +98,7 @@ def plan(
     try:
         # Numbers that overflow or underflow on the way (1e-180 m in a WKT) end as inf or NaN, which no check passes.
         with np.errstate(all="ignore"):
-            return _solved(problem, effort, empty, settings)
+            return _solved(problem, effort, empty, settings, on_better)
     except shapely.errors.GEOSException as error:
         reason = f"the obstacles or the fence cannot be made valid ({str(error).splitlines()[0]})"
         return replace(empty, reason=reason, elapsed_s=effort.elapsed_s, why=Why(text=reason))
@@ -102,7 +112,10 @@ def warm(algorithm: str = "auto") -> None:
             plan(problem, expansions=20_000 if algorithm == "auto" else 2000, algorithm=algorithm)
 
 
-def _solved(problem: Problem, effort: Effort, empty: Plan, settings: Settings | None) -> Plan:
+def _solved(
+    problem: Problem, effort: Effort, empty: Plan, settings: Settings | None,
+    on_better: Callable[[Plan], None] | None,
+) -> Plan:
     module, name = ALGORITHMS[empty.algorithm]
     found = getattr(importlib.import_module(module), name)
     search: Search = found if settings is None else partial(found, settings=settings)
@@ -125,13 +138,77 @@ def _solved(problem: Problem, effort: Effort, empty: Plan, settings: Settings | 
         search = with_beats(search, problem.beat)
 
     whole = _whole(search, problem)
+    answers = _Answers(problem, effort, empty, on_better)
+    if empty.algorithm == "auto" and problem.risk is None and (on_better is not None or problem.tracking is not None):
+        effort.listen(answers.judge)
     if problem.risk is None:
-        return with_risk(problem, _judged(problem, whole(problem, effort, empty.seed), effort, empty))
+        outcome = whole(problem, effort, empty.seed)
+        return answers.last(outcome, with_risk(problem, _judged(problem, outcome, effort, empty)))
     if empty.algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)
         outcome = whole(problem, effort, empty.seed)
     else:
         outcome = search_within(whole, problem, effort, empty.seed)
     return keep_limit(problem, _judged(problem, outcome, effort, empty))
+
+
+class _Answers:
+    """The best answer so far of a search in seconds, and what judging it takes."""
+
+    def __init__(
+        self, problem: Problem, effort: Effort, empty: Plan, on_better: Callable[[Plan], None] | None,
+    ) -> None:
+        self._problem, self._effort, self._empty, self._on_better = problem, effort, empty, on_better
+        self.best: Plan | None = None
+
+    def judge(self, waypoints_en: NDArray[np.float64]) -> float:
+        """Judge a path that the search has come to; return when the next is to be judged [s]."""
+        from companion.planner.risk.wind import with_risk
+
+        problem, effort = self._problem, self._effort
+        began_s, spare_s, is_kept = effort.elapsed_s, 0.0, True
+        path = [(float(x), float(y)) for x, y in waypoints_en]
+        judged = evaluate(problem, path)
+        needed_s = effort.elapsed_s - began_s
+        if problem.tracking is not None and judged.is_feasible:
+            from companion.planner.track.expected import expected
+            from companion.planner.track.kept import laid
+
+            is_kept, spare_s = expected(problem, path, judged.legs).is_kept, TRIED * effort.budget_s
+            needed_s = effort.elapsed_s - began_s
+            if not is_kept:
+                path, seen = laid(problem, path, None, Effort(spare_s, None))
+                is_kept = seen.is_kept
+        found = None
+        if judged.is_feasible and is_kept:
+            then_s = effort.elapsed_s
+            found = with_risk(problem, _judged(
+                problem, Outcome(waypoints_en=np.asarray(path)), effort, self._empty))
+            needed_s += effort.elapsed_s - then_s
+        effort.needed_s = max(effort.needed_s, AGAIN * needed_s)
+        if not is_kept or (found is not None and found.tack_risk > 0.0):
+            spare_s += MENDED * effort.budget_s
+        effort.judging_s = max(effort.judging_s, effort.needed_s + spare_s)
+        if found is not None and found.has_path and (self.best is None or found.cost_s < self.best.cost_s):
+            self.best = replace(found, unproven=("search", "bound"))
+            effort.has_answer = True
+            if self._on_better is not None:
+                self._on_better(self.best)
+        if self.best is not None and self._on_better is None:
+            return math.inf     # it was judged to know what that takes
+        return effort.elapsed_s + LATER * (effort.elapsed_s if found is not None else effort.elapsed_s - began_s)
+
+    def last(self, outcome: Outcome, plan: Plan) -> Plan:
+        """Return the last answer, or a better one from before: a path that does not keep what it must is none."""
+        best = self.best
+        if best is None or (plan.has_path and (plan.cost_s <= best.cost_s or plan.tack_risk < best.tack_risk)):
+            return plan
+        bound = min(outcome.lower_bound_s, best.cost_s)
+        is_bound = bound > 0.0 and math.isfinite(outcome.lower_bound_s)
+        return replace(
+            best, lower_bound_s=bound if is_bound else best.lower_bound_s, trace=outcome.trace,
+            expansions=self._effort.used, elapsed_s=self._effort.elapsed_s,
+            reason=f"{100.0 * (best.cost_s / bound - 1.0):.1f} % above the bound" if is_bound else best.reason,
+            unproven=() if is_bound else ("bound",))
 
 
 def _whole(

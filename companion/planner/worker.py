@@ -18,6 +18,7 @@ import struct
 import sys
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -50,6 +51,13 @@ def failed(reason: str, *, seed: int, algorithm: str, elapsed_s: float = 0.0) ->
     """Return the plan that says the worker did not answer."""
     return Plan(status=PlanStatus.UNANSWERED, reason=reason, waypoints_en=np.empty((0, 2)), algorithm=algorithm,
                 seed=seed, elapsed_s=elapsed_s, why=Why(text=reason))
+
+
+def _without(reason: str, best: Plan | None, *, seed: int, algorithm: str, elapsed_s: float) -> Plan:
+    """Return the answer of a worker that gave no last one: the best that it had handed out before."""
+    if best is None:
+        return failed(reason, seed=seed, algorithm=algorithm, elapsed_s=elapsed_s)
+    return replace(best, reason=f"{best.reason}; {reason}, and this is the best that it had found", elapsed_s=elapsed_s)
 
 
 class InlinePlanner:
@@ -141,7 +149,9 @@ class PlannerWorker:
         self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
         algorithm: str = "auto", settings: Settings | None = None,
     ) -> Plan:
-        """Return the child's plan; ``PlanStatus.TIMEOUT`` when it hangs or dies, and it is then replaced.
+        """Return the child's plan; when it hangs or dies the best it had found, or ``PlanStatus.UNANSWERED``.
+
+        It is then replaced.
 
         With only an expansion budget there is no limit in seconds to judge a hang by: a minute is allowed.
         """
@@ -153,26 +163,32 @@ class PlannerWorker:
         )
         async with self._lock:
             began_s = effort_s()
+            best: Plan | None = None
             try:
                 if not self.is_alive:
                     await self._replace()
                 await self._warm()
                 began_s = effort_s()
                 await self._send(request)
-                answer = await self._answer((60.0 if budget_s is None else budget_s) + self._grace_s)
+                deadline_s = effort_s() + (60.0 if budget_s is None else budget_s) + self._grace_s
+                is_last = False
+                while not is_last:
+                    answer = await self._answer(deadline_s - effort_s())
+                    is_last, value = pickle.loads(answer)  # noqa: S301 - our own child wrote it
+                    best = best if is_last else value
             except (OSError, EOFError, asyncio.IncompleteReadError, TimeoutError) as error:
                 hung = isinstance(error, TimeoutError)
                 reason = "the planner's worker did not answer in time" if hung else "the planner's worker died"
                 _LOG.warning("%s; it is replaced", reason)
                 await self._replace()
-                return failed(reason, seed=seed, algorithm=algorithm, elapsed_s=effort_s() - began_s)
+                return _without(reason, best, seed=seed, algorithm=algorithm, elapsed_s=effort_s() - began_s)
             except asyncio.CancelledError:
                 await self._replace()  # its answer would be taken for that of the next request
                 raise
-        value = pickle.loads(answer)  # noqa: S301 - our own child wrote it
         if isinstance(value, Plan):
             return value
-        return failed(f"the planner's worker failed: {value}", seed=seed, algorithm=algorithm)
+        return _without(f"the planner's worker failed: {value}", best, seed=seed, algorithm=algorithm,
+                        elapsed_s=effort_s() - began_s)
 
     # ------------------------------------------------------------------------------------ the child
     async def _start(self) -> None:
@@ -223,11 +239,12 @@ class PlannerWorker:
         task = asyncio.ensure_future(self._receive())
         deadline_s = effort_s() + limit_s
         try:
-            while not task.done():
+            while True:   # looked for before the clock: this process may have been kept waiting, too
+                await asyncio.wait({task}, timeout=_PULSE_S)
+                if task.done():
+                    return task.result()
                 if effort_s() >= deadline_s:
                     raise TimeoutError
-                await asyncio.wait({task}, timeout=_PULSE_S)
-            return task.result()
         finally:
             if not task.done():
                 await ended(task)
@@ -253,7 +270,11 @@ def serve(algorithm: str = "auto") -> None:
 
 
 def answer_requests(source: Any, sink: Any) -> None:
-    """Answer requests on a stream of bytes until it closes, all being loaded."""
+    """Answer requests on a stream of bytes until it closes, all being loaded.
+
+    An answer is whether it is the last, and a plan or what failed; plans that can be sailed come before it as they are
+    found.
+    """
     _write(sink, _READY)
     while True:
         head = source.read(_LENGTH.size)
@@ -261,10 +282,11 @@ def answer_requests(source: Any, sink: Any) -> None:
             return
         request: dict[str, Any] = pickle.loads(source.read(_LENGTH.unpack(head)[0]))  # noqa: S301 - our parent's
         try:
-            answer: Plan | str = plan(request.pop("problem"), **request)
+            answer: Plan | str = plan(
+                request.pop("problem"), **request, on_better=lambda found: _write(sink, pickle.dumps((False, found))))
         except Exception as error:
             answer = f"{type(error).__name__}: {error}"
-        _write(sink, pickle.dumps(answer))
+        _write(sink, pickle.dumps((True, answer)))
         del request, answer
         trim()   # the next plan may be an hour away
 

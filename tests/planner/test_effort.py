@@ -1,5 +1,6 @@
 """What may be spent: what is left for afterwards counts where seconds decide, and nowhere else."""
 
+import numpy as np
 import pytest
 
 from companion.planner.effort import Effort
@@ -21,3 +22,46 @@ def test_where_expansions_decide_no_second_counts():
     effort.spend(40)
     assert effort.fraction == 0.4
     assert not effort.is_over
+
+
+def test_what_comes_after_a_search_is_begun_while_there_is_time_for_it():
+    effort = Effort(10.0, None)
+    effort.needed_s = 4.0
+    assert effort.has_time(5.0)
+    assert not effort.has_time(7.0)
+    assert Effort(None, 100).has_time(1e9)
+    assert Effort(None, None).has_time(1e9)
+
+
+def test_a_path_is_judged_when_it_is_time_and_not_within_its_own_judgement():
+    effort, judged = Effort(1e6, None), []
+
+    def judge(path):
+        judged.append(path)
+        assert not effort.improved(lambda: path)
+        return 1e3   # the next one then
+
+    effort.listen(judge)
+    part = effort.part(0.5)
+    assert part.improved(lambda: np.zeros((2, 2)))
+    assert not part.improved(lambda: np.ones((2, 2)))
+    assert len(judged) == 1
+    steps = Effort(None, 100)
+    steps.listen(judge)
+    assert not steps.improved(lambda: np.zeros((2, 2)))
+
+
+def test_a_part_does_not_pay_for_the_judgement(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("companion.planner.effort.effort_s", lambda: now[0])
+    effort = Effort(10.0, None)
+    effort.listen(lambda _: now.__setitem__(0, now[0] + 2.0) or 99.0)
+    part = effort.part(0.3)
+    assert part.improved(lambda: np.zeros((2, 2)))
+    assert part.remaining_s == pytest.approx(3.0)
+    effort.needed_s, effort.has_answer = 4.0, True
+    now[0] = 4.9
+    assert not part.is_over
+    now[0] = 7.1      # with what another judgement needs, beyond the whole
+    assert effort.is_late
+    assert part.is_over

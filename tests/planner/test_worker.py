@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import os
 import signal
 import subprocess
@@ -152,6 +153,63 @@ def test_a_child_that_falls_silent_while_it_compiles_is_replaced(monkeypatch):
             assert (await planner.plan(Problem.from_json(simple()), expansions=3_000)).status is PlanStatus.UNANSWERED
             await planner.ready()
             assert planner.restarts == 1
+
+    run(main())
+
+
+# A child that hands out what it has found, and then dies or stands still.
+ENDS = """
+import os, sys, time
+from companion.planner import plan, worker
+from companion.planner.solve import warm
+
+warm()
+
+def planned(problem, *, on_better, **request):
+    on_better(plan(problem, expansions=1_000))
+    {end}
+
+worker.plan = planned
+worker.answer_requests(sys.stdin.buffer, sys.stdout.buffer)
+"""
+
+
+@pytest.mark.parametrize(("end", "said", "restarts"), [
+    ("os._exit(9)", "died", 1), ("time.sleep(99.0)", "did not answer in time", 1), ("raise MemoryError", "failed", 0)])
+def test_a_child_that_is_killed_or_too_slow_leaves_the_best_that_it_had_found(end, said, restarts):
+    """It left nothing, however good its path was: on a slow computer the boat never set sail (issue 33)."""
+    async def main():
+        async with PlannerWorker(command=[sys.executable, "-c", ENDS.format(end=end)]) as planner:
+            await planner.ready()
+            answer = await planner.plan(Problem.from_json(simple()), budget_s=0.2)
+            assert answer.has_path
+            assert said in answer.reason
+            assert planner.restarts == restarts
+
+    run(main())
+
+
+def test_an_answer_that_waits_is_taken_however_late_it_is_looked_for(monkeypatch):
+    """A process that is starved itself came back after its deadline, and killed a child that had answered."""
+    async def main():
+        async with PlannerWorker() as planner:
+            await planner.ready()
+            late = itertools.chain([0.0, 0.0, 0.0], itertools.repeat(1e6))
+            monkeypatch.setattr(worker, "_PULSE_S", 30.0)
+            monkeypatch.setattr(worker, "effort_s", lambda: next(late))
+            assert (await planner.plan(Problem.from_json(simple()), expansions=1_000)).has_path
+            assert planner.restarts == 0
+
+    run(main())
+
+
+def test_what_a_child_hands_out_on_the_way_is_not_taken_for_its_answer():
+    async def main():
+        async with PlannerWorker() as planner:
+            found = await planner.plan(load("four-beat-60"), budget_s=0.3, seed=1)
+            assert found.has_path
+            assert "search" not in found.unproven
+            assert (await planner.plan(Problem.from_json(simple()), expansions=1_000)).cost_s < 120.0
 
     run(main())
 

@@ -278,6 +278,7 @@ def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -
             seconds, steps = min(seconds, effort.budget_s / RISK_ROUNDS), min(steps, (effort.limit or 0) // RISK_ROUNDS)
         inner = Effort(None if math.isinf(effort.budget_s) else max(1e-3, seconds),
                        None if effort.limit is None else max(1, steps))
+        inner.judging_s, inner.needed_s = effort.judging_s / RISK_ROUNDS, effort.needed_s
         outcome = search(widened(problem, extra), inner, seed)
         effort.spend(inner.used)
         if turn == 0 or (settled and extra == 0.0):

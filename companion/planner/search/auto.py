@@ -20,9 +20,7 @@ from companion.planner.problem.shore import shore_of
 from companion.planner.problem.value import Problem
 from companion.planner.search.bound import Bound, cut_off, no_course
 from companion.planner.search.gauge import make_gauge
-from companion.planner.search.kernels import Floats
 from companion.planner.search.searcher import FINE_FROM, Searcher
-from companion.planner.search.tacks import check_path
 from companion.planner.search.world import World, make_world
 
 _LADDER = ((400, 2), (1_600, 2), (6_000, 2), (24_000, 2), (100_000, 2), (400_000, 2), (1_600_000, 2))
@@ -64,10 +62,7 @@ def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
         _improve(searcher)
     if searcher.best is None:
         return Outcome(waypoints_en=None, lower_bound_s=bound.value_s)
-    points = _tidy(world, searcher.best.points)
-    waypoints = world.to_en(points)
-    waypoints[0] = problem.start_en
-    return Outcome(waypoints_en=waypoints, lower_bound_s=bound.value_s,
+    return Outcome(waypoints_en=searcher.waypoints_en(), lower_bound_s=bound.value_s,
                    trace={"origin": searcher.best.origin, "candidates": len(searcher.pool),
                           "paths": tuple(world.to_en(c.points) for c in searcher.pool)})
 
@@ -164,21 +159,3 @@ def _improve(s: Searcher) -> None:
                 s.zoom()
             continue
         spent += s.effort.fraction - before
-
-
-def _tidy(world: World, points: Floats) -> Floats:
-    """Drop points that are not needed: doubles, and those on a straight line."""
-    keep = [points[0]]
-    for i in range(1, len(points)):
-        if math.dist(points[i], keep[-1]) > 1e-6 or i == len(points) - 1:
-            keep.append(points[i])
-    cost = float(check_path(world.grid, world.boat, points, world.h0))
-    out = np.array(keep)
-    i = 1
-    while i < len(out) - 1:
-        fewer = np.delete(out, i, axis=0)
-        if check_path(world.grid, world.boat, fewer, world.h0) <= cost + 1e-9:
-            out = fewer
-        else:
-            i += 1
-    return out

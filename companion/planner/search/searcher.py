@@ -83,6 +83,7 @@ class Searcher:
         self.turns = 0
         self.is_finishing = False
         self.pops_per_s = 6e5
+        self._judged: Floats | None = None
 
     # ------------------------------------------------------------------------------------ candidates
     @property
@@ -136,7 +137,17 @@ class Searcher:
         if self.best is None or candidate.worth(price) < self.best.worth(price):
             self.best = candidate
             self.effort.found()
-        self.effort.after_s = _LEG_S * len(self.best.points)
+        self.effort.after_s = self.effort.judging_s + _LEG_S * len(self.best.points)
+        points = self.best.points
+        if points is not self._judged and self.effort.improved(self.waypoints_en):
+            self._judged = points
+
+    def waypoints_en(self) -> Floats:
+        """Return the best path in the problem's frame, without points that are not needed."""
+        assert self.best is not None
+        waypoints = self.world.to_en(_tidy(self.world, self.best.points))
+        waypoints[0] = self.world.problem.start_en
+        return waypoints
 
     # ---------------------------------------------------------------------------------------- guides
     def along(self, guide: Floats, *, most: int = 3, halving: int = 0) -> Floats | None:
@@ -458,3 +469,21 @@ class Searcher:
         keep = np.argsort(near, kind="stable")[:200]
         candidate.spots = np.ascontiguousarray(corners[keep])
         return candidate.spots
+
+
+def _tidy(world: World, points: Floats) -> Floats:
+    """Drop points that are not needed: doubles, and those on a straight line."""
+    keep = [points[0]]
+    for i in range(1, len(points)):
+        if math.dist(points[i], keep[-1]) > 1e-6 or i == len(points) - 1:
+            keep.append(points[i])
+    cost = float(check_path(world.grid, world.boat, points, world.h0))
+    out = np.array(keep)
+    i = 1
+    while i < len(out) - 1:
+        fewer = np.delete(out, i, axis=0)
+        if check_path(world.grid, world.boat, fewer, world.h0) <= cost + 1e-9:
+            out = fewer
+        else:
+            i += 1
+    return out

@@ -34,6 +34,7 @@ LARGEST = 60                # waypoints: a longer path is looked at as it is
 SHORTER_SHARE, SHORTER_S = 0.006, 0.4   # what a waypoint less may cost
 SHORT_SHARE, SHORT_EXTRA_S = 0.03, 2.0  # ... and a leg less that cannot be followed
 PUSH_M = (1.0, 2.5, 5.0)    # a corner is pushed by as much
+AGAIN_S = 0.04              # another search is not begun with less: its water alone takes most of that
 BEAT_MORE_M = 1.0           # of room for a beat whose boards come too near
 MEET_M = 60.0               # legs that meet farther from their corners do not meet
 BEYOND_M = (0.0, 3.0, 6.0)  # an arc's ends, on along the legs around it, before the leg between them is long enough
@@ -49,15 +50,18 @@ def with_track(search: Search, judge: Judge | None = None) -> Search:
         outcome = search(problem, effort, seed)
         if outcome.waypoints_en is None:
             return outcome
-        path, seen = laid(problem, [(float(x), float(y)) for x, y in outcome.waypoints_en], judge)
-        if seen.is_beat and problem.beat is not None:
+        if effort.is_late:
+            return replace(outcome, waypoints_en=None, reason="there was no time to judge another path")
+        path, seen = laid(problem, [(float(x), float(y)) for x, y in outcome.waypoints_en], judge, effort)
+        if seen.is_beat and problem.beat is not None and effort.has_time(AGAIN_S):
             # More water about what is beaten; what has none is sailed.
             wider = replace(problem, beat=replace(
                 problem.beat, clearance_m=problem.beat.clearance_m + seen.lack_m + BEAT_MORE_M))
+            effort.reserve(effort.needed_s)   # what was kept back for this is spent now
             again = search(wider, effort, seed)
             if again.waypoints_en is not None:
                 outcome = again
-                path, seen = laid(problem, [(float(x), float(y)) for x, y in again.waypoints_en], judge)
+                path, seen = laid(problem, [(float(x), float(y)) for x, y in again.waypoints_en], judge, effort)
         if seen.is_kept:
             return replace(outcome, waypoints_en=np.asarray(path))
         return replace(outcome, waypoints_en=None, status=PlanStatus.TIMEOUT, reason=lacking(problem, seen))
@@ -75,17 +79,23 @@ def lacking(problem: Problem, seen: Expected) -> str:
             f"the floor is {floor:.1f} m")
 
 
-def laid(problem: Problem, path: Path, judge: Judge | None = None) -> tuple[Path, Expected]:
-    """Return the path with few corners, all of which can be followed and keep the floor, as far as that is possible."""
+def laid(
+    problem: Problem, path: Path, judge: Judge | None = None, effort: Effort | None = None,
+) -> tuple[Path, Expected]:
+    """Return the path with few corners, all of which can be followed and keep the floor, as far as that is possible.
+
+    Of an ``effort`` in seconds changes are tried while there is time.
+    """
+    effort = effort or Effort(None, None)
     judge = _scorer(problem) if judge is None else judge
     judged = judge(path)
     seen = expected(problem, path, judged.legs)
     if len(path) > LARGEST or not judged.is_feasible:
         return path, seen
-    path, judged, seen = _fewer(problem, judge, path, judged, seen)
-    pushed, seen = _pushed(problem, judge, path, seen)
+    path, judged, seen = _fewer(problem, judge, path, judged, seen, effort)
+    pushed, seen = _pushed(problem, judge, path, seen, effort)
     if pushed is not path:   # a corner that was put into a leg may have made two of it that are too short
-        pushed, _, seen = _fewer(problem, judge, pushed, judge(pushed), seen)
+        pushed, _, seen = _fewer(problem, judge, pushed, judge(pushed), seen, effort)
     return pushed, seen
 
 
@@ -95,7 +105,7 @@ def _scorer(problem: Problem) -> Judge:
 
 
 def _fewer(
-    problem: Problem, judge: Judge, path: Path, judged: Evaluation, seen: Expected,
+    problem: Problem, judge: Judge, path: Path, judged: Evaluation, seen: Expected, effort: Effort,
 ) -> tuple[Path, Evaluation, Expected]:
     """Leave out corners and short legs, the shortest first, while it costs little and brings her nearer to nothing."""
     tried: set[tuple[int, ...]] = set()
@@ -110,7 +120,7 @@ def _fewer(
             longer = (*_rounded(path, n, lengths, least_m), *_stretched(path, n, lengths, least_m)) if is_short else ()
             for option in (*longer, *_without(path, n)):
                 key = tuple(round(10.0 * c) for point in option for c in point)
-                if key in tried or count >= AT_MOST:
+                if key in tried or count >= AT_MOST or not effort.has_time(0.0):
                     continue
                 tried.add(key)
                 count += 1
@@ -133,13 +143,15 @@ def _fewer(
 
 
 def _pushed(
-    problem: Problem, judge: Judge, path: Path, seen: Expected,
+    problem: Problem, judge: Judge, path: Path, seen: Expected, effort: Effort,
 ) -> tuple[Path, Expected]:
     """Push corners away from what the track comes too near to, until it keeps the floor or nothing helps."""
     count = 0
     while not seen.is_kept and count < AT_MOST:
         best: tuple[float, float, Path, Expected] | None = None
         for option in _pushes(problem, path, seen):
+            if not effort.has_time(0.0):
+                break
             count += 1
             found = judge(option)
             if not found.is_feasible:

@@ -1,0 +1,101 @@
+"""A budget in seconds is that of the whole answer, and from the first path on there is one."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.planner import Plan, Problem, effort, plan
+from companion.planner.problem.evaluate import evaluate
+from companion.planner.solve import warm
+from companion.planner.track import expected
+from tests.planner.problems import load
+
+REQUESTS = sorted((Path(__file__).parents[2] / "bench" / "requests").glob("*.json"))
+
+
+def recorded(name):
+    return Problem.from_json(REQUESTS[0].parent / f"{name}.json")
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """The planner's stopwatch, of the processor; it can be put forward."""
+    ahead = [0.0]
+    monkeypatch.setattr(effort, "effort_s", lambda: time.process_time() + ahead[0])
+    return ahead
+
+
+def test_the_requests_are_of_narrow_water_with_all_that_is_judged_after_a_search():
+    problems = [Problem.from_json(path) for path in REQUESTS]
+    assert all(p.tracking is not None and p.wind.strength is not None for p in problems)
+    assert any(p.boat.tack_fails > 0.1 for p in problems)
+    assert any(p.current.drift_mps > 0.0 for p in problems)
+    assert any(p.is_shared for p in problems)
+
+
+@pytest.mark.parametrize("name", ["tacks-fail-late", "current-across"])
+def test_the_whole_answer_is_within_the_budget(name, clock):
+    """They took 0.54 and 0.57 s of 0.3: changes to the path, tacks that fail and other waters came on top of it."""
+    warm()
+    p, taken_s = recorded(name), []
+    for seed in range(2):
+        began_s = time.process_time()
+        assert plan(p, budget_s=0.3, seed=seed).has_path
+        taken_s.append(time.process_time() - began_s)
+    assert min(taken_s) <= 1.1 * 0.3 + 0.05
+
+
+def test_plans_that_can_be_sailed_are_handed_out_as_they_come(clock):
+    p, handed = recorded("slalom"), []
+    last = plan(p, budget_s=0.4, seed=1, on_better=handed.append)
+    assert handed
+    for found in handed:
+        assert evaluate(p, found.waypoints_en).is_feasible
+        assert expected(p, found.waypoints_en).is_kept
+        assert found.risk is not None
+        assert found.arrival is not None
+        assert found.unproven == ("search", "bound")
+    costs = [found.cost_s for found in handed]
+    assert all(b < a for a, b in itertools.pairwise(costs))
+    assert last.cost_s <= costs[-1]
+    assert last.unproven == ()
+    assert handed[0].elapsed_s < 0.5 * 0.4
+    again = Plan.from_dict(handed[0].to_dict())
+    assert again.unproven == handed[0].unproven
+
+
+def test_when_the_time_is_up_the_best_so_far_is_the_answer(clock):
+    """The first path was thrown away with everything that had been found, when what was left took too long."""
+    handed = []
+
+    def late(found):
+        handed.append(found)
+        clock[0] += 10.0
+
+    p = recorded("archipelago-start")
+    answer = plan(p, budget_s=0.5, seed=1, on_better=late)
+    assert len(handed) == 1
+    assert np.array_equal(answer.waypoints_en, handed[0].waypoints_en)
+    assert answer.unproven == ("bound",)
+
+
+def test_without_a_track_and_a_listener_nothing_is_judged_on_the_way(monkeypatch):
+    monkeypatch.setattr(effort.Effort, "listen", lambda *_: pytest.fail("judged"))
+    assert plan(load("four-beat-60"), budget_s=0.05).has_path
+
+
+def test_with_expansions_nothing_is_handed_out_and_nothing_depends_on_the_clock(clock):
+    p = recorded("slalom")
+
+    def no(found):
+        raise AssertionError
+
+    first = plan(p, expansions=2_000, seed=3, on_better=no)
+    clock[0] += 1e6
+    again = plan(p, expansions=2_000, seed=3)
+    assert first.to_dict() | {"elapsed_s": 0, "first_s": 0} == again.to_dict() | {"elapsed_s": 0, "first_s": 0}
