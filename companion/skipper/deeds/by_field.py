@@ -121,7 +121,7 @@ def habits(turn: Turn, tws_mps: float) -> Habits:
         is_sailing=turn.config.sails,
         no_go_half_rad=turn.planned_no_go_rad, polar_twa_rad=tuple(map(float, twa)),
         polar_mps=tuple(map(float, speed)), turn_rate_radps=boat.turn_rate_radps, tack_s=max(1.0, boat.tack_loss_s),
-        lag_s=LAG_S, horizon_s=HORIZON_S, keep_m=turn.config.margin_floor_m,
+        lag_s=LAG_S, horizon_s=HORIZON_S, keep_m=turn.config.margin_floor_m + boat.hull.reach_m,   # of her place
     )
 
 

@@ -9,11 +9,12 @@ from shapely.geometry import box
 
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
-from companion.skipper.deeds.by_field import NAME
+from companion.skipper.deeds.by_field import NAME, habits
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import ALL_PERMITTED, Guidance
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
+from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from companion.traffic import Targets
@@ -251,3 +252,12 @@ def test_station_keeping_lasts_as_long_as_asked(guidance):
     assert world.t - arrived > 115.0
     assert far < 20.0
     assert bool(steered(world)) is (guidance is not Guidance.PLAN)
+
+
+def test_by_field_the_floor_is_the_hulls_and_not_the_antennas():
+    """Two channels by field: 4.95 m clear, and the floor was 5."""
+    world = World(skipper=skipper(voyage(), guidance=Guidance.FIELD))
+    turn = Turn(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
+    reach_m = world.skipper.voyage.boat.hull.reach_m
+    assert reach_m > 0.0
+    assert habits(turn, 5.0).keep_m == world.skipper.config.margin_floor_m + reach_m
