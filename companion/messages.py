@@ -117,6 +117,7 @@ class AutopilotStatus:
     battery_remaining: float | None = None
     battery_failed: bool | None = None   # its battery failsafe has spoken, or the monitor is ill
     receiver_lost: bool | None = None    # it hears no transmitter
+    fence_on: bool | None = None         # it has told of a fence, and does; None: never
     fence_breached: bool | None = None
     fence_breaches: int | None = None    # since the boot; outside the home circle one more every 20 m
     last_reached_seq: int | None = None

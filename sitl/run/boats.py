@@ -28,7 +28,7 @@ from companion.mavlink.wire import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import MOTOR, ArduRover, require
 from sitl.scene import EventSpec, Scenario, SensorsSpec, free_port, scenario_waters
-from sitl.trouble import give_order, set_parameter
+from sitl.trouble import DRAWN, draw, give_order, set_parameter
 from sitl.world import Wind
 
 # A warm simulated autopilot has been up for a minute when its simulation starts [s].
@@ -43,7 +43,7 @@ JUDGE_STREAMS = (
     Stream("ATTITUDE", 5.0, 3.0),
 )
 # What an operator and a ground station do, over any autopilot's link.
-OPERATORS = frozenset({"mode", "reboot", "foreign_mission", "order", "parameter"})
+OPERATORS = frozenset({"mode", "reboot", "foreign_mission", "order", "parameter"}) | DRAWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,6 +167,8 @@ class SimulatedBoat:
             await _answered(give_order(open_link(self._judge_url), event, frame))
         elif event.kind == "parameter":
             await _answered(set_parameter(open_link(self._judge_url), event))
+        elif event.kind in DRAWN:
+            await _answered(draw(open_link(self._judge_url), event, frame))
 
 
 class RealBoat:
@@ -230,6 +232,8 @@ class RealBoat:
             await _answered(give_order(open_link(rover.shore_link), event, frame))
         elif event.kind == "parameter":
             await _answered(set_parameter(open_link(rover.shore_link), event))
+        elif event.kind in DRAWN:
+            await _answered(draw(open_link(rover.shore_link), event, frame))
         elif event.kind in {"arm", "disarm"}:
             rover.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, float(event.kind == "arm"))
         elif event.kind == "radio_lost":

@@ -50,7 +50,7 @@ from sitl.scene import (
     scenario_wind,
     tasks_of,
 )
-from sitl.trouble import KEY, FragilePlanner, MortalPlanner, Observer, Satellite, World, channel, happen
+from sitl.trouble import DRAWN, KEY, FragilePlanner, MortalPlanner, Observer, Satellite, World, channel, happen
 
 TRUTH_EVERY_S = 0.25
 MAX_TRUTH_SAMPLES = 20_000
@@ -111,7 +111,7 @@ def replace_struct(struct: Any, **changes: Any) -> Any:
 
 
 # What is done ashore over a port of the autopilot's own; into which nothing is plugged where none of it is.
-SHORE_EVENTS = frozenset({"foreign_mission", "parameter", "order"})
+SHORE_EVENTS = frozenset({"foreign_mission", "parameter", "order"}) | DRAWN
 RADIO_EVENTS = frozenset({"intruder", "second_boat"})
 
 

@@ -29,6 +29,12 @@ EventKind = Literal[
     "arm", "disarm",     # by the ground station
     "set_current",       # seq, for_s: the ground station makes an item of the mission current, and insists
     "parameter",         # parameter, value: set by the ground station, for good
+    "home",              # east_m, north_m: the ground station moves home there
+    "fence",             # radius_m about east_m, north_m: it draws another fence and switches it on; state: off
+    "rally",             # east_m, north_m: it draws the list of rally points anew, this one alone
+    "edit_item",         # seq, east_m, north_m: it moves one item of the mission and uploads the list again
+    "refused",           # state: arm, or a mode by name; for_s: the autopilot refuses it
+    "company",           # another companion speaks on the link with our ids; for_s
     "reboot",            # the autopilot restarts
     "link_cut",          # for_s (none: for good)
     "link_half",         # state: unheard (the companion hears and is not heard) | deaf; for_s
@@ -116,6 +122,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     volts: float | None = None
     roll_deg: float = 0.0
     seq: int = 1
+    radius_m: float = 100.0      # of a fence
     system: int = 7              # of a neighbour
     vehicle_type: int = 11
     forgery: str = ""

@@ -1,7 +1,7 @@
 """Trouble: what is made to go wrong, with links, sensors, disks, processes and people."""
 
 from sitl.trouble.befalls import Observer, World, break_vane, channel, happen
-from sitl.trouble.crew import give_order, set_parameter
+from sitl.trouble.crew import DRAWN, draw, give_order, set_parameter
 from sitl.trouble.forgeries import FORGERIES
 from sitl.trouble.fragile import FragilePlanner, MortalPlanner
 from sitl.trouble.hostile import HOSTILITIES, measure, rows, written
@@ -10,7 +10,27 @@ from sitl.trouble.relay import LINK_EVENTS, Relay, befall
 from sitl.trouble.satellite import KEY, Satellite
 
 __all__ = [
-    "FORGERIES", "HOSTILITIES", "KEY", "LINK_EVENTS", "FragilePlanner", "Middle", "MortalPlanner", "Observer", "Plan",
-    "Relay", "Satellite", "World", "befall", "break_vane", "channel", "give_order", "happen", "measure", "rows",
-    "set_parameter", "written",
+    "DRAWN",
+    "FORGERIES",
+    "HOSTILITIES",
+    "KEY",
+    "LINK_EVENTS",
+    "FragilePlanner",
+    "Middle",
+    "MortalPlanner",
+    "Observer",
+    "Plan",
+    "Relay",
+    "Satellite",
+    "World",
+    "befall",
+    "break_vane",
+    "channel",
+    "draw",
+    "give_order",
+    "happen",
+    "measure",
+    "rows",
+    "set_parameter",
+    "written",
 ]

@@ -11,16 +11,19 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
 from companion.clock import now_s
 from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
 from companion.mavlink.transports import Transport
-from companion.mavlink.trust import LinkIdentity
+from companion.mavlink.trust import OWN_COMPONENT, LinkIdentity
+from companion.mavlink.wire import Codec
 from companion.messages import GeoPoint, MissionItem, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryEnd, MemoryLink, VaneFault, VaneState, serve
 from sitl.scene import TRAFFIC, EventSpec, Motion, Others, Truth
-from sitl.trouble.crew import give_order, set_parameter, wanted_by
+from sitl.trouble.crew import DRAWN, draw, give_order, set_parameter, wanted_by
 from sitl.trouble.failsafes import FAILURES, PERSONS, play
 from sitl.trouble.forgeries import Forger, forgery_named
 from sitl.trouble.fragile import FragilePlanner, MortalPlanner
@@ -81,7 +84,7 @@ def channel(world: World, events: tuple[EventSpec, ...]) -> None:
     for event in events:
         if event.kind == "neighbour" and event.system not in world.neighbours:
             world.neighbours[event.system] = MemoryLink(f"neighbour {event.system}", seed=world.seed + event.system)
-    is_forged = any(e.kind == "spoof" for e in events)
+    is_forged = any(e.kind in {"spoof", "company"} for e in events)
     if world.neighbours or is_forged:
         def overheard(data: bytes) -> None:
             for forger in world.forgers:
@@ -159,6 +162,29 @@ async def _parameter(world: World, event: EventSpec) -> None:
         trouble = await set_parameter(world.shore.near, event)
     if trouble:
         world.errors.append(trouble)
+
+
+async def _draw(world: World, event: EventSpec) -> None:
+    await _begins(event)
+    async with world.stranger:
+        trouble = await draw(world.shore.near, event, world.frame)
+    if trouble:
+        world.errors.append(trouble)
+
+
+async def _company(world: World, event: EventSpec) -> None:
+    """Be another companion with our ids, at work: it says so once a second."""
+    await _begins(event)
+    other, until_s = Codec(1, OWN_COMPONENT), math.inf if event.for_s is None else event.at_s + event.for_s
+    beat = mav.MAVLink_heartbeat_message(
+        mav.MAV_TYPE_ONBOARD_CONTROLLER, mav.MAV_AUTOPILOT_INVALID, 0, 0x0BAD, mav.MAV_STATE_ACTIVE, 3)
+    while now_s() < until_s and world.air is not None:
+        world.air.say(other.pack(beat))
+        await asyncio.sleep(1.0)
+
+
+def _refuse(world: World, event: EventSpec) -> None:
+    world.autopilot.pilot.refuse(event.state or "arm")
 
 
 async def _neighbour(world: World, event: EventSpec) -> None:
@@ -256,6 +282,9 @@ _BY_KIND: dict[str, _Befall] = {
     "far_order": _far_order,
     "foreign_mission": _foreign,
     "parameter": _parameter,
+    **dict.fromkeys(DRAWN, _draw),
+    "company": _company,
+    "refused": _switched(_refuse, lambda world: world.autopilot.pilot.refuse("")),
     "neighbour": _neighbour,
     "spoof": _spoof,
 }

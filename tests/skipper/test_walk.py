@@ -203,6 +203,7 @@ EVENTS = {
     "stuck waypoint": status(mission_seq=1),
     "mission ended": status(mission_seq=9999),
     "fence breach": status(fence_breached=True),
+    "fence off": status(fence_on=False),
     "foreign mission": event(StatusText(t_s=0.0, severity=6, text="Flight plan received")),
     "reboot": event(AutopilotRebooted()),
     "battery low": status(battery_remaining=0.15),

@@ -258,18 +258,19 @@ class VehicleAssembler:
             fence = bool(message.breach_status), int(message.breach_count)
             last, self._fence_told, self._fence_s = self._fence_told, fence, t_s
             return {
-                "fence_breached": fence[0] and last[0], **({"fence_breaches": fence[1]} if fence[1] == last[1] else {})}
+                "fence_on": True, "fence_breached": fence[0] and last[0],
+                **({"fence_breaches": fence[1]} if fence[1] == last[1] else {})}
         return None
 
-    def _quiet(self, t_s: float) -> dict[str, None]:
+    def _quiet(self, t_s: float) -> dict[str, bool | None]:
         """Return what was told too long ago to be true of now."""
-        old: dict[str, None] = {}
+        old: dict[str, bool | None] = {}
         if self._nav_s is not None and t_s - self._nav_s > QUIET_S:
             self._nav_s = None
             old |= {"waypoint_distance_m": None, "target_bearing_rad": None, "cross_track_m": None}
         if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
             self._fence_s = None
-            old |= {"fence_breached": None, "fence_breaches": None}
+            old |= {"fence_on": False, "fence_breached": None, "fence_breaches": None}
         if self._leak_s is not None and t_s - self._leak_s > QUIET_S:
             self._leak_s = self._leak_told = None
             old |= {"leaks": None}

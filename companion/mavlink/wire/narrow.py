@@ -7,7 +7,7 @@ WATCHDOGS = (
     "link silent", "position lost", "position jump", "wind untrusted", "becalmed", "drifting", "in irons",
     "vessel too near", "no progress", "heading against course", "off the corridor", "stuck waypoint", "mission ended",
     "fence breach", "foreign mission", "reboot", "battery low", "battery critical", "leaking", "dark", "shore lost",
-    "out of time", "dragged off", "planner dead", "strong wind", "light wind",
+    "out of time", "dragged off", "planner dead", "strong wind", "light wind", "fence off",
 )
 
 

@@ -204,13 +204,18 @@ def _planner(turn: Turn) -> float | None:
     return float(not turn.snapshot.planner_alive)
 
 
+def _fence_off(turn: Turn) -> float | None:
+    return None if turn.autopilot is None else float(turn.autopilot.fence_on is False)
+
+
 _MEASURES: dict[str, Callable[[Turn], float | None]] = {
     "link silent": _link, "position lost": _position_lost, "position jump": _jump, "wind untrusted": _wind,
     "strong wind": too_strong, "light wind": too_light,
     "becalmed": _becalmed, "drifting": meets_in_s, "in irons": _irons, "vessel too near": _too_near,
     "no progress": _progress,
     "heading against course": _heading, "off the corridor": _corridor, "stuck waypoint": _stuck,
-    "mission ended": _ended, "fence breach": _breach, "foreign mission": _foreign, "reboot": _reboot,
+    "mission ended": _ended, "fence breach": _breach, "fence off": _fence_off, "foreign mission": _foreign,
+    "reboot": _reboot,
     "battery low": _battery_low, "battery critical": _battery_critical, "out of time": _time, "dragged off": _dragged,
     "planner dead": _planner, "leaking": _leak, "dark": _dark, "shore lost": _shore,
 }

@@ -20,6 +20,7 @@ class Arming:
         self._helm = helm
         self._fence = fence
         self._ekf = ekf
+        self.is_refused = False   # by a check of the autopilot's that knows why
 
     def arm(self, *, force: bool) -> bool:
         """Arm; False, with the reasons announced, when refused."""
@@ -38,7 +39,7 @@ class Arming:
 
     def _reasons(self) -> list[str]:
         core, mode = self._core, self._helm.mode
-        reasons = []
+        reasons = ["Hardware safety switch"] if self.is_refused else []
         if core.internal_errors:
             reasons.append(INTERNAL_ERROR)
         if core.parameters.flag("SAIL_ENABLE") and not core.parameters.flag("WNDVN_TYPE"):

@@ -32,6 +32,7 @@ class Helm:
         self._mode_changed = mode_changed
         self.mission = Mission(self)
         self.mode = Mode.MANUAL
+        self.refused: Mode | None = None   # it cannot be entered now
         self.task = Task.HOLD
         self._is_waiting = False       # AUTO was entered before there was an origin
         self._is_reached = False
@@ -52,6 +53,9 @@ class Helm:
         mode = Mode(number)
         if mode is self.mode:
             return True
+        if mode is self.refused:
+            self._voice.announce(mav.MAV_SEVERITY_WARNING, "Flight mode change failed")
+            return False
         if mode is Mode.AUTO and self.mission.total == 0:
             self._voice.announce(mav.MAV_SEVERITY_NOTICE, "No Mission. Can't set AUTO.")
             self._voice.announce(mav.MAV_SEVERITY_WARNING, "Flight mode change failed")

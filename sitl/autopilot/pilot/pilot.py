@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from companion.messages import Mode
 from sitl.autopilot.pilot.arming import Arming
 from sitl.autopilot.pilot.core import Core
 from sitl.autopilot.pilot.ekf import Ekf
@@ -42,6 +43,11 @@ class Pilot:
     def due_s(self) -> float:
         """When there is something to do."""
         return min(self.startup.due_s, self.helm.due_s, self.failsafe.due_s, self.fence.due_s)
+
+    def refuse(self, what: str) -> None:
+        """Refuse to arm ("arm"), or a mode by its name, from now on; empty: neither."""
+        self.arming.is_refused = what == "arm"
+        self.helm.refused = Mode[what] if what and what != "arm" else None
 
     def parameter_changed(self, name: str) -> None:
         """Act on a parameter that somebody set."""

@@ -284,6 +284,22 @@ def last(assembler, message):
     return values[-1] if values else None
 
 
+def test_a_fence_that_is_told_of_no_more_is_off():
+    """A person who switched it off under way took the last line of defence, and nobody said so."""
+    assembler, beat = VehicleAssembler(), wire.MAVLink_heartbeat_message(11, 3, 81, 10, 4, 3)
+    fence = wire.MAVLink_fence_status_message(0, 0, 0, 0, 0)
+
+    def seen(t_s, message):
+        return assembler.take(t_s, heard(message))[-1].fence_on
+
+    assert seen(0.0, beat) is None                 # never told of
+    assert seen(1.0, fence) is True
+    assert seen(5.0, beat) is True
+    assert seen(7.0, beat) is False
+    assert seen(60.0, beat) is False
+    assert seen(61.0, fence) is True
+
+
 def test_what_is_not_looked_at_tells_nothing_of_the_status():
     """The list of what tells, by which the rest is left out, is whole."""
     assembler = VehicleAssembler()
