@@ -107,6 +107,8 @@ class AutopilotStatus:
     system_status: int = 0
     ekf_ok: bool = False
     gps_fix: int | None = None
+    gps: GeoPoint | None = None          # what its receiver says, the filter apart; None: no fix
+    gps2: GeoPoint | None = None         # the same of a second receiver, where there is one
     mission_seq: int | None = None
     mission_total: int | None = None
     mission_state: MissionState = MissionState.UNKNOWN

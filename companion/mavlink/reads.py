@@ -23,6 +23,7 @@ READS: Mapping[str, tuple[str, ...]] = {
     "NAV_CONTROLLER_OUTPUT": ("assembler",),
     "EKF_STATUS_REPORT": ("assembler",),
     "GPS_RAW_INT": ("assembler",),
+    "GPS2_RAW": ("assembler",),
     "SYS_STATUS": ("assembler",),
     "SYSTEM_TIME": ("assembler",),
     "FENCE_STATUS": ("assembler",),

@@ -75,7 +75,8 @@ class Skipper:
         return SkipperState(
             adoptable=persisted, known=known, under_way_s=persisted.under_way_s, arrived=persisted.arrived,
             uid=persisted.uid, system=persisted.system, standing=persisted.standing, skipped=persisted.skipped,
-            set_sail_utc_s=persisted.set_sail_utc_s,
+            set_sail_utc_s=persisted.set_sail_utc_s, place=persisted.place,
+            restored=persisted.place,
             tacking=Tacking(tried=persisted.tacks[0], failed=persisted.tacks[1]))
 
     def fits(self, persisted: Persisted) -> bool:
@@ -92,10 +93,10 @@ class Skipper:
         turn = Turn(self.voyage, self.config, state, snapshot)
         judge(turn)
         take_events(turn)
+        follow(turn)
         take_outcomes(turn)
         follow_stops(turn)
         follow_answer(turn)
-        follow(turn)
         follow_ground(turn)
         follow_field(turn)
         locate(turn)
@@ -226,7 +227,7 @@ def _operator_has_it(turn: Turn) -> bool:
     since = state.operator_since_s if state.operator_since_s is not None else turn.t_s
     turn.update(
         operator_since_s=None, checked_mission=False, read_since_s=turn.t_s, after_operator=True, plan_retry=PATIENT,
-        answering="", history=(),
+        answering="", history=(), given_back_s=turn.t_s,
     )
     turn.phase(Phase.WAITING, "AUTO is back: waiting for the mission on board to be compared")
     turn.say(Severity.NOTICE, "operator back", f"AUTO is back after {turn.t_s - since:.0f} s", every_s=0.0)

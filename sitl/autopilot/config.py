@@ -120,9 +120,13 @@ class GpsFault:
     ``is_resisted``: the EKF does as the real one did with a jump of 30 m: it holds out for 3.8 s, then takes the
     new position, and its failsafe puts the boat in HOLD one second later. Otherwise the offset is believed at once
     and in silence, as with a spoofed or slowly drifting receiver.
+    ``over_s``: the offset grows evenly for so long, and the velocity that is told has it in it, as a patient forger's
+    has. ``is_of_one``: it befalls one receiver of two; from then on the other is there, and tells the truth.
     """
 
     east_m: float = 0.0
     north_m: float = 0.0
     is_lost: bool = False
     is_resisted: bool = False
+    over_s: float = 0.0
+    is_of_one: bool = False

@@ -22,15 +22,17 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import shapely
 
 from companion.errors import InputError
 from companion.fold import Step
-from companion.messages import CompanionStatus
-from sitl.campaigns.counterfactual import avoidable
+from companion.messages import CompanionStatus, Mode
+from sitl.campaigns.counterfactual import ALERT_S, avoidable, by_hand
 from sitl.campaigns.fault_draw import draw, draw_planner
 from sitl.campaigns.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
+from sitl.campaigns.jump_draw import KINDS, MODES, draw_jump
 from sitl.means import Means
-from sitl.run.variation import Method, drawn_method
+from sitl.run.variation import Method, Variation, drawn_method
 from sitl.runner import Key, file_hash, sail
 from sitl.scene import EventSpec, Scenario, is_all_ordinary, load_scenario
 
@@ -74,6 +76,51 @@ def method_of(seed: int, scenario: Scenario, source: Path, draws: Sequence[str])
     return drawn_method(random.Random(f"method {seed}"), draws, mission_of(scenario, source)) if draws else Method()
 
 
+def sail_jump_seed(
+    seed: int, base: Path = BASE, keep: Path | None = None, *, draws: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Sail a voyage with a false position, and once more with a skipper who puts her into LOITER and leaves her there.
+
+    The second does so as soon as anything could be known of it. What the first touches and the second does not is a
+    fault. ``draws`` as of ``method_of``.
+    """
+    from companion.geofence import load_mission
+    from sitl.run.embedded import solid_of
+
+    plain = load_scenario(base)
+    mission = load_mission(plain.mission_path(base))
+    frame = mission.frame()
+    places = [frame.en_from_geo(p) for p in (mission.start or mission.origin, mission.goals[-1].point)]
+    solid = solid_of(mission.area.local(frame))
+    drawn = draw_jump(seed, plain, start_en=places[0], goal_en=places[1],
+                      solids_en=[(p.centroid.x, p.centroid.y) for p in shapely.get_parts(solid)])
+    method = method_of(seed, plain, base, draws)
+    ours = _sail(drawn.scenario, seed, base, keep, method=method, variation=drawn.variation)
+    reach = ours.watch.reach()
+    jump = next(e for e in drawn.scenario.events if e.kind == "gps_jump" and e.for_s is not None)
+    first_s = next((t for t in reach.false_s if t >= jump.at_s), jump.at_s)
+    seen_s = reach.first_s(first_s + ALERT_S, drawn.scenario.limit_s)
+    held = None if seen_s is None else _sail(
+        by_hand(drawn.scenario, seen_s, Mode.LOITER, drawn.scenario.limit_s), seed, base, None,
+        method=method, variation=drawn.variation)
+    touched = [t_s for t_s, _ in ours.watch.contacts() if t_s >= jump.at_s]
+    held_touched = [] if held is None else [t_s for t_s, _ in held.watch.contacts() if t_s >= jump.at_s]
+    faults = [f"contact at {touched[0]:.0f} s, none when held in LOITER"] if touched and not held_touched else []
+    silence_s = ours.watch.silence_s(ours.status_s)
+    if silence_s > MAX_SILENCE_S:
+        faults.append(f"silent for {silence_s:.0f} s")
+    if ours.errors:
+        faults.append(f"unhandled: {ours.errors[0].strip().splitlines()[-1]}")
+    return {
+        "seed": seed, "passed": not faults, "faults": faults, "kind": drawn.kind, "mode": drawn.mode,
+        "size": drawn.size_class, "size_m": drawn.size_m, "for_s": drawn.for_s,
+        "events": [told(e) for e in drawn.scenario.events], "parameters": {},
+        "touched_s": touched[:1], "held_touched_s": held_touched[:1], "arrived": bool(ours.figures.get("arrived")),
+        "time_s": ours.figures.get("time_s"), "errors": ours.errors,
+        "simulated_s": ours.watch.t_s[-1] if ours.watch.t_s else 0.0,
+    }
+
+
 def sail_faults(
     scenario: Scenario, seed: int, base: Path, keep: Path | None = None, *, worker_pace: float | None = None,
     method: Method | None = None,
@@ -82,11 +129,12 @@ def sail_faults(
     method = method or Method()
     if keep is not None and keep.is_dir() and any(keep.iterdir()):
         raise InputError("--keep", str(keep), "is not empty", "a voyage's folder is taken up where it was left")
-    voyage = _sail(scenario, seed, base, keep, worker_pace, method)
+    voyage = _sail(scenario, seed, base, keep, worker_pace, method=method)
     watch, figures, errors = voyage.watch, voyage.figures, voyage.errors
 
     def touches(other: Scenario) -> float | None:
-        return next((t_s for t_s, _ in _sail(other, seed, base, None, worker_pace, method).watch.contacts()), None)
+        sailed = _sail(other, seed, base, None, worker_pace, method=method)
+        return next((t_s for t_s, _ in sailed.watch.contacts()), None)
 
     contacts = []
     for t_s, excuse in watch.contacts():
@@ -138,7 +186,8 @@ class _Voyage:
 
 
 def _sail(
-    scenario: Scenario, seed: int, base: Path, keep: Path | None, worker_pace: float | None, method: Method,
+    scenario: Scenario, seed: int, base: Path, keep: Path | None, worker_pace: float | None = None, *,
+    method: Method | None = None, variation: Variation | None = None,
 ) -> _Voyage:
     """Sail a scenario on the embedded autopilot under the eyes of a watch."""
     from companion.clock import run_virtual
@@ -170,7 +219,8 @@ def _sail(
         folder = keep if keep is not None else Path(scratch) / "voyage"
         try:
             voyage = run_embedded(scenario, base, seed, folder, on_status=on_status, expansions=EXPANSIONS,
-                                  observer=watch, worker_pace=worker_pace, variation=method.variation(mission))
+                                  observer=watch, worker_pace=worker_pace,
+                                  variation=(method or Method()).variation(mission, variation))
             verdict = run_virtual(voyage) if worker_pace is None else run_from_zero(voyage, worker_pace)
             figures = verdict.figures
             seen = {check.name: check.figure for check in verdict.checks}
@@ -189,16 +239,20 @@ def told(event: EventSpec) -> str:
     return f"{event.kind} at {event.at_s:.0f} s" + (f" ({', '.join(drawn)})" if drawn else "")
 
 
+# What a seed draws its trouble of, and who sails it.
+SAILORS = {"all": sail_seed, "worker": sail_worker_seed, "jumps": sail_jump_seed}
+
+
 def run_faults(
-    *, runs: int, first_seed: int = 0, means: Means, json_path: Path | None = None, worker: bool = False,
+    *, runs: int, first_seed: int = 0, means: Means, json_path: Path | None = None, trouble: str = "all",
     draws: Sequence[str] = (),
 ) -> int:
     """Sail ``runs`` seeds, print those that failed and what was counted; return the exit code.
 
     ``draws`` as of ``method_of``. It is 1 where one failed that is not ``KNOWN`` to.
     """
-    known = {} if worker or draws else KNOWN
-    water = {"scenario": load_scenario(BASE).name, "hash": file_hash(BASE), "trouble": "worker" if worker else "all"}
+    known = KNOWN if trouble == "all" and not draws else {}
+    water = {"scenario": load_scenario(BASE).name, "hash": file_hash(BASE), "trouble": trouble}
 
     def key_of(seed: int) -> Key:
         return {**water, **({"draws": ", ".join(draws)} if draws else {}), "seed": seed}
@@ -210,17 +264,17 @@ def run_faults(
             word = "known to fail," if record["seed"] in known else "FAILED"
             print(f"{word} seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})", flush=True)
 
-    work = partial(sail_worker_seed if worker else sail_seed, draws=tuple(draws))
-    sailed = sail("faults", work, range(first_seed, first_seed + runs), means,
-                  key=key_of, on_record=tell)
+    work = partial(SAILORS[trouble], draws=tuple(draws))
+    sailed = sail("faults", work, range(first_seed, first_seed + runs), means, key=key_of, on_record=tell)
     records = sailed.records
     drawing = f" --draw {','.join(draws)}" if draws else ""
-    table = figures_of(records)
-    print_figures(table)
+    table = jump_figures(records) if trouble == "jumps" else figures_of(records)
+    (print_jumps if trouble == "jumps" else print_figures)(table)
     print(f"{table['simulated_s'] / 3600.0:.1f} h simulated; {sailed.took}")
+    option = "" if trouble == "all" else f" --{trouble}"
     for record in records:
         if not record["passed"]:
-            print(f"again: sitl faults{drawing} --first-seed {record['seed']} --keep DIR")
+            print(f"again: sitl faults{option}{drawing} --first-seed {record['seed']} --keep DIR")
         elif record["seed"] in known:
             print(f"seed {record['seed']} passes, which was known to fail: {known[record['seed']]}")
     if json_path is not None:
@@ -270,3 +324,28 @@ def print_figures(table: dict[str, Any]) -> None:
           "in ordinary weather")
     print(f"  a mission held back by a slow upload, ended by a loiter: {table['held_back_max_s']:.1f} s at most")
     print("voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items()))
+
+
+def jump_figures(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return, by class of the false position and by mode, how many touched, and how many of them held in LOITER."""
+    def row(name: str, of: Sequence[dict[str, Any]]) -> dict[str, Any]:
+        return {"class": name, "voyages": len(of), "touched": sum(bool(r["touched_s"]) for r in of),
+                "held_touched": sum(bool(r["held_touched_s"]) for r in of), "arrived": sum(r["arrived"] for r in of)}
+
+    classes = [(kind, [r for r in records if r["kind"] == kind]) for kind in KINDS]
+    classes += [(f"{kind}, {size}", [r for r in records if (r["kind"], r["size"]) == (kind, size)])
+                for kind in KINDS for size in ("to 100 m", "to 500 m", "farther")]
+    classes += [(mode, [r for r in records if r["mode"] == mode]) for mode in MODES]
+    return {
+        "voyages": len(records), "passed": sum(r["passed"] for r in records),
+        "failed_seeds": [r["seed"] for r in records if not r["passed"]],
+        "classes": [row(name, of) for name, of in [*classes, ("all", list(records))] if of],
+        "simulated_s": sum(r["simulated_s"] for r in records)}
+
+
+def print_jumps(table: dict[str, Any]) -> None:
+    """Print the classes of false positions under each other."""
+    print(f"{'false position':<24} voyages  touched  held in LOITER  arrived")
+    for row in table["classes"]:
+        print(f"{row['class']:<24} {row['voyages']:7}  {row['touched']:7}  {row['held_touched']:14}  "
+              f"{row['arrived']:7}")

@@ -28,8 +28,11 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
     parser.add_argument("--keep", type=out_folder, metavar="DIR",
                         help="sail only the first seed and keep its voyage folder")
-    parser.add_argument("--worker", action="store_true",
-                        help="the planner's real process, killed, stopped, out of memory: in real time (a minute each)")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--jumps", dest="trouble", action="store_const", const="jumps", default="all",
+                      help="false positions alone, each sailed again by who only holds her in LOITER")
+    what.add_argument("--worker", dest="trouble", action="store_const", const="worker",
+                      help="the planner's real process, killed, stopped, out of memory: in real time (a minute each)")
     add_draw(parser)
     add_options(parser)
     parser.set_defaults(run=run)
@@ -37,13 +40,13 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.faults import run_faults, sail_seed, sail_worker_seed
+    from sitl.campaigns.faults import SAILORS, run_faults
 
     compile_planners(args.draw)
     if args.keep is not None:
-        record = (sail_worker_seed if args.worker else sail_seed)(args.first_seed, keep=args.keep, draws=args.draw)
+        record = SAILORS[args.trouble](args.first_seed, keep=args.keep, draws=args.draw)
         for key, value in record.items():
             print(f"{key}: {value}")
         return 0 if record["passed"] else 1
     return run_faults(runs=args.runs, first_seed=args.first_seed, means=means_of(args), json_path=args.json,
-                      worker=args.worker, draws=args.draw)
+                      trouble=args.trouble, draws=args.draw)

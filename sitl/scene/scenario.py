@@ -107,6 +107,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     east_m: float = 0.0
     north_m: float = 0.0
     is_resisted: bool = False
+    is_of_one: bool = False      # of two receivers: from now on there is a second, which tells the truth
     order: str = ""
     answer: Literal["done", "refused", "not now", "unknown", "no answer", "expired"] = "done"
     expires_s: float = 3600.0    # of an order from far away

@@ -259,7 +259,8 @@ _BY_KIND: dict[str, _Befall] = {
     "reboot": _at(lambda world, _: world.autopilot.reboot()),
     "gps_jump": _switched(
         lambda world, e: world.autopilot.set_gps(
-            GpsFault(east_m=e.east_m, north_m=e.north_m, is_resisted=e.is_resisted)),
+            GpsFault(east_m=e.east_m, north_m=e.north_m, is_resisted=e.is_resisted, over_s=e.over_s,
+                     is_of_one=e.is_of_one)),
         lambda world: world.autopilot.set_gps(GpsFault())),
     "gps_lost": _switched(
         lambda world, _: world.autopilot.set_gps(GpsFault(is_lost=True)),

@@ -110,6 +110,8 @@ FORGERIES: tuple[Forgery, ...] = (
             build=lambda _: wire.MAVLink_ekf_status_report_message(0, 9.0, 9.0, 9.0, 9.0, 0.0, 0.0)),
     Forgery(message="GPS_RAW_INT", says="no fix", build=lambda k: wire.MAVLink_gps_raw_int_message(
         k.boot_ms * 1000, 0, 0, 0, 0, 9999, 9999, 0, 0, 0)),
+    Forgery(message="GPS2_RAW", says="300 m off", build=lambda k: wire.MAVLink_gps2_raw_message(
+        k.boot_ms * 1000, 3, k.lat_e7 + OFF_E7, k.lon_e7, 0, 121, 200, 0, 65535, 10, 0, 0)),
     Forgery(message="SYS_STATUS", says="battery at 3 %", build=lambda _: wire.MAVLink_sys_status_message(
         0, 0, 0, 0, 9000, 0, 3, 0, 0, 0, 0, 0, 0)),
     Forgery(message="FENCE_STATUS", says="the fence is breached",

@@ -17,6 +17,7 @@ from companion.skipper.step.standing import Standing
 from companion.skipper.step.state import Adrift, Fix, PendingPlan, SkipperState
 from companion.skipper.step.water import in_water
 from companion.skipper.way.gates import Approach
+from companion.skipper.way.integrity import PositionDoubt
 from companion.traffic.vessel import Vessel
 from tests.skipper.world import World, voyage
 
@@ -76,7 +77,8 @@ def test_everything_that_is_remembered_is_where_it_was():
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
     world.run(120)
     state = replace(
-        world.state, rest_en_m=(10.0, 20.0), doubt=Fix(t_s=1.0, en_m=(30.0, 40.0)), searched=((1.0, 2.0), (3.0, 4.0)),
+        world.state, rest_en_m=(10.0, 20.0), searched=((1.0, 2.0), (3.0, 4.0)),
+        doubt=PositionDoubt(since_s=1.0, t_s=1.0, settled_s=1.0, reckoned_en_m=(30.0, 40.0), why="it jumped"),
         adrift=Adrift(places=(Fix(t_s=0.0, en_m=(5.0, 6.0)),), ground_en_mps=(0.5, 0.0)),
         approaches=(Approach(goal=0, en_m=(7.0, 8.0), sweeps=(((0.0, 0.0), (9.0, 9.0)),)),),
         standing=Standing(verb=Verb.GOAL, by="crew", name="there", en_m=(100.0, 200.0)))
@@ -88,13 +90,12 @@ def test_everything_that_is_remembered_is_where_it_was():
         (state.rest_en_m, out.rest_en_m), (state.last_seen.en_m, out.last_seen.en_m),
         (state.standing.en_m, out.standing.en_m), (state.approaches[0].en_m, out.approaches[0].en_m),
         (state.approaches[0].sweeps[0][1], out.approaches[0].sweeps[0][1]), (state.searched[1], out.searched[1]),
+        (state.doubt.reckoned_en_m, out.doubt.reckoned_en_m),
         (state.adrift.places[0].en_m, out.adrift.places[0].en_m), (state.history[1][1:3], out.history[1][1:3]),
         *zip(state.route.points_en_m, out.route.points_en_m, strict=True),
         *zip(state.route.leg_from_en_m, out.route.leg_from_en_m, strict=True),
     ]:
         assert math.dist(shift.point(old), new) < 1e-9
-    # A jump is a way and no place: as long as it was.
-    assert math.hypot(*out.doubt.en_m) == pytest.approx(50.0, abs=1e-6)
     assert math.hypot(*out.adrift.ground_en_mps) == pytest.approx(0.5)
     assert [h[0::3] for h in out.history] == [h[0::3] for h in state.history]
     assert out.route.items == state.route.items

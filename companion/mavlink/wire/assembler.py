@@ -39,7 +39,7 @@ KNOWS_TIME_S = 1_577_836_800.0    # 2020: an autopilot that has no time yet tell
 # What tells of the status; an autopilot sends as many kinds again that tell nothing here.
 _TELLING = frozenset({
     "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "NAV_CONTROLLER_OUTPUT", "EKF_STATUS_REPORT", "GPS_RAW_INT",
-    "SYS_STATUS", "RC_CHANNELS", "SERVO_OUTPUT_RAW", "HOME_POSITION", "SYSTEM_TIME", "NAMED_VALUE_FLOAT",
+    "GPS2_RAW", "SYS_STATUS", "RC_CHANNELS", "SERVO_OUTPUT_RAW", "HOME_POSITION", "SYSTEM_TIME", "NAMED_VALUE_FLOAT",
     "FENCE_STATUS",
 })
 _APPARENT = ("AppWndSpd", "AppWndDir")
@@ -87,6 +87,7 @@ class VehicleAssembler:
         self._apparent_ms = -1
         self._nav_s: float | None = None
         self._fence_s: float | None = None
+        self._gps2_s: float | None = None
         self._fence_told = (False, -1)
         self._leak_told: bool | None = None
         self._leak_s: float | None = None
@@ -230,7 +231,10 @@ class VehicleAssembler:
         if kind == "EKF_STATUS_REPORT":
             return {"ekf_ok": codec.ekf_ok(message)}
         if kind == "GPS_RAW_INT":
-            return {"gps_fix": int(message.fix_type)}
+            return {"gps_fix": int(message.fix_type), "gps": codec.fix(message)}
+        if kind == "GPS2_RAW":
+            self._gps2_s = t_s
+            return {"gps2": codec.fix(message)}
         if kind == "SYS_STATUS":
             volts, remaining = message.voltage_battery, message.battery_remaining
             return {
@@ -271,6 +275,9 @@ class VehicleAssembler:
         if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
             self._fence_s = None
             old |= {"fence_on": False, "fence_breached": None, "fence_breaches": None}
+        if self._gps2_s is not None and t_s - self._gps2_s > QUIET_S:
+            self._gps2_s = None
+            old |= {"gps2": None}
         if self._leak_s is not None and t_s - self._leak_s > QUIET_S:
             self._leak_s = self._leak_told = None
             old |= {"leaks": None}

@@ -166,6 +166,11 @@ def ekf_ok(message: Message) -> bool:
     return message.flags & _EKF_NEEDED == _EKF_NEEDED and not message.flags & _EKF_FORBIDDEN
 
 
+def fix(message: Message) -> GeoPoint | None:
+    """Return where GPS_RAW_INT or GPS2_RAW has the receiver, None without a fix in three dimensions."""
+    return geo_point(message.lat, message.lon) if message.fix_type >= wire.GPS_FIX_TYPE_3D_FIX else None
+
+
 def has_failed(message: Message, sensor: int) -> bool | None:
     """Return whether SYS_STATUS calls a sensor that is switched on ill, None when it is not there or off."""
     if not message.onboard_control_sensors_enabled & sensor:

@@ -45,6 +45,7 @@ DEFAULT_STREAMS = (
     Stream("MISSION_CURRENT", 1.0, 5.0, is_vital=True),
     Stream("EKF_STATUS_REPORT", 1.0, 5.0, is_vital=True),
     Stream("GPS_RAW_INT", 1.0, 5.0, is_vital=True),
+    Stream("GPS2_RAW", 1.0, 5.0),
     Stream("SYS_STATUS", 0.5, 10.0, is_vital=True),
     Stream("SYSTEM_TIME", 0.5, 10.0),
     Stream("FENCE_STATUS", 1.0, 10.0),

@@ -46,7 +46,7 @@ HAIR_M = 0.5
 # ---------------------------------------------------------------------------------------- seen
 def follow_ground(turn: Turn) -> None:
     """Keep the mean velocity over ground, and the places of the last minute of a boat that hardly moves."""
-    vehicle, boat, memory = turn.snapshot.vehicle, turn.boat_en, turn.state.adrift
+    vehicle, boat, memory = turn.snapshot.vehicle, turn.reckoned_en, turn.state.adrift
     if vehicle is None or boat is None:
         turn.update(adrift=replace(memory, ground_en_mps=None, places=()))
         return
@@ -108,7 +108,7 @@ def _goes_away(boat: PointEn, place: PointEn, ground: tuple[float, float]) -> bo
 
 def drift(turn: Turn) -> DriftAhead | None:
     """Return where the boat drifts, None when she sails, lies still, or it cannot be told."""
-    ground, wind, boat = over_ground(turn), turn.wind_now, turn.boat_en
+    ground, wind, boat = over_ground(turn), turn.wind_now, turn.reckoned_en
     if ground is None or wind is None or boat is None:
         return None
     if not (wind[1] < STEERAGE_MPS or _is_carried(turn, boat, ground)):
@@ -242,7 +242,7 @@ def is_cramped(turn: Turn) -> bool:
 
     Who lies in irons beside a wall is better helped by her way on, which was planned clear of it.
     """
-    wind, boat = turn.wind_now, turn.boat_en
+    wind, boat = turn.wind_now, turn.reckoned_en
     if wind is None or boat is None or wind[1] < LIGHT_MPS:
         return False
     return float(water_at(turn.voyage.area, boat).clearance_m([boat])[0]) < turn.config.loiter_radius_m
@@ -256,7 +256,7 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
     what = "becalmed" if turn.is_raised("becalmed") else "adrift"
     how = "lying still" if ahead is None else ahead.sentence()
     if status.mode is Mode.LOITER and state.own_mode is Mode.LOITER:
-        place = memory.loiter_en_m if memory.loiter_en_m is not None else turn.boat_en
+        place = memory.loiter_en_m if memory.loiter_en_m is not None else turn.reckoned_en
         turn.update(adrift=replace(memory, loitered=True, loiter_en_m=place))
         turn.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until she can sail")
         return True

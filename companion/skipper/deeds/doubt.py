@@ -1,9 +1,13 @@
-"""A position that jumped: the boat is where it says, or where it was and has sailed on from. What is safe at both?
+"""A position in doubt: what is safe where it says that the boat is, and where she was and has sailed on from?
 
-The autopilot takes the new position and sails by it. A jump back to where dead reckoning has the boat ends the doubt at
-once. Until then, where the other place is not clear ahead, the boat loiters: ArduRover's LOITER turns in circles of
-12 m about a point, and where on earth that is does not matter to it, while HOLD would drift. That the new place is not
-clear, either, is no reason against it: nobody sails inside a rock, and what jumps is false more often than true.
+The autopilot takes a new position and sails by it, true or not. Until there is evidence (``companion.skipper.way
+.integrity``) nothing is planned from it, and where the reckoned place is not clear ahead the boat loiters: ArduRover's
+LOITER turns in circles of 12 m about a point, and where on earth that is does not matter to it, while HOLD drifts. That
+the new place is not clear, either, is no reason against it: nobody sails inside a rock, and what jumps is false more
+often than true.
+
+Once held she stays held until the position is believed. A jump moves the point of a LOITER that is sailed already, and
+she would make for it over whatever lies between: then she is put into HOLD and into LOITER again, which begins here.
 """
 
 from __future__ import annotations
@@ -11,81 +15,235 @@ from __future__ import annotations
 import math
 
 from companion.messages import Mode
+from companion.skipper.deeds.adrift import stops_drift
 from companion.skipper.deeds.helm import is_busy, set_mode
+from companion.skipper.planning.waits import utc_s
 from companion.skipper.step.actions import Severity
-from companion.skipper.step.causes import CRITICAL
-from companion.skipper.step.state import Fix, Phase
-from companion.skipper.step.turn import JUMP_M, Turn
+from companion.skipper.step.causes import CRITICAL, HOMEWARD
+from companion.skipper.step.saved import SavedPlace
+from companion.skipper.step.state import Phase
+from companion.skipper.step.turn import FRESH_S, JUMP_M, Turn
+from companion.skipper.way.integrity import (
+    DISPUTED_S,
+    ERROR_M,
+    LASTS_S,
+    LOST_ERRS_MPS,
+    LOST_S,
+    Evidence,
+    PositionDoubt,
+    is_impossible,
+)
 from companion.skipper.way.voyage import PointEn
 
-BACK_M = 15.0         # a jump back misses dead reckoning by no more than this, over the seconds in between
-MEMORY_S = 300.0      # a jump back after this is a new jump
-AHEAD_S = 20.0        # what the boat sails while the doubt lasts
-LOITER_M = 12.0       # measured: how far it gets from the point
-STAND_OFF_S = 90.0    # longer than this a position is believed, whatever lies at the other place
+AHEAD_S = 20.0        # what the boat sails until a LOITER that is asked for now has her, and some more
 SLOW_MPS = 1.0
+GLITCH_S = 3.0        # a position that is back sooner has done no harm
+SAVE_S = 30.0         # between two places that are saved
+STRAYS_M = 25.0       # what a boat in LOITER or HOLD is off her place when she is found again
+LEAST_REACH_M = 30.0  # a start finds her so near to where she was, whatever the clocks say
+UNKNOWN_S = 120.0     # how long a start has taken when no clock tells
+BEATEN_MPS = 10.0     # the wind in which she may have sailed meanwhile
+CODE = "position doubted"
 
 
+# --------------------------------------------------------------------------------------------- seen
 def follow(turn: Turn) -> None:
-    """Add up the jumps; notice that the position is back where dead reckoning has it."""
-    state, here, vehicle = turn.state, turn.snapshot.position_en_m, turn.snapshot.vehicle
-    if state.doubt is not None and turn.t_s - state.doubt.t_s > MEMORY_S:
-        turn.update(doubt=None)
-    last, age = state.last_seen, turn.snapshot.vehicle_age_s
-    if here is None or vehicle is None or last is None or age is None or turn.jump_m < JUMP_M:
+    """Begin a doubt of the position, reckon on from where the boat was, and end it when there is evidence."""
+    state, here, vehicle, age = (
+        turn.state, turn.snapshot.position_en_m, turn.snapshot.vehicle, turn.snapshot.vehicle_age_s)
+    if here is None or vehicle is None or age is None or age > FRESH_S:
         return
-    elapsed_s = turn.t_s - age - last.t_s
-    before = (0.0, 0.0) if state.doubt is None else state.doubt.en_m
-    east = before[0] + here[0] - last.en_m[0] - vehicle.velocity_en_mps[0] * elapsed_s
-    north = before[1] + here[1] - last.en_m[1] - vehicle.velocity_en_mps[1] * elapsed_s
-    if state.doubt is not None and math.hypot(east, north) < BACK_M:
-        turn.update(doubt=None, back_s=turn.t_s, raised=tuple(r for r in state.raised if r.name != "position jump"))
-        turn.say(Severity.NOTICE, "position back", "the position is back where it was reckoned: believed", every_s=0.0)
-    else:
-        turn.update(doubt=Fix(t_s=turn.t_s, en_m=(east, north)))
+    _follow_filter(turn)
+    seen = _evidence(turn, here, turn.t_s - age)
+    doubt = _begun(turn, seen) if state.doubt is None else state.doubt.after(seen)
+    turn.update(restored=None if doubt is not None or utc_s(turn) is not None else turn.state.restored)
+    if doubt is None:
+        _remember(turn, here, None)
+        return
+    if seen.is_jump and state.own_mode is Mode.LOITER and turn.autopilot is not None and (
+        turn.autopilot.mode is Mode.LOITER
+    ):
+        turn.update(anew=Mode.HOLD)
+    why = "" if state.doubt is None else doubt.believed_for(seen)
+    if why:
+        turn.update(doubt=None, back_s=turn.t_s,
+                    raised=tuple(r for r in state.raised if r.name != "position jump"))
+        code = "position back" if doubt.is_back(here) else "position believed"
+        turn.say(Severity.NOTICE, code, f"the position is believed again: {why}", every_s=0.0)
+        _remember(turn, here, None)
+        return
+    if state.doubt is None and not seen.is_jump:   # of a jump the watchdog speaks
+        turn.say(Severity.WARNING, CODE, f"the position is doubted: {doubt.why}; reckoned on from where she was",
+                 every_s=0.0)
+    turn.update(doubt=doubt)
+    _remember(turn, here, doubt)
 
 
-def other_place(turn: Turn) -> PointEn | None:
-    """Return where the boat is if the position has jumped wrongly, None without a doubt."""
-    here, doubt = turn.snapshot.position_en_m, turn.state.doubt
-    return None if here is None or doubt is None else (here[0] - doubt.en_m[0], here[1] - doubt.en_m[1])
+def _evidence(turn: Turn, here: PointEn, at_s: float) -> Evidence:
+    """Return what this step shows of the position."""
+    state, vehicle, status, solid = turn.state, turn.snapshot.vehicle, turn.autopilot, turn.voyage.area.unfenced
+    jumped = turn.jump_m >= JUMP_M
+    velocity = (0.0, 0.0) if vehicle is None else vehicle.velocity_en_mps
+    told = status.gps2 if status is not None else None
+    second = None if told is None else turn.voyage.frame.en_from_geo(told)
+    if state.doubt is None:   # nothing of the rest matters
+        return Evidence(t_s=at_s, en_m=here, velocity_en_mps=velocity, is_jump=jumped, second_en_m=second)
+    place = state.doubt.reckoned_en_m
+    room_m, other_m = (float(room) for room in solid.clearance_m([here, place]))
+    return Evidence(
+        t_s=at_s, en_m=here, velocity_en_mps=velocity, is_jump=jumped, is_possible=room_m > -ERROR_M,
+        is_well=status is None or (status.ekf_ok and status.system_status != CRITICAL),
+        is_other_possible=other_m > -(ERROR_M + state.doubt.error_m), room_m=min(room_m, other_m), second_en_m=second,
+        is_given=state.given_back_s >= state.doubt.since_s)
 
 
+def _begun(turn: Turn, seen: Evidence) -> PositionDoubt | None:
+    """Return the doubt that this step begins, None: the position is believed."""
+    state, last = turn.state, turn.state.last_seen
+    lost_s = 0.0 if state.lost_s is None else turn.t_s - state.lost_s
+    lost_m = ERROR_M + LOST_ERRS_MPS * lost_s if lost_s >= LOST_S else 0.0
+    if seen.is_jump and last is not None:
+        begun = PositionDoubt(since_s=turn.t_s, t_s=last.t_s, settled_s=seen.t_s, reckoned_en_m=last.en_m,
+                              lost_m=lost_m, why=f"it jumped {turn.jump_m:.0f} m")
+        return begun.after(seen)
+    if seen.is_contradicted and seen.second_en_m is not None:
+        disputed_s = state.disputed_s if state.disputed_s is not None else turn.t_s
+        turn.update(disputed_s=disputed_s)
+        if turn.t_s - disputed_s >= DISPUTED_S:
+            off_m = math.dist(seen.second_en_m, seen.en_m)
+            return PositionDoubt(since_s=turn.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=seen.second_en_m,
+                                 farthest_m=off_m, is_dispute=True,
+                                 why=f"a second receiver is {off_m:.0f} m away from it")
+    elif state.disputed_s is not None:
+        turn.update(disputed_s=None)
+    if state.restored is not None:
+        begun_anew = _since_the_last_start(turn, state.restored, seen)
+        if begun_anew is not None:
+            return begun_anew
+    if is_impossible(turn.voyage.area, seen.en_m, margin_m=turn.config.margin_m):
+        deep_m = -float(turn.voyage.area.unfenced.clearance_m([seen.en_m])[0])
+        name = turn.voyage.area.nearest_name(seen.en_m) or "an obstacle"
+        return PositionDoubt(since_s=turn.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=seen.en_m,
+                             error_m=deep_m + turn.config.margin_m, why=f"it is {deep_m:.0f} m inside {name}")
+    return None
+
+
+def _since_the_last_start(turn: Turn, before: SavedPlace, seen: Evidence) -> PositionDoubt | None:
+    """Return the doubt of a fix that is not where the boat can have come to since it was saved, or was in doubt."""
+    now_s, saved = utc_s(turn), turn.state.adoptable
+    passed_s = UNKNOWN_S if now_s is None else max(0.0, now_s - before.utc_s)
+    is_held = saved is not None and saved.own_mode in {Mode.LOITER, Mode.HOLD}
+    fastest_mps = turn.voyage.boat.polar.max_speed_mps(BEATEN_MPS) + turn.snapshot.current.drift_mps + SLOW_MPS
+    reach_m = before.error_m + (min(STRAYS_M, fastest_mps * passed_s) if is_held else fastest_mps * passed_s)
+    off_m = math.dist(before.en_m, seen.en_m)
+    was_doubted = before.farthest_m > 0.0 and passed_s < LASTS_S
+    if not was_doubted and (now_s is None or off_m <= reach_m + LEAST_REACH_M):
+        return None
+    text = "in doubt before this start" if was_doubted else (
+        f"{off_m:.0f} m from where she was {passed_s:.0f} s ago")
+    doubt = PositionDoubt(
+        since_s=turn.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=before.en_m, error_m=reach_m,
+        farthest_m=max(before.farthest_m, off_m), why=f"it is {text}")
+    return None if doubt.is_back(seen.en_m) else doubt
+
+
+def _follow_filter(turn: Turn) -> None:
+    """Notice since when the filter has had no position; that is forgotten when a fix has come without a jump."""
+    status = turn.autopilot
+    if status is None or status.ekf_ok:
+        if turn.jump_m < JUMP_M and turn.state.lost_s is not None and turn.state.doubt is None:
+            turn.update(lost_s=None)
+    elif turn.state.lost_s is None:
+        turn.update(lost_s=turn.t_s)
+
+
+def _remember(turn: Turn, here: PointEn, doubt: PositionDoubt | None) -> None:
+    """Keep for who comes after a kill where the boat is, every ``SAVE_S`` and when a doubt begins or ends."""
+    now_s, before = utc_s(turn), turn.state.place
+    if now_s is None or not turn.state.sailing:
+        return
+    is_same = before is not None and (before.farthest_m > 0.0) == (doubt is not None)
+    if is_same and before is not None and before.utc_s // SAVE_S == now_s // SAVE_S:
+        return
+    en_m = here if doubt is None else doubt.reckoned_en_m
+    turn.update(place=SavedPlace(
+        utc_s=round(now_s, 1), en_m=(round(en_m[0], 1), round(en_m[1], 1)),
+        error_m=0.0 if doubt is None else round(doubt.error_m, 1),
+        farthest_m=0.0 if doubt is None else max(JUMP_M, round(doubt.farthest_m, 1))))
+
+
+# --------------------------------------------------------------------------------------------- held
 def is_other_shut(turn: Turn) -> bool:
-    """Return whether, from the other place, the boat would soon come too near to something as it is steered now."""
-    place, here, leg, vehicle = other_place(turn), turn.snapshot.position_en_m, turn.leg(), turn.snapshot.vehicle
-    if place is None or here is None or leg is None or vehicle is None:
+    """Return whether, from the reckoned place, the boat would soon come too near to something as it is steered now."""
+    doubt, here, leg, vehicle = turn.state.doubt, turn.snapshot.position_en_m, turn.leg(), turn.snapshot.vehicle
+    if doubt is None or here is None or vehicle is None:
         return False
-    way = (leg[1][0] - here[0], leg[1][1] - here[1])
+    place = doubt.reckoned_en_m
+    way = (0.0, 0.0) if leg is None else (leg[1][0] - here[0], leg[1][1] - here[1])
     left_m = math.hypot(*way)
     share = min(1.0, AHEAD_S * max(vehicle.speed_mps, SLOW_MPS) / left_m) if left_m > 0.0 else 0.0
     drift = (AHEAD_S * vehicle.velocity_en_mps[0], AHEAD_S * vehicle.velocity_en_mps[1])
-    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
+    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m) + doubt.error_m
     return min(
         turn.voyage.area.path_clearance_m([place, (place[0] + d[0], place[1] + d[1])])
         for d in ((share * way[0], share * way[1]), drift)) < floor_m
 
 
+def _is_steered_falsely(turn: Turn) -> bool:
+    """Return whether the autopilot has steered for a while by a place where no boat can be: inside something."""
+    here, doubt = turn.snapshot.position_en_m, turn.state.doubt
+    if here is None or doubt is None or turn.t_s - doubt.since_s < GLITCH_S:
+        return False
+    return float(turn.voyage.area.unfenced.clearance_m([here])[0]) < -ERROR_M
+
+
 def stands_off(turn: Turn) -> bool:
-    """Loiter while the position is in doubt and the other place is not clear ahead; True while it does."""
-    status, state, here = turn.autopilot, turn.state, turn.snapshot.position_en_m
-    if status is None or here is None or state.doubt is None or not turn.snapshot.permissions.may_set_mode:
+    """Loiter while the position is in doubt and the reckoned place is not clear ahead; True while it does."""
+    status, state = turn.autopilot, turn.state
+    if status is None or not turn.snapshot.permissions.may_set_mode:
         return False
     if not status.ekf_ok or status.system_status == CRITICAL:
         return False   # nor would it loiter then
-    if turn.t_s - state.doubt.t_s > STAND_OFF_S or not is_other_shut(turn):
+    if state.anew is not None:
+        _begin_anew(turn)
+        if turn.state.anew is not None:
+            turn.phase(Phase.HOLDING, "the position jumped, and the loiter's point with it: waiting to loiter anew")
+            return True
+    if state.doubt is None:
         return False
-    room_m = float(turn.voyage.area.clearance_m([here])[0])
-    if 0.0 < room_m < LOITER_M and not turn.is_way_shut:
-        return False   # afloat there she would have no room to loiter, and her way is clear
-    if status.mode is Mode.LOITER and state.own_mode is Mode.LOITER:
-        turn.phase(Phase.HOLDING, "the position jumped and the other place is not clear ahead: waiting in a loiter "
-                   "until it can be believed")
+    is_held = status.mode is state.own_mode and state.own_mode is Mode.LOITER
+    if is_held:
+        stops_drift(turn)   # which the reckoned track tells, too
+        turn.phase(Phase.HOLDING, f"the position is doubted, {state.doubt.why}: waiting in a loiter until it can be "
+                   "believed")
         return True
-    if not turn.is_raised("position jump") or is_busy(turn, Mode.LOITER.name):
+    is_stopped = status.mode is state.own_mode and state.own_mode in {Mode.HOLD, *HOMEWARD}
+    if not (is_stopped or turn.steers or _is_steered_falsely(turn) or is_other_shut(turn)):
         return False
-    if set_mode(turn, Mode.LOITER, "the position jumped and the other place is not clear ahead"):
+    if is_busy(turn, Mode.LOITER.name):
+        return is_stopped
+    if set_mode(turn, Mode.LOITER, "the position is doubted and the reckoned place is not clear ahead"):
         turn.update(after_operator=True)
         turn.say(Severity.WARNING, "standing off",
-                 "the position jumped and the other place is not clear ahead: loitering", every_s=0.0)
+                 f"the position is doubted ({state.doubt.why}) and the reckoned place is not clear ahead: loitering",
+                 every_s=0.0)
     return True
+
+
+def _begin_anew(turn: Turn) -> None:
+    """Begin a LOITER anew whose point has jumped with the position: HOLD, then LOITER, then it is over.
+
+    A position that is believed is planned from meanwhile: with a plan on its way HOLD is left for that.
+    """
+    status, state = turn.autopilot, turn.state
+    shown = None if status is None else status.mode
+    if shown not in {Mode.LOITER, Mode.HOLD} or state.own_mode not in {Mode.LOITER, Mode.HOLD}:
+        turn.update(anew=None)
+    elif state.anew is Mode.HOLD and shown is Mode.LOITER:
+        set_mode(turn, Mode.HOLD, "the position jumped, and the loiter's point with it: loitering anew")
+    elif shown is Mode.LOITER or (
+        state.doubt is None and (state.pending_plan is not None or state.pending_upload is not None)
+    ):
+        turn.update(anew=None)
+    elif set_mode(turn, Mode.LOITER, "loitering anew where she is"):
+        turn.update(anew=Mode.LOITER)

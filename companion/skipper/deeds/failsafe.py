@@ -91,7 +91,7 @@ def _was_sailed(turn: Turn, before: Signs) -> bool:
 def _is_ours(turn: Turn) -> bool:
     """Return whether the mode is one that we asked for."""
     status = turn.autopilot
-    return status is not None and status.is_armed and status.mode is turn.state.own_mode
+    return status is not None and status.is_armed and turn.is_own(status.mode)
 
 
 def _sticks(signs: Signs, status: AutopilotStatus, limits: AutopilotLimits, t_s: float) -> Signs:

@@ -48,7 +48,7 @@ def start(turn: Turn) -> None:
         return
     wants = []
     if turn.boat_en is None:
-        wants.append("a position")
+        wants.append("a position" + (f" that can be believed: {state.doubt.why}" if state.doubt is not None else ""))
     if turn.autopilot is not None and not turn.autopilot.ekf_ok:
         wants.append("the autopilot's position filter (EKF)")
     wind = snapshot.wind

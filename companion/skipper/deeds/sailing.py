@@ -48,10 +48,14 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     """Act for one step under way."""
     bound = errand(turn)
     if bound is None and (turn.gate is None or turn.state.over):
-        if not (turn.state.over and stops_drift(turn)):
+        if not (stands_off(turn) or (turn.state.over and stops_drift(turn))):
             rest(turn)
         return
-    if stands_off(turn) or stops_drift(turn) or brakes(turn):
+    if stands_off(turn):
+        if turn.state.doubt is None and turn.state.pending_upload is None:
+            _consider(turn, fresh)   # from where she is known to be, while her loiter is begun anew
+        return
+    if stops_drift(turn) or brakes(turn):
         return
     stopped = turn.state.own_mode in STOPPING
     if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:

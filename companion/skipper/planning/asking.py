@@ -24,6 +24,7 @@ from companion.skipper.step.state import PendingPlan
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
+from companion.skipper.way.integrity import is_impossible
 from companion.skipper.way.judge import half_width_rad
 from companion.skipper.way.stemming import waiting_place
 
@@ -109,7 +110,7 @@ def _failing(turn: Turn) -> dict[str, Any]:
 
 def _start(turn: Turn, from_index: int | None) -> Start | None:
     boat, vehicle, route = turn.boat_en, turn.snapshot.vehicle, turn.state.route
-    if boat is None or vehicle is None:
+    if boat is None or vehicle is None or is_impossible(turn.voyage.area, boat, margin_m=turn.config.margin_m):
         return None
     if from_index is None:
         # Stopped, or turning in circles, she is where she is.
@@ -140,7 +141,8 @@ def lacks(turn: Turn, from_index: int | None = None) -> str:
     if turn.snapshot.wind.forecast is None:
         return "a wind forecast"
     if _start(turn, from_index) is None:
-        return "a position to plan from"
+        doubt = turn.state.doubt
+        return "a position to plan from" + (f": {doubt.why}" if doubt is not None else "")
     if _target(turn, from_index) is None:
         return "a goal: none is left"
     return ""

@@ -162,7 +162,7 @@ def _no_go(turn: Turn) -> Trigger | None:
 
 def _position(turn: Turn) -> Trigger | None:
     """The boat is not where the plan has it, or is nowhere on it."""
-    if turn.is_raised("position jump"):   # with a position all the same: see Turn.is_way_shut
+    if turn.state.doubt is not None:   # with a position all the same: see Turn.plans_in_doubt
         return Trigger(reason=ReplanReason.OFF_LEG, text="the position jumped, and the way from there is not clear",
                        interval_s=turn.config.no_go_replan_interval_s, urgent=True)
     if turn.is_raised("off the corridor"):

@@ -59,7 +59,7 @@ SHORE = "shore link"
 
 TABLE: tuple[Cause, ...] = (
     Cause(name="position", texts=("EKF variance", "EKF failsafe"), shown="HEARTBEAT critical with the filter ill",
-          answer=Answer.SAIL_ON, waits_for="the filter well again, a position that can be believed",
+          answer=Answer.SAIL_ON, waits_for="the filter well again, evidence for the position; meanwhile LOITER",
           press="MANUAL to take her; AUTO when the position is back",
           why="ArduRover holds when its filter loses the position, and never goes back by itself"),
     Cause(name="crash", texts=("Crash:",), shown="", answer=Answer.LEAVE,

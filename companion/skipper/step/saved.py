@@ -30,6 +30,19 @@ _DEFAULTS: dict[str, Any] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SavedPlace:
+    """Where the boat was at ``utc_s``, by the autopilot's clock: as it was believed, or reckoned while it was not.
+
+    ``farthest_m``: how far off that place the doubted position was at the most; 0: it was believed.
+    """
+
+    utc_s: float
+    en_m: tuple[float, float]
+    error_m: float = 0.0
+    farthest_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Persisted:
     """What survives a kill: written whenever it changes, before the actions of the step are carried out.
 
@@ -58,6 +71,7 @@ class Persisted:
     searched: tuple[tuple[float, float], ...] = ()   # the track of the search that is next
     covered: tuple[tuple[int, float], ...] = ()      # goals searched, and the share that was seen
     tacks: tuple[int, int] = (0, 0)    # tried, and of these failed
+    place: SavedPlace | None = None    # where she was
     water: GeoPoint | None = None      # the origin of all metres here; None: the mission's
 
     @property
@@ -82,7 +96,7 @@ class Persisted:
             "standing": _standing_to_dict(self.standing), "skipped": self.skipped,
             "set_sail_utc_s": self.set_sail_utc_s, "inside": None if self.inside is None else list(self.inside),
             "searched": [list(p) for p in self.searched], "covered": [list(c) for c in self.covered],
-            "tacks": list(self.tacks),
+            "tacks": list(self.tacks), "place": _place_to_list(self.place),
             **({} if self.water is None else {"water": [self.water.lat_deg, self.water.lon_deg]}),
         }
 
@@ -114,12 +128,23 @@ class Persisted:
                     _whole(data["inside"][0], 0, MAX_GOALS), _number(data["inside"][1])),
                 searched=tuple((_number(e), _number(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
                 covered=tuple((_whole(g, 0, MAX_GOALS), _number(s)) for g, s in data.get("covered", ())[:MAX_GOALS]),
-                tacks=_tacks(data.get("tacks", (0, 0))),
+                tacks=_tacks(data.get("tacks", (0, 0))), place=_place_from_list(data.get("place")),
                 water=None if data.get("water") is None else GeoPoint(
                     lat_deg=_number(data["water"][0]), lon_deg=_number(data["water"][1])),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
+
+
+def _place_to_list(place: SavedPlace | None) -> list[float] | None:
+    return None if place is None else [place.utc_s, *place.en_m, place.error_m, place.farthest_m]
+
+
+def _place_from_list(data: Any) -> SavedPlace | None:
+    if data is None:
+        return None
+    utc_s, east, north, error_m, farthest_m = (_number(value) for value in data)
+    return SavedPlace(utc_s=utc_s, en_m=(east, north), error_m=abs(error_m), farthest_m=abs(farthest_m))
 
 
 def _approach_to_list(approach: Approach) -> list[Any]:

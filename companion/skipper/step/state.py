@@ -14,10 +14,11 @@ from companion.messages import MissionItem, Mode
 from companion.orders import Answer, Order, Verb
 from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.route import Route
-from companion.skipper.step.saved import Persisted
+from companion.skipper.step.saved import Persisted, SavedPlace
 from companion.skipper.step.standing import Standing
 from companion.skipper.step.tacking import NO_TACKS, Tacking
 from companion.skipper.way.gates import Approach
+from companion.skipper.way.integrity import PositionDoubt
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Assessment
 from companion.traffic.encounters import Held
@@ -67,7 +68,7 @@ class PendingUpload:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fix:
-    """A position, or how far one has jumped, and when."""
+    """A position, and when."""
 
     t_s: float
     en_m: PointEn
@@ -258,8 +259,14 @@ class SkipperState:
     history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
     last_seen: Fix | None = None        # the last position
     boot_s: float | None = None
-    doubt: Fix | None = None            # the sum of the position's jumps, and the last one's time
-    back_s: float = float("-inf")      # when it was back where it was reckoned: this step's jump is none
+    doubt: PositionDoubt | None = None  # the position is not believed (``deeds.doubt``)
+    back_s: float = float("-inf")      # when it was believed again: this step's jump is none
+    lost_s: float | None = None        # since when the autopilot's filter has had no position
+    given_back_s: float = float("-inf")  # when a person last gave her back
+    disputed_s: float | None = None    # since when two receivers have said different things
+    anew: Mode | None = None           # a LOITER whose point jumped with the position is begun anew: what shows next
+    place: SavedPlace | None = None    # where she is believed or reckoned to be, for who comes after a kill
+    restored: SavedPlace | None = None  # where she was before this start, until the first fix is held against it
     signs: Signs = Signs()
     battery_critical: bool = False     # by the autopilot's own limit (BATT_CRT_VOLT, BATT_CRT_MAH)
     charge: Charge | None = None
@@ -321,5 +328,5 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         standing=standing_saved(state), skipped=state.skipped, set_sail_utc_s=state.set_sail_utc_s,
         inside=None if state.inside is None or state.inside.utc_s is None else (state.inside.goal, state.inside.utc_s),
         searched=state.searched[:-1], covered=state.covered,   # the last point moves with her
-        tacks=(state.tacking.tried, state.tacking.failed),
+        tacks=(state.tacking.tried, state.tacking.failed), place=state.place,
     )

@@ -180,9 +180,23 @@ class Turn:
         age = self.snapshot.vehicle_age_s
         if self.snapshot.vehicle is None or age is None or age > FRESH_S:
             return None
-        if (self.is_raised("position jump") or self.jump_m >= JUMP_M) and not self.is_way_shut:
-            return None
-        return self.snapshot.position_en_m
+        is_doubted = self.state.doubt is not None or self.jump_m >= JUMP_M
+        return None if is_doubted and not self.plans_in_doubt else self.snapshot.position_en_m
+
+    @property
+    def reckoned_en(self) -> PointEn | None:
+        """Where the boat is, reckoned on from the last place that was believed while the position is not."""
+        doubt = self.state.doubt
+        return self.boat_en if doubt is None else doubt.reckoned_en_m
+
+    @property
+    def plans_in_doubt(self) -> bool:
+        """Whether a plan is made from a position that is not believed: where she cannot be kept in a LOITER instead.
+
+        Sailed by the autopilot, on a way that is shut, a plan that is clear from where it believes to be is better.
+        """
+        is_held = self.state.own_mode in STOPPING and self.snapshot.permissions.may_set_mode
+        return not is_held and self.is_way_shut
 
     @property
     def is_way_shut(self) -> bool:
@@ -303,7 +317,14 @@ class Turn:
             return False
         if status.is_armed and self.is_leaving:
             return False
-        return not status.is_armed or status.mode not in {None, Mode.AUTO, Mode.INITIALISING, self.state.own_mode}
+        if status.mode in {None, Mode.AUTO, Mode.INITIALISING} or self.is_own(status.mode):
+            return not status.is_armed
+        return True
+
+    def is_own(self, mode: Mode | None) -> bool:
+        """Return whether a mode is one that we asked for; a LOITER that is begun anew passes through HOLD."""
+        own = self.state.own_mode
+        return mode is own or (self.state.anew is not None and {mode, own} <= {Mode.LOITER, Mode.HOLD})
 
     @property
     def is_given_up(self) -> bool:

@@ -13,7 +13,7 @@ from companion.skipper.planning.autopilot_beats import beaten_within_m
 from companion.skipper.planning.errands import Kind, errand, is_composed
 from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.snapshot import WindHealth
-from companion.skipper.step.turn import Turn
+from companion.skipper.step.turn import JUMP_M, Turn
 from companion.skipper.step.wind_limits import too_light, too_strong
 from companion.skipper.watch.watchdogs import BY_NAME
 from companion.skipper.way.geometry import along_m, cross_track_m, distance_m
@@ -42,7 +42,9 @@ def _position_lost(turn: Turn) -> float | None:
 
 
 def _jump(turn: Turn) -> float | None:
-    return turn.jump_m if turn.snapshot.position_en_m is not None else None
+    if turn.snapshot.position_en_m is None:
+        return None
+    return turn.jump_m if turn.state.doubt is None else max(turn.jump_m, JUMP_M)   # it lasts as long as the doubt
 
 
 def _wind(turn: Turn) -> float | None:

@@ -21,6 +21,7 @@ class Response(enum.Enum):
     SAY = "say so"
     FREEZE = "no actions until it clears; what is on the autopilot sails on"
     NO_BOAT_PLANS = "no plan from the boat's position until it clears, unless the way from there is shut"
+    DOUBT = "no plan from it, LOITER where the reckoned place is not clear ahead, until there is evidence for it"
     NO_WIND_PLANS = "no new plan because of the wind; the plan in place stays"
     WAIT_FOR_WIND = "no plans, no complaint about progress; LOITER where she drifts; plan again when the wind is back"
     STOP_DRIFT = "say where to and when, each minute; motor if there is one, LOITER if she can stem it, else the anchor"
@@ -62,9 +63,10 @@ TABLE: tuple[Watchdog, ...] = (
       why="nothing can be asked of an autopilot that is not heard; it sails its mission to the safe end alone"),
     W(name="position lost", watches="time since the last position", enter=5.0, exit=2.0, unit="s", enter_s=0.0,
       exit_s=2.0, severity=S.ERROR, response=Response.NO_BOAT_PLANS, at_rest=True, why="a plan needs a start"),
-    W(name="position jump", watches="distance of a fix from where the boat is reckoned", enter=JUMP_M, exit=5.0,
-      unit="m", enter_s=0.0, exit_s=20.0, severity=S.WARNING, response=Response.NO_BOAT_PLANS, at_rest=True,
-      why="a GPS jump may put the start into an obstacle; the plan on the autopilot does not depend on us"),
+    W(name="position jump", watches="distance of a fix from where the boat is reckoned; stays while it is doubted",
+      enter=JUMP_M, exit=5.0, unit="m", enter_s=0.0, exit_s=20.0, severity=S.WARNING, response=Response.DOUBT,
+      at_rest=True,
+      why="a GPS jump may put the start into an obstacle, and the autopilot sails by it, true or not"),
     W(name="wind untrusted", watches="the wind room's verdict (frozen, mirrored, spiking, silent vane)", enter=1.0,
       exit=0.5, unit="", enter_s=5.0, exit_s=30.0, severity=S.WARNING, response=Response.NO_WIND_PLANS, at_rest=True,
       why="a plan made for a wind that is not there is worse than an old one"),

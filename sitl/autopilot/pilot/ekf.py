@@ -28,6 +28,7 @@ class Ekf:
         self._fault = GpsFault()
         self._fault_s = -math.inf
         self.has_acted = False
+        self.has_second = False    # another receiver, whose truth the filter does not take
 
     @property
     def gps_lost(self) -> bool:
@@ -37,11 +38,23 @@ class Ekf:
     @property
     def is_watching(self) -> bool:
         """Whether something is due soon."""
-        return self.has_acted or self._fault.is_lost or self._is_resisting
+        return self.has_acted or self._fault.is_lost or self._is_resisting or self._is_growing
 
     @property
     def _is_resisting(self) -> bool:
         return self._fault.is_resisted and self._core.t_s - self._fault_s < JUMP_OVER_S + 1.0
+
+    @property
+    def _is_growing(self) -> bool:
+        return 0.0 < self._fault.over_s >= self._core.t_s - self._fault_s - 1.0
+
+    @property
+    def velocity_error_en_mps(self) -> tuple[float, float]:
+        """What is wrong with the velocity that is told [m/s]: how fast an offset grows."""
+        fault = self._fault
+        if 0.0 < fault.over_s >= self._core.t_s - self._fault_s and not fault.is_resisted:
+            return fault.east_m / fault.over_s, fault.north_m / fault.over_s
+        return 0.0, 0.0
 
     @property
     def is_ready(self) -> bool:
@@ -51,11 +64,14 @@ class Ekf:
     def set_gps(self, fault: GpsFault) -> None:
         """Break or mend the position."""
         self._fault, self._fault_s = fault, self._core.t_s
+        self.has_second = self.has_second or fault.is_of_one
         if not fault.is_resisted:
             self._take_position()
 
     def _take_position(self) -> None:
-        self._core.vehicle.set_position_error(self._fault.east_m, self._fault.north_m)
+        fault = self._fault
+        share = 1.0 if fault.over_s <= 0.0 else min(1.0, (self._core.t_s - self._fault_s) / fault.over_s)
+        self._core.vehicle.set_position_error(share * fault.east_m, share * fault.north_m)
 
     @property
     def flags(self) -> int:
@@ -74,6 +90,8 @@ class Ekf:
         """Look at the filter."""
         core, age_s = self._core, self._core.t_s - self._fault_s
         bad = self._fault.is_lost and age_s >= LOST_FAILSAFE_S - 1e-9
+        if self._is_growing and not self._fault.is_resisted:
+            self._take_position()
         if self._fault.is_resisted:
             if age_s >= JUMP_TAKEN_S - 1e-9:
                 self._take_position()

@@ -63,44 +63,56 @@ def _attitude(p: Pilot) -> Any:
     return mav.MAVLink_attitude_message(p.core.boot_ms, p.core.roll_rad, 0.0, heading_rad, 0.0, 0.0, rate_radps)
 
 
+def _velocity_en_mps(p: Pilot) -> tuple[float, float]:
+    """Return the velocity over ground as the filter believes it."""
+    (east, north), s = p.ekf.velocity_error_en_mps, p.core.vehicle.state
+    return float(s[k.S_VE]) + east, float(s[k.S_VN]) + north
+
+
 def _global_position(p: Pilot) -> Any:
-    s = p.core.vehicle.state
+    east, north = _velocity_en_mps(p)
     heading = round(math.degrees(wrap_two_pi(p.core.vehicle.heading)) * 100) % 36000
     lat, lon = p.core.latlon_e7 if p.core.has_origin else (0, 0)
     return mav.MAVLink_global_position_int_message(
-        p.core.boot_ms, lat, lon, 0, 0, round(float(s[k.S_VN]) * 100), round(float(s[k.S_VE]) * 100), 0, heading
+        p.core.boot_ms, lat, lon, 0, 0, round(north * 100), round(east * 100), 0, heading
     )
 
 
 def _local_position(p: Pilot) -> Any:
     if not p.core.has_origin:
         return None
-    s = p.core.vehicle.state
-    (east, north), (east_0, north_0) = p.core.vehicle.position, p.core.origin_en
+    (ve, vn), (east, north), (east_0, north_0) = _velocity_en_mps(p), p.core.vehicle.position, p.core.origin_en
     return mav.MAVLink_local_position_ned_message(
-        p.core.boot_ms, north - north_0, east - east_0, 0.0, float(s[k.S_VN]), float(s[k.S_VE]), 0.0
+        p.core.boot_ms, north - north_0, east - east_0, 0.0, vn, ve, 0.0
     )
 
 
 def _vfr_hud(p: Pilot) -> Any:
-    s = p.core.vehicle.state
-    speed = math.hypot(float(s[k.S_VE]), float(s[k.S_VN]))
+    speed = math.hypot(*_velocity_en_mps(p))
     heading = int(math.degrees(wrap_two_pi(p.core.vehicle.heading)))
     return mav.MAVLink_vfr_hud_message(speed, speed, heading, 0, 0.0, 0.0)
 
 
 def _gps(p: Pilot) -> Any:
-    s = p.core.vehicle.state
     if p.core.boot_s < 9.95 or p.ekf.gps_lost:
         return mav.MAVLink_gps_raw_int_message(
             p.core.boot_us, 0 if p.core.boot_s < 9.95 else 1, 0, 0, 0, 65535, 65535, 0, 0, 0, 0, 0, 0, 0, 0, 0
         )
-    speed = math.hypot(float(s[k.S_VE]), float(s[k.S_VN]))
-    course = round(math.degrees(wrap_two_pi(math.atan2(float(s[k.S_VE]), float(s[k.S_VN])))) * 100) % 36000
+    east, north = _velocity_en_mps(p)
+    speed = math.hypot(east, north)
+    course = round(math.degrees(wrap_two_pi(math.atan2(east, north))) * 100) % 36000
     lat, lon = p.core.latlon_e7
     return mav.MAVLink_gps_raw_int_message(
         p.core.boot_us, 6, lat, lon, 0, 121, 200, round(speed * 100), course, 10, 0, 300, 300, 0, 0, 0
     )
+
+
+def _gps2(p: Pilot) -> Any:
+    if not p.ekf.has_second or p.core.boot_s < 9.95:
+        return None
+    lat, lon = p.core.chart.to_e7(p.core.vehicle.true_position)
+    return mav.MAVLink_gps2_raw_message(
+        p.core.boot_us, 6, lat, lon, 0, 121, 200, 0, 65535, 10, 0, 0, 0, 0, 300, 300, 0, 0)
 
 
 def _system_time(p: Pilot) -> Any:
@@ -109,7 +121,10 @@ def _system_time(p: Pilot) -> Any:
 
 
 def _wind(p: Pilot) -> Any:
-    twd, tws = p.core.vehicle.true_wind
+    (twd, tws), (east, north) = p.core.vehicle.true_wind, p.ekf.velocity_error_en_mps
+    if (east, north) != (0.0, 0.0):   # it is the apparent wind less the velocity that is believed
+        east, north = tws * math.sin(twd) - east, tws * math.cos(twd) - north
+        twd, tws = wrap_two_pi(math.atan2(east, north)), math.hypot(east, north)
     return mav.MAVLink_wind_message(math.degrees(twd), tws, 0.0)
 
 
@@ -283,6 +298,7 @@ BUILDERS: dict[int, Callable[[Pilot], Any]] = {
     mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position,
     mav.MAVLINK_MSG_ID_VFR_HUD: _vfr_hud,
     mav.MAVLINK_MSG_ID_GPS_RAW_INT: _gps,
+    mav.MAVLINK_MSG_ID_GPS2_RAW: _gps2,
     mav.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
     mav.MAVLINK_MSG_ID_WIND: _wind,
     mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: _nav,

@@ -343,3 +343,21 @@ def test_what_tells_a_failsafe_from_a_person_reaches_the_status():
     assert (once.fence_breached, once.fence_breaches) == (False, None)   # one alone may be forged
     twice = last(assembler, breach)
     assert (twice.fence_breached, twice.fence_breaches) == (True, 3)
+
+
+def test_each_receiver_says_where_it_is_and_one_that_falls_silent_is_forgotten():
+    def second(fix_type):
+        return heard(wire.MAVLink_gps2_raw_message(
+            0, fix_type, 511_000_000, -13_000_000, 0, 121, 200, 0, 65535, 10, 0, 0))
+
+    assembler = VehicleAssembler()
+    assembler.take(0.0, heard(wire.MAVLink_heartbeat_message(11, 3, 65, 10, 4, 3)))
+    assert assembler.status is not None
+    assert assembler.status.gps2 is None
+    assembler.take(1.0, second(3))
+    assert assembler.status.gps2 == GeoPoint(lat_deg=51.1, lon_deg=-1.3)
+    assembler.take(2.0, second(1))
+    assert assembler.status.gps2 is None
+    assembler.take(3.0, second(6))
+    assembler.take(9.0, heard(wire.MAVLink_heartbeat_message(11, 3, 65, 10, 4, 3)))
+    assert assembler.status.gps2 is None

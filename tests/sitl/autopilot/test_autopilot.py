@@ -681,3 +681,32 @@ def test_an_unread_port_does_not_grow() -> None:
     autopilot.step(300.0)
     assert len(autopilot.take_outgoing(0)) <= 65536
     assert autopilot.links[0].dropped_bytes > 0
+
+
+def test_a_forger_s_offset_grows_and_the_velocity_that_is_told_has_it_in_it() -> None:
+    async def job(c: Client) -> None:
+        c.autopilot.set_gps(GpsFault(north_m=60.0, over_s=30.0))
+        await asyncio.sleep(10.0)
+        assert c.autopilot.core.vehicle.position[1] == pytest.approx(20.0, abs=1.0)
+        assert c.last("GLOBAL_POSITION_INT").vx == pytest.approx(200, abs=10)
+        assert c.autopilot.truth.north_m == pytest.approx(0.0, abs=1.0)
+        await asyncio.sleep(30.0)
+        assert c.autopilot.core.vehicle.position[1] == pytest.approx(60.0, abs=1.0)
+        assert c.last("GLOBAL_POSITION_INT").vx == pytest.approx(0, abs=10)
+
+    sail(job, is_moored=True)
+
+
+def test_of_two_receivers_the_other_tells_the_truth() -> None:
+    async def job(c: Client) -> None:
+        from tests.sitl.boats import en
+
+        c.rate(mav.MAVLINK_MSG_ID_GPS2_RAW, 1.0)
+        await asyncio.sleep(3.0)
+        assert not c.of("GPS2_RAW")
+        c.autopilot.set_gps(GpsFault(north_m=200.0, is_of_one=True))
+        await asyncio.sleep(3.0)
+        assert en(c.last("GPS_RAW_INT").lat, c.last("GPS_RAW_INT").lon)[1] == pytest.approx(200.0, abs=1.0)
+        assert en(c.last("GPS2_RAW").lat, c.last("GPS2_RAW").lon)[1] == pytest.approx(0.0, abs=1.0)
+
+    sail(job, is_moored=True)

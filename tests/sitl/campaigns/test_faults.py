@@ -1,5 +1,6 @@
 """Faults drawn from a seed: repeatable, of every kind, and judged by a judge that can say no."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +14,8 @@ from companion.messages import GeoPoint, Mode
 from sitl.autopilot import EPOCH_S
 from sitl.campaigns.fault_draw import draw
 from sitl.campaigns.fault_watch import EXCUSES, REACTION_S, RESUME_S, Watch, mission_key, operator_spans
-from sitl.campaigns.faults import BASE, run_faults, sail_faults, sail_seed
+from sitl.campaigns.faults import BASE, jump_figures, run_faults, sail_faults, sail_seed
+from sitl.campaigns.jump_draw import CREEPS_MPS, KINDS, LONG_S, MODES, NEAR_M, SHORT_S, draw_jump
 from sitl.means import Means
 from sitl.scene.scenario import EventSpec, load_scenario
 from sitl.trouble.forgeries import forgery_named
@@ -89,6 +91,36 @@ def test_a_voyage_with_faults_repeats_exactly(seed, tmp_path):
     assert first["passed"], first
     for name in ("telemetry.tlog", "track.csv"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def jumps(seeds, base):
+    return [draw_jump(seed, base, start_en=(0.0, 0.0), goal_en=(0.0, 170.0), solids_en=((10.0, 90.0),))
+            for seed in seeds]
+
+
+def test_false_positions_are_drawn_of_every_kind_and_mode_and_within_their_bounds():
+    base = load_scenario(BASE)
+    drawn = jumps(range(200), base)
+    assert drawn[:5] == jumps(range(5), base)
+    assert {(d.kind, d.mode) for d in drawn} == {(kind, mode) for kind in KINDS for mode in MODES}
+    for d in drawn:
+        jump = next(e for e in d.scenario.events if e.kind == "gps_jump" and e.for_s is not None)
+        assert SHORT_S <= d.for_s <= LONG_S
+        assert math.hypot(jump.east_m, jump.north_m) == pytest.approx(d.size_m, abs=NEAR_M)
+        assert jump.at_s + d.for_s < d.scenario.limit_s
+        if d.kind == "creeping":
+            assert CREEPS_MPS[0] - 0.1 < d.size_m / jump.over_s < CREEPS_MPS[1] + 0.1
+    assert {d.size_class for d in drawn} == {"to 100 m", "to 500 m", "farther"}
+
+
+def test_a_false_position_that_only_ours_touched_by_is_a_fault_of_its_class():
+    plain = {"kind": "followed", "mode": "by plan", "size": "to 100 m", "arrived": True, "simulated_s": 1.0}
+    table = jump_figures([
+        {**plain, "seed": 0, "passed": False, "touched_s": [80.0], "held_touched_s": []},
+        {**plain, "seed": 5, "passed": True, "touched_s": [], "held_touched_s": [90.0]}])
+    assert table["failed_seeds"] == [0]
+    assert {(r["class"], r["touched"], r["held_touched"]) for r in table["classes"]} == {
+        (name, 1, 1) for name in ("followed", "followed, to 100 m", "by plan", "all")}
 
 
 # What the campaign found: a mission written one by one over a bad link (233), sails set on a position that had just

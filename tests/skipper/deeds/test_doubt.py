@@ -11,6 +11,7 @@ from companion.skipper.step import actions as act
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from tests.skipper.test_voyage import GOAL, is_done, make, said
+from tests.skipper.world import FRAME, restarted
 
 
 def raised(world):
@@ -106,3 +107,137 @@ def test_without_permission_it_does_not_touch_the_mode():
     lie(world)
     world.run(10)
     assert world.mode is Mode.AUTO
+
+
+UTC_S = 1_780_000_000.0
+
+
+def land(world):
+    """Lie a place in the middle of an island: nothing that could be sailed from."""
+    rock = min(world.skipper.voyage.area.polygons, key=lambda p: -p.distance(shapely.Point(world.position)))
+    place = rock.representative_point()
+    world.position_offset = (place.x - world.position[0], place.y - world.position[1])
+    assert world.skipper.voyage.area.clearance_m([(place.x, place.y)])[0] < -15.0
+
+
+def asked(world, since):
+    return [a for _, a in world.actions[since:] if isinstance(a, (act.RequestPlan, act.UploadMission, act.SetMode))]
+
+
+def on_land(**changes):
+    """Return a world that loiters since its position has jumped onto an island."""
+    world = make(**changes)
+    assert world.run(600, is_near_an_island)
+    land(world)
+    assert world.run(6, lambda w: w.mode is Mode.LOITER)
+    return world
+
+
+def test_a_place_inside_an_island_is_never_planned_from_and_a_safe_loiter_not_left_for_it():
+    """A jump of 500 m for a minute: led 140 m into free water, AUTO at 137 s and ashore at 162."""
+    world = on_land()
+    since = len(world.actions)
+    world.run(400)
+    assert not asked(world, since)
+    assert world.mode is Mode.LOITER
+    assert "doubted" in world.state.why
+    world.position_offset = (0.0, 0.0)
+    assert world.run(12, lambda w: w.mode is Mode.AUTO)
+    assert world.run(1500, is_done)
+
+
+def test_a_loiter_in_doubt_is_kept_whatever_way_its_circle_goes_just_now():
+    world = make()
+    assert world.run(600, is_near_an_island)
+    lie(world)
+    assert world.run(6, lambda w: w.mode is Mode.LOITER)
+    since = len(world.actions)
+    for n in range(240):
+        world.heading, world.speed = 0.6 * n, 2.0     # as LOITER turns
+        world.step()
+    assert not asked(world, since)
+    assert world.mode is Mode.LOITER
+
+
+def test_a_loiter_whose_point_jumps_with_the_position_is_begun_anew():
+    """Its point is elsewhere on earth then, and she would sail there over whatever lies between."""
+    world = on_land()
+    world.run(10)
+    since = len(world.actions)
+    world.position_offset = (world.position_offset[0] + 70.0, world.position_offset[1])
+    world.run(8)
+    modes = [a.mode for a in asked(world, since)]
+    assert modes == [Mode.HOLD, Mode.LOITER]
+    assert world.mode is Mode.LOITER
+    assert not said(world, "operator")
+
+
+def test_a_start_in_the_middle_of_an_island_is_none():
+    world = make(obstacles=(shapely.box(-100.0, 100.0, 100.0, 300.0),))
+    world.position = (-5.0, 200.0)
+    world.run(60)
+    assert not world.count(act.RequestPlan)
+    assert "inside" in world.state.why
+
+
+def test_a_boat_that_is_set_onto_something_while_she_is_in_doubt_calls_her_crew_by_the_reckoned_track():
+    world = on_land()
+    place = world.skipper.voyage.area.polygons[0]
+    near = shapely.ops.nearest_points(place, shapely.Point(world.position))[0]
+    away = distance_m(world.position, (near.x, near.y))
+    set_en = tuple((b - a) / away * 0.5 for a, b in zip(world.position, (near.x, near.y), strict=True))
+    world.wind, world.current = (lambda t: (0.0, 0.1)), (lambda t: set_en)
+    world.run(90)
+    assert said(world, "anchor")
+
+
+@pytest.mark.parametrize("knows_time", [True, False])
+def test_a_doubt_outlives_the_companion(knows_time):
+    world = on_land(shown={"utc_at_boot_s": UTC_S})
+    world.run(20)
+    if not knows_time:
+        world.shown = {}
+    restarted(world)
+    since = len(world.actions)
+    world.run(120)
+    assert not asked(world, since)
+    assert world.mode is Mode.LOITER
+    world.position_offset = (0.0, 0.0)
+    assert world.run(20, lambda w: w.mode is Mode.AUTO)
+
+
+def test_a_position_that_jumped_while_the_companion_was_dead_is_doubted_by_who_comes_next():
+    world = make(shown={"utc_at_boot_s": UTC_S})
+    assert world.run(600, is_near_an_island)
+    restarted(world)
+    world.position_offset = (400.0, -300.0)
+    assert world.run(10, lambda w: w.state.doubt is not None)
+    assert "s ago" in world.state.doubt.why
+    world.position_offset = (0.0, 0.0)
+    assert world.run(3, lambda w: w.state.doubt is None)
+
+
+def test_an_ordinary_restart_doubts_nothing():
+    world = make(shown={"utc_at_boot_s": UTC_S})
+    for _ in range(5):
+        world.run(37)
+        restarted(world)
+    assert not said(world, "position doubted")
+
+
+def geo(en_m):
+    return FRAME.geo_from_en(*en_m)
+
+
+def test_of_two_receivers_that_differ_the_other_one_may_be_right():
+    world = make()
+    assert world.run(600, is_near_an_island)
+    for n in range(12):     # the one that is sailed by creeps away, slower than a jump is seen by
+        world.shown = {"gps2": geo(world.position)}
+        world.position_offset = (3.0 * n, 0.0)
+        world.step()
+    assert world.state.doubt is not None
+    assert "second receiver" in world.state.doubt.why
+    world.shown = {}       # a forger's, or it has fallen silent: nothing has jumped
+    world.run(3)
+    assert world.state.doubt is None

@@ -339,6 +339,7 @@ def test_sailed_home_straight_she_is_back_in_auto_before_any_plan(mode, shown):
 def test_sailed_home_where_the_way_on_board_is_shut_a_plan_comes_first():
     world = under_way(goals=(Goal(en_m=(0.0, 200.0), radius_m=8.0),), obstacles=(ISLAND,))
     world.position = (0.0, 70.0)   # swept to where the island stands before her
+    world.state = replace(world.state, last_seen=None)   # in time: no jump is meant
     stop(world, Mode.RTL, fence_breached=True)
     before = len(world.actions)
     world.run(2)
@@ -351,6 +352,7 @@ def test_a_loiter_laid_where_she_lies_is_sailed_to_before_she_drifts_onto_what_i
     """It is the plan that she waits for; while another was waited for she drifted onto the rock."""
     world = under_way(obstacles=(box(130, -60, 170, 60),))
     world.position, world.heading, world.speed = (112.0, 0.0), math.pi / 2.0, 0.6
+    world.state = replace(world.state, last_seen=None)   # she has come there by sailing: no jump is meant
     stop(world, battery_failed=True)
     text(world, "Battery 1 is low 10.20V used 0 mAh")
     assert world.run(8, lambda w: w.mode is Mode.AUTO)
@@ -365,10 +367,11 @@ def test_a_loiter_that_cannot_be_sailed_to_any_more_is_laid_anew():
     assert world.run(8, lambda w: w.mode is Mode.AUTO)
     world.position = (195.0, 0.0)   # set behind the island, and held there once more
     world.heading = math.pi / 2.0
+    world.state = replace(world.state, last_seen=None)   # a position that leapt would not be believed
     before = len(world.actions)
     stop(world)
     text(world, "Battery 1 is critical 9.10V used 0 mAh")
-    assert world.run(60, lambda w: w.mode is Mode.AUTO)   # a position that leapt is not believed at once
+    assert world.run(60, lambda w: w.mode is Mode.AUTO)
     assert any(isinstance(a, act.UploadMission) for _, a in world.actions[before:])
 
 
