@@ -232,7 +232,7 @@ def test_a_plan_that_went_stale_says_why_it_is_renewed_and_is_not_sailed():
     world.position, world.track = (0.0, 130.0), []
     world.planner = lambda problem, seed: None
     world.permissions = type(world.permissions)(may_upload=True, may_set_mode=True, may_arm=True)
-    assert world.run(60, lambda w: "next try in" in w.state.why and "o0" in w.state.why)
+    assert world.run(100, lambda w: "next try in" in w.state.why and "o0" in w.state.why)
     world.run(20)
     assert not world.armed
     world.planner = None

@@ -9,11 +9,11 @@
 """
 
 from companion.boat.tracking.band import beat_band_m
-from companion.boat.tracking.error import SHORT_S, are_near_short, stated_error_m
+from companion.boat.tracking.error import SHORT_S, are_near_short, loop_m, stated_error_m
 from companion.boat.tracking.helm import CURVE_NODES, Helm
 from companion.boat.tracking.predict import Predicted, curve_of, drawn_winds, predict
 
 __all__ = [
     "CURVE_NODES", "SHORT_S", "Helm", "Predicted", "are_near_short", "beat_band_m", "curve_of", "drawn_winds",
-    "predict", "stated_error_m",
+    "loop_m", "predict", "stated_error_m",
 ]

@@ -19,6 +19,10 @@ SHORT_S = 4.5
 SPEEDS_MPS = (0.5, 1.2, 2.3, 3.3, 4.4)
 LONG_M = (1.4, 1.4, 1.4, 1.9, 6.6)
 SHORT_M = (2.4, 2.4, 3.1, 6.3, 7.4)
+# ... and the greatest that was sailed where one of them is short, by the best speeds that it was sailed at: a voyage
+# round a row of such corners meets each of them, and the 99 % of one place is no promise for a hundred.
+LOOP_SPEEDS_MPS = (0.5, 1.2, 2.3, 2.95, 3.3, 4.4)
+LOOP_M = (2.7, 2.7, 4.1, 9.6, 10.0, 11.1)
 
 
 def stated_error_m(best_mps: float, *, has_short: bool) -> float:
@@ -28,6 +32,11 @@ def stated_error_m(best_mps: float, *, has_short: bool) -> float:
     """
     table = SHORT_M if has_short else LONG_M
     return float(np.interp(best_mps, SPEEDS_MPS, table)) * max(1.0, best_mps / SPEEDS_MPS[-1])
+
+
+def loop_m(best_mps: float) -> float:
+    """Return how far off her track [m] a loop about the end of a short leg takes a boat of a best speed."""
+    return float(np.interp(best_mps, LOOP_SPEEDS_MPS, LOOP_M)) * max(1.0, best_mps / LOOP_SPEEDS_MPS[-1])
 
 
 def are_near_short(lengths_m: Sequence[float] | NDArray[np.float64], best_mps: float) -> NDArray[np.bool_]:

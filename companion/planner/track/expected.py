@@ -21,6 +21,7 @@ from companion.boat.tracking import (
     Predicted,
     are_near_short,
     drawn_winds,
+    loop_m,
     predict,
     stated_error_m,
 )
@@ -45,7 +46,7 @@ class Expected:
         at_en: Where, and ``leg`` on which leg of the path.
         is_kept: Whether the floor is, everywhere; at a start that is nearer she only comes no nearer.
         lack_m: How far the worst place is below what it needs [m], 0 where none is.
-        error_m: The prediction's own stated error that was taken off there [m].
+        error_m: The prediction's own stated error there, loops left aside [m].
         worst_en: Where that is, and ``near_en`` the place of something solid that it is near to.
         worst_leg: On which leg.
         is_beat: The worst place is on a leg that is left to the autopilot.
@@ -77,15 +78,18 @@ def curve_mps(problem: Problem) -> NDArray[np.float64]:
 
 
 def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray[np.float64],
-             legs: Sequence[Leg] | None = None, *, has_boards: bool = True) -> Expected:
+             legs: Sequence[Leg] | None = None, *, has_boards: bool = True, has_loops: bool = True,
+             part: slice | None = None, sailed_m: float = 0.0) -> Expected:
     """Return what is expected of a path of a problem that has ``tracking``.
 
     Args:
         problem: With its tracking.
         waypoints_en: (n, 2), the start first.
         legs: What the scorer says of the path; None: it is asked.
-        has_boards: Look at the boards of legs that are left to the autopilot, which takes its time. Without, what
-            is expected is no worse, and ``lack_m`` no greater.
+        has_boards: Look at the boards of legs that are left to the autopilot, which takes its time.
+        has_loops: Allow for a loop about the ends of legs that are too short to be followed.
+        part: Of which waypoints, the whole path otherwise: she comes to them along the leg before.
+        sailed_m: Of the first leg, which is as much longer than what is left of it.
 
     """
     tracking = problem.tracking
@@ -97,17 +101,22 @@ def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray
     if legs is None:
         legs = evaluate(problem, path).legs
     beats = tuple(leg.is_beat for leg in legs) if len(legs) == len(path) - 1 else (False,) * (len(path) - 1)
-    asked = problem, path.tobytes(), beats
-    return _beaten(*asked) if has_boards and any(beats) else _sailed(*asked)
+    begin, end, _ = (part or slice(None)).indices(len(path))
+    before = tracking.before_en if begin == 0 else _point(path[begin - 1])
+    seen = _expected(problem, path[begin:end].tobytes(), beats[begin:end - 1], before, has_boards, has_loops,
+                     0.0 if begin else sailed_m)
+    return replace(seen, leg=seen.leg + begin, worst_leg=seen.worst_leg + begin) if begin else seen
 
 
-@lru_cache(maxsize=16)   # by identity: a search's best path is asked for again when the plan is written
-def _sailed(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...]) -> Expected:
-    """Return what is expected of the legs that are sailed."""
+@lru_cache(maxsize=32)   # by identity: a search's best path is asked for again when the plan is written
+def _expected(
+    problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...], before_en: tuple[float, float] | None,
+    has_boards: bool, has_loops: bool, sailed_m: float,
+) -> Expected:
     tracking = problem.tracking
     assert tracking is not None
     path, beats = np.frombuffer(path_bytes).reshape(-1, 2), np.array(is_beat)
-    whole, first = _with_run_up(tracking, path)
+    whole, first = _with_run_up(before_en, path)
     curve = curve_mps(problem)
     heading = None if first else problem.start_heading_rad
     track = predict(whole, tracking.helm, curve_mps=curve, twd_from_rad=problem.wind.twd_from_rad, heading_rad=heading)
@@ -116,9 +125,11 @@ def _sailed(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...]) -> E
     en, leg = track.en_m[mine], np.maximum(leg[mine], 0)
     distance = tracking.distance_m(en)
     best = float(np.max(curve))
-    near = are_near_short(np.hypot(*np.diff(whole, axis=0).T), best)[first:]
-    errors = np.array([stated_error_m(best, has_short=bool(short) or not tracking.is_known) for short in near])
-    error = errors[leg]
+    lengths_m = np.hypot(*np.diff(whole, axis=0).T)
+    lengths_m[first] += sailed_m
+    near = are_near_short(lengths_m, best)[first:]
+    stated_m = stated_error_m(best, has_short=not tracking.is_known)
+    error = np.where(near & has_loops, loop_m(best), stated_m)[leg]
     if not first:
         error = error * np.minimum(1.0, np.hypot(*(en - path[0]).T) / BESIDE_M)   # where she begins is known
     room = distance - error - tracking.reach_m
@@ -130,28 +141,21 @@ def _sailed(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...]) -> E
     judged = np.where(is_beaten, math.inf, room)
     lack = np.where(is_beaten, 0.0, np.maximum(0.0, need - room))
     worst, least = int(np.argmax(lack)), int(np.argmin(judged))
-    return Expected(
+    found = Expected(
         clearance_m=float(judged[least]), at_en=_point(en[least]), leg=int(leg[least]), is_kept=not lack[worst] > 0.0,
-        lack_m=float(lack[worst]), error_m=float(error[worst]), worst_en=_point(en[worst]),
+        lack_m=float(lack[worst]), error_m=min(float(error[worst]), stated_m), worst_en=_point(en[worst]),
         near_en=_nearest(tracking, en[worst]),
         worst_leg=int(leg[worst]))
+    return _with_boards(problem, tracking, whole, first, beats, found) if has_boards and bool(beats.any()) else found
 
 
-@lru_cache(maxsize=8)
-def _beaten(problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...]) -> Expected:
-    """Return what is expected of all legs, those that are left to the autopilot in drawn winds."""
-    tracking = problem.tracking
-    assert tracking is not None
-    whole, first = _with_run_up(tracking, np.frombuffer(path_bytes).reshape(-1, 2))
-    found = _sailed(problem, path_bytes, is_beat)
-    return _with_boards(problem, tracking, whole, first, np.array(is_beat), found)
-
-
-def _with_run_up(tracking: Tracking, path: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+def _with_run_up(
+    before_en: tuple[float, float] | None, path: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], int]:
     """Return the path behind a run-up on the leg before its start, and how many legs that is."""
-    if tracking.before_en is None:
+    if before_en is None:
         return path, 0
-    back = np.asarray(tracking.before_en) - path[0]
+    back = np.asarray(before_en) - path[0]
     length = float(np.hypot(*back))
     if length < 1.0:
         return path, 0

@@ -15,13 +15,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from companion.boat.tracking import SHORT_S
+from companion.geo.angles import wrap_pi
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import PlanStatus
 from companion.planner.problem.evaluate import Evaluation, evaluate
 from companion.planner.problem.sharing import resolved
+from companion.planner.problem.shore import shore_of
 from companion.planner.problem.value import Problem
 from companion.planner.track.expected import Expected, curve_mps, expected
 
@@ -30,11 +33,14 @@ Judge = Callable[[Path], Evaluation]
 """Says of a path whether it is feasible, and how long it takes."""
 
 AT_MOST = 80                # changes to one path: each costs a check and a prediction
-LARGEST = 60                # waypoints: a longer path is looked at as it is
+FOR_AN_ARC = 30             # ... and for each arc of short legs in it
+SLOWEST_MPS = 0.3           # taken for a leg that the polar says nothing of
+AROUND = 2                  # waypoints on either side of a change, where it is judged
 SHORTER_SHARE, SHORTER_S = 0.006, 0.4   # what a waypoint less may cost
 SHORT_SHARE, SHORT_EXTRA_S = 0.03, 2.0  # ... and a leg less that cannot be followed
 PUSH_M = (1.0, 2.5, 5.0)    # a corner is pushed by as much
 AGAIN_S = 0.04              # another search is not begun with less: its water alone takes most of that
+LESS_M = 0.05               # ... where that takes as much of what is lacking, or half of it
 BEAT_MORE_M = 1.0           # of room for a beat whose boards come too near
 MEET_M = 60.0               # legs that meet farther from their corners do not meet
 BEYOND_M = (0.0, 3.0, 6.0)  # an arc's ends, on along the legs around it, before the leg between them is long enough
@@ -89,13 +95,13 @@ def laid(
     effort = effort or Effort(None, None)
     judge = _scorer(problem) if judge is None else judge
     judged = judge(path)
-    seen = expected(problem, path, judged.legs)
-    if len(path) > LARGEST or not judged.is_feasible:
-        return path, seen
-    path, judged, seen = _fewer(problem, judge, path, judged, seen, effort)
-    pushed, seen = _pushed(problem, judge, path, seen, effort)
+    if not judged.is_feasible:
+        return path, expected(problem, path, judged.legs)
+    path, judged = _fewer(problem, judge, path, judged, effort)
+    pushed, seen = _pushed(problem, judge, path, expected(problem, path, judged.legs), effort)
     if pushed is not path:   # a corner that was put into a leg may have made two of it that are too short
-        pushed, _, seen = _fewer(problem, judge, pushed, judge(pushed), seen, effort)
+        pushed, judged = _fewer(problem, judge, pushed, judge(pushed), effort)
+        seen = expected(problem, pushed, judged.legs)
     return pushed, seen
 
 
@@ -105,41 +111,98 @@ def _scorer(problem: Problem) -> Judge:
 
 
 def _fewer(
-    problem: Problem, judge: Judge, path: Path, judged: Evaluation, seen: Expected, effort: Effort,
-) -> tuple[Path, Evaluation, Expected]:
-    """Leave out corners and short legs, the shortest first, while it costs little and brings her nearer to nothing."""
-    tried: set[tuple[int, ...]] = set()
+    problem: Problem, judge: Judge, path: Path, judged: Evaluation, effort: Effort,
+) -> tuple[Path, Evaluation]:
+    """Leave out corners and short legs, the shortest first, while it costs little and brings her nearer to nothing.
+
+    A change is judged where it is made: what has been tried there is not tried again for a change elsewhere.
+    """
+    tried: set[tuple[float, ...]] = set()
     least_m = SHORT_S * float(np.max(curve_mps(problem)))
-    limit_s = judged.time_s * (1.0 + SHORT_SHARE) + SHORT_EXTRA_S
-    count = 0
-    while count < AT_MOST:
-        best: tuple[Path, Evaluation, Expected] | None = None
-        lengths = [math.dist(a, b) for a, b in itertools.pairwise(path)]
+    lengths = _lengths_m(path)
+    arcs = sum(length < least_m and not (n and lengths[n - 1] < least_m) for n, length in enumerate(lengths))
+    limit_s = judged.time_s * (1.0 + SHORT_SHARE) + max(arcs, 1) * SHORT_EXTRA_S
+    count, most = 0, AT_MOST + arcs * FOR_AN_ARC
+    while count < most:
+        best: tuple[float, float, Path, Evaluation] | None = None
+        lengths = _lengths_m(path)
         for n in sorted(range(len(lengths)), key=lengths.__getitem__):
-            is_short = lengths[n] < least_m
-            longer = (*_rounded(path, n, lengths, least_m), *_stretched(path, n, lengths, least_m)) if is_short else ()
-            for option in (*longer, *_without(path, n)):
-                key = tuple(round(10.0 * c) for point in option for c in point)
-                if key in tried or count >= AT_MOST or not effort.has_time(0.0):
-                    continue
-                tried.add(key)
+            allowed_s = limit_s
+            if lengths[n] >= least_m:
+                allowed_s = min(limit_s, judged.time_s * (1.0 + SHORTER_SHARE) + SHORTER_S)
+            for option, was, now in _changes(problem, path, n, least_m, tried):
+                if count >= most or (best is not None and best[0] <= 0.0) or not effort.has_time(0.0):
+                    break
                 count += 1
                 found = judge(option)
-                allowed_s = limit_s if is_short else min(
-                    limit_s, judged.time_s * (1.0 + SHORTER_SHARE) + SHORTER_S)
                 if not found.is_feasible or found.time_s > allowed_s:
                     continue
-                before = seen.lack_m + 1e-9, math.inf
-                then = _better(problem, option, found, before if best is None else min(
-                    before, (best[2].lack_m, best[1].time_s)))
-                if then is not None:
-                    best = option, found, then
+                # without the loops about what is short beside it, which goes later; or with them, where that is less
+                lack_m, with_loops_m = _lacks_m(problem, option, found, now)
+                was_m, was_with_loops_m = _lacks_m(problem, path, judged, was)
+                if lack_m > was_m + 1e-9 and (lengths[n] >= least_m or with_loops_m >= was_with_loops_m):
+                    continue
+                if best is None or (lack_m, found.time_s) < best[:2]:
+                    best = lack_m, found.time_s, option, found
             if best is not None:
                 break
         if best is None:
             break
-        path, judged, seen = best
-    return path, judged, seen
+        _, _, path, judged = best
+    return path, judged
+
+
+def _changes(
+    problem: Problem, path: Path, n: int, least_m: float, tried: set[tuple[float, ...]],
+) -> list[tuple[Path, slice, slice]]:
+    """Return what a path can be changed to about leg n, the fastest first, and ``_changed`` of each.
+
+    Left out is what has been ``tried``, to which it is added, and what collides.
+    """
+    lengths = _lengths_m(path)
+    is_short = lengths[n] < least_m
+    longer = (*_rounded(path, n, lengths, least_m), *_stretched(path, n, lengths, least_m)) if is_short else ()
+    found: list[tuple[float, Path, slice, slice]] = []
+    for option in (*longer, *_without(path, n)):
+        was, now = _changed(path, option)
+        key = tuple(round(10.0 * c) for place in (*path[was], *option[now]) for c in place)
+        if key not in tried and not _collides(problem, option[now]):
+            found.append((_sailed_s(problem, option[now]) - _sailed_s(problem, path[was]), option, was, now))
+        tried.add(key)
+    return [each[1:] for each in sorted(found, key=lambda each: each[0])]
+
+
+def _lacks_m(problem: Problem, path: Path, judged: Evaluation, part: slice) -> tuple[float, float]:
+    """Return what a part of a path lacks of the floor [m]: as if no leg were short, and as they are."""
+    plain, looped = (expected(problem, path, judged.legs, part=part, has_loops=has) for has in (False, True))
+    return plain.lack_m, looped.lack_m
+
+
+def _collides(problem: Problem, path: Path) -> bool:
+    """Return whether a leg of a path collides: most changes do, and the scorer would walk the whole path."""
+    shore = shore_of(problem)
+    return any(shore.hits(shapely.LineString(leg)) for leg in itertools.pairwise(path))
+
+
+def _sailed_s(problem: Problem, path: Path) -> float:
+    """Return how long legs take by the polar alone, not less than drifting [s]: options are tried in this order."""
+    twd = problem.wind.twd_from_rad
+    return sum(
+        math.dist(a, b) / max(problem.boat.speed_mps(wrap_pi(math.atan2(b[0] - a[0], b[1] - a[1]) - twd)), SLOWEST_MPS)
+        for a, b in itertools.pairwise(path))
+
+
+def _changed(path: Path, option: Path) -> tuple[slice, slice]:
+    """Return which waypoints of a path, and which of one that was made of it, a change concerns."""
+    same = min(len(path), len(option))
+    begin = next((n for n in range(same) if path[n] != option[n]), same)
+    end = next((n for n in range(same) if path[-1 - n] != option[-1 - n]), same)
+    begin, end = max(0, begin - AROUND), max(0, end - AROUND)
+    return slice(begin, len(path) - end), slice(begin, len(option) - end)
+
+
+def _lengths_m(path: Path) -> list[float]:
+    return [math.dist(a, b) for a, b in itertools.pairwise(path)]
 
 
 def _pushed(
@@ -156,26 +219,14 @@ def _pushed(
             found = judge(option)
             if not found.is_feasible:
                 continue
-            before = seen.lack_m - 0.05, -math.inf
-            then = _better(problem, option, found, before if best is None else min(before, best[:2]))
-            if then is not None:
+            then = expected(problem, option, found.legs)
+            is_better = then.lack_m < seen.lack_m - min(LESS_M, 0.5 * seen.lack_m)
+            if is_better and (best is None or (then.lack_m, found.time_s) < best[:2]):
                 best = then.lack_m, found.time_s, option, then
         if best is None:
             break
         _, _, path, seen = best
     return path, seen
-
-
-def _better(problem: Problem, path: Path, judged: Evaluation, than: tuple[float, float]) -> Expected | None:
-    """Return what is expected of a path that lacks less than another, or as much and takes less time; None: it is not.
-
-    ``than`` is the other's lack [m] and time [s]. Boards add to what a path lacks: of one that lacks more without them
-    they are not looked at, and they take most of the time.
-    """
-    if not (expected(problem, path, judged.legs, has_boards=False).lack_m, judged.time_s) < than:
-        return None
-    found = expected(problem, path, judged.legs)
-    return found if (found.lack_m, judged.time_s) < than else None
 
 
 def _pushes(problem: Problem, path: Path, seen: Expected) -> Iterator[Path]:

@@ -28,6 +28,7 @@ from companion.skipper.planning.vessels import meetings
 from companion.skipper.step.route import Route
 from companion.skipper.step.state import PendingPlan
 from companion.skipper.step.turn import Turn
+from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.judge import judge
 from companion.skipper.way.voyage import PointEn
 
@@ -45,19 +46,23 @@ def refusal(turn: Turn, route: Route, set_current: int | None, pending: PendingP
     if boat is None or vehicle is None or not turn.state.sailing:
         return ""
     problem: Problem = pending.problem
-    first = turn.state.index if set_current is None else set_current - 1
-    new = [boat, *route.points_en_m[first:-1]]
-    if set_current is not None and pending.from_index is None and not pending.lead_in:
-        new.insert(1, pending.start_en_m)   # where she is by the time that it is on board
-    ahead = turn.ahead()
-    old = [boat, *ahead]
-    seen = of_way(problem, new, heading_rad=vehicle.heading_rad, before_en=None)
-    before = of_way(problem, old, heading_rad=vehicle.heading_rad, before_en=None) if ahead else Expected()
     here_m = float(turn.voyage.area.clearance_m([boat])[0]) - turn.voyage.boat.hull.reach_m
+    is_low = problem.tracking is not None and here_m < problem.tracking.floor_m
+    first, heading_rad, begins = turn.state.index if set_current is None else set_current - 1, vehicle.heading_rad, boat
+    if set_current is not None and pending.from_index is None and not pending.lead_in:
+        # where she is by the time that it is on board
+        begins, heading_rad = pending.start_en_m, problem.start_heading_rad
+    new = [begins, *route.points_en_m[first:-1]]
+    old, ahead, leg = [boat, *turn.ahead()], turn.ahead(), turn.leg()
+    sailed_m = 0.0 if leg is None else distance_m(leg[0], boat)
+    before = Expected() if not ahead else of_way(
+        problem, old, heading_rad=vehicle.heading_rad, before_en=None, sailed_m=sailed_m, has_loops=not is_low)
+    seen = of_way(problem, new, heading_rad=heading_rad, before_en=None, has_loops=not is_low,
+                  sailed_m=sailed_m if set_current is None else 0.0)
     low = _below_floor(problem, seen, before if ahead else None, here_m=here_m)
     if low or not ahead or not is_open(turn, pending, before):
         return low
-    return _less(turn, pending, new, old, heading_rad=vehicle.heading_rad)
+    return _less(turn, pending, new, old, heading_rad=heading_rad)
 
 
 def _below_floor(problem: Problem, new: Expected, old: Expected | None, *, here_m: float) -> str:
@@ -115,7 +120,7 @@ def _less(turn: Turn, pending: PendingPlan, new: list[PointEn], old: list[PointE
     if facts.delta_s < route.delta_s - 1e-9:
         return f"its delta_s is {facts.delta_s:g}, that of the way on board, which is open, {route.delta_s:g}"
     here = replace(resolved(pending.problem), start_en=new[0], start_heading_rad=heading_rad)
-    legs = [evaluate(here, np.asarray(way)).legs for way in (new, old)]
+    legs = [evaluate(replace(here, start_en=way[0]), np.asarray(way)).legs for way in (new, old)]
     tacks = [of_risky(tacks_at_risk(here, each)) for each in legs]
     if tacks[0] > tacks[1] + TACKS_RISK:
         return (f"tacks of it that fail are likelier to end in a contact: {100.0 * tacks[0]:.2g} %, "

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from companion.boat.tracking import SHORT_S
 from companion.planner import Plan, PlanStatus
 from companion.planner.problem import evaluate, resolved
 from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
@@ -83,9 +84,12 @@ def _place(turn: Turn, pending: PendingPlan) -> tuple[int | None, int | None]:
         return 0, 1
     if k is None:
         return state.index, state.index + 1
-    if state.index <= k:
-        return k + 1, None
     boat = turn.boat_en
+    if state.index <= k:
+        if pending.reason in AT_WAYPOINT and boat is not None and (
+                distance_m(boat, state.route.points_en_m[state.index]) < SHORT_S * turn.speed_mps):
+            return None, None   # an upload begins the leg anew, and what is left of it is too short to be followed
+        return k + 1, None
     if state.index == k + 1 and boat is not None and distance_m(boat, pending.start_en_m) < turn.config.grid_size_m:
         return k + 1, k + 2
     return None, None
@@ -113,8 +117,11 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     gain = old.time_s - plan.cost_s
     if not old.is_feasible:
         return False
-    before_en = None if pending.from_index is None else route.leg_from_en_m[pending.from_index]
-    seen = of_way(problem, [pending.start_en_m, *points], heading_rad=problem.start_heading_rad, before_en=before_en)
+    before_en, leg_from_en = None, route.leg_from_en_m[first]
+    if pending.from_index is not None:
+        before_en, leg_from_en = route.leg_from_en_m[pending.from_index], pending.start_en_m
+    seen = of_way(problem, [pending.start_en_m, *points], heading_rad=problem.start_heading_rad, before_en=before_en,
+                  sailed_m=distance_m(leg_from_en, pending.start_en_m))
     if not seen.is_kept or is_riskier(problem, old.legs, plan.legs):
         return False
     if problem.targets:

@@ -15,6 +15,7 @@ from companion.skipper.step.actions import Severity
 from companion.skipper.step.missions import loiter_place
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.step.turn import Turn
+from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.rejudged import too_risky
 from companion.skipper.way.stemming import waiting_place
 
@@ -57,7 +58,8 @@ def _keeps_floor(turn: Turn, pending: PendingPlan) -> bool:
     boat, vehicle, leg, ahead = turn.boat_en, turn.snapshot.vehicle, turn.leg(), turn.ahead()
     if boat is None or vehicle is None or leg is None or not ahead:
         return True
-    return of_way(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad, before_en=None).is_within_error
+    return of_way(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad, before_en=None,
+                  sailed_m=distance_m(leg[0], boat)).is_within_error
 
 
 def _risk_of_old(turn: Turn, pending: PendingPlan) -> str:

@@ -62,14 +62,21 @@ def _is_known(turn: Turn) -> bool:
     return limits is not None and limits.wp_speed_mps is not None
 
 
-def of_way(problem: Problem, way: Sequence[PointEn], *, heading_rad: float, before_en: PointEn | None) -> Expected:
-    """Return what is expected of a way that begins elsewhere than the problem, its beats left aside."""
+def of_way(
+    problem: Problem, way: Sequence[PointEn], *, heading_rad: float, before_en: PointEn | None, sailed_m: float = 0.0,
+    has_loops: bool = True,
+) -> Expected:
+    """Return what is expected of a way that begins elsewhere than the problem, its beats left aside.
+
+    ``before_en``: where the leg begins that ends at its start; or its start is on its first leg, ``sailed_m`` along.
+    ``has_loops``: allow for loops about legs that are too short to be followed.
+    """
     tracking = problem.tracking
     if tracking is None or len(way) < 2:
         return Expected()
     from_here = replace(problem, start_en=way[0], start_heading_rad=heading_rad,
                         tracking=replace(tracking, before_en=before_en))
-    return expected(from_here, np.asarray(way), has_boards=False)
+    return expected(from_here, np.asarray(way), has_boards=False, has_loops=has_loops, sailed_m=sailed_m)
 
 
 def said(clearance_m: float | None, floor_m: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from companion.boat.tracking import SHORT_S
 from companion.geo.angles import difference_rad
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
@@ -24,7 +25,7 @@ from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
 from companion.traffic.plans import MIN_INTERVAL_S
 
-TOO_LATE_S = 2.0             # a plan asked for this shortly before the waypoint cannot be there in time
+TOO_LATE_S = SHORT_S + 2.0   # an upload begins the leg anew: what is left of it then must be long enough to be followed
 BEND_RAD = math.radians(6.0)     # a smaller change of course at a waypoint is not worth a plan of its own ...
 BENDS_RAD = math.radians(25.0)   # a greater one, in all, ends a board
 BEND_PLAN_AGE_S = 60.0           # ... unless the last one is this old

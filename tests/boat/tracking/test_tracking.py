@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from companion.boat.tracking import (
     beat_band_m,
     curve_of,
     drawn_winds,
+    loop_m,
     predict,
     stated_error_m,
 )
@@ -58,6 +61,26 @@ def test_the_stated_error_is_the_99_percent_of_what_ardurover_sailed(sailed, tws
     stated = stated_error_m(float(np.max(curve_mps(tws))), has_short=near_short)
     assert len(off) > 400
     assert 0.4 * stated <= np.quantile(off, 0.99) <= stated
+
+
+def test_no_loop_about_a_short_leg_went_farther_off_than_is_allowed_for(sailed):
+    for tws in WINDS_MPS:
+        allowed = loop_m(float(np.max(curve_mps(tws))))
+        rows = [residuals(t, sailed[t.name]) for t in corners() if t.tws_mps == tws]
+        greatest = max(float(np.max(r.track_m[r.is_short], initial=0.0)) for r in rows)
+        assert 0.9 * allowed <= greatest <= allowed
+
+
+def test_the_loop_onto_a_walls_end_was_farther_off_than_the_99_percent_and_within_what_is_allowed_for():
+    short = json.loads(Path("tests/boat/tracking/short_legs.json").read_text())
+    expected = shapely.LineString(track(short["legs_en_m"], twd=math.radians(20.0)).en_m)
+    off = shapely.distance(expected, shapely.points(short["sailed_en_m"]))
+    best = float(np.max(curve_of(POLAR, 5.0)))
+    assert np.mean(off > stated_error_m(best, has_short=True)) > 0.2
+    assert np.max(off) <= loop_m(best)
+    end = shapely.Point(short["wall_end_en_m"][0])
+    assert shapely.distance(end, expected) > 12.0
+    assert shapely.distance(end, shapely.LineString(short["sailed_en_m"])) < 3.2
 
 
 def test_the_prediction_is_nearer_to_what_was_sailed_than_the_legs_are(sailed):

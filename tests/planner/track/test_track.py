@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,6 +68,43 @@ def test_round_walls_ends_there_and_back_no_leg_is_too_short_to_be_followed(star
     assert min(lengths_m(found)) >= short_m
     assert expected(tracked, found.waypoints_en).is_kept
     assert found.cost_s <= 1.03 * lines.cost_s + 2.0
+
+
+def test_a_slalom_of_thick_walls_is_sailed_in_a_sixth_of_the_legs_all_long_enough():
+    walls = [shapely.box(*((-400.0, y, 9.0, y + 16.0) if n % 2 == 0 else (-9.0, y, 400.0, y + 16.0)))
+             for n, y in enumerate(60.0 + 52.0 * k for k in range(7))]
+    tracked = problem(walls, tws=5.0, goal=(0.0, 480.0))
+    lines = plan(replace(tracked, tracking=None), expansions=8_000, seed=1)
+    found = plan(tracked, expansions=8_000, seed=1)
+    assert len(lengths_m(lines)) > 80
+    assert len(lengths_m(found)) <= len(lengths_m(lines)) / 6
+    assert min(lengths_m(found)) >= SHORT_S * float(np.max(curve_mps(tracked)))
+    assert expected(tracked, found.waypoints_en).is_kept
+    assert found.cost_s <= 1.03 * lines.cost_s
+
+
+def test_legs_in_which_ardurover_looped_onto_a_walls_end_are_no_plan():
+    short = json.loads(Path("tests/boat/tracking/short_legs.json").read_text())
+    ends = np.asarray(short["wall_end_en_m"])
+    back = np.asarray([-1.0, 1.0]) * (ends[0] - ends[1])[::-1] * 4.0      # square to the end
+    wall = shapely.Polygon([*ends, ends[1] + back, ends[0] + back])
+    path = [(float(e), float(n)) for e, n in short["legs_en_m"]]
+    tracked = replace(problem([wall], wind_deg=20.0, tws=5.0), start_en=path[0], goal_en=path[-1])
+    seen = expected(tracked, path)
+    assert shapely.distance(wall, shapely.LineString(path)) > 12.0
+    assert expected(tracked, path, has_loops=False).is_kept
+    assert not seen.is_kept
+    assert seen.clearance_m < shapely.distance(wall, shapely.LineString(short["sailed_en_m"])) < FLOOR_M
+
+
+def test_a_part_of_a_path_is_judged_as_in_the_whole():
+    tracked = problem()
+    path = [(0.0, 0.0), (60.0, 20.0), (60.0, 50.0), (36.0, 75.0), (-60.0, 78.0), (-46.0, 105.0), (60.0, 110.0),
+            (0.0, 190.0)]
+    whole, part = expected(tracked, path), expected(tracked, path, part=slice(1, 6))
+    assert not whole.is_kept
+    assert whole.worst_leg == part.worst_leg
+    assert part.lack_m == pytest.approx(whole.lack_m, abs=0.1)
 
 
 def lengths_m(found):

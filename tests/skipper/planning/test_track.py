@@ -8,12 +8,19 @@ import pytest
 from shapely.geometry import box
 
 from companion.boat import AutopilotLimits
-from companion.planner import Problem
+from companion.boat.tracking import SHORT_S
+from companion.planner import Problem, plan
+from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.statement import Start, problem_dict
 from companion.skipper.planning.track import of_way, problem_tracking, said, steps
+from companion.skipper.step.actions import Announce, ReplanReason
 from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.snapshot import PlanOutcome
+from companion.skipper.way.geometry import moved
 from tests.skipper.planning.test_beating import turn
+from tests.skipper.planning.test_tacks_fail import turn_of
+from tests.skipper.way.test_rejudged import asked, sailing
 
 WALL = box(-4.0, 60.0, 60.0, 61.0)
 
@@ -84,3 +91,28 @@ def _aim():
     (None, ""), (8.44, "; passes 8.4 m clear or more (floor 6 m)")])
 def test_what_is_expected_is_said(clearance, words):
     assert said(clearance, 6.0) == words
+
+
+def test_what_is_left_of_a_leg_is_no_short_leg_while_it_is_sailed():
+    now = turn(WALL)
+    problem = Problem.from_json(problem_dict(
+        now.voyage, now.gates[0], start=Start(en_m=(0.0, 0.0), heading_rad=0.0),
+        aim=_aim(), forecast=now.snapshot.wind.forecast, margin_m=12.0, delta_s=0.9, no_go_half_rad=0.8,
+        tracking={**tracking(now), "known": True}))
+    left = [(-60.0, 44.0), (-54.0, 46.0), (80.0, 46.0)]
+    whole, rest = (of_way(problem, left, heading_rad=1.25, before_en=None, sailed_m=m) for m in (40.0, 0.0))
+    assert whole.is_kept
+    assert not rest.is_kept
+
+
+@pytest.mark.parametrize(("left_s", "is_late"), [(SHORT_S - 0.5, True), (SHORT_S + 0.5, False)])
+def test_no_upload_begins_a_leg_of_which_too_little_is_left_to_be_followed(left_s, is_late):
+    world = sailing(obstacles=())
+    boat, heading, speed = world.position, world.snapshot().vehicle.heading_rad, turn_of(world).speed_mps
+    corner = moved(boat, heading, left_s * speed)
+    route = world.state.route
+    now = turn_of(world, route=replace(route, points_en_m=(corner, *route.points_en_m[1:])))
+    problem = asked(now, ReplanReason.WAYPOINT, from_index=0)
+    take_plan(now, PlanOutcome(request_id=now.state.pending_plan.request_id, plan=plan(problem, expansions=2000)))
+    assert speed > 1.0
+    assert any(isinstance(a, Announce) and a.code == "plan late" for a in now.actions) == is_late
