@@ -84,7 +84,7 @@ def test_when_the_time_is_up_the_best_so_far_is_the_answer(clock):
     assert answer.unproven == ("bound",)
 
 
-def test_without_a_track_and_a_listener_nothing_is_judged_on_the_way(monkeypatch):
+def test_without_a_track_and_a_listener_nothing_is_judged_on_the_way(clock, monkeypatch):
     monkeypatch.setattr(effort.Effort, "listen", lambda *_: pytest.fail("judged"))
     assert plan(load("four-beat-60"), budget_s=0.05).has_path
 
