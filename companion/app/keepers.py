@@ -43,7 +43,7 @@ async def keep_parameters(fold: VoyageFold, autopilot: Autopilot) -> None:
             reboots = autopilot.link.stats.reboots
             asked_s.clear()
         unread = fold.unread
-        for name in RANGES:
+        for name in (*RANGES, *(name for name in unread if name not in RANGES)):
             again_s = PARAMETER_AGAIN_S if name in unread else PARAMETERS_EVERY_S
             if now_s() - asked_s.get(name, -math.inf) >= again_s and autopilot.link.is_alive:
                 asked_s[name] = now_s()

@@ -11,13 +11,16 @@ tell by its covariance, which shrinks when she sails on headings far apart. It i
 vane (there about what is believed), one reading a second.
 
 The current is a departure from what the mission expects (``Prior``), and goes back to it with ``TAU_S`` where nothing
-is heard of it.
+is heard of it. A reading that no likely water explains (``companion.current.motion``) is not taken. Where such go on
+the wind or the water is in doubt: what is believed stays, and a second filter, begun anew, must tell the new water on
+headings apart before it is believed. Not where the wind's direction has leapt before: no water does that.
 """
 
 from __future__ import annotations
 
 import cmath
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -25,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.current.doubt import Doubt
+from companion.current.motion import FAR_APART_RAD, SHOULD_MPS, STANDS_MPS, SWINGS_S, Motion, MotionCheck
 from companion.current.over_water import over_water
 from companion.current.prior import STILL, Expected, Prior
 from companion.current.value import WaterCurrent
@@ -43,7 +47,6 @@ SLOW_S = 36_000.0            # polar, leeway, compass and vane hardly change in 
 ALONG_MPS, ALONG_SHARE = 0.08, 0.06   # noise of a reading along the heading: gusts that the hull has not answered
 ACROSS_MPS, ACROSS_SHARE = 0.06, 0.03
 ALIKE_S = 12.0               # readings this near in time are wrong alike: waves, a gust, the helm
-SWINGS_S = 4.0               # heading and velocity are means over it: waves swing her bow within less
 STEADY_RAD_S = math.radians(6.0)      # faster turns are manoeuvres ...
 SETTLES_S = 6.0              # ... after which, and the means with them, she needs this long to have her speed again
 STEADY_MPS2 = 0.06           # a faster change of speed is none of the polar's
@@ -54,14 +57,17 @@ GATE = 16.0                  # of the innovation squared over its variance, two 
 MISFIT_SAMPLES, MISFIT = 15.0, 0.5   # the mean of that figure: 0.1 at most in a steady current, noise being twelvefold
 FADE_SHARE = 0.02            # of the prior's variance, for each reading while it does not fit
 GATED_S = 60.0               # what does not fit for so long is the new truth
-STANDS_MPS, SHOULD_MPS = 0.15, 0.6    # a boat that stands where she should sail is aground, moored or in irons
+BELIEVED_S = 60.0            # she is held against the water that was believed so long ago: water changes slowly
+NEW_WATER_S = 60.0           # of readings, on headings apart, tell of water that changed as water seldom does ...
+NEW_WATER_MPS, NEW_WATER_SPREADS = 0.5, 3.0   # ... no stronger than so many of this and of the prior's spread
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sailing:
     """One moment of the boat: velocity over ground [m/s], heading, and the wind over the ground.
 
-    ``is_driven``: her sails are sheeted and nothing else drives her; ``age_s``: of the velocity and the heading.
+    ``is_driven``: her sails are sheeted and nothing else drives her; ``age_s``: of the velocity and the heading;
+    ``roll_rad``: positive to starboard, None where it is not told.
     """
 
     t_s: float
@@ -71,6 +77,7 @@ class Sailing:
     tws_mps: float
     is_driven: bool
     age_s: float = 0.0
+    roll_rad: float | None = None
 
 
 class CurrentEstimator:
@@ -79,10 +86,14 @@ class CurrentEstimator:
     Args:
         speed: the boat's polar.
         prior: what the mission expects.
+        checked: readings are held against what water can do; without, all are taken.
     """
 
-    def __init__(self, speed: Speed, prior: Prior = STILL) -> None:
+    def __init__(self, speed: Speed, prior: Prior = STILL, *, checked: bool = True) -> None:
         self._speed, self._prior = speed, prior
+        self._check = MotionCheck() if checked else None
+        self._trial: CurrentEstimator | None = None   # of the water that is there since the doubt began
+        self._believed: deque[tuple[float, tuple[float, float]]] = deque()   # the current, when
         self._x = np.zeros(6)      # departure east, north [m/s]; share k; leeway, compass, vane [rad]
         self._expected: Expected | None = None
         self._p = np.zeros((6, 6))
@@ -106,6 +117,8 @@ class CurrentEstimator:
         last, self._last = self._last, now
         if last is None or not now.is_driven or now.age_s > LATE_S:
             self._unsteady_s, self._means = t_s, None
+            if self._check is not None:
+                self._check.pause()
             return
         dt_s = now.t_s - last.t_s
         if dt_s <= 0.0:
@@ -116,13 +129,77 @@ class CurrentEstimator:
         share = 1.0 - math.exp(-dt_s / SWINGS_S)
         bow, made = was_bow + share * (bow - was_bow), was_made + share * (made - was_made)
         self._means = bow, made
+        is_doubted = self._check is not None and self._is_doubted(t_s, utc_s, now, self._check)
         if abs(difference_rad(cmath.phase(bow), cmath.phase(was_bow))) > STEADY_RAD_S * dt_s:
             self._unsteady_s = t_s
-        if t_s - self._taken_s < 0.9 * EVERY_S or t_s - self._unsteady_s < SETTLES_S:
+        if is_doubted or t_s - self._taken_s < 0.9 * EVERY_S or t_s - self._unsteady_s < SETTLES_S:
             return
         if abs(abs(made) - abs(was_made)) > STEADY_MPS2 * max(0.2, dt_s):
             return
         self._take(t_s, replace(now, heading_rad=cmath.phase(bow), velocity_en_mps=(made.real, made.imag)))
+
+    # ------------------------------------------------------------------------------------------ doubt
+    def _is_doubted(self, t_s: float, utc_s: float | None, now: Sailing, check: MotionCheck) -> bool:
+        """Hold a moment against what is believed; return whether it is not to be learned from."""
+        expected, means = self._expected, self._means
+        assert expected is not None
+        assert means is not None
+        self._believed.append((t_s, (float(expected.east_mps + self._x[0]), float(expected.north_mps + self._x[1]))))
+        while t_s - self._believed[0][0] > BELIEVED_S:
+            self._believed.popleft()
+        current = self._believed[0][1]
+        twa, speed = self._speed_with(now, current, float(self._x[5]))
+        heading_rad, made = cmath.phase(means[0]), means[1]
+        sin, cos = math.sin(heading_rad), math.cos(heading_rad)
+        east, north = made.real - current[0], made.imag - current[1]
+        sigma = math.sqrt(max(0.0, float(np.array([sin, cos]) @ self._p[:2, :2] @ np.array([sin, cos]))))
+        was = check.doubt
+        check.update(t_s, Motion(
+            along_mps=east * sin + north * cos, across_mps=east * cos - north * sin,
+            speed_mps=speed * self.scale, twa_rad=twa, twd_from_rad=now.twd_from_rad, tws_mps=now.tws_mps,
+            heading_rad=heading_rad, sigma_mps=sigma, roll_rad=now.roll_rad))
+        if not check.doubt:
+            self._trial = None
+            return check.is_odd
+        if not check.is_winds:
+            if not was or self._trial is None:
+                self._trial = CurrentEstimator(self._speed, self._prior, checked=False)
+            self._trial.update(t_s, utc_s, now)
+            if self._trial.tells_of_new_water:
+                self._become(self._trial)
+        return True
+
+    @property
+    def tells_of_new_water(self) -> bool:
+        """Whether all that was seen since it was begun is one current that can be, on headings apart."""
+        if self._samples_s < NEW_WATER_S or self._headings_rad() < FAR_APART_RAD or self._misfit > MISFIT:
+            return False
+        assert self._expected is not None
+        most_mps = NEW_WATER_SPREADS * math.hypot(NEW_WATER_MPS, self._expected.sigma_mps)
+        return math.hypot(float(self._x[0]), float(self._x[1])) <= most_mps
+
+    def _become(self, trial: CurrentEstimator) -> None:
+        self._x, self._p, self._misfit, self._seen = trial._x, trial._p, trial._misfit, trial._seen
+        self._samples_s, self._rejected_s, self._taken_s = trial._samples_s, 0.0, trial._taken_s
+        self._trial = None
+        self._believed.clear()
+        if self._check is not None:
+            self._check.settle()
+
+    @property
+    def motion_doubt(self) -> str:
+        """Why wind or water are not believed, in words; empty: they are."""
+        return "" if self._check is None else self._check.doubt
+
+    @property
+    def fits_s(self) -> float:
+        """For how long she has moved as she should since this was begun, or a doubt [s]."""
+        return 0.0 if self._check is None else self._check.fits_s
+
+    @property
+    def doubts_wind(self) -> bool:
+        """Whether the doubt is of the wind sensor."""
+        return self._check is not None and self._check.is_winds
 
     def _predict(self, t_s: float, utc_s: float | None) -> None:
         expected = self._prior.at(utc_s)

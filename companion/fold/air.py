@@ -12,7 +12,7 @@ SETTLED_S = 20.0
 
 # A spiking vane is not among them: its spikes are not fed, and what is left is widened.
 _UNTRUSTED = frozenset({
-    Verdict.FROZEN, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR,
+    Verdict.FROZEN, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR, Verdict.TURNED,
 })
 
 
@@ -21,10 +21,18 @@ class Air:
 
     def __init__(self, room: WindRoom) -> None:
         self.room = room
+        self._begin()
+
+    def _begin(self) -> None:
         self._mean90: Estimator = make("mean90")
         self._mean5: Estimator = make("mean5")
         self._first_s: float | None = None
         self._last_s: float | None = None
+
+    def begin_anew(self) -> None:
+        """Forget all readings: what they were read by has been changed."""
+        self.room.begin_anew()
+        self._begin()
 
     def take(self, value: WindSample | ApparentWind) -> None:
         """Take what an instrument said, in the order of time."""
@@ -35,9 +43,13 @@ class Air:
         self._last_s = sample.t_s
         if self._first_s is None:
             self._first_s = sample.t_s
-        for mean in (self._mean90, self._mean5):
-            mean.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight,
-                        speed_weight=status.speed_weight)
+        self._mean90.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight,
+                            speed_weight=status.speed_weight)
+        # What a turned vane says now the autopilot sails by, and it is what her motion is held against.
+        is_turned = Verdict.TURNED in status.verdicts
+        self._mean5.update(sample.t_s, sample.twd_from_rad, sample.tws_mps,
+                           weight=1.0 if is_turned else status.weight,
+                           speed_weight=1.0 if is_turned else status.speed_weight)
 
     def view(self, t_s: float) -> WindView:
         """Return the wind at ``t_s``."""

@@ -10,15 +10,16 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from companion.current import STILL, CurrentEstimator, Prior, Sailing
+from companion.current import FITS_S, STILL, CurrentEstimator, Prior, Sailing
 from companion.fold.air import Air
-from companion.fold.parameters import ToldParameters
+from companion.fold.parameters import Change, ToldParameters
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
 from companion.mavlink.trust import GAP_S, UID_EVERY_S, Identity, Witness
 from companion.mavlink.wire import (
     AUTOPILOT_COMPONENT,
     Drop,
+    Effect,
     Message,
     VehicleAssembler,
     autopilot_version,
@@ -43,6 +44,7 @@ from companion.skipper.step import (
     MissionOnBoard,
     ModeChanged,
     Outcome,
+    ParameterChanged,
     Permissions,
     Persisted,
     ReadOutcome,
@@ -57,6 +59,8 @@ from companion.wind import WindRoom
 
 # Modes in which the sheets are trimmed to sail; in HOLD they are eased, and by hand nobody knows.
 _SAILS = frozenset({Mode.AUTO, Mode.GUIDED, Mode.LOITER})
+UNTOLD_S = 60.0       # of a boat whose motion does not tell whether the wind that is learned anew is the right one
+_NO_INDEX = 65535      # of a parameter that was set or asked for by its name: one of a list has its place in it
 
 Value = VehicleState | AutopilotStatus | WindSample | ApparentWind | StatusText | AisReport
 Waters = Callable[[GeoPoint], Voyage]
@@ -91,7 +95,10 @@ class VoyageFold:
     ) -> None:
         self._waters = waters
         skipper, persisted = begun(skipper, persisted, waters)
+        self._prior = water
         self.current = CurrentEstimator(skipper.voyage.boat.polar.speed_mps, water)
+        self._anew = ""    # why the wind is learned anew, until it is ...
+        self._anew_s: float | None = None   # ... and since when
         self.skipper, self.permissions = skipper, permissions
         self._air = Air(wind)
         self.state: SkipperState = skipper.initial(persisted, known)
@@ -138,7 +145,8 @@ class VoyageFold:
             elif kind == "MISSION_ITEM_REACHED":
                 self._events.append(WaypointReached(seq=int(message.seq)))
             elif kind == "PARAM_VALUE":
-                self.parameters({message.param_id: float(message.param_value)})
+                self.parameters({message.param_id: float(message.param_value)}, is_set=(
+                    message.param_index == _NO_INDEX and self.state.sailing))
             elif kind == "AUTOPILOT_VERSION":
                 self._uid_s = t_s
                 self._identity = self._identity.told(message.get_srcSystem(), autopilot_version(message).uid)
@@ -181,18 +189,36 @@ class VoyageFold:
         """Take something that happened outside the autopilot's messages: an order of the crew."""
         self._events.append(event)
 
-    def parameters(self, values: Mapping[str, float]) -> None:
+    def parameters(self, values: Mapping[str, float], *, is_set: bool = False) -> None:
         """Take parameters of the autopilot (ArduPilot's names and units).
 
         One that cannot be is said and left out. One that was known and has changed is asked for again, and believed
-        when it is told twice.
+        when it is told twice; so is one that was not known and ``is_set``, it seems. What was learned by another value
+        is forgotten.
         """
-        good, refused = self._parameters.take(values)
+        good, refused, changes = self._parameters.take(values, is_set=is_set)
         for why in refused:
             self._disbelieve(why.split()[0], f"the autopilot's {why}: not used")
         self._identity = self._identity.with_parameters(good)
         if any(name.startswith("WNDVN_") for name in good):
             self._air.room.set_parameters(self._parameters.values)
+        for change in changes:
+            self._changed(change)
+
+    def _changed(self, change: Change) -> None:
+        """Say that a parameter was set, and forget what was learned by another value of it."""
+        before = "a value that was not known" if change.before is None else f"{change.before:g}"
+        text = f"{change.name} was set from {before} to {change.after:g} ({change.effect.value})"
+        learns = ""
+        if change.effect in {Effect.WIND, Effect.HEADING}:
+            self._anew, self._anew_s = text, None
+            self._air.begin_anew()
+            learns = ": wind, current and polar are learned anew"
+        elif change.effect is Effect.BOAT:
+            learns = ": current and polar are learned anew"
+        if learns:
+            self.current = CurrentEstimator(self.skipper.voyage.boat.polar.speed_mps, self._prior)
+        self._events.append(ParameterChanged(name=change.name, text=text + learns))
 
     @property
     def unread(self) -> tuple[str, ...]:
@@ -250,6 +276,7 @@ class VoyageFold:
             self._shore_s = t_s
         wind = self._air.view(t_s)
         self.current.update(t_s, self._utc_s(t_s), self._sailing(t_s, wind))
+        self._air.room.contradict(self.current.motion_doubt if self.current.doubts_wind else "")
         return Snapshot(
             t_s=t_s,
             vehicle=vehicle,
@@ -261,6 +288,7 @@ class VoyageFold:
             wind=wind,
             current=self.current.view(),
             doubt=self.current.doubt(),
+            unsure=self._unsure(t_s, wind),
             mission=self._mission,
             identity=replace(
                 self._identity, vehicle_type=None if autopilot is None else autopilot.vehicle_type,
@@ -276,6 +304,18 @@ class VoyageFold:
             outcomes=tuple(self._outcomes),
         )
 
+    def _unsure(self, t_s: float, wind: WindView) -> str:
+        """Return why neither wind nor water may be planned with now, in words; empty: they may.
+
+        A wind that is learned anew is believed when she has sailed by it as she should, or has not told for long.
+        """
+        if self._anew_s is None:
+            self._anew_s = t_s
+        is_told = self.current.fits_s >= FITS_S or t_s - self._anew_s >= UNTOLD_S
+        if self.current.motion_doubt or (is_told and wind.record_s >= self.skipper.config.wind_settle_s):
+            self._anew = ""
+        return f"{self._anew}: the wind is learned anew" if self._anew else self.current.motion_doubt
+
     def _utc_s(self, t_s: float) -> float | None:
         """Return the Unix time at ``t_s`` by the autopilot's clock, None before it knows the time."""
         status = self._autopilot
@@ -290,11 +330,13 @@ class VoyageFold:
             return None
         is_driven = (
             self.skipper.config.sails and not self.state.adrift.motor and status is not None and status.is_armed
-            and status.mode in _SAILS and wind.health in {WindHealth.GOOD, WindHealth.LIGHT})
+            and status.mode in _SAILS
+            and (wind.health in {WindHealth.GOOD, WindHealth.LIGHT} or self.current.doubts_wind or (
+                self._anew != "" and wind.health is WindHealth.SETTLING)))
         return Sailing(
             t_s=vehicle.t_s, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
             twd_from_rad=wind.present_twd_from_rad,
-            tws_mps=wind.present_tws_mps, is_driven=is_driven, age_s=t_s - vehicle.t_s)
+            tws_mps=wind.present_tws_mps, is_driven=is_driven, age_s=t_s - vehicle.t_s, roll_rad=vehicle.roll_rad)
 
 
 def begun(

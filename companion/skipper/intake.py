@@ -20,6 +20,7 @@ from companion.skipper.step.snapshot import (
     CommandOutcome,
     CommandResult,
     Disbelieved,
+    ParameterChanged,
     PlanOutcome,
     ReadOutcome,
     UploadOutcome,
@@ -113,6 +114,8 @@ def take_events(turn: Turn) -> None:
             note(turn, event)
         elif isinstance(event, Disbelieved):
             turn.say(Severity.WARNING, event.what, event.text, every_s=0.0)
+        elif isinstance(event, ParameterChanged):
+            turn.say(Severity.WARNING, "parameter", event.text, every_s=0.0)
 
 
 def count_time(turn: Turn) -> None:

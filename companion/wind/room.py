@@ -5,6 +5,7 @@ A deterministic fold: the same messages in the same order give the same forecast
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 
@@ -26,7 +27,7 @@ WIND_PREFERRED_S = 10.0   # [s] after a WIND message during which apparent wind 
 _QUALITY = {
     Verdict.TURNING: WindQuality.TURNING, Verdict.CALM: WindQuality.LIGHT, Verdict.HELD: WindQuality.HELD,
     Verdict.FROZEN: WindQuality.SUSPECT, Verdict.SPIKING: WindQuality.SUSPECT, Verdict.MISALIGNED: WindQuality.SUSPECT,
-    Verdict.SYNTHESISED: WindQuality.INVALID,
+    Verdict.TURNED: WindQuality.SUSPECT, Verdict.SYNTHESISED: WindQuality.INVALID,
 }
 
 
@@ -47,9 +48,13 @@ class WindRoom:
     """
 
     def __init__(self, parameters: VaneParameters | None = None, estimator: Estimator | None = None) -> None:
-        self._watch = WindWatch(parameters)
         self._estimator: Estimator = estimator if estimator is not None else Forecaster()
+        self._unused = copy.deepcopy(self._estimator)
         self._vehicle: VehicleState | None = None
+        self._begin(WindWatch(parameters))
+
+    def _begin(self, watch: WindWatch) -> None:
+        self._watch = watch
         self._mean_s: float | None = None
         self._mean_sin = self._mean_cos = 0.0
         self._rough_rad = math.radians(4.0)
@@ -60,6 +65,15 @@ class WindRoom:
     def estimator(self) -> Estimator:
         """The forecaster inside."""
         return self._estimator
+
+    def begin_anew(self) -> None:
+        """Forget all readings: what they were read by has been changed."""
+        self._estimator = copy.deepcopy(self._unused)
+        self._begin(WindWatch(self._watch.parameters))
+
+    def contradict(self, why: str) -> None:
+        """Take why the boat's motion speaks against the sensor; empty: it does not, any more."""
+        self._watch.contradicted = why
 
     def set_parameters(self, parameters: VaneParameters | Mapping[str, float]) -> None:
         """Take the autopilot's WNDVN_ parameters, as read at any time."""

@@ -28,6 +28,7 @@ class Verdict(enum.Enum):
     FROZEN = "frozen"                    # the vane does not move although the boat turns under it
     SPIKING = "spiking"                  # single readings far from their neighbours
     MISALIGNED = "misaligned"            # port and starboard tack disagree: the vane is mounted wrong
+    TURNED = "turned"                    # the direction leapt, and the boat does not sail by it
     RETURNED = "returned"                # readings are back after a gap
     SILENT = "silent"                    # no reading for some time
     HELD = "held"                        # the autopilot repeats an old true wind
@@ -85,6 +86,7 @@ class WindWatch:
 
     def __init__(self, parameters: VaneParameters | None = None) -> None:
         self.parameters = parameters or VaneParameters()
+        self.contradicted = ""    # why the boat's motion speaks against the sensor (``companion.current.motion``)
         self.tacks = TackOffset()
         self._frozen, self._spikes = FrozenVane(), Spikes()
         self._vehicle: VehicleState | None = None
@@ -164,6 +166,10 @@ class WindWatch:
             widening *= 1.5 + min(1.5, frozen_s / 60.0)
             weight = 0.0
         elif self._frozen.is_suspect:
+            weight = 0.0
+        if self.contradicted:
+            found.append((Verdict.TURNED, self.contradicted))
+            widening *= 2.0
             weight = 0.0
         # In a calm a wandering direction is no fault of the vane.
         if self._speed_mps >= 2.0 * LIGHT_MPS and not is_turning and frozen_s == 0.0:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import msgspec
 
 from sitl.campaigns.failsafe_lots import FAILSAFES, unattended
-from sitl.campaigns.fault_lots import LOTS, PLANNER, SINGLE, Lot, Maker
+from sitl.campaigns.fault_lots import LOTS, PLANNER, SINGLE, Lot, Maker, turned_vane
 from sitl.scene import ExpectSpec, Scenario, WindSpec
 
 _MAKERS, _WEIGHTS = zip(*LOTS, *SINGLE, *FAILSAFES, strict=True)
@@ -16,11 +16,18 @@ _ONCE = frozenset(maker for maker, _ in (*SINGLE, *FAILSAFES))
 MODERATE_MPS = 4.0      # in less wind than this the same way takes longer
 UNATTENDED = 0.06       # the share of voyages on which the companion may not set modes
 LATEST_S = 170.0        # for a fault to begin
+TURNS_S = 45.0, 90.0    # when a vane is turned: under way, on a voyage of two minutes
 
 
 def draw(seed: int, base: Scenario) -> Scenario:
     """Return ``base`` with the weather and the faults of ``seed``; its limit grows with what takes long."""
     return drawn_by(random.Random(f"faults {seed}"), base)
+
+
+def draw_turned_vane(seed: int, base: Scenario) -> Scenario:
+    """Return what ``draw`` returns, and a vane that is turned under way, by a lot of its own."""
+    rng = random.Random(f"turned vane {seed}")
+    return befallen(draw(seed, base), [turned_vane(rng, round(rng.uniform(*TURNS_S), 1))])
 
 
 def drawn_by(rng: random.Random, base: Scenario) -> Scenario:

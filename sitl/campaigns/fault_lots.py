@@ -81,6 +81,18 @@ def _vane(rng: random.Random, at_s: float) -> Lot:
     return one(at_s=at_s, kind="vane", state=state, value_deg=round(value, 1), for_s=length(rng, 5.0, 120.0))
 
 
+def turned_vane(rng: random.Random, at_s: float) -> Lot:
+    """Turn the vane on its mast, or let a station write its offset: for good, or until somebody puts it right."""
+    turned_deg = round(rng.choice((-1.0, 1.0)) * rng.choice((90.0, 180.0, rng.uniform(60.0, 180.0))), 1)
+    for_s = rng.choice((None, length(rng, 60.0, 300.0)))
+    if rng.random() < 0.5:
+        return one(at_s=at_s, kind="vane", state="offset", value_deg=turned_deg, for_s=for_s)
+    events = [EventSpec(at_s=at_s, kind="parameter", parameter="WNDVN_DIR_OFS", value=turned_deg)]
+    if for_s is not None:
+        events.append(EventSpec(at_s=round(at_s + for_s, 1), kind="parameter", parameter="WNDVN_DIR_OFS", value=0.0))
+    return Lot(events=tuple(events))
+
+
 def _crooked_vane(rng: random.Random, at_s: float) -> Lot:  # noqa: ARG001 - it was mounted so
     return one(at_s=FIRST_S, kind="vane", state="offset", value_deg=round(rng.uniform(-20.0, 20.0), 1))
 

@@ -28,7 +28,7 @@ from companion.errors import InputError
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode
 from sitl.campaigns.counterfactual import ALERT_S, avoidable, by_hand
-from sitl.campaigns.fault_draw import draw, draw_planner
+from sitl.campaigns.fault_draw import draw, draw_planner, draw_turned_vane
 from sitl.campaigns.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
 from sitl.campaigns.jump_draw import KINDS, MODES, draw_jump
 from sitl.means import Means
@@ -55,6 +55,15 @@ def sail_seed(
     """
     scenario = load_scenario(base)
     return sail_faults(draw(seed, scenario), seed, base, keep, method=method_of(seed, scenario, base, draws))
+
+
+def sail_turned_vane_seed(
+    seed: int, base: Path = BASE, keep: Path | None = None, *, draws: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Sail what ``sail_seed`` sails, with a vane that is turned under way beside it."""
+    scenario = load_scenario(base)
+    return sail_faults(draw_turned_vane(seed, scenario), seed, base, keep,
+                       method=method_of(seed, scenario, base, draws))
 
 
 def sail_worker_seed(
@@ -240,7 +249,7 @@ def told(event: EventSpec) -> str:
 
 
 # What a seed draws its trouble of, and who sails it.
-SAILORS = {"all": sail_seed, "worker": sail_worker_seed, "jumps": sail_jump_seed}
+SAILORS = {"all": sail_seed, "jumps": sail_jump_seed, "turned-vane": sail_turned_vane_seed, "worker": sail_worker_seed}
 
 
 def run_faults(

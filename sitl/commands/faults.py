@@ -31,6 +31,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--jumps", dest="trouble", action="store_const", const="jumps", default="all",
                       help="false positions alone, each sailed again by who only holds her in LOITER")
+    what.add_argument("--turned-vane", dest="trouble", action="store_const", const="turned-vane",
+                      help="beside what is drawn: the vane turned by 60 degrees or more under way, or its offset set")
     what.add_argument("--worker", dest="trouble", action="store_const", const="worker",
                       help="the planner's real process, killed, stopped, out of memory: in real time (a minute each)")
     add_draw(parser)

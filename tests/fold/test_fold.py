@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import socket
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -20,10 +21,11 @@ from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.transports.endpoints import open_link
 from companion.mavlink.wire.frames import Codec
-from companion.mavlink.wire.parameter_ranges import RANGES, believable, refusal
+from companion.mavlink.wire.parameter_ranges import RANGES, believable, effect_of, refusal
+from companion.messages import GeoPoint, VehicleState, WindQuality, WindSample, WindSource
 from companion.skipper import Skipper
 from companion.skipper.step.config import Permissions
-from companion.skipper.step.snapshot import Disbelieved
+from companion.skipper.step.snapshot import Disbelieved, ParameterChanged, WindHealth
 from companion.wind import WindRoom
 from companion.wind.parameters import VaneParameters
 from sitl.autopilot import Autopilot as SimulatedAutopilot
@@ -40,8 +42,8 @@ def fresh():
         Permissions())
 
 
-def told(fold, name, value, *, component=1, t_s=1.0):
-    message = wire.MAVLink_param_value_message(name.encode(), value, 9, 900, 65535)
+def told(fold, name, value, *, component=1, t_s=1.0, index=65535):
+    message = wire.MAVLink_param_value_message(name.encode(), value, 9, 900, index)
     [heard] = Codec(9, 9).feed(Codec(1, component).pack(message))
     fold.message(t_s, heard)
 
@@ -94,6 +96,82 @@ def test_a_change_is_believed_when_it_is_told_twice():
     told(fold, "SAIL_XTRACK_MAX", 100.0)
     told(fold, "SAIL_XTRACK_MAX", 100.0)
     assert fold.tick(3.0).snapshot.limits.sail_xtrack_max_m == 100.0
+
+
+def changed(fold, t_s=2.0):
+    return [e for e in fold.tick(t_s).snapshot.events if isinstance(e, ParameterChanged)]
+
+
+def heard(fold, first_s, last_s, *, twd_rad=0.3):
+    """Let the fold hear a wind and a boat that lies still, once a second; return the last snapshot."""
+    here = GeoPoint(lat_deg=50.817, lon_deg=-1.31)
+    for t in range(first_s, last_s):
+        fold.take(VehicleState(
+            t_s=float(t), boot_s=float(t), position=here, velocity_en_mps=(0.0, 0.0), heading_rad=1.0))
+        fold.take(WindSample(t_s=float(t), twd_from_rad=twd_rad, tws_mps=5.0 + 0.01 * (t % 7),
+                             source=WindSource.AUTOPILOT_TRUE, quality=WindQuality.GOOD))
+        snapshot = fold.tick(float(t)).snapshot
+    return snapshot
+
+
+@pytest.mark.parametrize("name", ["WNDVN_DIR_OFS", "AHRS_ORIENTATION", "COMPASS_ORIENT"])
+def test_a_parameter_that_changes_what_a_sensor_says_is_said_and_the_wind_is_learned_anew(name):
+    fold = fresh()
+    told(fold, name, 0.0)
+    before = heard(fold, 1, 60)
+    assert before.wind.health is WindHealth.GOOD
+    current = fold.current
+    told(fold, name, 4.0)
+    assert not changed(fold, 60.0), "told once"
+    assert name in fold.unread, "asked for again"
+    told(fold, name, 4.0)
+    [event] = changed(fold, 61.0)
+    assert event.text == (
+        f"{name} was set from 0 to 4 ({effect_of(name).value}): wind, current and polar are learned anew")
+    after = heard(fold, 62, 70, twd_rad=1.9)
+    assert name in after.unsure
+    assert after.wind.record_s < 10.0
+    assert after.wind.mean_twd_from_rad == pytest.approx(1.9, abs=0.01), "nothing is left of the wind before"
+    assert fold.current is not current
+    assert not heard(fold, 70, 140, twd_rad=1.9).unsure
+
+
+@pytest.mark.parametrize(
+    ("name", "anew"), [("SERVO1_REVERSED", True), ("SAIL_ANGLE_IDEAL", True), ("SAIL_HEEL_MAX", False)])
+def test_one_that_changes_how_she_answers_leaves_the_wind(name, anew):
+    fold = fresh()
+    told(fold, name, 0.0)
+    heard(fold, 1, 60)
+    current = fold.current
+    told(fold, name, 1.0)
+    told(fold, name, 1.0)
+    [event] = changed(fold, 60.0)
+    assert ("anew" in event.text) is anew
+    assert (fold.current is not current) is anew
+    assert heard(fold, 61, 63).wind.record_s > 50.0
+
+
+def test_a_filter_is_no_sensor_and_a_stranger_to_the_table_is_nobodys():
+    fold = fresh()
+    for name in ("WNDVN_TRUE_FILT", "LOG_BITMASK"):
+        for value in (0.05, 0.5, 0.5):
+            told(fold, name, value)
+    assert [e.name for e in changed(fold)] == ["WNDVN_TRUE_FILT"]
+    assert not fold.tick(3.0).snapshot.unsure
+
+
+def test_one_that_was_not_known_is_said_when_it_is_set_under_way_and_not_when_a_list_is_read():
+    fold = fresh()
+    told(fold, "COMPASS_ORIENT", 6.0)
+    assert not changed(fold), "before she sails somebody reads it"
+    fold.state = replace(fold.state, sailing=True)
+    told(fold, "SERVO3_REVERSED", 1.0, index=311)
+    assert "SERVO3_REVERSED" not in fold.unread
+    told(fold, "AHRS_ORIENTATION", 8.0)
+    assert fold.unread[-1] == "AHRS_ORIENTATION"
+    told(fold, "AHRS_ORIENTATION", 8.0)
+    [event] = changed(fold, 3.0)
+    assert event.text.startswith("AHRS_ORIENTATION was set from a value that was not known to 8")
 
 
 def test_parameters_and_versions_of_other_components_are_none():

@@ -1,6 +1,7 @@
 """Where it ends: home, refuges, the voyage's time, the loiter that is watched, a voyage finished before."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from shapely.geometry import box
@@ -229,10 +230,10 @@ def test_a_plan_that_went_stale_says_why_it_is_renewed_and_is_not_sailed():
     world = make(Goal(en_m=(0.0, 220.0), radius_m=8.0), obstacles=(ISLAND,), **ASIDE)
     world.permissions = type(world.permissions)(may_upload=True)
     assert world.run(120, lambda w: bool(w.mission) and "waiting for the operator" in w.state.why)
-    world.position, world.track = (0.0, 130.0), []
+    world.position, world.track, world.state = (0.0, 130.0), [], replace(world.state, last_seen=None)   # it drifted
     world.planner = lambda problem, seed: None
     world.permissions = type(world.permissions)(may_upload=True, may_set_mode=True, may_arm=True)
-    assert world.run(100, lambda w: "next try in" in w.state.why and "o0" in w.state.why)
+    assert world.run(60, lambda w: "next try in" in w.state.why and "o0" in w.state.why)
     world.run(20)
     assert not world.armed
     world.planner = None

@@ -186,6 +186,7 @@ EVENTS = {
     "position lost": lambda s: replace(s, vehicle_age_s=40.0),
     "position jump": lambda s: replace(s, position_en_m=(s.position_en_m[0] + 500.0, s.position_en_m[1])),
     "wind untrusted": wind(health=WindHealth.UNTRUSTED, verdict="frozen"),
+    "wind contradicted": lambda s: replace(s, unsure="the wind's direction leapt by +90° and she goes astern"),
     "strong wind": forecast(25.0),
     "light wind": forecast(0.1),
     "becalmed": lambda s: replace(

@@ -288,3 +288,34 @@ def test_a_steady_wind_over_a_drifting_boat_is_a_wind():
         room.update(apparent_wind(replace(later, t_s=float(t)), boat))
         status = room.update(replace(true, t_s=float(t)))
     assert Verdict.HELD in status.verdicts
+
+
+def test_a_vane_that_her_motion_contradicts_is_not_fed_until_it_fits_again():
+    log, room = sail(seconds=300.0)
+    at_s = log[-1][0]
+    before = room.forecast_table(at_s)
+    room.contradict("the vane was turned")
+    for t in range(1, 61):
+        status = room.update(WindSample(t_s=at_s + t, twd_from_rad=2.0, tws_mps=6.0))
+    assert Verdict.TURNED in status.verdicts
+    assert status.sample.quality is WindQuality.SUSPECT
+    assert "the vane was turned" in status.reason
+    after = room.forecast_table(at_s + 60.0)
+    assert abs(wrap_pi(after.mean_twd_from_rad[0] - before.mean_twd_from_rad[0])) < 0.2, "the wind before the turn"
+    assert after.sigma_twd_rad[0] > 1.5 * before.sigma_twd_rad[0]
+    room.contradict("")
+    assert Verdict.TURNED not in room.update(WindSample(t_s=at_s + 62.0, twd_from_rad=0.3, tws_mps=6.0)).verdicts
+
+
+def test_what_was_read_by_another_offset_is_forgotten():
+    log, room = sail(seconds=300.0, seed=1)
+    at_s = log[-1][0]
+    room.set_parameters({"WNDVN_TYPE": 4.0})
+    room.begin_anew()
+    assert room.status(at_s) is None
+    assert room.forecast_table(at_s) is None
+    for t in range(1, 31):
+        status = room.update(WindSample(t_s=at_s + t, twd_from_rad=-2.0, tws_mps=6.0))
+    assert room.forecast_table(at_s + 30.0).mean_twd_from_rad[0] == pytest.approx(-2.0, abs=0.05)
+    room.set_parameters({"WNDVN_TYPE": 0.0})
+    assert Verdict.SYNTHESISED not in status.verdicts

@@ -7,12 +7,12 @@ from companion.mavlink.wire.fixes import MEMORY_S
 from companion.mavlink.wire.frames import Codec, Drop, Message
 from companion.mavlink.wire.high_latency import CONTROL_COMMAND, HIGH_LATENCY_S
 from companion.mavlink.wire.items import first_difference, mission_hash
-from companion.mavlink.wire.parameter_ranges import RANGES, believable
+from companion.mavlink.wire.parameter_ranges import RANGES, Effect, believable, effect_of
 from companion.mavlink.wire.status import StatusReader, StatusReport
 from companion.mavlink.wire.streams import Stream
 
 __all__ = [
     "AUTOPILOT_COMPONENT", "CONTROL_COMMAND", "HIGH_LATENCY_S", "MEMORY_S", "RANGES", "Codec", "Dialect",
-    "Drop", "Message", "StatusReader", "StatusReport", "Stream", "VehicleAssembler", "autopilot_version", "believable",
-    "first_difference", "is_autopilot_heartbeat", "mission_hash",
+    "Drop", "Effect", "Message", "StatusReader", "StatusReport", "Stream", "VehicleAssembler", "autopilot_version",
+    "believable", "effect_of", "first_difference", "is_autopilot_heartbeat", "mission_hash",
 ]

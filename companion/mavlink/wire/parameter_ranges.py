@@ -1,4 +1,4 @@
-"""The parameters that a voyage reads, and what each can be. Pure.
+"""The parameters that a voyage reads, what each can be, and those that change what a sensor says. Pure.
 
 A value outside its range cannot be what the autopilot sails by: it was damaged, forged, or set by mistake. It is not
 used; what was known before stays, or the firmware's default.
@@ -6,6 +6,8 @@ used; what was known before stays, or the firmware's default.
 
 from __future__ import annotations
 
+import enum
+import re
 from collections.abc import Mapping
 
 # Name -> lowest and highest value that can be, in ArduPilot's units. Those of the frame come first: nothing is asked
@@ -58,3 +60,31 @@ def believable(values: Mapping[str, float]) -> tuple[dict[str, float], tuple[str
     """Return the values that can be, and why the others cannot."""
     refused = {name: why for name, value in values.items() if (why := refusal(name, value))}
     return {name: value for name, value in values.items() if name not in refused}, tuple(refused.values())
+
+
+class Effect(enum.Enum):
+    """What somebody changes who sets a parameter under way."""
+
+    WIND = "what the vane says"
+    HEADING = "what the compass says"
+    BOAT = "how she answers to sheet and rudder"
+    HABIT = "how the autopilot sails"
+
+
+# The first pattern that a name matches counts; names of none are nobody's business here.
+EFFECTS: tuple[tuple[re.Pattern[str], Effect], ...] = (
+    (re.compile(r"WNDVN_(SPEED_MIN|DIR_DZ|.*_FILT)"), Effect.HABIT),
+    (re.compile(r"WNDVN_.*"), Effect.WIND),
+    (re.compile(r"(COMPASS|AHRS)_.*"), Effect.HEADING),
+    (re.compile(r"SERVO\d+_REVERSED|SAIL_ENABLE|SAIL_ANGLE_.*"), Effect.BOAT),
+    (re.compile(r"SAIL_.*"), Effect.HABIT),
+)
+
+
+def effect_of(name: str) -> Effect | None:
+    """Return what setting a parameter changes of what sensors say and how she sails, None for any other.
+
+    >>> effect_of("WNDVN_DIR_OFS"), effect_of("SERVO1_REVERSED"), effect_of("WP_RADIUS")
+    (<Effect.WIND: 'what the vane says'>, <Effect.BOAT: 'how she answers to sheet and rudder'>, None)
+    """
+    return next((effect for pattern, effect in EFFECTS if pattern.fullmatch(name)), None)

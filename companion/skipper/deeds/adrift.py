@@ -151,7 +151,7 @@ def _run_motor(turn: Turn) -> None:
 def _stems(turn: Turn, ahead: DriftAhead) -> bool:
     """Whether she can sail against the drift, faster than it, in the wind that there is, and may be told to."""
     wind, boat = turn.wind_now, turn.voyage.boat
-    if wind is None or wind[1] < STEERAGE_MPS or not turn.snapshot.permissions.may_set_mode:
+    if wind is None or wind[1] < STEERAGE_MPS or not turn.snapshot.permissions.may_set_mode or turn.snapshot.unsure:
         return False
     against_rad = heading_of(-ahead.velocity_en_mps[0], -ahead.velocity_en_mps[1])
     twa = abs(difference_rad(wind[0], against_rad))

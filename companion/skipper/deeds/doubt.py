@@ -1,5 +1,6 @@
-"""A position in doubt: what is safe where it says that the boat is, and where she was and has sailed on from?
+"""What is done while it is doubted where the boat is, or what wind she sails in.
 
+A position in doubt: what is safe where it says that the boat is, and where she was and has sailed on from?
 The autopilot takes a new position and sails by it, true or not. Until there is evidence (``companion.skipper.way
 .integrity``) nothing is planned from it, and where the reckoned place is not clear ahead the boat loiters: ArduRover's
 LOITER turns in circles of 12 m about a point, and where on earth that is does not matter to it, while HOLD drifts. That
@@ -8,17 +9,21 @@ often than true.
 
 Once held she stays held until the position is believed. A jump moves the point of a LOITER that is sailed already, and
 she would make for it over whatever lies between: then she is put into HOLD and into LOITER again, which begins here.
+
+A wind that her motion contradicts, or that is learned anew: she loiters, and nothing is planned. A plan for a wind that
+is not there leads anywhere, and each step of the ladder gives up some of what keeps her clear.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from companion.messages import Mode
 from companion.skipper.deeds.adrift import stops_drift
 from companion.skipper.deeds.helm import is_busy, set_mode
 from companion.skipper.planning.waits import utc_s
-from companion.skipper.step.actions import Severity
+from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.causes import CRITICAL, HOMEWARD
 from companion.skipper.step.saved import SavedPlace
 from companion.skipper.step.state import Phase
@@ -43,6 +48,7 @@ STRAYS_M = 25.0       # what a boat in LOITER or HOLD is off her place when she 
 LEAST_REACH_M = 30.0  # a start finds her so near to where she was, whatever the clocks say
 UNKNOWN_S = 120.0     # how long a start has taken when no clock tells
 BEATEN_MPS = 10.0     # the wind in which she may have sailed meanwhile
+SAID_S = 60.0         # between two words on a wind that is not known
 CODE = "position doubted"
 
 
@@ -247,3 +253,31 @@ def _begin_anew(turn: Turn) -> None:
         turn.update(anew=None)
     elif set_mode(turn, Mode.LOITER, "loitering anew where she is"):
         turn.update(anew=Mode.LOITER)
+
+
+def holds(turn: Turn) -> bool:
+    """Loiter while wind and water are not to be planned with; True while LOITER is ours, or asked for."""
+    status, state, why = turn.autopilot, turn.state, turn.snapshot.unsure
+    memory = state.adrift
+    if not why and memory.loiter_en_m is not None and not memory.loitered:
+        turn.update(adrift=replace(memory, loiter_en_m=None))
+    if not why or status is None:
+        return False
+    if state.pending_plan is not None:
+        turn.act(CancelPlan(request_id=state.pending_plan.request_id))
+        turn.update(pending_plan=None)
+    turn.update(rung=0, ladder_reason=None)
+    turn.say(Severity.ERROR, "held", f"{why}: no plan is made until it is known again", every_s=SAID_S)
+    if state.by_field.resort.engaged or not turn.snapshot.permissions.may_set_mode or not status.ekf_ok:
+        return False
+    if status.mode is Mode.LOITER and state.own_mode is Mode.LOITER:
+        if memory.loiter_en_m is None:   # by a wrong wind she may be carried off it, which is a drift
+            turn.update(adrift=replace(memory, loiter_en_m=turn.boat_en))
+        turn.phase(Phase.HOLDING, f"{why}: waiting in a loiter until the wind is known")
+        return True
+    if state.steering_until_s is not None:      # out of irons, it was believed
+        turn.update(steering_until_s=None, steering_heading_rad=None)
+    if not is_busy(turn, Mode.LOITER.name) and set_mode(turn, Mode.LOITER, why):
+        turn.update(after_operator=True)
+    turn.phase(Phase.HOLDING, f"{why}: waiting for the autopilot to take LOITER")
+    return True

@@ -10,7 +10,7 @@ from companion.skipper.deeds.adrift import stops_drift
 from companion.skipper.deeds.brake import brakes
 from companion.skipper.deeds.by_field import heading as by_field_heading
 from companion.skipper.deeds.by_field import last_resort
-from companion.skipper.deeds.doubt import stands_off
+from companion.skipper.deeds.doubt import holds, stands_off
 from companion.skipper.deeds.failsafe import waits_for
 from companion.skipper.deeds.headings import desired_heading_rad
 from companion.skipper.deeds.helm import check_current, hand_back, is_busy, leave_passed, make_current, repair, set_mode
@@ -55,7 +55,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         if turn.state.doubt is None and turn.state.pending_upload is None:
             _consider(turn, fresh)   # from where she is known to be, while her loiter is begun anew
         return
-    if stops_drift(turn) or brakes(turn):
+    if stops_drift(turn) or holds(turn) or brakes(turn):
         return
     stopped = turn.state.own_mode in STOPPING
     if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:

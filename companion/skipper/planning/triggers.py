@@ -54,6 +54,8 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
     state, config = turn.state, turn.config
     if turn.boat_en is None or turn.snapshot.wind.forecast is None or turn.is_raised("becalmed"):
         return None
+    if turn.snapshot.unsure:
+        return None
     bound, route = errand(turn), turn.state.route
     if state.over if bound is None else not bound.has_place:
         return None

@@ -33,6 +33,7 @@ from companion.skipper.step.snapshot import (
     MissionOnBoard,
     ModeChanged,
     Outcome,
+    ParameterChanged,
     PlanOutcome,
     ReadOutcome,
     Snapshot,
@@ -48,9 +49,9 @@ from companion.skipper.step.state import Phase, SkipperState, is_given_up
 __all__ = [
     "CHOICES", "SHORE", "Acknowledge", "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted",
     "CancelPlan", "CommandOutcome", "CommandResult", "Disbelieved", "End", "Ends", "Event", "Guidance",
-    "MissionOnBoard", "ModeChanged", "Outcome", "Permissions", "Persisted", "Phase", "PlanOutcome", "ReadMission",
-    "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd", "SetCurrent", "SetMode",
-    "Severity", "SkipperConfig", "SkipperState", "Snapshot", "Standing", "SteerHeading", "StopOrders", "Tack",
-    "UploadFence", "UploadMission", "UploadOutcome", "UploadResult", "WaypointReached", "WindHealth", "WindView",
-    "ends_safely", "is_given_up",
+    "MissionOnBoard", "ModeChanged", "Outcome", "ParameterChanged", "Permissions", "Persisted", "Phase",
+    "PlanOutcome", "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd",
+    "SetCurrent", "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot", "Standing",
+    "SteerHeading", "StopOrders", "Tack", "UploadFence", "UploadMission", "UploadOutcome", "UploadResult",
+    "WaypointReached", "WindHealth", "WindView", "ends_safely", "is_given_up",
 ]

@@ -27,7 +27,7 @@ class WindHealth(enum.Enum):
     SETTLING = "settling"      # too short a record to forecast from
     GOOD = "good"
     LIGHT = "light"            # the direction is nearly without meaning
-    UNTRUSTED = "untrusted"    # frozen, mirrored, spiking or silent vane
+    UNTRUSTED = "untrusted"    # frozen, turned or silent vane, or none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +82,15 @@ class Disbelieved:
     text: str
 
 
-Event = WaypointReached | ModeChanged | AutopilotRebooted | StatusText | Order | Disbelieved
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterChanged:
+    """Somebody has set a parameter that changes what a sensor says or how she sails: what it was and is, in words."""
+
+    name: str
+    text: str
+
+
+Event = WaypointReached | ModeChanged | AutopilotRebooted | StatusText | Order | Disbelieved | ParameterChanged
 
 
 # ----------------------------------------------------------------------------------------- outcomes
@@ -157,6 +165,7 @@ class Snapshot:
     wind: WindView = WindView()
     current: WaterCurrent = STILL_WATER
     doubt: Doubt | None = None
+    unsure: str = ""                       # why no plan may be made for wind and water now, in words; empty: it may
     mission: MissionOnBoard = MissionOnBoard()
     identity: Identity = field(default_factory=Identity)   # as far as the autopilot has told it
     neighbours: tuple[str, ...] = ()       # other autopilots on a link on which ours was not named, in words

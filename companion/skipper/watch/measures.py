@@ -52,6 +52,10 @@ def _wind(turn: Turn) -> float | None:
     return float(health is WindHealth.UNTRUSTED or (health is WindHealth.NONE and turn.state.sailing))
 
 
+def _contradicted(turn: Turn) -> float | None:
+    return float(bool(turn.snapshot.unsure))
+
+
 def _becalmed(turn: Turn) -> float | None:
     wind = turn.wind_mean
     if wind is None:
@@ -212,6 +216,7 @@ def _fence_off(turn: Turn) -> float | None:
 
 _MEASURES: dict[str, Callable[[Turn], float | None]] = {
     "link silent": _link, "position lost": _position_lost, "position jump": _jump, "wind untrusted": _wind,
+    "wind contradicted": _contradicted,
     "strong wind": too_strong, "light wind": too_light,
     "becalmed": _becalmed, "drifting": meets_in_s, "in irons": _irons, "vessel too near": _too_near,
     "no progress": _progress,

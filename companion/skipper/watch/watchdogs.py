@@ -22,6 +22,7 @@ class Response(enum.Enum):
     FREEZE = "no actions until it clears; what is on the autopilot sails on"
     NO_BOAT_PLANS = "no plan from the boat's position until it clears, unless the way from there is shut"
     DOUBT = "no plan from it, LOITER where the reckoned place is not clear ahead, until there is evidence for it"
+    HOLD = "LOITER where that may be set, no plan and no step of the ladder until it clears; then plan again"
     NO_WIND_PLANS = "no new plan because of the wind; the plan in place stays"
     WAIT_FOR_WIND = "no plans, no complaint about progress; LOITER where she drifts; plan again when the wind is back"
     STOP_DRIFT = "say where to and when, each minute; motor if there is one, LOITER if she can stem it, else the anchor"
@@ -67,9 +68,14 @@ TABLE: tuple[Watchdog, ...] = (
       enter=JUMP_M, exit=5.0, unit="m", enter_s=0.0, exit_s=20.0, severity=S.WARNING, response=Response.DOUBT,
       at_rest=True,
       why="a GPS jump may put the start into an obstacle, and the autopilot sails by it, true or not"),
-    W(name="wind untrusted", watches="the wind room's verdict (frozen, mirrored, spiking, silent vane)", enter=1.0,
+    W(name="wind untrusted", watches="the wind room's verdict (frozen, turned, silent vane, or none)", enter=1.0,
       exit=0.5, unit="", enter_s=5.0, exit_s=30.0, severity=S.WARNING, response=Response.NO_WIND_PLANS, at_rest=True,
       why="a plan made for a wind that is not there is worse than an old one"),
+    W(name="wind contradicted", enter=1.0, exit=0.5, unit="", enter_s=0.0, exit_s=0.0, severity=S.ERROR,
+      watches="whether wind, polar and a likely current explain how she moves; parameters that change what vane and "
+              "compass say",
+      response=Response.HOLD,
+      why="who is told a wrong wind sails by it: a vane that turned on its mast looks like a current that cannot be"),
     W(name="becalmed", watches="mean true wind speed, of a boat that does not sail", enter=LIGHT_MPS, exit=1.2,
       unit="m/s", enter_s=60.0, exit_s=30.0, severity=S.NOTICE, response=Response.WAIT_FOR_WIND,
       loitering=True,

@@ -12,7 +12,7 @@ from companion.boat import Hull
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint, Mode
 from sitl.autopilot import EPOCH_S
-from sitl.campaigns.fault_draw import draw
+from sitl.campaigns.fault_draw import draw, draw_turned_vane
 from sitl.campaigns.fault_watch import EXCUSES, REACTION_S, RESUME_S, Watch, mission_key, operator_spans
 from sitl.campaigns.faults import BASE, jump_figures, run_faults, sail_faults, sail_seed
 from sitl.campaigns.jump_draw import CREEPS_MPS, KINDS, LONG_S, MODES, NEAR_M, SHORT_S, draw_jump
@@ -33,6 +33,16 @@ def test_a_seed_draws_the_same_faults_and_another_seed_others():
     base = load_scenario(BASE)
     assert draw(5, base) == draw(5, base)
     assert draw(5, base) != draw(6, base)
+
+
+def test_a_turned_vane_is_drawn_beside_the_others_by_a_stream_of_its_own():
+    base = load_scenario(BASE)
+    turned = [(draw(seed, base), draw_turned_vane(seed, base)) for seed in range(60)]
+    assert all(set(plain.events) < set(more.events) for plain, more in turned)
+    extra = [next(e for e in more.events if e not in plain.events) for plain, more in turned]
+    assert {e.kind for e in extra} == {"vane", "parameter"}
+    assert all(60.0 <= abs(e.value_deg or e.value) <= 180.0 and 45.0 <= e.at_s <= 90.0 for e in extra)
+    assert all(plain.wind == more.wind and plain.parameters == more.parameters for plain, more in turned)
 
 
 @pytest.fixture(scope="module")

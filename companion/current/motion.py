@@ -1,0 +1,196 @@
+"""Does the boat move as the wind that is measured and her polar say, in any water that is likely?
+
+Water changes slowly, and no current turns the wind over the ground. So a boat that goes astern, or lies nearly still,
+where she should run at 2 m/s has been told a wrong wind: a vane that was turned on its mast, or an offset that somebody
+wrote, not a current of 3 m/s that came within a second. What tells:
+
+- **Speed.** Along her heading she lacks (or has too much of) more than the polar's error and what is not known of the
+  current could explain.
+- **Heel.** She heels to windward.
+- **The direction's leap.** A front turns the wind, too, but then she sails by it. A direction that has leapt before she
+  ceased to sail as she should is the sensor's doing; less is enough then, and a shorter time.
+
+What sets her across her heading as well is no wind's doing: a current's, which the filter takes up, or a compass's,
+which "heading against course" tells.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from companion.geo.angles import difference_rad
+
+SWINGS_S = 4.0                     # of the means of heading and velocity: waves swing her bow within less
+TURNING_RAD_S = math.radians(6.0)  # faster she manoeuvres ...
+SETTLES_S = 4.0                    # ... and has her speed again so long after it, and the means with it
+LEAST_TWA_RAD = math.radians(38.0)  # closer to the wind a polar says little, and she may be in irons
+LEAST_TWS_MPS = 1.5
+STANDS_MPS, SHOULD_MPS = 0.15, 0.6  # a boat that stands where she should sail is aground, moored or in irons
+ODD_MPS, ODD_SHARE = 0.5, 0.35     # of a speed: gusts that the hull has not answered, and a polar that is a quarter off
+SPREADS = 2.0                      # of what is not known of the current, beside it
+LEAPT_MPS, LEAPT_SHARE, LEAPT_SPREADS = 0.4, 0.2, 1.0   # likewise after the direction has leapt
+ACROSS_SHARE = 0.3                 # of what she lacks: a current sets her more across her heading, on most of them ...
+LEAPT_ACROSS_SHARE = 0.6           # ... and a compass that is up to 120 degrees off does, with a direction that leapt
+HEELS_RAD = math.radians(8.0)      # to windward: more than a wave's
+LEAST_HEEL_TWA_RAD, MOST_HEEL_TWA_RAD = math.radians(30.0), math.radians(150.0)
+HEEL_S = 10.0                      # of the mean heel
+SURE_S, JUMPED_S = 20.0, 8.0       # of odd readings, without a jump of the direction and after one
+FORGETS = 0.5                      # a reading that fits takes back so much of one that does not
+FITS_S = 20.0                      # of readings that fit end a doubt
+NEW_WIND_S = 90.0                  # likewise in another direction than before, on headings far apart
+FAR_APART_RAD = math.radians(70.0)
+JUMP_RAD = math.radians(40.0)      # of the direction's 5 s mean against what it was half a minute and more ago
+BEFORE_S, MEMORY_S = 30.0, 90.0
+KEPT_EVERY_S = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """One moment: how she goes through the water that is believed, and what the polar says in the wind of now.
+
+    Attributes:
+        along_mps, across_mps: through the water, ahead and to starboard, means over ``SWINGS_S``.
+        speed_mps: the polar's.
+        twa_rad: the wind's angle to her bow, over the water, positive over starboard.
+        twd_from_rad, tws_mps: the wind over the ground.
+        heading_rad: of her bow, likewise a mean.
+        sigma_mps: of the current along her heading.
+        roll_rad: positive to starboard; None: not told.
+    """
+
+    along_mps: float
+    across_mps: float
+    speed_mps: float
+    twa_rad: float
+    twd_from_rad: float
+    tws_mps: float
+    heading_rad: float
+    sigma_mps: float
+    roll_rad: float | None = None
+
+
+class MotionCheck:
+    """A fold over moments of a boat that sails: is the wind, or the water, to be doubted?
+
+    ``doubt`` says why in words, empty: nothing is. ``is_winds``: it is of the wind alone.
+    ``is_odd``: the last moment did not fit; ``fits_s``: for how long all did.
+    """
+
+    def __init__(self) -> None:
+        self.doubt, self.is_odd, self.is_winds = "", False, False
+        self._t_s: float | None = None
+        self._heading_rad = 0.0
+        self._turned_s = -math.inf
+        self.fits_s = self._odd_s = 0.0
+        self._heel_rad = 0.0
+        self._directions: deque[tuple[float, float]] = deque()   # of the wind, one in 5 s
+        self._before_rad: float | None = None                    # where it came from before it leapt ...
+        self._leapt_s = -math.inf                                # ... and when it was seen to have
+        self._fitted: list[float] = []                           # headings on which she sailed as she should
+
+    def pause(self) -> None:
+        """Take note that nobody knows how she is driven: what is settled begins anew."""
+        self._t_s = None
+
+    def update(self, t_s: float, now: Motion) -> None:
+        """Take the moment at ``t_s``."""
+        self.is_odd = False
+        self._follow_direction(t_s, now)
+        if self._t_s is None or t_s <= self._t_s:
+            self._t_s, self._heading_rad, self._turned_s = t_s, now.heading_rad, t_s
+            return
+        dt_s, self._t_s = min(5.0, t_s - self._t_s), t_s
+        if now.roll_rad is not None:
+            self._heel_rad += -math.expm1(-dt_s / HEEL_S) * (now.roll_rad - self._heel_rad)
+        if abs(difference_rad(now.heading_rad, self._heading_rad)) > TURNING_RAD_S * dt_s:
+            self._turned_s = t_s
+        self._heading_rad = now.heading_rad
+        if t_s - self._turned_s < SETTLES_S or now.tws_mps < LEAST_TWS_MPS:
+            return
+        fits = self._fits(t_s, now)
+        if fits is None:
+            return
+        self.is_odd = not fits
+        self.fits_s = self.fits_s + dt_s if fits else 0.0
+        self._odd_s = max(0.0, self._odd_s - FORGETS * dt_s) if fits else self._odd_s + dt_s
+        if self.doubt:
+            self._look_for_an_end(now, fits=fits)
+        elif self._odd_s >= (JUMPED_S if self._has_leapt(t_s) else SURE_S):
+            self._begin(t_s, now)
+
+    def _fits(self, t_s: float, now: Motion) -> bool | None:
+        """Return whether she moves as the wind and her polar say, None where that cannot be told."""
+        angle = abs(now.twa_rad)
+        if self._heels_to_windward(now):
+            return False
+        if math.hypot(now.along_mps, now.across_mps) < STANDS_MPS and now.speed_mps > SHOULD_MPS:
+            return None
+        lacks = now.speed_mps - now.along_mps
+        if lacks > 0.0 and angle < LEAST_TWA_RAD:
+            return None
+        fixed, share, spreads, across = ODD_MPS, ODD_SHARE, SPREADS, ACROSS_SHARE
+        if self.is_winds or self._has_leapt(t_s):
+            fixed, share, spreads, across = LEAPT_MPS, LEAPT_SHARE, LEAPT_SPREADS, LEAPT_ACROSS_SHARE
+        if abs(lacks) <= fixed + share * now.speed_mps + spreads * now.sigma_mps:
+            return True
+        return None if abs(now.across_mps) > across * abs(lacks) else False
+
+    def _heels_to_windward(self, now: Motion) -> bool:
+        return LEAST_HEEL_TWA_RAD < abs(now.twa_rad) < MOST_HEEL_TWA_RAD and abs(self._heel_rad) > HEELS_RAD and (
+            (self._heel_rad > 0.0) == (now.twa_rad > 0.0))
+
+    # ------------------------------------------------------------------------------------ the direction
+    def _follow_direction(self, t_s: float, now: Motion) -> None:
+        kept = self._directions
+        if not kept or t_s - kept[-1][0] >= KEPT_EVERY_S:
+            kept.append((t_s, now.twd_from_rad))
+        while t_s - kept[0][0] > MEMORY_S:
+            kept.popleft()
+        old = [direction for then_s, direction in kept if t_s - then_s > BEFORE_S]
+        if self.doubt or not old:
+            return
+        was = math.atan2(sum(map(math.sin, old)), sum(map(math.cos, old)))
+        if abs(difference_rad(now.twd_from_rad, was)) > JUMP_RAD:
+            if not self._has_leapt(t_s):
+                self._before_rad = was
+            self._leapt_s = t_s
+
+    def _has_leapt(self, t_s: float) -> bool:
+        return t_s - self._leapt_s <= BEFORE_S
+
+    # ---------------------------------------------------------------------------------------- the doubt
+    def _begin(self, t_s: float, now: Motion) -> None:
+        heels = self._heels_to_windward(now)
+        self.fits_s, self._fitted, self.is_winds = 0.0, [], heels or self._has_leapt(t_s)
+        how = "astern" if now.along_mps < 0.0 else "ahead"
+        moves = f"she makes {abs(now.along_mps):.1f} m/s {how} where {now.speed_mps:.1f} m/s were to be expected"
+        if heels:
+            moves = f"she heels {math.degrees(abs(self._heel_rad)):.0f}° to windward"
+        if self._has_leapt(t_s) and self._before_rad is not None:
+            by = math.degrees(difference_rad(now.twd_from_rad, self._before_rad))
+            self.doubt = f"the wind's direction leapt by {by:+.0f}° and {moves}: the vane was turned, or its offset"
+        elif heels:
+            self.doubt = f"{moves}: the wind is not where the vane says"
+        else:
+            self.doubt = f"{moves}: no current comes so suddenly, the wind or the water is another than is measured"
+
+    def _look_for_an_end(self, now: Motion, *, fits: bool) -> None:
+        if not fits:
+            self._fitted = []
+            return
+        self._fitted.append(now.heading_rad)
+        is_back = not self.is_winds or self._before_rad is None or (
+            abs(difference_rad(now.twd_from_rad, self._before_rad)) <= JUMP_RAD)
+        is_told = self.fits_s >= NEW_WIND_S and any(
+            abs(difference_rad(a, self._fitted[0])) > FAR_APART_RAD for a in self._fitted)
+        if is_told or (is_back and self.fits_s >= FITS_S):
+            self.settle()
+
+    def settle(self) -> None:
+        """End a doubt: what is measured is believed from here on."""
+        self.doubt, self.is_odd, self.is_winds = "", False, False
+        self._odd_s = self.fits_s = 0.0
+        self._fitted, self._before_rad, self._leapt_s = [], None, -math.inf
+        self._directions.clear()
