@@ -67,7 +67,8 @@ class Outputs:
         self, chosen: Wanted, frame: LocalFrame, say: Say, *, seed: int = 0, guard: Guard | None = None,
     ) -> None:
         self._frame = frame
-        self._guard = guard or Guard(lambda name, why: say(f"{name}: {why}"))
+        self._guard = guard or Guard(lambda name, why: say(
+            f"{name}: not told: {why}" if why else f"{name}: told again"))
         self.nmea: list[Outlet[Lines]] = [
             (UdpOutlet if name.kind == "udp" else TcpOutlet)(name, say, seed=seed + number)
             for number, name in enumerate(chosen.displays.nmea)]

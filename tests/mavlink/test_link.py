@@ -59,8 +59,8 @@ def with_peer(main, *, peer_signing=None, **link_options):
 
 @pytest.mark.parametrize("held_s", [0.45, 0.6, 1.6, 3.0])
 def test_what_waited_while_the_loop_was_held_up_proves_no_silence(held_s):
-    """A computer that was busy for a moment, 0.15 s of it beside a simulator in a hurry, read at once what had come and
-    took its own absence for a silence of the autopilot: the first forged mode in the queue was believed."""
+    """A computer that was busy for a moment read at once what had come, and took its own absence for a silence of the
+    autopilot: the first forged mode in the queue was believed."""
     async def main(peer, link):
         heard, forger, boot = [], Codec(1, 1), now_s()
         link.subscribe(lambda _, message: heard.append((message.get_type(), getattr(message, "custom_mode", None))))

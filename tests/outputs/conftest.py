@@ -6,6 +6,7 @@ import pytest
 
 from companion.addresses import Displays, parse_nmea, parse_signalk
 from companion.geo.frame import LocalFrame
+from companion.guard import Guard
 from companion.messages import GeoPoint
 from companion.outputs import wanted
 from companion.view.air import Polar, Wind
@@ -19,10 +20,10 @@ def frame():
     return LocalFrame(ORIGIN)
 
 
-def chosen(nmea=(), signalk=(), token_file=None):
+def chosen(nmea=(), signalk=(), token_file=None, guard=None):
     """Return whom to tell, by their names."""
     return wanted(Displays(nmea=tuple(map(parse_nmea, nmea)), signalk=tuple(map(parse_signalk, signalk)),
-                           token_file=token_file))
+                           token_file=token_file), guard or Guard())
 
 
 def view_of(**changes):

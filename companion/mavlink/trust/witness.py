@@ -112,12 +112,15 @@ class _Stream:
         """Its boot times have been right."""
         return self.vouchers >= VOUCHERS
 
-    def holds(self, t_s: float, seq: int, *, is_timed: bool) -> bool:
-        """Return whether the stream can have come to ``seq``; ``is_timed``: its boot time is right."""
+    def holds(self, t_s: float, seq: int, *, is_timed: bool, may_skip: bool = True) -> bool:
+        """Return whether the stream can have come to ``seq``.
+
+        ``is_timed``: its boot time is right; ``may_skip``: the autopilot is silent on its other streams, too.
+        """
         since_s = t_s - self._anchor_s
         room = BURST + FASTER * self._rate_hz * since_s
         gone = (seq - self._anchor_seq) % 256 or 256
-        if gone <= room and (is_timed or since_s >= SILENCE_S):
+        if gone <= room and (is_timed or (may_skip and since_s >= SILENCE_S)):
             return True
         if gone <= room and 0 < (seq - self._seq) % 256 <= self._step:
             return True
@@ -171,11 +174,15 @@ class Witness:
 
     def _stream_of(self, t_s: float, seq: int, boot_s: float | None) -> _Stream:
         """Return the stream that the frame belongs to, one that is vouched for first; a new one where none can be."""
-        streams = self._streams
+        if len(self._streams) > 1:
+            self._bury(t_s)
+        streams, spoke_s = self._streams, -math.inf
         if len(streams) > 1:
             streams = sorted(streams, key=lambda s: -min(s.vouchers, VOUCHERS))
+            spoke_s = max(s.last_s for s in streams if s.is_vouched) if streams[0].is_vouched else spoke_s
         for stream in streams:
-            if stream.holds(t_s, seq, is_timed=boot_s is not None):
+            if stream.holds(t_s, seq, is_timed=boot_s is not None,
+                            may_skip=stream.last_s == spoke_s or t_s - spoke_s >= SILENCE_S):
                 stream.take(t_s, seq, boot_s)
                 return stream
         if len(self._streams) >= MAX_STREAMS:
@@ -184,3 +191,8 @@ class Witness:
         self._streams.append(stream)
         stream.take(t_s, seq, boot_s)
         return stream
+
+    def _bury(self, t_s: float) -> None:
+        """Forget streams that died while a vouched one lives: the longer they are silent, the more they would hold."""
+        if any(s.is_vouched and t_s - s.last_s <= ALIVE_S for s in self._streams):
+            self._streams = [s for s in self._streams if t_s - s.last_s <= ALIVE_S]

@@ -88,6 +88,7 @@ class VehicleAssembler:
         self._nav_s: float | None = None
         self._fence_s: float | None = None
         self._gps2_s: float | None = None
+        self._fenced_s = 0.0   # since when it tells of a fence without a gap
         self._fence_told = (False, -1)
         self._leak_told: bool | None = None
         self._leak_s: float | None = None
@@ -260,9 +261,12 @@ class VehicleAssembler:
         if kind == "FENCE_STATUS":
             # Two in a row that say the same: one alone may be damaged or forged.
             fence = bool(message.breach_status), int(message.breach_count)
+            self._fenced_s = t_s if self._fence_s is None else self._fenced_s
             last, self._fence_told, self._fence_s = self._fence_told, fence, t_s
+            # What is told for a moment, by whomever, is not missed afterwards.
+            on: dict[str, Any] = {"fence_on": True} if t_s - self._fenced_s >= QUIET_S else {}
             return {
-                "fence_on": True, "fence_breached": fence[0] and last[0],
+                **on, "fence_breached": fence[0] and last[0],
                 **({"fence_breaches": fence[1]} if fence[1] == last[1] else {})}
         return None
 
@@ -274,7 +278,9 @@ class VehicleAssembler:
             old |= {"waypoint_distance_m": None, "target_bearing_rad": None, "cross_track_m": None}
         if self._fence_s is not None and t_s - self._fence_s > QUIET_S:
             self._fence_s = None
-            old |= {"fence_on": False, "fence_breached": None, "fence_breaches": None}
+            old |= {"fence_breached": None, "fence_breaches": None}
+            if self._status is not None and self._status.fence_on:
+                old["fence_on"] = False
         if self._gps2_s is not None and t_s - self._gps2_s > QUIET_S:
             self._gps2_s = None
             old |= {"gps2": None}

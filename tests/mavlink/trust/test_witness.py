@@ -102,6 +102,27 @@ def test_what_is_out_of_step_is_not_used_while_the_true_one_speaks():
     assert believed <= 8, "one number in a hundred is in step by chance"
 
 
+@pytest.mark.parametrize("silent_s", [0.8, 2.0, 30.0, 600.0])
+def test_a_route_that_fell_silent_vouches_for_nobody_while_the_other_speaks(silent_s):
+    """A stream that was vouched for once and then died held every number for ever: each forged HOLD was believed by it.
+
+    A hurried simulation made such a second stream in its first seconds; a route that goes, or a gap, does so on a boat.
+    """
+    air = Air()
+    air.run(10.0)
+    second = Codec(1, 1)
+    for _ in range(20):   # the same autopilot over another route, with a count of its own
+        air.run(0.2)
+        air.hear(second, attitude(air.t_s - ZERO_S))
+        air.hear(second, wind())
+    assert air.run(silent_s) == []
+    forger, believed = Codec(1, 1), 0
+    for _ in range(200):
+        believed += air.hear(forger, beat(mode=4)) is None
+        air.run(0.2)
+    assert believed <= 8, "one number in a hundred is in step by chance"
+
+
 def test_a_flood_of_every_number_does_not_lead_the_count_away():
     air = Air()
     air.run(10.0)

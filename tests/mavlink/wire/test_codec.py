@@ -293,11 +293,16 @@ def test_a_fence_that_is_told_of_no_more_is_off():
         return assembler.take(t_s, heard(message))[-1].fence_on
 
     assert seen(0.0, beat) is None                 # never told of
-    assert seen(1.0, fence) is True
-    assert seen(5.0, beat) is True
-    assert seen(7.0, beat) is False
+    assert seen(1.0, fence) is None                # for a moment, by whomever
+    assert seen(3.0, fence) is None
+    assert seen(9.0, beat) is None
+    for t_s in range(20, 26):
+        assert seen(float(t_s), fence) is (True if t_s == 25 else None)
+    assert seen(29.0, beat) is True
+    assert seen(31.0, beat) is False
     assert seen(60.0, beat) is False
-    assert seen(61.0, fence) is True
+    for t_s in range(61, 67):
+        assert seen(float(t_s), fence) is (t_s == 66)
 
 
 def test_what_is_not_looked_at_tells_nothing_of_the_status():
