@@ -25,12 +25,12 @@ def add_methods(parser: argparse.ArgumentParser) -> None:
                         help="and by the plans of each of these: auto, rrtstar, astar")
 
 
-def methods_of(args: argparse.Namespace) -> list[Method]:
+def methods_of(guidances: Sequence[str] | None, planners: Sequence[str] | None) -> list[Method]:
     """Return the methods that were asked for, one of the mission's own where none was."""
     from sitl.run.variation import Method
 
-    return [Method(guidance=guidance, planner=planner)
-            for guidance in args.guidance or [None] for planner in args.planner or [None]]
+    own: Sequence[None] = (None,)
+    return [Method(guidance=guidance, planner=planner) for guidance in guidances or own for planner in planners or own]
 
 
 def compile_planners(draws: Sequence[str]) -> None:

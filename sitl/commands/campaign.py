@@ -37,5 +37,5 @@ def run(args: argparse.Namespace) -> int:
 
     return run_campaign(
         args.scenarios, runs=args.runs, first_seed=args.first_seed, means=means_of(args), json_path=args.json,
-        keep=args.keep, methods=methods_of(args),
+        keep=args.keep, methods=methods_of(args.guidance, args.planner),
     )

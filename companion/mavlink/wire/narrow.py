@@ -8,6 +8,7 @@ WATCHDOGS = (
     "vessel too near", "no progress", "heading against course", "off the corridor", "stuck waypoint", "mission ended",
     "fence breach", "foreign mission", "reboot", "battery low", "battery critical", "leaking", "dark", "shore lost",
     "out of time", "dragged off", "planner dead", "strong wind", "light wind", "fence off",
+    "wind contradicted",
 )
 
 

@@ -22,7 +22,7 @@ from companion.planner import Problem
 from companion.planner.problem import evaluate, resolved
 from companion.planner.risk import of_risky, path_risk, tacks_at_risk
 from companion.planner.track import Expected
-from companion.skipper.planning.autopilot_beats import room_m
+from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
 from companion.skipper.planning.track import of_way
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step.route import Route
@@ -47,7 +47,8 @@ def refusal(turn: Turn, route: Route, set_current: int | None, pending: PendingP
         return ""
     problem: Problem = pending.problem
     here_m = float(turn.voyage.area.clearance_m([boat])[0]) - turn.voyage.boat.hull.reach_m
-    is_low = problem.tracking is not None and here_m < problem.tracking.floor_m
+    # Below the floor, and where it has to be gybed round, a way of short legs is better than none.
+    has_loops = not tacks_fail(turn) and (problem.tracking is None or here_m >= problem.tracking.floor_m)
     first, heading_rad, begins = turn.state.index if set_current is None else set_current - 1, vehicle.heading_rad, boat
     if set_current is not None and pending.from_index is None and not pending.lead_in:
         # where she is by the time that it is on board
@@ -56,8 +57,8 @@ def refusal(turn: Turn, route: Route, set_current: int | None, pending: PendingP
     old, ahead, leg = [boat, *turn.ahead()], turn.ahead(), turn.leg()
     sailed_m = 0.0 if leg is None else distance_m(leg[0], boat)
     before = Expected() if not ahead else of_way(
-        problem, old, heading_rad=vehicle.heading_rad, before_en=None, sailed_m=sailed_m, has_loops=not is_low)
-    seen = of_way(problem, new, heading_rad=heading_rad, before_en=None, has_loops=not is_low,
+        problem, old, heading_rad=vehicle.heading_rad, before_en=None, sailed_m=sailed_m, has_loops=has_loops)
+    seen = of_way(problem, new, heading_rad=heading_rad, before_en=None, has_loops=has_loops,
                   sailed_m=sailed_m if set_current is None else 0.0)
     low = _below_floor(problem, seen, before if ahead else None, here_m=here_m)
     if low or not ahead or not is_open(turn, pending, before):
@@ -121,7 +122,7 @@ def _less(turn: Turn, pending: PendingPlan, new: list[PointEn], old: list[PointE
         return f"its delta_s is {facts.delta_s:g}, that of the way on board, which is open, {route.delta_s:g}"
     here = replace(resolved(pending.problem), start_en=new[0], start_heading_rad=heading_rad)
     legs = [evaluate(replace(here, start_en=way[0]), np.asarray(way)).legs for way in (new, old)]
-    tacks = [of_risky(tacks_at_risk(here, each)) for each in legs]
+    tacks = [min(1.0, of_risky(tacks_at_risk(here, each))) for each in legs]   # a union bound may be above 1
     if tacks[0] > tacks[1] + TACKS_RISK:
         return (f"tacks of it that fail are likelier to end in a contact: {100.0 * tacks[0]:.2g} %, "
                 f"of the way on board {100.0 * tacks[1]:.2g} %")

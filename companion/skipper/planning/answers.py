@@ -157,7 +157,8 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
     if tacks_fail(turn):
         # Tacks have failed: turn the other way round where there is room.
         points = list(_gybed_round(turn, pending, start, points))
-        seen = of_way(pending.problem, [start, *points], heading_rad=pending.problem.start_heading_rad, before_en=None)
+        seen = of_way(pending.problem, [start, *points], heading_rad=pending.problem.start_heading_rad, before_en=None,
+                      has_loops=False)
         if not seen.is_kept:
             points = [*pending.lead_in, *planned[1:]]   # rather a tack that may fail than a loop onto something
         elif expected_m is not None:

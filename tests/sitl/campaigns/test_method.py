@@ -97,9 +97,10 @@ def test_the_options():
     add_methods(parser)
     assert parser.parse_args([]).draw == ()
     assert parser.parse_args(["--draw", "planner, guidance"]).draw == DRAWABLE
-    assert methods_of(parser.parse_args([])) == [Method()]
+    assert methods_of(None, None) == [Method()]
     args = parser.parse_args(["--guidance", "plan", "heading", "--planner", "astar"])
-    assert [m.told for m in methods_of(args)] == ["in AUTO, planner astar", "by heading, planner astar"]
+    told = [m.told for m in methods_of(args.guidance, args.planner)]
+    assert told == ["in AUTO, planner astar", "by heading, planner astar"]
 
 
 @pytest.mark.parametrize("words", [
