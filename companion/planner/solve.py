@@ -21,6 +21,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.errors import InputError
+from companion.planner.contingency import CONTACT_S
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.defects import defect_of
@@ -71,7 +72,7 @@ def plan(
         algorithm: one of ``ALGORITHMS``.
         settings: the algorithm's numbers, None: its defaults.
         on_better: is told of plans that can be sailed while better ones are looked for, each better than the one
-            before; by ``auto`` with a budget in seconds alone.
+            before (its time, with ``CONTACT_S`` for the risk of its tacks); by ``auto`` with a budget in seconds alone.
 
     Raises:
         InputError: the algorithm is unknown, the settings are another's, or a budget is not positive.
@@ -188,7 +189,7 @@ class _Answers:
         if not is_kept or (found is not None and found.tack_risk > 0.0):
             spare_s += MENDED * effort.budget_s
         effort.judging_s = max(effort.judging_s, effort.needed_s + spare_s)
-        if found is not None and found.has_path and (self.best is None or found.cost_s < self.best.cost_s):
+        if found is not None and found.has_path and (self.best is None or _counted_s(found) < _counted_s(self.best)):
             self.best = replace(found, unproven=("search", "bound"))
             effort.has_answer = True
             if self._on_better is not None:
@@ -198,9 +199,13 @@ class _Answers:
         return effort.elapsed_s + LATER * (effort.elapsed_s if found is not None else effort.elapsed_s - began_s)
 
     def last(self, outcome: Outcome, plan: Plan) -> Plan:
-        """Return the last answer, or a better one from before: a path that does not keep what it must is none."""
+        """Return the last answer, or a better one from before: a path that does not keep what it must is none.
+
+        The last may take longer than one from before where fewer of its tacks are at risk.
+        """
         best = self.best
-        if best is None or (plan.has_path and (plan.cost_s <= best.cost_s or plan.tack_risk < best.tack_risk)):
+        if best is None or (plan.has_path and (
+                _counted_s(plan) <= _counted_s(best) or plan.tack_risk < best.tack_risk)):
             return plan
         bound = min(outcome.lower_bound_s, best.cost_s)
         is_bound = bound > 0.0 and math.isfinite(outcome.lower_bound_s)
@@ -209,6 +214,11 @@ class _Answers:
             expansions=self._effort.used, elapsed_s=self._effort.elapsed_s,
             reason=f"{100.0 * (best.cost_s / bound - 1.0):.1f} % above the bound" if is_bound else best.reason,
             unproven=() if is_bound else ("bound",))
+
+
+def _counted_s(plan: Plan) -> float:
+    """Return a plan's time, with what the risk of its tacks counts as [s]."""
+    return plan.cost_s + CONTACT_S * plan.tack_risk
 
 
 def _whole(
