@@ -236,7 +236,7 @@ def _convert(args: argparse.Namespace) -> int:
 
 
 def _upload(args: argparse.Namespace) -> int:
-    from companion.commands.shore import Shore, upload_and_compare
+    from companion.commands.mavsdk_session import MavsdkSession, upload_and_compare
     from companion.geofence.formats import MAX_FENCE_ITEMS, STORAGE_BYTES, storage_bytes, zones_to_items
     from companion.geofence.mission import zones_only
     from companion.messages import MissionType
@@ -256,30 +256,30 @@ def _upload(args: argparse.Namespace) -> int:
         )
     else:
         print_losses(tuple(losses), args.file)
-    with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
-        name = upload_and_compare(shore, MissionType.FENCE, items)
+    with MavsdkSession(args.link, timeout_s=args.timeout, system=args.system) as session:
+        name = upload_and_compare(session, MissionType.FENCE, items)
         print(f"fence of {counted(len(items), 'item')} uploaded and read back the same, hash {name}")
         if args.enable:
-            shore.set_param("FENCE_TYPE", 4.0)  # polygons alone: the default's 300 m circle round home would breach
-            shore.set_param("FENCE_ENABLE", 1.0)
-            print(f"fence enabled: FENCE_TYPE 4, FENCE_ACTION {shore.get_param('FENCE_ACTION'):g}")
+            session.set_param("FENCE_TYPE", 4.0)  # polygons alone: the default's 300 m circle round home would breach
+            session.set_param("FENCE_ENABLE", 1.0)
+            print(f"fence enabled: FENCE_TYPE 4, FENCE_ACTION {session.get_param('FENCE_ACTION'):g}")
         else:
-            enabled, kind = shore.get_param("FENCE_ENABLE"), shore.get_param("FENCE_TYPE")
+            enabled, kind = session.get_param("FENCE_ENABLE"), session.get_param("FENCE_TYPE")
             print(f"FENCE_ENABLE is {enabled:g} and FENCE_TYPE {kind:g}: "
                   + ("in force" if enabled and int(kind) & 4 else "not in force; --enable sets both"))
     return 0
 
 
 def _download(args: argparse.Namespace) -> int:
-    from companion.commands.shore import Shore, download_list
+    from companion.commands.mavsdk_session import MavsdkSession, download_list
     from companion.geofence.formats import Findings, format_of, items_to_zones, write
     from companion.mavlink.wire import mission_hash
     from companion.messages import MissionType
 
     format_of(args.out)
     refuse_existing([args.out], force=args.force)
-    with Shore(args.link, timeout_s=args.timeout, system=args.system) as shore:
-        items = download_list(shore, MissionType.FENCE)
+    with MavsdkSession(args.link, timeout_s=args.timeout, system=args.system) as session:
+        items = download_list(session, MissionType.FENCE)
     findings = Findings()
     zones, return_point = items_to_zones(items, findings)
     document = _document(zones, return_point, findings)

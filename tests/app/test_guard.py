@@ -17,7 +17,7 @@ from companion.app.crew import Crew
 from companion.app.far import Mailbox
 from companion.app.options import Far, SailOptions, at_once
 from companion.clock import now_s, run_virtual
-from companion.commands.run.given import charts_of, far_of, page_of
+from companion.commands.run import charts_of, far_of, page_of
 from companion.compose import displays_of
 from companion.errors import InputError
 from companion.fold import VoyageFold

@@ -10,7 +10,7 @@ import pytest
 
 from companion import cli
 from companion.clock import run_virtual
-from companion.commands.run.command import NOT_THERE
+from companion.commands.run import NOT_THERE
 from companion.errors import InputError
 from companion.plots.chart import save
 from sitl import cli as sitl_cli

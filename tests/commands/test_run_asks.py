@@ -8,7 +8,7 @@ import pytest
 
 from companion.app.options import at_once
 from companion.clock import run_virtual
-from companion.commands.starting import alone, asked
+from companion.commands.run import confirm_again, hold_state_folder
 from companion.disk import Disk
 from companion.errors import InputError, JobError
 from companion.geofence import load_mission
@@ -45,7 +45,7 @@ def test_a_mission_that_has_arrived_is_asked_for(answer, again, terminal, missio
     keyboard, stream = terminal
     os.write(keyboard, answer.encode() + b"\n")
     with Console(stream) as console:
-        assert asked(mission, tmp_path / "state.json", console) is again
+        assert confirm_again(mission, tmp_path / "state.json", console) is again
     seen = b""
     while b"lake has arrived already" not in seen:
         seen += os.read(keyboard, 4096)
@@ -54,27 +54,27 @@ def test_a_mission_that_has_arrived_is_asked_for(answer, again, terminal, missio
 def test_one_that_has_not_is_sailed_on_without_a_question(terminal, mission, tmp_path):
     save(tmp_path / "state.json", arrived=False)
     with Console(terminal[1]) as console:
-        assert asked(mission, tmp_path / "state.json", console) is False
+        assert confirm_again(mission, tmp_path / "state.json", console) is False
         (tmp_path / "state.json").write_text("[" * 100_000)
-        assert asked(mission, tmp_path / "state.json", console) is False
-        assert asked(mission, tmp_path / "none.json", console) is False
+        assert confirm_again(mission, tmp_path / "state.json", console) is False
+        assert confirm_again(mission, tmp_path / "none.json", console) is False
 
 
 def test_a_service_is_notasked(mission, tmp_path, monkeypatch):
     save(tmp_path / "state.json", arrived=True)
     monkeypatch.setattr(sys, "stdin", None)
     with Console(None) as console:
-        assert asked(mission, tmp_path / "state.json", console) is False
+        assert confirm_again(mission, tmp_path / "state.json", console) is False
 
 
 def test_one_boat_has_one_companion_whatever_it_sails(tmp_path):
-    with Console(None) as console, alone(tmp_path / "x/a.state.json", tmp_path / "v", console):
+    with Console(None) as console, hold_state_folder(tmp_path / "x/a.state.json", tmp_path / "v", console):
         with pytest.raises(JobError, match="two must not command one boat"), \
-                alone(tmp_path / "x/b.json", tmp_path / "w", console):
+                hold_state_folder(tmp_path / "x/b.json", tmp_path / "w", console):
             pass
-        with alone(tmp_path / "y/a.state.json", tmp_path / "v", console):      # another boat
+        with hold_state_folder(tmp_path / "y/a.state.json", tmp_path / "v", console):      # another boat
             pass
-    with Console(None) as console, alone(tmp_path / "x/a.state.json", tmp_path / "v", console):
+    with Console(None) as console, hold_state_folder(tmp_path / "x/a.state.json", tmp_path / "v", console):
         pass
 
 
@@ -82,7 +82,7 @@ def test_a_place_that_cannot_hold_the_state_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with Console(None) as console:
         with pytest.raises(InputError, match="cannot hold the state"), \
-                alone(tmp_path / "file/s.json", tmp_path / "v", console):
+                hold_state_folder(tmp_path / "file/s.json", tmp_path / "v", console):
             pass
-        with pytest.raises(InputError, match="is a folder"), alone(tmp_path, tmp_path / "v", console):
+        with pytest.raises(InputError, match="is a folder"), hold_state_folder(tmp_path, tmp_path / "v", console):
             pass

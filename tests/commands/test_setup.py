@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from companion import cli
-from companion.commands.setup import ports
+from companion.commands import setup
 from companion.errors import LinkError
 from companion.geofence import load_mission
 from sitl.scene.ships import free_port
@@ -63,7 +63,7 @@ def serial(boat):
 
 def test_it_finds_the_autopilot_writes_a_mission_that_can_be_sailed_and_runs_the_doctor(
         serial, tmp_path, monkeypatch, capfd):
-    monkeypatch.setattr(ports, "ports", lambda: [ports.Port(path=serial)])
+    monkeypatch.setattr(setup, "serial_ports", lambda: [setup.Port(path=serial)])
     code = cli.main(["setup", "lake", "--yes", "--dir", str(tmp_path), *HERE])
     out, err = capfd.readouterr()
     assert code in {0, 1}, err   # the doctor's: what it finds on a fresh autopilot
@@ -122,23 +122,23 @@ def test_a_system_of_32_bits_is_one_line_with_what_to_install(command, monkeypat
 
 def refusal(found):
     with pytest.raises(LinkError) as error:
-        ports.find(found, lambda _: None)
+        setup.find_autopilot(found, lambda _: None)
     assert "\n" not in str(error.value)
     return str(error.value)
 
 
 def test_no_port_a_busy_one_and_one_without_permission(tmp_path, monkeypatch, serial):
-    assert "there is no serial port here; wire the autopilot" in refusal(ports.ports(tmp_path))
+    assert "there is no serial port here; wire the autopilot" in refusal(setup.serial_ports(tmp_path))
     (tmp_path / "ttyACM0").symlink_to(serial)
     (tmp_path / "autopilot").symlink_to("ttyACM0")
-    assert [p.path.name for p in ports.ports(tmp_path)] == ["autopilot"]   # one port, its best name
+    assert [p.path.name for p in setup.serial_ports(tmp_path)] == ["autopilot"]   # one port, its best name
     monkeypatch.setattr(os, "access", lambda *_: False)   # root may everything
     group = grp.getgrgid(serial.stat().st_gid).gr_name
     assert f"belongs to the group {group}, and you are not in it; sudo adduser $USER {group}" in refusal(
-        ports.ports(tmp_path))
+        setup.serial_ports(tmp_path))
 
 
 def test_a_busy_port_says_who_to_end(serial):
     with serial.open("r+b", buffering=0) as taken:
         fcntl.flock(taken, fcntl.LOCK_EX)
-        assert "another program has it; end that, or share the port" in refusal([ports.Port(path=serial)])
+        assert "another program has it; end that, or share the port" in refusal([setup.Port(path=serial)])

@@ -15,7 +15,7 @@ from companion import cli
 from companion.app import sail as app
 from companion.app.options import SailOptions, at_once
 from companion.clock import run_virtual
-from companion.commands.run.command import last_words
+from companion.commands.run import outcome_of
 from companion.geofence import load_mission
 from companion.mavlink.wire.frames import Codec
 from companion.planner.worker import InlinePlanner
@@ -129,17 +129,17 @@ def test_a_mission_that_has_arrived_says_what_would_sail_it_again(short, tmp_pat
     """It ended with "arrived; 0 s" (issue 13, point 1)."""
     assert sail(short, tmp_path)[0].passed
     first = json.loads((tmp_path / "summary.json").read_bytes())
-    assert last_words("reach", first)[0] == 0
-    assert last_words("reach", first)[1].startswith("arrived; ")
+    assert outcome_of("reach", first)[0] == 0
+    assert outcome_of("reach", first)[1].startswith("arrived; ")
     # Another state file, the boat in the loiter of this list: it takes the list over and is there ("arrived; 1 s").
-    code, said = last_words("reach", first | {"plans": 0, "uploads": 0, "time_s": 2.0, "tacks": 0})
+    code, said = outcome_of("reach", first | {"plans": 0, "uploads": 0, "time_s": 2.0, "tacks": 0})
     assert code == 0
     assert said.startswith("arrived, with nothing sailed anew: at this start she lay at the goal of reach already")
     sail(short, tmp_path)      # another boat, the same state
     again = json.loads((tmp_path / "summary.json").read_bytes())
     assert again["arrived_before"] is True
     assert again["uploads"] == 0
-    assert last_words("reach", again) == (
+    assert outcome_of("reach", again) == (
         2, "not sailed: reach had arrived before this start; --again sails it again")
 
 
@@ -205,4 +205,4 @@ def test_started_again_beside_the_boat_in_her_loiter_it_says_so_too(short, tmp_p
     again = json.loads((tmp_path / "summary.json").read_bytes())
     assert (again["arrived"], again["arrived_before"], again["uploads"]) == (True, True, 0)
     assert again["end_why"].startswith("the goal is reached before this start")
-    assert last_words("reach", again)[0] == 2
+    assert outcome_of("reach", again)[0] == 2

@@ -229,12 +229,12 @@ def test_a_link_that_dies_in_a_transfer_is_an_error(tmp_path):
     """The autopilot stops answering after the connection: an error, no empty fence."""
     script = textwrap.dedent("""
         import os, signal, sys
-        from companion.commands.shore import shore
+        from companion.commands import mavsdk_session
         from companion.errors import TransferError
         from companion.messages import MissionType
 
-        shore.SILENCE_S = 1.5
-        with shore.Shore(sys.argv[1], timeout_s=20.0) as end:
+        mavsdk_session.SILENCE_S = 1.5
+        with mavsdk_session.MavsdkSession(sys.argv[1], timeout_s=20.0) as end:
             os.kill(int(sys.argv[2]), signal.SIGSTOP)
             try:
                 print("got", end.download(MissionType.FENCE))

@@ -1,4 +1,4 @@
-"""The shore's end of a transfer: missions, fences and rally lists by MAVSDK 4, with deadlines and proof of life.
+"""The autopilot's lists over a link, by MAVSDK: what fence and mission upload, download and compare with.
 
 MAVSDK answers a dead link with empty lists and waits without saying so; here every wait has an end, a transfer
 counts only if the autopilot was seen to take part in it, and a failure quotes what the autopilot said.
@@ -9,13 +9,63 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
-from companion.commands.shore.wording import NAMES, from_mavsdk, home_item, mavsdk_url, to_mavsdk, words
 from companion.errors import LinkError, TransferError
-from companion.messages import GeoPoint, MissionItem, MissionType
+from companion.messages import Command, GeoPoint, MissionItem, MissionType
+
+NAMES = {MissionType.MISSION: "mission", MissionType.FENCE: "fence", MissionType.RALLY: "rally"}
+
+
+def mavsdk_url(link: str) -> str:
+    """Return MAVSDK's words for a LINK. Raises InputError.
+
+    >>> mavsdk_url("tcp:127.0.0.1:5760")
+    'tcpout://127.0.0.1:5760'
+    """
+    from companion.mavlink.transports import parse_link
+
+    name = parse_link(link)
+    if name.kind == "serial":
+        return f"serial://{name.device}:{name.baud}"
+    kind = {"tcp": "tcpout"}.get(name.kind, name.kind)
+    return f"{kind}://{name.host}:{name.port}"
+
+
+def home_item(items: Sequence[MissionItem], home: GeoPoint | None) -> MissionItem:
+    """Return item 0 of a mission: home, else the first place of the list."""
+    point = home or next((i.point for i in items if i.lat_e7 or i.lon_e7), GeoPoint(lat_deg=0.0, lon_deg=0.0))
+    return MissionItem(command=Command.NAV_WAYPOINT, lat_e7=round(point.lat_deg * 1e7),
+                       lon_e7=round(point.lon_deg * 1e7), frame=0)
+
+
+def to_mavsdk(number: int, item: MissionItem, kind: MissionType) -> Any:
+    """Return an item as MAVSDK has it."""
+    from mavsdk.plugins.mission_raw import MissionItem as RawItem
+
+    p1, p2, p3, p4 = item.params
+    return RawItem(number, item.frame, int(item.command), int(number == 0), int(item.autocontinue), p1, p2, p3, p4,
+                   item.lat_e7, item.lon_e7, item.alt_m, int(kind))
+
+
+def from_mavsdk(item: Any) -> MissionItem:
+    """Return an item of MAVSDK's as ours."""
+    params = tuple(float(p) if p == p else 0.0 for p in (item.param1, item.param2, item.param3, item.param4))  # noqa: PLR0124
+    return MissionItem(
+        command=int(item.command), lat_e7=int(item.x), lon_e7=int(item.y), alt_m=float(item.z), frame=int(item.frame),
+        params=(params[0], params[1], params[2], params[3]), autocontinue=bool(item.autocontinue),
+    )
+
+
+def words(result: object) -> str:
+    """Return a result of MAVSDK in plain words."""
+    inner = getattr(result, "result", getattr(result, "_result", result))
+    name = getattr(inner, "name", None)
+    return str(name).lower().replace("_", " ") if name else str(result).split("\n", maxsplit=1)[0]
+
 
 OnProgress = Callable[[float], None]  # 0..1
 
@@ -44,7 +94,7 @@ def find_system(link: str, timeout_s: float, system: int | None) -> int:
     return run(listen())
 
 
-class Shore:
+class MavsdkSession:
     """A connected autopilot, seen from the shore. Use as a context manager; blocking, one call at a time.
 
     ``system`` is the autopilot's system id, None: the only one that is heard.
@@ -289,3 +339,44 @@ class Shore:
         if failure:
             raise TransferError(f"{what}: {words(failure[0])}")
         return answer[0]
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[OnProgress]:
+    """Show a bar on a terminal's stderr; elsewhere nothing."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description:>18}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"),
+               TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+        task = progress.add_task(title, total=1.0)
+        yield lambda done: progress.update(task, completed=done)
+        progress.update(task, completed=1.0)
+
+
+def upload_and_compare(
+    session: MavsdkSession, kind: MissionType, items: Sequence[MissionItem], *, home: GeoPoint | None = None,
+) -> str:
+    """Write a list, read it back, compare, and return its hash. Raises TransferError where they differ."""
+    from companion.mavlink.wire import first_difference, mission_hash
+
+    name = NAMES[kind]
+    with progress_bar(f"{name} upload") as on_progress:
+        session.upload(kind, items, home=home, on_progress=on_progress)
+    with progress_bar("read back") as on_progress:
+        found = session.download(kind, on_progress=on_progress)
+    difference = first_difference(items, found)
+    if difference:
+        raise TransferError(f"{name} read back differs: {difference}")
+    sent, back = mission_hash(items), mission_hash(found)
+    if sent != back:
+        raise TransferError(f"{name} read back differs: hash {back}, sent {sent}")
+    return sent
+
+
+def download_list(session: MavsdkSession, kind: MissionType) -> tuple[MissionItem, ...]:
+    """Read a list with a progress bar."""
+    with progress_bar(f"{NAMES[kind]} download") as on_progress:
+        return session.download(kind, on_progress=on_progress)

@@ -1,16 +1,21 @@
-"""The options of ``companion setup``, and its course: look, ask, write, examine."""
+"""``companion setup``: from a computer that is wired to an autopilot to a service that can be started."""
 
 from __future__ import annotations
 
 import argparse
+import grp
+import os
 import re
+import stat
 import sys
+import tempfile
 from argparse import ArgumentTypeError
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from companion.errors import CompanionError, InputError, JobError
+from companion.errors import CompanionError, InputError, JobError, LinkError
 from companion.program.arguments import number, place, system_id
 
 FOLDER = Path("/etc/companion")
@@ -64,7 +69,6 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.commands.output import refuse_existing
-    from companion.commands.setup.files import mission_of, settings_of, write
 
     ask = Questions(is_silent=args.yes)
     args.name = args.name or ask("name of the mission", "boat", instance)
@@ -77,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
         args.start = args.start or ask("where she starts, LAT,LON", None, place)
         args.goal = args.goal or [ask("where she is to sail, LAT,LON", None, place)]
     args.no_go = args.no_go or ask("how near to the wind she sails [deg]", 47.0, NO_GO_DEG)
-    written = write(args.dir, args.name, mission_of(args, system), settings_of(link), args.polar)
+    written = write_instance(args.dir, args.name, mission_of(args, system), settings_of(link), args.polar)
     for path in written:
         print(f"{path}: written")
     code = 0 if args.no_doctor else _examine(written[0], link, system)
@@ -100,14 +104,12 @@ def _room(folder: Path) -> None:
 
 def _link(args: argparse.Namespace, ask: Questions) -> tuple[str, int | None]:
     """Return the link and the system id of the autopilot on it."""
-    from companion.commands.setup.ports import find, ports
-    from companion.errors import LinkError
     from companion.mavlink.transports import parse_link
 
     if args.link is not None:
         return parse_link(args.link).text, args.system
     try:
-        link, system = find(ports(), lambda text: print(text, file=sys.stderr))
+        link, system = find_autopilot(serial_ports(), lambda text: print(text, file=sys.stderr))
     except LinkError as error:
         if ask.is_silent:
             raise
@@ -159,3 +161,153 @@ class Questions:
                 return take(text)
             except (ArgumentTypeError, ValueError, CompanionError) as error:
                 print(error)
+
+
+def mission_of(args: argparse.Namespace, system: int | None) -> dict[str, Any]:
+    """Return the mission, as its file has it; its operator permits nothing."""
+    boat: dict[str, Any] = {"no_go_half_deg": args.no_go}
+    if args.polar is not None:
+        boat["polar"] = args.polar.name
+    mission: dict[str, Any] = {"name": args.name}
+    if args.drawn:
+        mission["from_autopilot"] = True
+    else:
+        mission["start"] = _place(args.start)
+        mission["goal"] = [_place(goal) for goal in args.goal]
+    mission["boat"] = boat
+    if system is not None:
+        mission["autopilot"] = {"system": system}
+    mission["operator"] = {"set_auto": False, "arm": False}
+    return mission
+
+
+def _place(point: Any) -> dict[str, float]:
+    return {"lat": point.lat_deg, "lon": point.lon_deg}
+
+
+def settings_of(link: str) -> str:
+    """Return the instance's settings."""
+    return f"# How companion@ reaches the autopilot; OPTIONS= has more options of `companion run`.\nLINK={link}\n"
+
+
+def write_instance(folder: Path, name: str, mission: dict[str, Any], settings: str, polar: Path | None) -> list[Path]:
+    """Write them once the mission has been read as the boat will read it; return the paths, the mission's first.
+
+    Raises:
+        InputError: it could not be sailed; nothing is written.
+    """
+    import tomli_w
+
+    from companion.disk import Disk
+    from companion.geofence.mission import load_mission, load_settings
+
+    files = {f"{name}.toml": tomli_w.dumps(mission).encode(), f"{name}.env": settings.encode()}
+    if polar is not None:
+        files[polar.name] = polar.read_bytes()
+    with tempfile.TemporaryDirectory() as scratch:
+        for file, data in files.items():
+            Path(scratch, file).write_bytes(data)
+        try:
+            path = Path(scratch, f"{name}.toml")
+            if mission.get("from_autopilot"):
+                load_settings(path)
+            else:
+                load_mission(path)
+        except InputError as error:
+            raise InputError(str(folder / Path(error.source).name), error.place, error.problem,
+                             error.remedy or "nothing is written") from None
+    for file, data in files.items():
+        Disk().replace(folder / file, data)
+    return [folder / file for file in files]
+
+
+# The best name first: those of udev stay when ports are plugged in another order.
+NAMES = ("autopilot", "serial/by-id/*", "serial0", "ttyAMA*", "ttyACM*", "ttyUSB*")
+BAUDS = (921_600, 115_200, 57_600)
+LISTEN_S = 3.0   # a heartbeat a second
+WIRE = "wire the autopilot to a serial port (docs/on-the-boat.md), or name another link: --link udpin:0.0.0.0:14550"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Port:
+    """A serial port by its best name; ``trouble`` says why it cannot be used, empty: it can be tried."""
+
+    path: Path
+    trouble: str = ""
+
+
+def serial_ports(devices: Path = Path("/dev")) -> list[Port]:
+    """Return the serial ports, each once."""
+    found: dict[Path, Port] = {}
+    for name in NAMES:
+        for path in sorted(devices.glob(name)):
+            found.setdefault(path.resolve(), Port(path=path, trouble=permission(path)))
+    return list(found.values())
+
+
+def permission(path: Path) -> str:
+    """Return what keeps this user from a port, with the remedy; empty: nothing does."""
+    try:
+        status = path.stat()
+    except OSError as error:
+        return f"{path}: {error.strerror}"
+    if not stat.S_ISCHR(status.st_mode):
+        return f"{path} is no serial port"
+    if os.access(path, os.R_OK | os.W_OK):
+        return ""
+    try:
+        group = grp.getgrgid(status.st_gid).gr_name
+    except KeyError:
+        group = str(status.st_gid)
+    return (f"{path}: no permission: it belongs to the group {group}, and you are not in it; "
+            f"sudo adduser $USER {group}, then log in anew")
+
+
+def find_autopilot(tried: Iterable[Port], say: Callable[[str], None]) -> tuple[str, int]:
+    """Return the LINK where an autopilot is heard, and its system id.
+
+    Raises:
+        LinkError: none is, with the reason and the remedy in a line.
+    """
+    troubles = []
+    candidates = list(tried)
+    for port in candidates:
+        if port.trouble:
+            troubles.append(port.trouble)
+            continue
+        for baud in BAUDS:
+            link = f"{port.path}:{baud}"
+            say(f"listening on {link}")
+            system, trouble = heard(link)
+            if system is not None:
+                return link, system
+            if trouble:
+                troubles.append(f"{port.path}: {trouble}; end that, or share the port by mavlink-router")
+                break
+    if not candidates:
+        raise LinkError(f"there is no serial port here; {WIRE}")
+    if troubles:
+        raise LinkError("; ".join(troubles))
+    names = ", ".join(str(port.path) for port in candidates)
+    raise LinkError(f"no autopilot is heard on {names}: is it on, are RX and TX crossed, is SERIALn_PROTOCOL 2? "
+                    "Or name the link: --link")
+
+
+def heard(link: str) -> tuple[int | None, str]:
+    """Return the system id of the autopilot on a link, None when none is heard, and why the port cannot be opened."""
+    from companion.clock import run
+    from companion.mavlink.link import Link
+    from companion.mavlink.transports import TransportState, open_link
+    from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
+
+    async def listen() -> tuple[int | None, str]:
+        transport = open_link(link)
+        async with Link(transport, identity=LinkIdentity(component=TOOL_COMPONENT)) as connected:
+            try:
+                return (await connected.wait_autopilot(LISTEN_S)).target_system, ""
+            except CompanionError as error:
+                if transport.state is not TransportState.OPEN:
+                    return None, transport.stats.last_error
+                return None, "" if "no autopilot in" in str(error) else str(error)
+
+    return run(listen())
