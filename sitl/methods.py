@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sitl.run.variation import Method
 
+ALL = "all"   # of what may be drawn
 
-def add_draw(parser: argparse.ArgumentParser) -> None:
-    """Add ``--draw``."""
-    parser.add_argument("--draw", type=_drawable, default=(), metavar="WHAT[,WHAT]",
+
+def add_draw(parser: argparse.ArgumentParser, more: Mapping[str, str] = MappingProxyType({})) -> None:
+    """Add ``--draw``, of guidance and planner and of ``more``: what each of them is, in words."""
+    words = "".join(f", {name} ({told})" for name, told in more.items())
+    parser.add_argument("--draw", type=partial(_drawable, more=tuple(more)), default=(), metavar="WHAT[,WHAT]",
                         help="draw from each seed, too: guidance (in AUTO, by heading, by field), planner (auto, "
-                        "rrtstar, astar); what else a seed is stays the same (default: as the mission says)")
+                        f"rrtstar, astar){words}; all: each of these; what else a seed is stays the same (default: as "
+                        "the mission says)")
 
 
 def add_methods(parser: argparse.ArgumentParser) -> None:
@@ -42,11 +48,12 @@ def compile_planners(draws: Sequence[str]) -> None:
         compile_ahead(planner)
 
 
-def _drawable(text: str) -> tuple[str, ...]:
+def _drawable(text: str, more: tuple[str, ...] = ()) -> tuple[str, ...]:
     from sitl.run.variation import DRAWABLE
 
-    wanted = tuple(_among(part.strip(), DRAWABLE) for part in text.split(","))
-    return tuple(part for part in DRAWABLE if part in wanted)
+    known = (*DRAWABLE, *more)
+    wanted = tuple(_among(part.strip(), (*known, ALL)) for part in text.split(","))
+    return tuple(part for part in known if part in wanted or ALL in wanted)
 
 
 def _guidance(text: str) -> str:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
+from typing import get_args
 
 import msgspec
 
 from sitl.campaigns.failsafe_lots import FAILSAFES, unattended
-from sitl.campaigns.fault_lots import LOTS, PLANNER, SINGLE, Lot, Maker, turned_vane
-from sitl.scene import ExpectSpec, Scenario, WindSpec
+from sitl.campaigns.fault_lots import LOTS, PLANNER, SINGLE, Lot, Maker, full_card, turned_vane
+from sitl.campaigns.jump_draw import Jump
+from sitl.scene import ExpectSpec, Outlet, Scenario, WindSpec
 
 _MAKERS, _WEIGHTS = zip(*LOTS, *SINGLE, *FAILSAFES, strict=True)
 _ONCE = frozenset(maker for maker, _ in (*SINGLE, *FAILSAFES))
@@ -17,6 +19,9 @@ MODERATE_MPS = 4.0      # in less wind than this the same way takes longer
 UNATTENDED = 0.06       # the share of voyages on which the companion may not set modes
 LATEST_S = 170.0        # for a fault to begin
 TURNS_S = 45.0, 90.0    # when a vane is turned: under way, on a voyage of two minutes
+BESIDE = ("jump", "vane", "outlets", "card")   # what may be drawn beside the rest
+BESIDE_SHARE = 0.5      # of the voyages, for each of them
+BROKEN_SHARE = 0.5      # of the outlets
 
 
 def draw(seed: int, base: Scenario) -> Scenario:
@@ -28,6 +33,31 @@ def draw_turned_vane(seed: int, base: Scenario) -> Scenario:
     """Return what ``draw`` returns, and a vane that is turned under way, by a lot of its own."""
     rng = random.Random(f"turned vane {seed}")
     return befallen(draw(seed, base), [turned_vane(rng, round(rng.uniform(*TURNS_S), 1))])
+
+
+def draw_beside(seed: int, drawn: Scenario, what: Sequence[str], jump: Jump) -> Scenario:
+    """Return what ``draw`` drew, with trouble of ``what`` of ``BESIDE`` beside it, each by a lot of its own.
+
+    Whether a seed has one of them, and which, does not depend on the others. ``jump`` is what ``draw_jump`` draws of
+    it.
+    """
+    lots: list[Lot] = []
+    for name in BESIDE:
+        rng = random.Random(f"{name} beside {seed}")
+        if name not in what or rng.random() >= BESIDE_SHARE:
+            continue
+        if name == "jump":
+            events = tuple(e for e in jump.scenario.events if e.kind != "order")
+            longer_s = max(0.0, jump.scenario.limit_s - drawn.limit_s)
+            lots.append(Lot(events=events, longer_s=longer_s,
+                            changes={"exit_on_arrival": drawn.exit_on_arrival and jump.scenario.exit_on_arrival}))
+        elif name == "vane":
+            lots.append(turned_vane(rng, round(rng.uniform(*TURNS_S), 1)))
+        elif name == "outlets":
+            lots.append(Lot(changes={"broken": tuple(o for o in get_args(Outlet) if rng.random() < BROKEN_SHARE)}))
+        else:
+            lots.append(full_card(rng, round(rng.uniform(3.0, LATEST_S), 1)))
+    return befallen(drawn, lots)
 
 
 def drawn_by(rng: random.Random, base: Scenario) -> Scenario:

@@ -192,6 +192,12 @@ def _disk(rng: random.Random, at_s: float) -> Lot:
                for_s=rng.choice((None, length(rng, 5.0, 120.0))))
 
 
+def full_card(rng: random.Random, at_s: float) -> Lot:
+    """Fill the card, or make it read-only: from the start or under way, for good or until it is well again."""
+    return one(at_s=rng.choice((FIRST_S, at_s)), kind="disk", state=rng.choice(("full", "read_only")),
+               for_s=rng.choice((None, length(rng, 5.0, 120.0))))
+
+
 # --------------------------------------------------------------------------------------------- people
 def _reboot(rng: random.Random, at_s: float) -> Lot:  # noqa: ARG001
     return one(at_s=at_s, kind="reboot")

@@ -28,11 +28,11 @@ from companion.errors import InputError
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode
 from sitl.campaigns.counterfactual import ALERT_S, avoidable, by_hand
-from sitl.campaigns.fault_draw import draw, draw_planner, draw_turned_vane
+from sitl.campaigns.fault_draw import BESIDE, draw, draw_beside, draw_planner, draw_turned_vane
 from sitl.campaigns.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
-from sitl.campaigns.jump_draw import KINDS, MODES, draw_jump
+from sitl.campaigns.jump_draw import KINDS, MODES, Jump, draw_jump
 from sitl.means import Means
-from sitl.run.variation import Method, Variation, drawn_method
+from sitl.run.variation import DRAWABLE, Method, Variation, drawn_method
 from sitl.runner import Key, file_hash, sail
 from sitl.scene import EventSpec, Scenario, is_all_ordinary, load_scenario
 
@@ -51,10 +51,13 @@ def sail_seed(
 ) -> dict[str, Any]:
     """Draw the faults of one seed, sail them and return how it went; a voyage folder is left in ``keep``.
 
-    ``draws`` as of ``method_of``.
+    ``draws`` as of ``method_of``, and of ``BESIDE``: what is drawn beside the seed's own faults.
     """
     scenario = load_scenario(base)
-    return sail_faults(draw(seed, scenario), seed, base, keep, method=method_of(seed, scenario, base, draws))
+    drawn = draw(seed, scenario)
+    if set(draws) & set(BESIDE):
+        drawn = draw_beside(seed, drawn, draws, _jump_of(seed, scenario, base))
+    return sail_faults(drawn, seed, base, keep, method=method_of(seed, scenario, base, draws))
 
 
 def sail_turned_vane_seed(
@@ -82,7 +85,22 @@ def method_of(seed: int, scenario: Scenario, source: Path, draws: Sequence[str])
     """
     from sitl.run.embedded import mission_of
 
-    return drawn_method(random.Random(f"method {seed}"), draws, mission_of(scenario, source)) if draws else Method()
+    if not set(draws) & set(DRAWABLE):
+        return Method()
+    return drawn_method(random.Random(f"method {seed}"), draws, mission_of(scenario, source))
+
+
+def _jump_of(seed: int, base: Scenario, source: Path) -> Jump:
+    """Return the false position that a seed draws in the water of ``base``."""
+    from companion.geofence import load_mission
+    from sitl.run.embedded import solid_of
+
+    mission = load_mission(base.mission_path(source))
+    frame = mission.frame()
+    places = [frame.en_from_geo(p) for p in (mission.start or mission.origin, mission.goals[-1].point)]
+    solid = solid_of(mission.area.local(frame))
+    return draw_jump(seed, base, start_en=places[0], goal_en=places[1],
+                     solids_en=[(p.centroid.x, p.centroid.y) for p in shapely.get_parts(solid)])
 
 
 def sail_jump_seed(
@@ -93,16 +111,8 @@ def sail_jump_seed(
     The second does so as soon as anything could be known of it. What the first touches and the second does not is a
     fault. ``draws`` as of ``method_of``.
     """
-    from companion.geofence import load_mission
-    from sitl.run.embedded import solid_of
-
     plain = load_scenario(base)
-    mission = load_mission(plain.mission_path(base))
-    frame = mission.frame()
-    places = [frame.en_from_geo(p) for p in (mission.start or mission.origin, mission.goals[-1].point)]
-    solid = solid_of(mission.area.local(frame))
-    drawn = draw_jump(seed, plain, start_en=places[0], goal_en=places[1],
-                      solids_en=[(p.centroid.x, p.centroid.y) for p in shapely.get_parts(solid)])
+    drawn = _jump_of(seed, plain, base)
     method = method_of(seed, plain, base, draws)
     ours = _sail(drawn.scenario, seed, base, keep, method=method, variation=drawn.variation)
     reach = ours.watch.reach()
@@ -172,6 +182,7 @@ def sail_faults(
         "events": [told(e) for e in scenario.events], "parameters": dict(scenario.parameters),
         "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}", "limit_s": scenario.limit_s,
         "set_auto": scenario.set_auto, "system": scenario.system, "method": method.told,
+        "broken": list(scenario.broken),
         "kinds": sorted({e.kind for e in scenario.events}),
         "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
         "contacts": contacts, "clearance_m": least and least[0], "clearance_t_s": least and least[1],
@@ -269,6 +280,7 @@ def run_faults(
     def tell(record: dict[str, Any]) -> None:
         if not record["passed"]:
             method = [record["method"]] if record.get("method") else []
+            method += [f"no {outlet}" for outlet in record.get("broken", ())]
             drawn = method + record["events"] + [f"{name} {value:g}" for name, value in record["parameters"].items()]
             word = "known to fail," if record["seed"] in known else "FAILED"
             print(f"{word} seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})", flush=True)

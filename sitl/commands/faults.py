@@ -5,9 +5,18 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from companion.errors import InputError
 from companion.program.arguments import out_file, out_folder, whole
 from sitl.means import add_options, means_of
 from sitl.methods import add_draw, compile_planners
+
+# What else may be drawn beside a seed's own faults, of the campaign that has them.
+BESIDE = {
+    "jump": "a false position, half of them onto something solid",
+    "vane": "turned under way, or its offset set",
+    "outlets": "page, its token, socket and satellite folder that cannot be used",
+    "card": "full or read-only",
+}
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -35,7 +44,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
                       help="beside what is drawn: the vane turned by 60 degrees or more under way, or its offset set")
     what.add_argument("--worker", dest="trouble", action="store_const", const="worker",
                       help="the planner's real process, killed, stopped, out of memory: in real time (a minute each)")
-    add_draw(parser)
+    add_draw(parser, BESIDE)
     add_options(parser)
     parser.set_defaults(run=run)
 
@@ -44,6 +53,9 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from sitl.campaigns.faults import SAILORS, run_faults
 
+    beside = [what for what in args.draw if what in BESIDE]
+    if beside and args.trouble != "all":
+        raise InputError("--draw", beside[0], f"is not drawn with --{args.trouble}", "leave out one of them")
     compile_planners(args.draw)
     if args.keep is not None:
         record = SAILORS[args.trouble](args.first_seed, keep=args.keep, draws=args.draw)

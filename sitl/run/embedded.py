@@ -10,7 +10,7 @@ import contextlib
 import json
 import math
 import traceback
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -28,7 +28,9 @@ from companion.errors import LinkError
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission, load_mission
+from companion.guard import Auxiliary, Guard
 from companion.messages import CompanionStatus, Mode
+from companion.page import Address
 from companion.sailable import require_sailable
 from companion.skipper.deeds import CALL
 from companion.skipper.step import Announce
@@ -38,6 +40,7 @@ from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.run.variation import Variation
 from sitl.scene import (
     Others,
+    Outlet,
     Scenario,
     Verdict,
     free_port,
@@ -60,7 +63,9 @@ EXPANSIONS = 15_000
 FAR = "far"   # the folder of the satellite link, in the voyage's
 # A companion that ended for want of an autopilot is started again after this long, as its service does [s].
 SERVICE_RESTART_S = 5.0
-
+# Where outlets cannot be: what is said of them is the same on every machine.
+NOWHERE = "192.0.2.1"          # an address for documentation (RFC 5737)
+NO_FOLDER = Path("/dev/null")
 
 
 def solid_of(area: LocalArea) -> BaseGeometry:
@@ -210,6 +215,7 @@ async def _sail_and_restart(
     )
     if room is not None:
         options = replace(options, room=room)
+    options = _with_broken(options, scenario.broken)
 
     def look(status: CompanionStatus, step: Step) -> None:
         world.status_s.append(step.snapshot.t_s)
@@ -228,7 +234,7 @@ async def _sail_and_restart(
         planner = world.planner = FragilePlanner() if worker_pace is None else MortalPlanner()
         task = asyncio.create_task(
             _one_life(planner, sail(mission, world.heard_by(), planner, folder, replace(options, limit_s=left_s),
-                                    on_status=look)),
+                                    on_status=look, guard=_guard_of(scenario.broken, seed))),
             name="companion",
         )
         kill = kills.pop(0) if kills else None
@@ -262,6 +268,23 @@ async def _sail_and_restart(
             world.disk.spoil(folder / STATE, kill.saved, kill.aged_s)
         options = replace(options, epoch_s=max(0.0, options.epoch_s + kill.clock_step_s))
         await asyncio.sleep(kill.restart_after_s)
+
+
+def _with_broken(options: SailOptions, broken: Sequence[Outlet]) -> SailOptions:
+    """Return the options with outlets that are wanted and cannot be used: of each of them its start fails."""
+    if "page" in broken or "page token" in broken:
+        options = replace(options, http=Address(host=NOWHERE if "page" in broken else "127.0.0.1", port=0))
+    if "socket" in broken:
+        options = replace(options, socket=NO_FOLDER / "socket")
+    return options if "satellite" not in broken else replace(options, far=Far(folder=NO_FOLDER / FAR, key=KEY))
+
+
+def _guard_of(broken: Sequence[Outlet], seed: int) -> Guard:
+    """Return the guard of a life, which knows what the command that begins it could not use."""
+    guard = Guard(seed=seed)
+    if "page token" in broken:
+        guard.lost(Auxiliary.ORDERS_BY_PAGE, "its token file is empty", for_good=True)
+    return guard
 
 
 async def _one_life(planner: FragilePlanner | MortalPlanner, voyage: Coroutine[Any, Any, dict[str, Any]]) -> Any:

@@ -9,6 +9,7 @@ from sitl.scene.road import Craft, Mover, duty
 from sitl.scene.scenario import (
     EventSpec,
     ExpectSpec,
+    Outlet,
     SatelliteSpec,
     Scenario,
     WindSpec,
@@ -24,7 +25,7 @@ from sitl.scene.written import scenario_text
 
 __all__ = [
     "CALL_HOLDS_S", "CLOSE_HAULED_DEG", "TASK_S", "TRAFFIC", "Craft", "CurrentSpec", "EventSpec", "ExpectSpec",
-    "HullSpec", "HullTrack", "LeeSpec", "Manner", "Motion", "Mover", "Others", "SatelliteSpec", "Scenario",
+    "HullSpec", "HullTrack", "LeeSpec", "Manner", "Motion", "Mover", "Others", "Outlet", "SatelliteSpec", "Scenario",
     "SensorsSpec", "StationScore", "Tasks", "Truth", "Verdict", "WavesSpec", "WindSpec", "count_tacks", "duty",
     "free_port", "is_all_ordinary", "judge", "load_scenario", "met_by", "own_polar", "recentre_m",
     "scenario_departures", "scenario_text", "scenario_waters", "scenario_wind", "station_score", "tasks_of",

@@ -68,6 +68,9 @@ EventKind = Literal[
 ]
 
 
+Outlet = Literal["page", "page token", "socket", "satellite"]
+
+
 class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The weather; from ``gust_spread`` on also what varies in time beside it and over the water."""
 
@@ -240,6 +243,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     policy: Literal["keep clear", "rules"] | None = None   # for vessels, in place of what the mission says
     system: int | None = None                 # of our autopilot, named in place of what the mission says
     satellite: SatelliteSpec | None = None    # ``far_order`` needs one
+    broken: tuple[Outlet, ...] = ()           # what is wanted beside the voyage, and cannot be used
     wind: WindSpec = msgspec.field(default_factory=WindSpec)
     current: CurrentSpec | None = None        # of these four: what the plan does not know of, None: it is as planned
     waves: WavesSpec | None = None

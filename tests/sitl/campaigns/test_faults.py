@@ -4,20 +4,25 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
+from typing import get_args
 
+import msgspec
 import pytest
 import shapely
 
 from companion.boat import Hull
 from companion.geo.frame import LocalFrame
+from companion.guard import Auxiliary
 from companion.messages import GeoPoint, Mode
+from companion.telemetry.folder.recorder import read_jsonl
+from sitl import cli
 from sitl.autopilot import EPOCH_S
-from sitl.campaigns.fault_draw import draw, draw_turned_vane
+from sitl.campaigns.fault_draw import BESIDE, draw, draw_beside, draw_turned_vane
 from sitl.campaigns.fault_watch import EXCUSES, REACTION_S, RESUME_S, Watch, mission_key, operator_spans
 from sitl.campaigns.faults import BASE, jump_figures, run_faults, sail_faults, sail_seed
 from sitl.campaigns.jump_draw import CREEPS_MPS, KINDS, LONG_S, MODES, NEAR_M, SHORT_S, draw_jump
 from sitl.means import Means
-from sitl.scene.scenario import EventSpec, load_scenario
+from sitl.scene.scenario import EventSpec, Outlet, load_scenario
 from sitl.trouble.forgeries import forgery_named
 
 SEEDS = Path(__file__).parent / "seeds"
@@ -43,6 +48,48 @@ def test_a_turned_vane_is_drawn_beside_the_others_by_a_stream_of_its_own():
     assert {e.kind for e in extra} == {"vane", "parameter"}
     assert all(60.0 <= abs(e.value_deg or e.value) <= 180.0 and 45.0 <= e.at_s <= 90.0 for e in extra)
     assert all(plain.wind == more.wind and plain.parameters == more.parameters for plain, more in turned)
+
+
+def beside(seed, what, base, drawn=None):
+    jump = draw_jump(seed, base, start_en=(0.0, 0.0), goal_en=(0.0, 170.0), solids_en=((10.0, 90.0),))
+    return draw_beside(seed, draw(seed, base) if drawn is None else drawn, what, jump)
+
+
+def test_what_is_drawn_beside_a_seeds_own_faults_is_drawn_apart_and_leaves_them():
+    base = load_scenario(BASE)
+    together = [(draw(seed, base), beside(seed, BESIDE, base)) for seed in range(60)]
+    assert together[:5] == [(draw(seed, base), beside(seed, BESIDE, base)) for seed in range(5)]
+    extra = [[e for e in more.events if e not in plain.events] for plain, more in together]
+    assert all(set(plain.events) <= set(more.events) and plain.wind == more.wind for plain, more in together)
+    kinds = {e.kind for events in extra for e in events}
+    assert kinds == {"gps_jump", "kill_companion", "vane", "parameter", "disk"}
+    assert {outlet for _, more in together for outlet in more.broken} == set(get_args(Outlet))
+    assert {e.state for events in extra for e in events if e.kind == "disk"} == {"full", "read_only"}
+    assert any({"gps_jump", "vane", "disk"} <= {e.kind for e in events} for events in extra)
+    assert any(not events for events in extra)
+    assert all(e.at_s + (e.for_s or 0.0) < more.limit_s for _, more in together for e in more.events
+               if e.kind == "gps_jump")
+    one_by_one = [draw(seed, base) for seed in range(20)]
+    for name in BESIDE:
+        one_by_one = [beside(seed, (name,), base, drawn) for seed, drawn in enumerate(one_by_one)]
+    assert [sorted(one.events, key=str) for one in one_by_one] == [
+        sorted(more.events, key=str) for _, more in together[:20]]
+    assert [beside(seed, ("guidance", "planner"), base) for seed in range(5)] == [plain for plain, _ in together[:5]]
+
+
+def test_a_voyage_whose_outlets_cannot_be_used_arrives_and_says_so(tmp_path):
+    scenario = msgspec.structs.replace(load_scenario(BASE), broken=get_args(Outlet))
+    record = sail_faults(scenario, 1, BASE, tmp_path / "v")
+    assert (record["passed"], record["arrived"], record["broken"]) == (True, True, list(get_args(Outlet)))
+    records = read_jsonl(tmp_path / "v/decisions.jsonl")
+    gone = {r["what"] for r in records if r["kind"] == "auxiliary" and r["gone"]}
+    assert gone == {Auxiliary.PAGE, Auxiliary.ORDERS_BY_PAGE, Auxiliary.SOCKET}
+    assert any("the folder of the satellite link" in r["text"] for r in records if r["kind"] == "far")
+
+
+def test_what_is_drawn_beside_is_no_part_of_another_campaign(capsys):
+    assert cli.main(["faults", "--jumps", "--draw", "all", "--runs", "1"]) == 2
+    assert "--draw" in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

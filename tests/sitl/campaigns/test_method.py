@@ -97,6 +97,7 @@ def test_the_options():
     add_methods(parser)
     assert parser.parse_args([]).draw == ()
     assert parser.parse_args(["--draw", "planner, guidance"]).draw == DRAWABLE
+    assert parser.parse_args(["--draw", "all"]).draw == DRAWABLE
     assert methods_of(None, None) == [Method()]
     args = parser.parse_args(["--guidance", "plan", "heading", "--planner", "astar"])
     told = [m.told for m in methods_of(args.guidance, args.planner)]
