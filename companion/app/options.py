@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from companion.app.adoption import Settings
+from companion.app.from_autopilot import DrawnSettings
 from companion.disk import Disk
 from companion.mavlink.transports import SigningStore
 from companion.page import Address, Chart
@@ -33,7 +33,7 @@ def wind_room(estimator: Estimator) -> WindRoom:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Far:
+class SatelliteLink:
     """The link far away: ``out`` and ``in`` of ``folder``, the ``key`` (32 bytes), a status every ``every_s`` [s]."""
 
     folder: Path
@@ -85,11 +85,11 @@ class SailOptions:
     disk: Disk = field(default_factory=Disk)
     shelf: Shelf | None = None
     is_again: bool = False
-    settings: Settings | None = None
+    settings: DrawnSettings | None = None
     socket: Path | None = None
     http: Address | None = None
     charts: tuple[Chart, ...] = ()
-    far: Far | None = None
+    far: SatelliteLink | None = None
     known: tuple[str, ...] = ()
     signing: SigningStore | None = None
     room: Callable[[Estimator], WindRoom] = field(default=wind_room, repr=False)

@@ -16,16 +16,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from companion.app.adoption import ADOPTED, Adoption
-from companion.app.company import NOBODY, make_way, others_on
-from companion.app.crew import Crew
+from companion.app.autopilot_upkeep import NOBODY, keep_fence, keep_identity, keep_parameters, make_way, others_on
 from companion.app.executor import Executor, Planner
-from companion.app.far import Mailbox
-from companion.app.keepers import keep_fence, keep_identity, keep_parameters
-from companion.app.local import take_orders
-from companion.app.options import Far, SailOptions
-from companion.app.page import live_page
-from companion.app.showing import OnView, Showing
+from companion.app.from_autopilot import ADOPTED, Adoption
+from companion.app.local_clients import OnView, ViewBroadcast, live_page, take_orders
+from companion.app.operator_commands import OperatorCommands
+from companion.app.options import SailOptions, SatelliteLink
+from companion.app.satellite import SatelliteMailbox
 from companion.clock import now_s
 from companion.compose import (
     config_of,
@@ -86,7 +83,7 @@ async def sail(
         shell = _Shell(mission, planner, recorder, options, stop or asyncio.Event(), guard or Guard(seed=options.seed))
         shell.on_status, shell.on_refusal = on_status, on_refusal
         if on_view is not None:
-            shell.showing.watchers.append(on_view)
+            shell.views.watchers.append(on_view)
         return await shell.run(transport)
 
 
@@ -104,8 +101,8 @@ class _Shell:
         self.voyage = voyage_of(mission)
         self.config = config_of(mission)
         self.log = Logbook(recorder, self.config, options.epoch_s)
-        self.showing = Showing(self.voyage, self.config, options.epoch_s, guard)
-        self.showing.is_kept = options.socket is not None
+        self.views = ViewBroadcast(self.voyage, self.config, options.epoch_s, guard)
+        self.views.is_kept = options.socket is not None
         self.state_file = StateFile(
             options.state_path or recorder.folder / STATE, disk=options.disk, offload=options.offload,
             is_durable=options.is_durable, pace=1.0 / options.budget_scale)
@@ -121,7 +118,7 @@ class _Shell:
         self._system: int | None = None            # of our autopilot, as heard
         self._others = NOBODY
         self._autopilot: Autopilot | None = None
-        self._crew: Crew | None = None
+        self._crew: OperatorCommands | None = None
         self._counted = LinkStats()
         self._are_clocks_compared = False
 
@@ -139,11 +136,11 @@ class _Shell:
             ):
                 stack.push_async_callback(self.guard.end)
                 self._counted = link.stats
-                crew = self._crew = Crew(link, has_key=self.options.signing is not None)
+                operator = self._crew = OperatorCommands(link, has_key=self.options.signing is not None)
                 link.subscribe(self._on_message)
                 if self.options.http is not None:
                     self.guard.keep(Auxiliary.PAGE, functools.partial(
-                        live_page, self.options.http, self.fold, self.planner, crew, self.showing,
+                        live_page, self.options.http, self.fold, self.planner, operator, self.views,
                         pace=1.0 / self.options.budget_scale, charts=self.options.charts))
                 await self._wait_autopilot(link)
                 autopilot = self._autopilot = await stack.enter_async_context(
@@ -157,11 +154,11 @@ class _Shell:
                 executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
                                     expansions=self.options.expansions,
                                     budget_scale=self.options.budget_scale, config=self.config,
-                                    on_adopt=adoption.ask, on_answer=crew.answered)
+                                    on_adopt=adoption.ask, on_answer=operator.answered)
                 async with asyncio.TaskGroup() as group:   # what is worth the voyage
                     orders = group.create_task(executor.run(), name="executor")
-                    self._keep_auxiliaries(autopilot, crew, adoption)
-                    crew.begin()
+                    self._keep_auxiliaries(autopilot, operator, adoption)
+                    operator.begin()
                     try:
                         await self._steps(executor, link)
                     finally:
@@ -175,13 +172,13 @@ class _Shell:
             self.recorder.summary(summary)
         return summary
 
-    def _keep_auxiliaries(self, autopilot: Autopilot, crew: Crew, adoption: Adoption) -> None:
+    def _keep_auxiliaries(self, autopilot: Autopilot, operator: OperatorCommands, adoption: Adoption) -> None:
         """Begin what lives beside the voyage: of none of it the voyage ends."""
         options, keep = self.options, self.guard.keep
         if options.socket is not None:
-            keep(Auxiliary.SOCKET, functools.partial(take_orders, options.socket, crew, self.showing))
+            keep(Auxiliary.SOCKET, functools.partial(take_orders, options.socket, operator, self.views))
         if options.far is not None:
-            keep(Auxiliary.FAR, self._mailbox(options.far, autopilot, crew).run)
+            keep(Auxiliary.FAR, self._mailbox(options.far, autopilot, operator).run)
         keep(Auxiliary.ADOPTION, adoption.run)
         keep(Auxiliary.IDENTITY, lambda: keep_identity(self.fold, autopilot))
         keep(Auxiliary.PARAMETERS, lambda: keep_parameters(self.fold, autopilot))
@@ -189,16 +186,16 @@ class _Shell:
         keep(Auxiliary.RADIO, Radio(
             autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble).run)
         keep(Auxiliary.HIGH_LATENCY, lambda: speak_high_latency(
-            autopilot, self._seen, lambda: crew.wants_high_latency))
-        keep(Auxiliary.CREW, lambda: crew.watch(autopilot, self._record))
+            autopilot, self._seen, lambda: operator.wants_high_latency))
+        keep(Auxiliary.CREW, lambda: operator.watch(autopilot, self._record))
         keep(Auxiliary.RECORDS, self._tend_records)
         keep(Auxiliary.LOOP_WATCH, self._watch_loop)
 
-    def _mailbox(self, far: Far, autopilot: Autopilot, crew: Crew) -> Mailbox:
+    def _mailbox(self, far: SatelliteLink, autopilot: Autopilot, operator: OperatorCommands) -> SatelliteMailbox:
         """Return the mailbox of the satellite link."""
         link, options = autopilot.link, self.options
-        return Mailbox(
-            far, link.party.target_system, crew, disk=options.disk, offload=options.offload,
+        return SatelliteMailbox(
+            far, link.party.target_system, operator, disk=options.disk, offload=options.offload,
             is_durable=options.is_durable, seen=self._seen, is_heard=lambda: link.is_alive,
             has_trouble=lambda: bool(self._trouble()), say=autopilot.say, record=self._record)
 
@@ -359,7 +356,7 @@ class _Shell:
         self.status, self._step = status, step
         if self.on_status is not None:
             self.on_status(status, step)
-        self.showing.take(step, status, self.log.figures)
+        self.views.take(step, status, self.log.figures)
 
     def _status(self, step: Step, clearance_m: float | None, link: Link) -> CompanionStatus:
         """Return the status at a step; where nothing else is wrong it tells what cannot be written, or is gone."""

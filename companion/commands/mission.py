@@ -121,7 +121,7 @@ def _check(args: argparse.Namespace) -> int:
         print_findings(document.findings, args.file)
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
-    from companion.compose.fields import told_of
+    from companion.compose import field_words
     from companion.sailable import judge, words_of
     from companion.sailable.previews import wind_limit_words
 
@@ -130,7 +130,7 @@ def _check(args: argparse.Namespace) -> int:
         raise judged.refusals[0]
     mission = judged.mission
     bad = print_findings(judged.findings, args.file)
-    for line in told_of(mission):
+    for line in field_words(mission):
         print(f"{args.file}: {line}")
     if args.plot:
         preview(mission, args)

@@ -24,7 +24,7 @@ from companion.program.extras import missing
 from companion.words import counted, file_name
 
 if TYPE_CHECKING:
-    from companion.app.adoption import Settings
+    from companion.app.from_autopilot import DrawnSettings
     from companion.geofence import Mission
     from companion.geofence.mission import MissionOptions
     from companion.guard import Guard
@@ -214,7 +214,7 @@ def _voyage(
     nursery: Nursery | None, out: Console, err: Console,
 ) -> int | None:
     """Sail; return the exit code, None when the voyage has given way to what was drawn under way."""
-    from companion.app.adoption import ADOPTED
+    from companion.app.from_autopilot import ADOPTED
     from companion.clock import run as run_loop
     from companion.compose import displays_of
     from companion.guard import Guard
@@ -265,7 +265,7 @@ def _voyage(
 
 def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
     """Return the exit code and what is said of a voyage at its end."""
-    from companion.app.adoption import ADOPTED
+    from companion.app.from_autopilot import ADOPTED
 
     if summary["arrived_before"]:
         # an order that gets no better by trying again
@@ -415,7 +415,7 @@ def far_of(args: argparse.Namespace, guard: Guard) -> Any:
             raise InputError("--far-key", str(args.far_key), "there is no link to use it on",
                              "name its folder: --far DIR")
         return None
-    from companion.app.options import Far
+    from companion.app.options import SatelliteLink
     from companion.mavlink.transports import read_key
 
     key_file = args.far_key or args.signing_key
@@ -423,7 +423,7 @@ def far_of(args: argparse.Namespace, guard: Guard) -> Any:
         raise InputError("--far", str(args.far), "has no key", "make one with `companion key new far.key` and name it "
                          "with --far-key")
     try:
-        return Far(folder=args.far, key=read_key(key_file), every_s=60.0 * args.far_every)
+        return SatelliteLink(folder=args.far, key=read_key(key_file), every_s=60.0 * args.far_every)
     except InputError as error:
         guard.lost(Auxiliary.FAR, f"{error}", for_good=True)
         return None
@@ -500,7 +500,7 @@ class MissionToSail:
     mission: Mission
     known: tuple[str, ...] = ()
     is_new: bool = False
-    settings: Settings | None = None   # where it is drawn
+    settings: DrawnSettings | None = None   # where it is drawn
 
 
 def settings_of(path: Path | None, *, is_drawn: bool, system: int | None) -> MissionOptions | None:
@@ -532,8 +532,7 @@ def read_drawn(
         InputError: the settings cannot be sailed with, or there is no drawing.
         LinkError: the autopilot's lists cannot be read.
     """
-    from companion.app.adoption import Settings
-    from companion.app.drawn import Found, find_on, keep, plan_path
+    from companion.app.from_autopilot import DrawnSettings, FoundMission, find_on, keep, plan_path
     from companion.clock import run as run_loop
     from companion.disk import Disk
     from companion.geofence.mission import NO_NAME
@@ -547,7 +546,7 @@ def read_drawn(
     # A dry run must not take the place of the drawing of a voyage that is interrupted.
     keep_at = folder / f"{NO_NAME}.plan" if args.dry_run else kept
 
-    async def read() -> Found:
+    async def read() -> FoundMission:
         patience = asyncio.create_task(_ask_for_patience(manager, BEAT_S * args.speedup))
         try:
             return await find_on(open_link(args.link), settings, args.mission, state_path, keep_at, say,
@@ -568,7 +567,7 @@ def read_drawn(
     if args.mission is None and not args.dry_run:
         say(NOTHING_PERMITTED)
     return MissionToSail(mission=mission, known=(found.board,), is_new=found.is_new,
-                  settings=Settings(options=settings, path=args.mission, state_path=state_path))
+                  settings=DrawnSettings(options=settings, path=args.mission, state_path=state_path))
 
 
 async def _ask_for_patience(manager: ServiceManager, every_s: float) -> None:

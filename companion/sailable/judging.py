@@ -12,12 +12,13 @@ from companion.compose import (
     displays_of,
     estimator_of,
     feeds_of,
+    field_findings_of,
     permissions_of,
+    require_fields,
     target_limits_of,
     voyage_of,
     water_of,
 )
-from companion.compose.fields import findings_of, require_fields
 from companion.errors import InputError
 from companion.geofence import Code, Finding, Mission, Severity
 from companion.geofence.check import Conditions, check_area
@@ -59,7 +60,7 @@ def judge(path: Path, *, from_deg: float | None = None, given: Mapping[Path, byt
         no_go_half_rad=math.radians(mission.boat.no_go_half_deg)))
     told = {Code.START_OUTSIDE, Code.GOAL_OUTSIDE} if troubles else set()
     return Judged(mission=mission, refusals=troubles, findings=(
-        *mission.findings, *(() if troubles else findings_of(mission)),
+        *mission.findings, *(() if troubles else field_findings_of(mission)),
         *(f for f in found if f.severity is not Severity.ERROR or f.code not in told)))
 
 

@@ -19,7 +19,7 @@ from typing import Any
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from companion.app.options import Far, SailOptions, at_once
+from companion.app.options import SailOptions, SatelliteLink, at_once
 from companion.app.sail import OnStatus, sail
 from companion.clock import now_s
 from companion.compose import boat_of
@@ -210,7 +210,7 @@ async def _sail_and_restart(
         budget_scale=1.0 / (worker_pace or 1.0), offload=at_once, is_durable=False,
         state_path=folder / STATE, disk=world.disk, command=f"sitl run {scenario.name}",
         exit_on_arrival=scenario.exit_on_arrival, dry_run=scenario.dry_run,
-        far=None if scenario.satellite is None else Far(
+        far=None if scenario.satellite is None else SatelliteLink(
             folder=folder / FAR, key=KEY, every_s=scenario.satellite.status_every_s),
     )
     if room is not None:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
-from companion.app.far import IN, OUT
+from companion.app.satellite import IN, OUT
 from companion.clock import now_s
 from companion.geo.frame import LocalFrame
 from companion.orders import Wanted

@@ -11,8 +11,7 @@ from dataclasses import replace
 
 import pytest
 
-from companion.app.adoption import Settings
-from companion.app.drawn import find_on, keep, plan_path
+from companion.app.from_autopilot import DrawnSettings, find_on, keep, plan_path
 from companion.app.options import SailOptions, at_once
 from companion.app.sail import sail
 from companion.clock import run_virtual
@@ -110,7 +109,8 @@ class Bay:
         settings = {"epoch_s": 1.78e9, "offload": at_once, "is_durable": False, "limit_s": 500.0, "expansions": 2000,
                     "state_path": self.state_path, "known": (found.board,), "is_again": found.is_new,
                     "exit_on_arrival": True,
-                    "settings": Settings(options=load_settings(self.path), path=self.path, state_path=self.state_path)}
+                    "settings": DrawnSettings(
+                        options=load_settings(self.path), path=self.path, state_path=self.state_path)}
         return await sail(found.drawn.mission, self.line.near, FragilePlanner(), folder or self.folder,
                           SailOptions(**settings | options), on_status=look)
 

@@ -1,8 +1,10 @@
-"""What is drawn on the autopilot, read before a voyage: whose list is on board, which drawing it was made of.
+"""A mission drawn in a ground station: found on the autopilot before a voyage, adopted under way.
 
 Our plan takes the place of the drawing on the autopilot, so the drawing is kept on the disk before anything is sent:
 beside the state for a restart, as a .plan that a ground station opens again. A list of ours on board is known by its
 content, and the drawing that was kept is the one that is sailed on.
+
+The drawing is on board the autopilot meanwhile and nobody touches it: it is on the disk before the next voyage does.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from companion.disk import Disk, read_regular, reason
-from companion.errors import InputError, TransferError, UnreadableError
+from companion.errors import CompanionError, InputError, TransferError, UnreadableError
 from companion.geofence import Document
 from companion.geofence.mission import Drawn, MissionOptions, drawing_of, drawn_mission, kept, read_kept
 from companion.mavlink.autopilot import Autopilot
@@ -24,7 +26,9 @@ from companion.mavlink.transports import SigningStore, Transport
 from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
 from companion.mavlink.wire import mission_hash
 from companion.messages import GeoPoint, MissionItem
+from companion.sailable import require_sailable
 from companion.skipper.board.mark import are_marked, is_remnant
+from companion.skipper.step import Severity
 from companion.telemetry.state_file import known_beside, read_state
 
 READ_TRIES = 5         # of one list; each has a patience of its own
@@ -39,7 +43,7 @@ Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Lists:
+class DrawnLists:
     """What the autopilot holds; the mission is without its home."""
 
     mission: tuple[MissionItem, ...]
@@ -53,7 +57,7 @@ class Lists:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class FoundMission:
     """What is to be sailed.
 
     Attributes:
@@ -73,16 +77,16 @@ class Found:
     text: str
 
 
-async def read_lists(autopilot: Autopilot, say: Say) -> Lists:
+async def read_lists(autopilot: Autopilot, say: Say) -> DrawnLists:
     """Read mission, fence and rally points until two readings agree.
 
     Raises:
         TransferError: one of them cannot be read, or they do not come to rest.
     """
-    before: Lists | None = None
+    before: DrawnLists | None = None
     for _ in range(MOST_READINGS):
         mission = await _read("mission", autopilot.read_mission, say)
-        lists = Lists(
+        lists = DrawnLists(
             mission=mission.items or (), home=_place_of(mission.home),
             fence=(await _read("fence", autopilot.read_fence, say)).items or (),
             rally=(await _read("rally points", autopilot.read_rally, say)).items or ())
@@ -119,7 +123,9 @@ def plan_path(state_path: Path) -> Path:
     return state_path.with_name(state_path.name.removesuffix(".json").removesuffix(".state") + PLAN)
 
 
-def find(lists: Lists, settings: MissionOptions, path: Path | None, state_path: Path, keep_at: Path) -> Found:
+def find(
+    lists: DrawnLists, settings: MissionOptions, path: Path | None, state_path: Path, keep_at: Path,
+) -> FoundMission:
     """Return what is to be sailed: the drawing on board, or the one that was kept where the list on board is ours.
 
     Args:
@@ -140,15 +146,17 @@ def find(lists: Lists, settings: MissionOptions, path: Path | None, state_path: 
         or (before is not None and is_remnant(lists.mission, before.items)))
     if not is_ours:
         document = lists.document()
-        return Found(document=document, drawn=drawn_mission(document, settings, path or keep_at, keep_at), plan=keep_at,
-                     is_new=True, board=board, text="the drawing on the autopilot")
+        return FoundMission(
+            document=document, drawn=drawn_mission(document, settings, path or keep_at, keep_at), plan=keep_at,
+            is_new=True, board=board, text="the drawing on the autopilot")
     if before is None or (board in others and board not in own):
         where = "of another voyage" if before is not None else f"and no drawing is kept at {plan}"
         raise UnreadableError("the autopilot", "", f"the mission on board is one of ours, {where}",
                               "draw a mission and upload it")
     day = datetime.fromtimestamp(plan.stat().st_mtime, UTC)
-    return Found(document=before, drawn=drawn_mission(before, settings, path or plan, plan), plan=plan, is_new=False,
-                 board=board, text=f"the drawing kept at {plan} ({day:%d %b %Y %H:%M} UTC): the list on board is ours")
+    return FoundMission(
+        document=before, drawn=drawn_mission(before, settings, path or plan, plan), plan=plan, is_new=False,
+        board=board, text=f"the drawing kept at {plan} ({day:%d %b %Y %H:%M} UTC): the list on board is ours")
 
 
 def _names(state_path: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -184,7 +192,7 @@ def keep(document: Document, plan: Path, disk: Disk, *, is_durable: bool = True)
 async def find_on(
     transport: Transport, settings: MissionOptions, path: Path | None, state_path: Path, keep_at: Path, say: Say, *,
     wait_s: float, signing: SigningStore | None = None,
-) -> Found:
+) -> FoundMission:
     """Read what is drawn on the autopilot behind ``transport``, and find what is to be sailed; see ``find``.
 
     What is refused is also said on the radio, to who drew it.
@@ -207,3 +215,59 @@ async def find_on(
         for refusal in found.drawn.refusals[:MOST_SAID]:
             autopilot.say(RADIO_WARNING, f"the drawing is refused: {refusal.place}: {refusal.text}")
     return found
+
+
+ADOPTED = "adopted"   # how a voyage ends that gives way to what was drawn under way
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrawnSettings:
+    """What a drawing is sailed with: the options of the mission file at ``path``, and where the state is kept."""
+
+    options: MissionOptions
+    path: Path | None
+    state_path: Path
+
+
+class Adoption:
+    """The order to adopt what is drawn on board. ``run`` lives in the voyage's task group.
+
+    Args:
+        settings: of the voyage; None: its goals are not drawn, and no drawing is adopted.
+        done: called when the drawing can be sailed: the voyage is to end.
+    """
+
+    def __init__(self, autopilot: Autopilot, settings: DrawnSettings | None, done: Callable[[], None]) -> None:
+        self._autopilot, self._settings, self._done = autopilot, settings, done
+        self._asked = asyncio.Event()
+
+    def ask(self) -> None:
+        """Take the order; never waits."""
+        self._asked.set()
+
+    async def run(self) -> None:
+        """Carry the order out whenever it is given, and say what is in the way."""
+        while True:
+            await self._asked.wait()
+            self._asked.clear()
+            trouble = await self._trouble()
+            if not trouble:
+                self._done()
+                return
+            self._autopilot.say(int(Severity.WARNING), f"the drawing is not adopted: {trouble}")
+
+    async def _trouble(self) -> str:
+        """Return why what is on board cannot be sailed, empty when it can be."""
+        settings = self._settings
+        if settings is None:
+            return "the goals of this voyage are in its mission file"
+        try:
+            lists = await read_lists(self._autopilot, lambda text: self._autopilot.say(int(Severity.NOTICE), text))
+            found = find(lists, settings.options, settings.path, settings.state_path, plan_path(settings.state_path))
+            if found.drawn.mission is not None:
+                require_sailable(found.drawn.mission)
+        except CompanionError as error:
+            return str(error)
+        if not found.is_new:
+            return "the mission on board is ours"
+        return "; ".join(f"{r.place}: {r.text}" for r in found.drawn.refusals)

@@ -4,7 +4,7 @@ import asyncio
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.app.crew import MOST_WAITING, Crew
+from companion.app.operator_commands import MOST_WAITING, OperatorCommands
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.wire.frames import Codec, Drop, SigningState
 from companion.orders import Verb
@@ -18,7 +18,7 @@ def command(verb, number=wire.MAV_CMD_USER_1, component=191):
 def test_orders_wait_for_the_step_and_the_rest_is_sent_away():
     async def main(peer, link):
         await link.wait_autopilot(5.0)
-        crew, station = Crew(link, has_key=False), Codec(255, 190)
+        operator, station = OperatorCommands(link, has_key=False), Codec(255, 190)
 
         async def give(*messages):
             for message in messages:
@@ -27,18 +27,18 @@ def test_orders_wait_for_the_step_and_the_rest_is_sent_away():
             return [(a.command, a.result) for a in peer.of("COMMAND_ACK")]
 
         assert await give(command(1)) == [(31010, 1)], "not now: nobody would answer it yet"
-        crew.begin()
+        operator.begin()
         assert len(await give(command(1), command(2))) == 1
-        orders = crew.take()
+        orders = operator.take()
         assert [o.wanted.verb for o in orders] == [Verb.HOLD, Verb.GO_ON]
         assert {(o.source.words, o.authority) for o in orders} == {("255/190", "unsigned")}
-        assert crew.take() == []
+        assert operator.take() == []
         assert (await give(command(1, number=wire.MAV_CMD_DO_SET_MODE)))[1:] == [(176, 3)]
         await give(command(1, component=190), command(1, component=0), command(1, component=1))
-        assert crew.take() == []
+        assert operator.take() == []
         acks = await give(*[command(float(n)) for n in range(1, MOST_WAITING + 3)])
         assert acks[2:] == [(31010, 1)] * 2
-        assert len(crew.take()) == MOST_WAITING
+        assert len(operator.take()) == MOST_WAITING
 
     with_peer(main)
 
@@ -48,23 +48,23 @@ def test_with_a_key_what_is_not_signed_with_it_is_counted_and_said_once(tmp_path
 
     async def main(peer, link):
         await link.wait_autopilot(5.0)
-        crew = Crew(link, has_key=True)
-        crew.begin()
+        operator = OperatorCommands(link, has_key=True)
+        operator.begin()
         good = SigningState(key=ours.state.key, timestamp=ours.state.timestamp + 1_000_000)
         for signing in (None, SigningState(key=bytes(32), timestamp=good.timestamp)):
             stranger = Codec(255, 190, signing)
             peer.end.write(stranger.pack(command(8)))
             peer.end.write(stranger.pack(command(8, component=1)))   # the autopilot's to judge
         await asyncio.sleep(0.1)
-        assert crew.take() == []
-        assert (crew.unsigned, peer.of("COMMAND_ACK")) == (2, [])
+        assert operator.take() == []
+        assert (operator.unsigned, peer.of("COMMAND_ACK")) == (2, [])
         assert (link.dropped()[Drop.BAD_SIGNATURE], link.dropped()[Drop.UNSIGNED]) == (2, 2)
         async with Autopilot(link) as autopilot:
             told = []
-            await crew.watch(autopilot, told.append)
+            await operator.watch(autopilot, told.append)
             assert ["without this boat's key" in record["text"] for record in told] == [True]
         peer.end.write(Codec(255, 190, good).pack(command(8)))
         await asyncio.sleep(0.1)
-        assert [(o.wanted.verb, o.authority) for o in crew.take()] == [(Verb.STOP, "signed")]
+        assert [(o.wanted.verb, o.authority) for o in operator.take()] == [(Verb.STOP, "signed")]
 
     with_peer(main, peer_signing=SigningState(key=ours.state.key, timestamp=ours.state.timestamp), signing=ours)

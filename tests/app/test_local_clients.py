@@ -10,9 +10,8 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from companion.app.crew import Crew
-from companion.app.local import MAX_LINE, MOST, served
-from companion.app.showing import Showing
+from companion.app.local_clients import MAX_LINE, MOST, ViewBroadcast, orders_served
+from companion.app.operator_commands import OperatorCommands
 from companion.clock import run
 from companion.compose import config_of, voyage_of
 from companion.errors import InputError
@@ -26,18 +25,18 @@ from sitl.autopilot import MemoryLink
 from tests.terminal.test_dashboard import VIEW
 
 
-def showing(guard=None):
+def views(guard=None):
     mission = load_mission("missions/archipelago.toml")
-    return Showing(voyage_of(mission), config_of(mission), 0.0, guard or Guard())
+    return ViewBroadcast(voyage_of(mission), config_of(mission), 0.0, guard or Guard())
 
 
 def with_socket(path, talk, shown=None):
     """Run ``talk(crew)`` with the socket served; what nobody takes is answered by nobody."""
     async def whole():
-        crew = Crew(Link(MemoryLink().near), has_key=False)
-        crew.begin()
-        async with served(path, crew, shown or showing()):
-            return await talk(crew)
+        operator = OperatorCommands(Link(MemoryLink().near), has_key=False)
+        operator.begin()
+        async with orders_served(path, operator, shown or views()):
+            return await talk(operator)
 
     return run(whole())
 
@@ -56,17 +55,17 @@ async def said(path, *lines):
 
 
 def test_an_order_waits_for_its_answer_and_only_for_its_own(tmp_path):
-    async def talk(crew):
+    async def talk(operator):
         first = asyncio.create_task(said(tmp_path / "s", b"hold\n"))
         second = asyncio.create_task(said(tmp_path / "s", b"goal 50.8 -1.3\n"))
         orders = []
         while len(orders) < 2:
             await asyncio.sleep(0.01)
-            orders += crew.take()
+            orders += operator.take()
         assert {o.wanted.verb for o in orders} == {Verb.HOLD, Verb.GOAL}
         assert {(o.source.kind, o.authority) for o in orders} == {("local", "local")}
         for order in reversed(orders):
-            crew.answered(Acknowledge(way="local", system=0, component=order.source.component, command=0,
+            operator.answered(Acknowledge(way="local", system=0, component=order.source.component, command=0,
                                       result=Result.DONE, text=order.wanted.verb))
         return [json.loads(line) for [line] in (await first, await second)]
 
@@ -92,15 +91,15 @@ def test_what_is_no_order_is_answered_and_the_next_is_heard(tmp_path, line):
 
 
 def test_a_line_without_end_is_hung_up_on_and_a_crowd_is_not_let_in(tmp_path):
-    async def talk(crew):
+    async def talk(operator):
         assert await said(tmp_path / "s", b"x" * 3 * MAX_LINE) == [b""]
         crowd = [await asyncio.open_unix_connection(tmp_path / "s") for _ in range(MOST)]
         for _, writer in crowd:
             writer.write(b"hold\n")   # each waits for its answer
         await asyncio.sleep(0.05)
         late = await said(tmp_path / "s", b"jump\n")
-        for order in crew.take():
-            crew.answered(Acknowledge(way="local", system=0, component=order.source.component, command=0,
+        for order in operator.take():
+            operator.answered(Acknowledge(way="local", system=0, component=order.source.component, command=0,
                                       result=Result.DONE, text="so be it"))
         for _, writer in crowd:
             writer.close()
@@ -136,9 +135,9 @@ def test_a_place_that_is_taken_is_left_alone_and_what_a_kill_left_is_not(tmp_pat
     with pytest.raises(InputError, match="cannot be made"):
         with_socket(tmp_path / "none" / "s", None)
 
-    async def twice(crew):
+    async def twice(operator):
         with pytest.raises(InputError, match="another program listens"):
-            async with served(tmp_path / "s", crew, showing()):
+            async with orders_served(tmp_path / "s", operator, views()):
                 pass
         return await said(tmp_path / "s", b"jump\n")
 
@@ -171,9 +170,9 @@ async def watching(path, shown):
 
 
 def test_who_watches_is_told_of_each_step_and_orders_go_on(tmp_path):
-    shown = showing()
+    shown = views()
 
-    async def talk(crew):
+    async def talk(operator):
         reader, writer = await watching(tmp_path / "s", shown)
         tell(shown, 1)
         first = msgspec.json.decode(await reader.readline())
@@ -197,10 +196,10 @@ def test_who_watches_is_told_of_each_step_and_orders_go_on(tmp_path):
 
 
 def test_who_watches_and_never_reads_is_hung_up_on(tmp_path, monkeypatch):
-    monkeypatch.setattr("companion.app.local.STUCK_S", 0.3)
-    shown = showing()
+    monkeypatch.setattr("companion.app.local_clients.STUCK_S", 0.3)
+    shown = views()
 
-    async def talk(crew):
+    async def talk(operator):
         _, writer = await watching(tmp_path / "s", shown)
         writer.transport.pause_reading()
         for number in range(200):
@@ -218,7 +217,7 @@ def test_who_watches_and_never_reads_is_hung_up_on(tmp_path, monkeypatch):
 
 def test_a_view_that_cannot_be_made_is_said_once_and_costs_nothing():
     faults, seen = [], []
-    shown = showing(Guard(lambda name, why: faults.append((name, why))))
+    shown = views(Guard(lambda name, why: faults.append((name, why))))
     shown.take(None, None, None)             # nobody watches: nothing is made
     assert faults == []
     shown.watchers.append(lambda *told: seen.append(told))

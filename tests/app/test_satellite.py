@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import pytest
 
 from companion.app import far
-from companion.app.crew import Crew
-from companion.app.far import ASIDE, IN, LOOK_S, MOST_ASIDE, OUT, TAKEN, TRIES, Mailbox
-from companion.app.options import Far, at_once
+from companion.app.operator_commands import OperatorCommands
+from companion.app.options import SatelliteLink, at_once
+from companion.app.satellite import ASIDE, IN, LOOK_S, MOST_ASIDE, OUT, TAKEN, TRIES, SatelliteMailbox
 from companion.clock import run_virtual
 from companion.disk import Disk
 from companion.mavlink.link import Link
@@ -59,16 +59,16 @@ class Voyage:
     def __init__(self, folder, *, disk=None, utc_s=UTC_S, has_answers=True):
         self.folder, self.disk, self.utc_s, self.has_answers = folder, disk or Disk(), utc_s, has_answers
         self.orders, self.said, self.records = [], [], []
-        self.crew = Crew(Link(MemoryLink().near), has_key=False)
-        self.crew.begin()
+        self.operator = OperatorCommands(Link(MemoryLink().near), has_key=False)
+        self.operator.begin()
 
     def sail(self, *looks):
         """Run the mailbox for a moment after each of ``looks`` was done; return the last status."""
         async def whole():
-            box = Mailbox(
-                Far(folder=self.folder, key=KEY.key, every_s=600.0), 1, self.crew, disk=self.disk, offload=at_once,
-                is_durable=False, seen=lambda: seen(utc_s=self.utc_s), is_heard=lambda: True, has_trouble=lambda: False,
-                say=lambda severity, text: self.said.append(text), record=self.records.append)
+            box = SatelliteMailbox(
+                SatelliteLink(folder=self.folder, key=KEY.key, every_s=600.0), 1, self.operator, disk=self.disk,
+                offload=at_once, is_durable=False, seen=lambda: seen(utc_s=self.utc_s), is_heard=lambda: True,
+                has_trouble=lambda: False, say=lambda severity, text: self.said.append(text), record=self.records.append)
             async with asyncio.TaskGroup() as group:
                 tasks = [group.create_task(box.run()), group.create_task(self.answer())]
                 await asyncio.sleep(LOOK_S / 2.0)
@@ -84,9 +84,9 @@ class Voyage:
 
     async def answer(self):
         while True:
-            for order in self.crew.take() if self.has_answers else ():
+            for order in self.operator.take() if self.has_answers else ():
                 self.orders.append(order)
-                self.crew.answered(Acknowledge(way="far", system=0, component=order.source.component, command=0,
+                self.operator.answered(Acknowledge(way="far", system=0, component=order.source.component, command=0,
                                                result=Result.DONE, text="so be it"))
             await asyncio.sleep(0.2)
 
@@ -222,14 +222,14 @@ def test_a_message_that_cannot_be_read_is_put_aside_and_keeps_no_other_out(tmp_p
 
 def test_a_message_that_cannot_be_judged_is_put_aside_too(tmp_path, monkeypatch):
     voyage = Voyage(tmp_path)
-    ask = voyage.crew.ask
+    ask = voyage.operator.ask
 
     async def faulty(wanted, number, way):
         if wanted.verb is Verb.HOME:
             raise AssertionError("a fault of ours")
         return await ask(wanted, number, way)
 
-    monkeypatch.setattr(voyage.crew, "ask", faulty)
+    monkeypatch.setattr(voyage.operator, "ask", faulty)
     status = voyage.sail(voyage.put(sealed(1, Verb.HOME), "0"), voyage.put(sealed(2)))
     assert (status.order, status.reply, voyage.waiting) == (2, Reply.DONE, [])
     assert put_aside(tmp_path) == ["0"]

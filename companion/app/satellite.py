@@ -20,7 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from companion.app.options import Far, Offload
+from companion.app.options import Offload, SatelliteLink
 from companion.clock import now_s
 from companion.disk import NEW, Disk, read_regular, reason
 from companion.fold import Step
@@ -57,21 +57,21 @@ Seen = tuple[CompanionStatus, Step]
 _Mark = tuple[int, int]   # of a file: when it was changed, and which it is
 
 
-class Teller(Protocol):
-    """Who carries out orders, and answers (``companion.app.crew.Crew``)."""
+class OrderHandler(Protocol):
+    """Who carries out orders, and answers (``companion.app.operator_commands.OperatorCommands``)."""
 
     async def ask(self, wanted: Wanted, number: int, way: str) -> Answer:
         """Give an order and return its answer."""
         ...
 
 
-class Mailbox:
+class SatelliteMailbox:
     """The folder and what was taken of it. ``run`` lives in the voyage's task group.
 
     Args:
         far: the folder, the key, and how often a status is put out.
         system: the autopilot's system id: what is sealed for another is no order of ours.
-        crew: who carries orders out.
+        operator: who carries orders out.
         seen: returns the newest status and step, None before there is one.
         is_heard: whether the autopilot is.
         say, record: for the radio, and for the voyage's records.
@@ -79,11 +79,12 @@ class Mailbox:
     """
 
     def __init__(
-        self, far: Far, system: int, crew: Teller, *, disk: Disk, offload: Offload, is_durable: bool,
-        seen: Callable[[], Seen | None], is_heard: Callable[[], bool], has_trouble: Callable[[], bool],
+        self, far: SatelliteLink, system: int, operator: OrderHandler, *, disk: Disk, offload: Offload,
+        is_durable: bool, seen: Callable[[], Seen | None], is_heard: Callable[[], bool],
+        has_trouble: Callable[[], bool],
         say: Callable[[int, str], None], record: Callable[[dict[str, Any]], None],
     ) -> None:
-        self._far, self._key, self._crew = far, FarKey(far.key, system), crew
+        self._far, self._key, self._crew = far, FarKey(far.key, system), operator
         self._disk, self._offload, self._is_durable = disk, offload, is_durable
         self._seen, self._is_heard, self._has_trouble = seen, is_heard, has_trouble
         self._say, self._record = say, record

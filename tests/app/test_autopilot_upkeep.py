@@ -3,7 +3,7 @@
 import asyncio
 from types import SimpleNamespace
 
-from companion.app.keepers import keep_parameters
+from companion.app.autopilot_upkeep import keep_parameters
 from companion.clock import run_virtual
 from companion.fold.parameters import ToldParameters
 from companion.mavlink.wire import RANGES

@@ -1,4 +1,4 @@
-"""The crew on the link: their orders as they come in, for the next step, and the answers that go back."""
+"""Commands of the operator: orders as they come in by the link, for the next step, and the answers that go back."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_WAITING = 4
 LOOK_S = 5.0
 
 
-class Crew:
+class OperatorCommands:
     """Takes the commands that are orders, from whoever names us; other commands stay unsupported.
 
     Before ``begin`` they are sent away: nobody would answer them.

@@ -1,0 +1,541 @@
+"""From a mission file to the values that the rooms want: boat, voyage, skipper, planner, wind and water."""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from companion.addresses import Displays, OutputName, parse_nmea, parse_signalk
+from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant, read_polar
+from companion.current import STILL, Prior, read_table
+from companion.current.prior import table_lines
+from companion.disk import read_regular
+from companion.errors import InputError, unreadable
+from companion.field.expression import MAX, PROJECT, is_name, names_in, parse, projects
+from companion.field.tree import (
+    LEAST,
+    Along,
+    Atom,
+    AwayFrom,
+    AwayFromLine,
+    Conditions,
+    Heading,
+    OutOf,
+    PointTo,
+    Round,
+    StayAt,
+    Tree,
+    lengths,
+)
+from companion.field.values import Habits, Situation
+from companion.fold import Waters
+from companion.geo.frame import LocalFrame
+from companion.geo.units import MPS_PER_KNOT
+from companion.geofence import Code, Finding, LocalArea, Mission, Severity
+from companion.geofence.mission import (
+    AtomOptions,
+    ByField,
+    CircleAtomOptions,
+    Gate,
+    HeadingAtomOptions,
+    LeaveAtomOptions,
+    LineAtomOptions,
+    MarkOptions,
+    PointAtomOptions,
+    RepulsiveLineAtomOptions,
+    RepulsivePointAtomOptions,
+    StationAtomOptions,
+    free_water,
+)
+from companion.geofence.shapes import polygon_en
+from companion.messages import GeoPoint
+from companion.orders import ALL, Verb, unknown
+from companion.planner.settings import AUTO, SETTINGS, Choice
+from companion.skipper.step import (
+    CHOICES,
+    SHORE,
+    End,
+    Ends,
+    Guidance,
+    Permissions,
+    ReplanPolicy,
+    SafeEnd,
+    SkipperConfig,
+)
+from companion.skipper.way import FAR_M, Box, Composed, Goal, Line, Refuge, Search, Side, Until, Voyage
+from companion.traffic import Policy, TargetLimits
+from companion.traffic.feeds import parse_feed
+from companion.wind import Estimator, make
+from companion.words import listed
+
+_POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
+
+
+def polar_of(mission: Mission) -> Polar:
+    """Return the mission's polar."""
+    path = mission.polar_path
+    if path is not None:
+        file = read_polar(path)
+        if file.warnings:
+            raise InputError(str(path), "", file.warnings[0], "fill it in: a guessed polar is not sailed")
+        return file.polar
+    polar = mission.boat.polar
+    if isinstance(polar, str):
+        maker = _POLARS.get(polar)
+        if maker is None:
+            raise InputError(str(mission.path), "[boat] polar", f"there is no polar {polar!r}",
+                             'write "ardurover", "avalon", a polar file beside the mission, or a speed in m/s')
+        return maker()
+    return constant(float(polar))
+
+
+def boat_of(mission: Mission) -> Boat:
+    """Return the mission's boat; one that does not sail has no no-go zone, and tacks cost her nothing."""
+    if mission.autopilot.frame == "motor":
+        if isinstance(mission.boat.polar, str):
+            raise InputError(str(mission.path), "[boat] polar", "a motor boat has no polar, and hers is "
+                             f"{mission.boat.polar!r}", "write her speed [m/s]: polar = 2.0")
+        return Boat(polar=polar_of(mission), no_go_half_rad=0.0, has_motor=True,
+                    turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s),
+                    hull=Hull(length_m=mission.boat.length_m, beam_m=mission.boat.beam_m))
+    return Boat(
+        polar=polar_of(mission),
+        no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
+        max_twa_rad=math.radians(mission.boat.max_twa_deg),
+        turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s),
+        tack_loss_s=mission.boat.tack_loss_s,
+        gybe_loss_s=mission.boat.gybe_loss_s,
+        can_tack=mission.boat.can_tack,
+        gybe_room_m=mission.boat.gybe_room_m,
+        hull=Hull(length_m=mission.boat.length_m, beam_m=mission.boat.beam_m),
+        has_motor=mission.boat.motor,
+        leeway_rad=math.radians(mission.boat.leeway_deg),
+        max_tws_mps=mission.boat.max_tws_mps,
+        min_tws_mps=mission.boat.min_tws_mps,
+        tack_fails=mission.boat.tack_fails if mission.boat.can_tack else 0.0,
+    )
+
+
+# The keys of [planner] by planner, and what they are called among its settings.
+_ASTAR = frozenset({"grid_m", "turn_s_per_rad", "tack_s", "gybe_s", "tunnel", "tunnel_width_m", "heuristic_kn",
+                    "min_twa_deg", "max_twa_deg", "max_turn_deg", "ship_match_s", "projection"})
+_RRTSTAR = frozenset({"goal_bias", "range_m", "rewiring", "risk_weight_s", "state_risk_weight_s"})
+_NUMBERS = {"tunnel": "is_tunnel_abrupt", "heuristic_kn": "heuristic_mps", "min_twa_deg": "min_twa_rad",
+            "max_twa_deg": "max_twa_rad", "max_turn_deg": "max_turn_rad", "rewiring": "is_rewired"}
+
+
+def planner_of(mission: Mission) -> Choice:
+    """Return the mission's planner and its numbers.
+
+    Raises:
+        InputError: a number is another planner's, or a tunnel has no width.
+    """
+    options, algorithm = mission.options.planner, mission.skipper.planner
+    given = {key: value for key in options.__struct_fields__ if (value := getattr(options, key)) is not None}
+    expansions = given.pop("expansions", None)
+    if expansions is not None and algorithm == AUTO.algorithm:
+        raise InputError(str(mission.path), "[planner] expansions", 'is for "rrtstar" and "astar"',
+                         "write [skipper] expansions for auto's")
+    own = _ASTAR if algorithm == "astar" else _RRTSTAR if algorithm == "rrtstar" else frozenset()
+    for key in given:
+        if key not in own:
+            whose = "astar" if key in _ASTAR else "rrtstar"
+            raise InputError(str(mission.path), f"[planner] {key}",
+                             f"is a number of {whose!r}, and this mission plans by {algorithm!r}",
+                             f'write [skipper] planner = "{whose}", or leave it out')
+    if "tunnel" in given and "tunnel_width_m" not in given:
+        raise InputError(str(mission.path), "[planner] tunnel", "a tunnel has a width", "add tunnel_width_m")
+    if algorithm == AUTO.algorithm:
+        return AUTO
+    numbers: dict[str, Any] = {_NUMBERS.get(key, key): value for key, value in given.items()}
+    for key in ("min_twa_rad", "max_twa_rad", "max_turn_rad"):
+        if key in numbers:
+            numbers[key] = math.radians(numbers[key])
+    if "heuristic_mps" in numbers:
+        numbers["heuristic_mps"] = numbers["heuristic_mps"] * MPS_PER_KNOT or None
+    if "is_tunnel_abrupt" in numbers:
+        numbers["is_tunnel_abrupt"] = numbers["is_tunnel_abrupt"] == "abrupt"
+    return Choice(algorithm=algorithm, settings=SETTINGS[algorithm](**numbers), expansions=expansions)
+
+
+LEAST_LINE_M = 1.0
+MOST_ATOMS = 64
+RANGE_M = 50_000.0
+
+
+def composed_field_of(mission: Mission, number: int, by_field: ByField, frame: LocalFrame) -> Composed:
+    """Return the field of the mission's goal ``number`` (from 1). Raises InputError with the place and a remedy."""
+    source, place = str(mission.path), f"[[goal]] {number} field"
+    atoms = atoms_of(mission, frame)
+    expression = parse(by_field.text, tuple(atoms), source, place)
+    if projects(expression) and mission.autopilot.frame == "motor":
+        raise InputError(source, place, f"{PROJECT}(...) keeps out of the no-go zone, and a motor boat has none",
+                         "write what is in its brackets alone")
+    tree = Tree(expression=expression, atoms=tuple((name, atoms[name]) for name in names_in(expression)))
+    return Composed(
+        tree=tree, until=Until(by_field.until), for_s=by_field.for_s,
+        water_en=None if by_field.shape is None else polygon_en(by_field.shape, frame, cover=False))
+
+
+def atoms_of(mission: Mission, frame: LocalFrame) -> dict[str, Atom]:
+    """Return the atoms of a mission by their names, in its local frame. Raises InputError."""
+    source, options = str(mission.path), mission.options.field
+    if len(options) > MOST_ATOMS:
+        raise InputError(source, "[field]", f"there are {len(options)} atoms", f"{MOST_ATOMS} are the most")
+    out: dict[str, Atom] = {}
+    for name, atom in options.items():
+        if not is_name(name):
+            raise InputError(source, f"[field.{name[:40]}]", "is no name that an expression can have",
+                             f"write letters, digits and _, a letter first; {MAX} and {PROJECT} mean something else")
+        out[name] = _atom(mission, name, atom, frame)
+    return out
+
+
+def require_fields(mission: Mission) -> None:
+    """Raise InputError for atoms and fields that cannot be sailed, and for those on another sea than their goal.
+
+    Under way, in a frame that moves along, they are made again and not looked at again.
+    """
+    atoms_of(mission, mission.frame())
+    for name, atom in mission.options.field.items():
+        if isinstance(atom, LineAtomOptions | RepulsiveLineAtomOptions):
+            length_m = math.hypot(*_en(atom.end, LocalFrame(_geo(atom.start))))
+            if length_m < LEAST_LINE_M:
+                raise InputError(str(mission.path), f"[field.{name}]", f"start and end are {length_m:.1f} m apart",
+                                 "a line has two places")
+    for number, goal in enumerate(mission.goals, start=1):
+        if goal.field is None:
+            continue
+        for name, made in composed_field_of(mission, number, goal.field, LocalFrame(goal.point)).tree.atoms:
+            places = (getattr(made, key, None) for key in ("at_en", "from_en", "to_en"))
+            far_m = max((math.hypot(*place) for place in places if place is not None), default=0.0)
+            if not far_m <= RANGE_M:
+                raise InputError(str(mission.path), f"[field.{name}]",
+                                 f"is {far_m / 1000.0:.0f} km from [[goal]] {number}, which is sailed by it",
+                                 "are lat and lon swapped? a field is sailed within 50 km")
+
+
+def field_words(mission: Mission) -> tuple[str, ...]:
+    """Return a line for each goal that is sailed by a field: which, and what ends it."""
+    frame, out = mission.frame(), []
+    for number, goal in enumerate(mission.goals, start=1):
+        if goal.field is not None:
+            made = composed_field_of(mission, number, goal.field, frame)
+            name = f", {goal.name}" if goal.name else ""
+            out.append(f"goal {number}{name}: by field {made.tree.text}, {made.until_words}")
+    return tuple(out)
+
+
+def field_findings_of(mission: Mission) -> tuple[Finding, ...]:
+    """Return what is worth knowing of a mission's fields: atoms that nobody sails by, a field without a value."""
+    out, told = [], set()
+    for number, goal in enumerate(mission.goals, start=1):
+        if goal.field is None:
+            continue
+        frame = LocalFrame(goal.point)
+        tree = composed_field_of(mission, number, goal.field, frame).tree
+        told |= {name for name, _ in tree.atoms}
+        place = frame.en_from_geo(goal.point)
+        found = float(lengths(tree, preview_conditions(mission, place), np.array([place]))[0])
+        if found < LEAST and tree.station_en is None and goal.field.until != "place":
+            out.append(Finding(
+                severity=Severity.WARNING, code=Code.FIELD, place=f"[[goal]] {number} field",
+                text=f"{tree.text} has no value at the goal's own place ({found:.2f} of 10): she would not be steered",
+                remedy="place it where the field leads somewhere"))
+    left = [name for name in mission.options.field if name not in told]
+    if left:
+        out.append(Finding(severity=Severity.WARNING, code=Code.FIELD, place="[field]",
+                           text=f"no goal is sailed by {listed(left)}", remedy="name it in a goal's field"))
+    return tuple(out)
+
+
+def preview_conditions(mission: Mission, at_en: tuple[float, float], twd_from_rad: float | None = None,
+            tws_mps: float | None = None) -> Conditions:
+    """Return a boat that lies at ``at_en`` in the wind that previews assume, or in another."""
+    from_rad = math.radians(mission.wind.preview_from_deg) if twd_from_rad is None else twd_from_rad
+    speed_mps = mission.wind.preview_speed_mps if tws_mps is None else tws_mps
+    sails = mission.autopilot.frame == "sailboat"
+    return Conditions(
+        seen=Situation(t_s=0.0, en_m=at_en, velocity_en_mps=(0.0, 0.0), heading_rad=0.0, tws_mps=speed_mps,
+                       twd_from_rad=from_rad if sails else None),
+        habits=Habits(
+            is_sailing=sails, no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
+            turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s), tack_s=max(1.0, mission.boat.tack_loss_s)))
+
+
+def _atom(mission: Mission, name: str, atom: AtomOptions, frame: LocalFrame) -> Atom:
+    if isinstance(atom, HeadingAtomOptions):
+        return Heading(heading_rad=math.radians(atom.heading_deg))
+    if isinstance(atom, LeaveAtomOptions):
+        return OutOf(water_en=polygon_en(mission.waters[name], frame, cover=False))
+    if isinstance(atom, LineAtomOptions | RepulsiveLineAtomOptions):
+        ends = [_en(mark, frame) for mark in (atom.start, atom.end)]
+        if isinstance(atom, LineAtomOptions):
+            return Along(from_en=ends[0], to_en=ends[1], zone_m=atom.zone_m)
+        return AwayFromLine(from_en=ends[0], to_en=ends[1], range_m=atom.range_m)
+    at_en = _en(atom, frame)
+    if isinstance(atom, PointAtomOptions):
+        return PointTo(at_en=at_en, zone_m=atom.zone_m)
+    if isinstance(atom, StationAtomOptions):
+        return StayAt(at_en=at_en, zone_m=atom.zone_m)
+    if isinstance(atom, CircleAtomOptions):
+        return Round(at_en=at_en, radius_m=atom.radius_m, is_clockwise=atom.turn == "clockwise", zone_m=atom.zone_m)
+    return AwayFrom(at_en=at_en, range_m=atom.range_m)
+
+
+def _en(
+    place: MarkOptions | PointAtomOptions | StationAtomOptions | CircleAtomOptions | RepulsivePointAtomOptions,
+    frame: LocalFrame,
+) -> tuple[float, float]:
+    return frame.en_from_geo(_geo(place))
+
+
+def _geo(
+    place: MarkOptions | PointAtomOptions | StationAtomOptions | CircleAtomOptions | RepulsivePointAtomOptions,
+) -> GeoPoint:
+    return GeoPoint(lat_deg=place.lat, lon_deg=place.lon)
+
+
+# A passage: how far the boat sails in one frame, and what of the area is in it: a plan may go aside as far as ahead.
+RECENTRE_M = 10_000.0
+HORIZONS, BEYOND_M = 1.5, 10_000.0
+
+_SIDES = {None: Side.NONE, "port": Side.PORT, "starboard": Side.STARBOARD}
+
+
+def voyage_of(mission: Mission) -> Voyage:
+    """Return the voyage in the mission's local frame, with its whole area."""
+    return _voyage_in(mission, mission.frame(), mission.water())
+
+
+def waters_of(mission: Mission) -> Waters | None:
+    """Return what makes a passage's voyage about a place, with the area that a plan from there can meet; None: none."""
+    if not mission.is_passage:
+        return None
+    reach_m = (mission.passage.recentre_m or RECENTRE_M) + HORIZONS * mission.skipper.horizon_m + BEYOND_M
+
+    def about(origin: GeoPoint) -> Voyage:
+        frame = LocalFrame(origin)
+        return _voyage_in(mission, frame, mission.area.about(frame, reach_m))
+
+    return about
+
+
+def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
+    goals = tuple(
+        Goal(
+            en_m=frame.en_from_geo(g.point), radius_m=g.radius_m, name=g.name, side=_SIDES[g.rounding],
+            rounding_m=max(g.radius_m, mission.margin_m) if g.rounding else 12.0,
+            bandwidth_m=mission.skipper.bandwidth_m if g.bandwidth_m is None else g.bandwidth_m,
+            line=_line(g.gate, frame),
+            box=None if g.box is None else Box(
+                area_en=polygon_en(g.box.shape, frame, cover=False), for_s=g.box.for_s),
+            search=None if g.search is None else Search(
+                area_en=free_water(g.search.shape, frame, mission.area), swath_m=g.search.swath_m,
+                coverage=g.search.coverage),
+            field=None if g.field is None else composed_field_of(mission, number, g.field, frame),
+        )
+        for number, g in enumerate(mission.goals, start=1)
+    )
+    return Voyage(
+        name=mission.name, frame=frame, goals=goals, area=area, boat=boat_of(mission),
+        laps=mission.skipper.laps,
+        refuges=tuple(
+            Refuge(name=r.name, en_m=frame.en_from_geo(r.point), radius_m=r.radius_m) for r in mission.refuges),
+        recentre_m=(mission.passage.recentre_m or RECENTRE_M) if mission.is_passage else None,
+        far_m=max(FAR_M, mission.passage.leg_m or 0.0),
+    )
+
+
+def _line(gate: Gate | None, frame: LocalFrame) -> Line | None:
+    if gate is None:
+        return None
+    return Line(
+        port_en_m=frame.en_from_geo(gate.port), starboard_en_m=frame.en_from_geo(gate.starboard), keep_m=gate.keep_m,
+        not_before_s=gate.not_before_s, after_s=gate.after_s)
+
+
+def config_of(mission: Mission) -> SkipperConfig:
+    """Return the skipper's thresholds; what the mission does not say keeps its default."""
+    options = mission.skipper
+    changes: dict[str, Any] = {
+        "sails": mission.autopilot.frame == "sailboat",
+        "delta_s": mission.risk.delta_s,
+        "max_path_risk": mission.risk.max_path_risk,
+        "delta_s_ladder": tuple(d for d in SkipperConfig().delta_s_ladder if d < mission.risk.delta_s),
+        "margin_m": mission.margin_m,
+        "margin_floor_m": mission.margin_floor_m,
+        "planner": planner_of(mission),
+        "plan_budget_s": options.planning_budget_s,
+        "first_plan_budget_s": options.planning_budget_s,
+        "autopilot_beats": options.autopilot_beats, "shifts": options.shifts,
+        "shift_tacks_apart_s": 60.0 / options.tacks_per_minute,
+        "replan_policy": ReplanPolicy(options.replan),
+        "guidance": Guidance(options.guidance),
+        "station_s": options.station_s,
+        "adopts": mission.options.from_autopilot,
+        "ends": _ends(mission),
+        "voyage_timeout_s": options.voyage_timeout_s,
+        "min_replan_interval_s": options.min_replan_s,
+        "traffic_clearance_m": mission.traffic.safe_distance_m,
+        "traffic_time_s": mission.traffic.safe_time_s,
+        "traffic_policy": Policy(mission.traffic.policy),
+        "wind_change_rad": math.radians(options.wind_shift_deg),
+        "grid_size_m": options.off_track_m,
+        "horizon_m": options.horizon_m,
+        "safe_end": SafeEnd.RETURN if options.end == "home" else SafeEnd.LOITER,
+    }
+    if options.max_replan_s is not None:
+        changes["plan_age_s"] = options.max_replan_s
+    return replace(SkipperConfig(), **changes)
+
+
+def _ends(mission: Mission) -> Ends:
+    safety = mission.safety
+    return Ends(
+        battery=End(safety.battery), battery_v=safety.battery_v, leak=End(safety.leak),
+        out_of_time=End(safety.out_of_time), strong_wind=End(safety.strong_wind),
+        light_wind=End(safety.light_wind), dark=End(safety.dark),
+        dark_below_rad=math.radians(safety.dark_below_deg), shore_lost=End(safety.shore_lost),
+        shore_lost_s=safety.shore_lost_s, battery_reserve=safety.battery_reserve,
+        failsafes=tuple((name, CHOICES[word]) for name, word in (
+            ("position", safety.position_failsafe), ("battery", safety.battery_failsafe),
+            ("fence", safety.fence_failsafe), (SHORE, safety.shore_failsafe))),
+    )
+
+
+def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
+    """Return what the operator allows. Uploading a mission goes with setting AUTO; a dry run allows nothing."""
+    if dry_run:
+        return Permissions()
+    operator = mission.operator
+    return Permissions(
+        orders=_orders(mission, "orders", mission.operator.orders),
+        local_orders=_orders(mission, "local_orders", mission.operator.local_orders),
+        far_orders=_orders(mission, "far_orders", mission.operator.far_orders),
+        may_upload=operator.set_auto, may_upload_fence=operator.upload_fence, may_arm=operator.arm,
+        may_set_mode=operator.set_auto, may_steer=operator.guided, may_replace_foreign=operator.replace_foreign,
+    )
+
+
+def _orders(mission: Mission, key: str, given: tuple[str, ...] | str) -> tuple[str, ...]:
+    """Return the verbs that a key of ``[operator]`` permits. Raises InputError for a word that is none."""
+    words = (given,) if isinstance(given, str) else given
+    for word in words:
+        if word != ALL and word not in set(Verb):
+            said, _, remedy = unknown(word).partition("; ")
+            raise InputError(str(mission.path), f"[operator] {key}", said, f'{remedy}, or "{ALL}"')
+    return tuple(words)
+
+
+_KALMAN = {"kalman_window": "n", "kalman_r_deg": "r_deg", "kalman_r_mps": "r_mps"}
+
+
+def estimator_of(mission: Mission) -> Estimator:
+    """Return the mission's wind estimator. Raises InputError for a name unknown."""
+    numbers = _kalman(mission)
+    try:
+        return make(mission.wind.estimator, **numbers)
+    except InputError as error:
+        name = mission.wind.estimator
+        raise InputError(str(mission.path), "[wind] estimator", f"{name!r} {error.problem}", error.remedy) from error
+
+
+def _kalman(mission: Mission) -> dict[str, Any]:
+    """Return the numbers of Wolsieffer's filter that the mission gives. Raises InputError for another estimator."""
+    given = {key: value for key in _KALMAN if (value := getattr(mission.wind, key)) is not None}
+    if given and mission.wind.estimator != "kalman":
+        raise InputError(str(mission.path), f"[wind] {next(iter(given))}",
+                         f"is for the estimator \"kalman\", and this mission's is {mission.wind.estimator!r}",
+                         'write estimator = "kalman", or leave it out')
+    return {_KALMAN[key]: value for key, value in given.items()}
+
+
+def water_of(mission: Mission) -> Prior:
+    """Return what the mission expects of the current.
+
+    Raises:
+        InputError: a table is no tide table, or set, drift and table do not go together.
+    """
+    current, path = mission.current, mission.tide_path
+    if current is None:
+        return STILL
+    source = str(mission.path)
+    if path is None:
+        if current.drift_mps is None or (current.set_deg is None and current.drift_mps > 0.0):
+            raise InputError(source, "[current]", "set_deg and drift_mps are not both there",
+                             "write where it goes and how fast, or a table")
+        set_rad = math.radians(current.set_deg or 0.0)
+        return Prior(east_mps=current.drift_mps * math.sin(set_rad), north_mps=current.drift_mps * math.cos(set_rad),
+                     sigma_mps=current.sigma_mps)
+    if current.set_deg is not None or current.drift_mps is not None:
+        raise InputError(source, "[current] table", "a table and a constant current exclude one another",
+                         "leave out set_deg and drift_mps, or the table")
+    try:
+        text = read_regular(path).decode("utf-8-sig")
+    except OSError as error:
+        raise unreadable(source, error, f"[current] table {path}", "write a tide table beside the mission") from None
+    except UnicodeDecodeError as error:
+        raise InputError(str(path), "", "is no text in UTF-8", "save the tide table as text") from error
+    times = tuple(_unix_s(line.split(",")[0].strip()) for _, line in table_lines(text))
+    return Prior(rows=read_table(text, str(path), times), sigma_mps=current.sigma_mps, name=path.name)
+
+
+def _unix_s(text: str) -> float | None:
+    """Return the Unix time [s] of an ISO 8601 time with its zone, None where it is none."""
+    try:
+        moment = dt.datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return None if moment.tzinfo is None else moment.timestamp()
+
+
+def target_limits_of(mission: Mission) -> TargetLimits:
+    """Return how long an unheard vessel is remembered."""
+    return TargetLimits(expire_s=mission.traffic.drop_after_s)
+
+
+def feeds_of(mission: Mission) -> tuple[str, ...]:
+    """Return the names of the AIS feeds to open; the autopilot's own AIS ("mavlink") needs none.
+
+    Raises:
+        InputError: a name is not a feed.
+    """
+    names = tuple(name for name in mission.traffic.feeds if name != "mavlink")
+    for name in names:
+        try:
+            parse_feed(name)
+        except InputError as error:
+            raise InputError(str(mission.path), "[traffic] feeds", f"{name!r} is not a feed", error.remedy) from error
+    return names
+
+
+def displays_of(mission: Mission) -> Displays:
+    """Return the other displays that are told of the voyage.
+
+    Raises:
+        InputError: a name is none, or there is a token for nobody.
+    """
+    output = mission.output
+    nmea, signalk = (_named(mission, *named) for named in (
+        ("nmea", output.nmea, parse_nmea), ("signalk", output.signalk, parse_signalk)))
+    if output.signalk_token is not None and all(name.kind == "tcp" for name in signalk):
+        raise InputError(str(mission.path), "[output] signalk_token", "there is no WebSocket to use it on",
+                         'name the server: signalk = ["ws://HOST:3000"]')
+    token = None if output.signalk_token is None else mission.path.parent / output.signalk_token
+    return Displays(nmea=nmea, signalk=signalk, token_file=token)
+
+
+def _named(
+    mission: Mission, key: str, names: tuple[str, ...], parse: Callable[[str], OutputName],
+) -> tuple[OutputName, ...]:
+    try:
+        return tuple(parse(name) for name in dict.fromkeys(names))
+    except InputError as error:
+        raise InputError(str(mission.path), f"[output] {key}", f"{error.place!r} {error.problem}",
+                         error.remedy) from error
