@@ -11,7 +11,7 @@ from companion.app.from_autopilot import DrawnSettings
 from companion.disk import Disk
 from companion.mavlink.transports import SigningStore
 from companion.page import Address, Chart
-from companion.telemetry.folder import Shelf
+from companion.telemetry.folder import VoyageArchive
 from companion.wind import Estimator, WindRoom
 
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
@@ -57,7 +57,7 @@ class SailOptions:
         offload: where disk work is done.
         is_durable: force files to the disk, against power cuts; a simulation has none.
         disk: what is written to.
-        shelf: the older voyages beside this one and what all may take together; None: they are left alone.
+        archive: the older voyages beside this one and what all may take together; None: they are left alone.
         is_again: sail the mission again although the saved state says that it has arrived.
         settings: what a drawing that is adopted under way is sailed with; None: none is adopted.
         known: hashes of missions on the autopilot that ours may take the place of: the drawing that is sailed.
@@ -83,7 +83,7 @@ class SailOptions:
     offload: Offload = in_thread
     is_durable: bool = True
     disk: Disk = field(default_factory=Disk)
-    shelf: Shelf | None = None
+    archive: VoyageArchive | None = None
     is_again: bool = False
     settings: DrawnSettings | None = None
     socket: Path | None = None

@@ -45,12 +45,10 @@ from companion.mavlink.wire import Drop
 from companion.messages import CompanionStatus
 from companion.skipper import Skipper
 from companion.skipper.step import Phase, Severity, Snapshot
-from companion.telemetry.far import unix_of_boat
+from companion.telemetry.console import DISK, GONE, left_behind
 from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, order_record, outcome_record
-from companion.telemetry.progress import DISK, GONE, left_behind
-from companion.telemetry.radio import Radio, speak_high_latency
 from companion.telemetry.state_file import StateFile
-from companion.telemetry.status import companion_status
+from companion.telemetry.status import TelemetrySender, companion_status, speak_high_latency, unix_of_boat
 from companion.traffic.listening import Feeds
 
 STEP_S = 1.0
@@ -79,7 +77,7 @@ async def sail(
         LinkError: no autopilot was heard within ``options.wait_s``.
         JobError: the folder's name cannot be one, or another companion is recording there.
     """
-    with Recorder(folder, disk=options.disk, shelf=options.shelf, is_durable=options.is_durable) as recorder:
+    with Recorder(folder, disk=options.disk, archive=options.archive, is_durable=options.is_durable) as recorder:
         shell = _Shell(mission, planner, recorder, options, stop or asyncio.Event(), guard or Guard(seed=options.seed))
         shell.on_status, shell.on_refusal = on_status, on_refusal
         if on_view is not None:
@@ -183,7 +181,7 @@ class _Shell:
         keep(Auxiliary.IDENTITY, lambda: keep_identity(self.fold, autopilot))
         keep(Auxiliary.PARAMETERS, lambda: keep_parameters(self.fold, autopilot))
         keep(Auxiliary.FENCE, lambda: keep_fence(self.fold, autopilot, self.mission, self._record))
-        keep(Auxiliary.RADIO, Radio(
+        keep(Auxiliary.RADIO, TelemetrySender(
             autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble).run)
         keep(Auxiliary.HIGH_LATENCY, lambda: speak_high_latency(
             autopilot, self._seen, lambda: operator.wants_high_latency))

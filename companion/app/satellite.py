@@ -40,7 +40,7 @@ from companion.orders.far import (
     unpack_order,
 )
 from companion.skipper.step import Severity
-from companion.telemetry.far import far_status, unix_of_boat
+from companion.telemetry.status import far_status, unix_of_boat
 
 LOOK_S = 5.0           # into the folder
 MOST = 20              # files in one look: a flood waits

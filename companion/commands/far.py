@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from companion.orders.far import FarStatus
 
 
-
 _EPILOG = """\
 examples:
   companion key new far.key                      (the same file on board: companion run ... --far DIR --far-key far.key)

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from companion.planner import Plan
 
 
-
 _EPILOG = """\
 examples:
   companion mission check missions/archipelago.toml --plot archipelago.png

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     from companion.planner.nursery import Nursery
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
-    from companion.telemetry.service import ServiceManager
-
+    from companion.telemetry.systemd import ServiceManager
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -183,7 +182,7 @@ def _start(
     nursery: Nursery | None, out: Console, err: Console,
 ) -> int:
     """Sail what is named, and what is drawn one after the other; return the exit code."""
-    from companion.telemetry.service import ServiceManager
+    from companion.telemetry.systemd import ServiceManager
 
     folder = _new_folder(args.out, name, 1)
     state_path = args.state or (folder.parent / f"{name}.state.json")
@@ -220,12 +219,13 @@ def _voyage(
     from companion.guard import Guard
     from companion.mavlink.transports import open_link
     from companion.outputs import wanted
-    from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, Shelf
+    from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, VoyageArchive
 
     signing = signing_of(args.signing_key)
-    shelf = None   # a folder that was named is not ours to tidy
+    archive = None   # a folder that was named is not ours to tidy
     if args.out is None or args.keep_gb is not None:
-        shelf = Shelf(folder=folder.parent, budget_bytes=int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9))
+        budget_bytes = int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9)
+        archive = VoyageArchive(folder=folder.parent, budget_bytes=budget_bytes)
     mission = sailed.mission.with_feeds(*args.feed).with_system(args.system).with_outputs(
         args.nmea, args.signalk, args.signalk_token)
     seed = mission.skipper.seed if args.seed is None else args.seed
@@ -246,7 +246,7 @@ def _voyage(
             seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
             expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
             wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
-            exit_on_arrival=args.exit_on_arrival, shelf=shelf, is_again=again, known=sailed.known,
+            exit_on_arrival=args.exit_on_arrival, archive=archive, is_again=again, known=sailed.known,
             settings=sailed.settings, socket=args.socket, http=page_of(args, guard),
             charts=charts_of(args, guard), far=far_of(args, guard), command=" ".join(sys.argv),
             token=secrets.randbelow(0xFFFFFFFF) + 1,
@@ -304,8 +304,8 @@ async def _sail(
         from companion.app.sail import sail
         from companion.guard import Auxiliary
         from companion.outputs import Outputs
-        from companion.telemetry.far import unix_of_boat
-        from companion.telemetry.progress import ProgressLine
+        from companion.telemetry.console import ProgressLine
+        from companion.telemetry.status import unix_of_boat
 
         if not await _is_ready(planner, stop, out, manager):
             return None
@@ -328,9 +328,9 @@ async def _sail(
 async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, manager: ServiceManager) -> bool:
     """Wait for the planner's kernels and say how far they are; return False when ``stop`` comes first."""
     from companion.errors import JobError
-    from companion.telemetry.preparing import Preparing
+    from companion.telemetry.console import CompileProgress
 
-    with Preparing(out) as preparing:
+    with CompileProgress(out) as preparing:
         def say(text: str) -> None:
             preparing.say(text)
             manager.starting(text)

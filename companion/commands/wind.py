@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from companion.wind.study import Ar1Fit, Characterisation, HorizonScore, Record, Score
 
 
-
 _EPILOG = """\
 examples:
   companion wind afternoon.csv

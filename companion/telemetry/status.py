@@ -1,21 +1,28 @@
-"""The companion's status as one value, from a step: what goes over the radio and to whoever watches."""
+"""The companion's status as one value, from a step: for the radio, a satellite link, and whoever watches."""
 
 from __future__ import annotations
 
+import asyncio
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from companion.clock import now_s
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
+from companion.mavlink.autopilot import Autopilot
+from companion.mavlink.wire import HIGH_LATENCY_S
 from companion.messages import CompanionStatus, TrafficStatus
+from companion.orders.far import FarStatus, Reply, minutes_of
 from companion.skipper.planning import next_tack_s
-from companion.skipper.step import Announce, Phase, Route, Severity
+from companion.skipper.step import Announce, Phase, Route, Severity, Snapshot
+from companion.skipper.watch.watchdogs import BY_NAME
 from companion.skipper.way import Voyage, gates_of
-from companion.telemetry.folder.records import sigma_ahead_rad
-from companion.telemetry.folder.summary import VoyageFigures
+from companion.telemetry.folder.logbook import Logbook
+from companion.telemetry.folder.records import VoyageFigures, sigma_ahead_rad
 from companion.traffic import TrafficCounts
 from companion.traffic.feeds import AisFeed
+from companion.traffic.listening import Feeds
 
 
 def companion_status(
@@ -106,3 +113,96 @@ def _alert(step: Step) -> tuple[str, str]:
     if step.state.phase in {Phase.HOLDING, Phase.OPERATOR}:
         return step.state.phase.value, step.state.why
     return "", step.state.why
+
+
+def unix_of_boat(snapshot: Snapshot, t_s: float) -> float | None:
+    """Return the time at ``t_s`` [s since 1970] by the autopilot's clock, which GPS sets; None: it has not told one.
+
+    Our own clock is not asked: a board without a battery begins somewhere in the past.
+    """
+    autopilot = snapshot.autopilot
+    if autopilot is None or autopilot.utc_at_boot_s is None or autopilot.boot_s is None:
+        return None
+    return autopilot.utc_at_boot_s + autopilot.boot_s + t_s - autopilot.t_s
+
+
+def worst_watchdog(step: Step) -> str:
+    """Return the name of the most severe watchdog that is raised, empty: none is."""
+    return min((raised.name for raised in step.state.raised), key=lambda name: BY_NAME[name].severity, default="")
+
+
+def far_status(
+    status: CompanionStatus, step: Step, *, sequence: int, order: int | None, reply: Reply | None, has_trouble: bool,
+    is_heard: bool,
+) -> FarStatus:
+    """Return what is told far away; ``order`` and ``reply`` are those of the order that came last."""
+    snapshot, traffic = step.snapshot, status.traffic
+    unix_s, autopilot, standing = unix_of_boat(snapshot, status.t_s), snapshot.autopilot, step.state.standing
+    goal = None if status.goal_index is None else status.goal_index + 1
+    return FarStatus(
+        phase=status.state, sequence=sequence, minute=None if unix_s is None else minutes_of(unix_s),
+        is_heard=is_heard, is_armed=autopilot is not None and autopilot.is_armed, is_under_way=step.state.sailing,
+        has_trouble=has_trouble, standing=None if standing is None else standing.verb, position=status.position,
+        goal_m=status.goal_distance_m, waypoint_m=status.waypoint_distance_m,
+        speed_mps=None if snapshot.vehicle is None else snapshot.vehicle.speed_mps,
+        twd_from_rad=status.twd_from_rad, tws_mps=status.tws_mps, twd_sigma_rad=status.twd_sigma_rad,
+        goal=goal, goals=status.goal_count, plan_age_s=status.plan_age_s, promised_risk=status.promised_risk,
+        clearance_m=status.clearance_m, cpa_m=None if traffic is None else traffic.cpa_m,
+        alarm="" if traffic is None else traffic.alarm or "none", watchdog=worst_watchdog(step),
+        battery_v=status.battery_v, order=order, reply=reply,
+    )
+
+
+# Status to the radio: a frame of it every so often [s]; see companion.mavlink.wire.status for its bytes.
+STATUS_EVERY_S = 2.0
+TROUBLE_EVERY_S = 600.0   # trouble with the disk that lasts is said again
+
+
+async def speak_high_latency(
+    autopilot: Autopilot, seen: Callable[[], tuple[CompanionStatus, Step] | None], is_wanted: Callable[[], bool],
+) -> None:
+    """Send HIGH_LATENCY2 while it is asked for, until cancelled."""
+    while True:
+        now = seen() if is_wanted() else None
+        if now is not None:
+            status, step = now
+            autopilot.send_high_latency(status, step.snapshot.vehicle, worst_watchdog(step))
+        await asyncio.sleep(HIGH_LATENCY_S)
+
+
+class TelemetrySender:
+    """Speaks through ``autopilot``; ``status`` and ``trouble`` are asked for what there is to say."""
+
+    def __init__(
+        self, autopilot: Autopilot, feeds: Feeds, log: Logbook, *, status: Callable[[], CompanionStatus | None],
+        trouble: Callable[[], str],
+    ) -> None:
+        self._autopilot, self._feeds, self._log = autopilot, feeds, log
+        self._status, self._trouble = status, trouble
+        self._told, self._told_s = "", -math.inf
+
+    async def run(self) -> None:
+        """Speak until cancelled."""
+        while True:
+            status = self._status()
+            if status is not None:
+                self._autopilot.send_status(status)
+            self._tell_silence()
+            self._tell_trouble()
+            await asyncio.sleep(STATUS_EVERY_S)
+
+    def _tell_silence(self) -> None:
+        """Say and record that a feed has fallen silent, and that it is heard again."""
+        for feed in self._feeds.changed():
+            text = f"AIS feed {'silent' if feed.is_silent else 'heard again'}: {feed.sentence()}"
+            self._log.note(self._log.now_s(), {"kind": "feed", "silent": feed.is_silent, "text": text})
+            self._autopilot.say(int(Severity.WARNING if feed.is_silent else Severity.NOTICE), text)
+
+    def _tell_trouble(self) -> None:
+        trouble = self._trouble()
+        if trouble and (trouble != self._told or now_s() - self._told_s >= TROUBLE_EVERY_S):
+            self._autopilot.say(int(Severity.WARNING), f"{trouble}; sailing on")
+            self._told_s = now_s()
+        elif self._told and not trouble:
+            self._autopilot.say(int(Severity.NOTICE), "the disk is well again: everything is recorded")
+        self._told = trouble

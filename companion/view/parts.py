@@ -13,8 +13,8 @@ from companion.orders import Verb, permitted
 from companion.skipper.step import WindHealth
 from companion.skipper.watch.watchdogs import BY_NAME
 from companion.skipper.way import Goal, PointEn, Side, Voyage, gates_of
+from companion.telemetry.console import DISK, GONE
 from companion.telemetry.folder import VoyageFigures
-from companion.telemetry.progress import DISK, GONE
 from companion.view import values
 from companion.view.company import alarms_of
 from companion.view.numbers import compass, metres, place, rounded, signed, tack_of

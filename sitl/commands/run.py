@@ -66,8 +66,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run_virtual
     from companion.errors import InputError
+    from companion.telemetry.console import ProgressLine
     from companion.telemetry.folder import DECISIONS
-    from companion.telemetry.progress import ProgressLine
     from sitl.run.compiled import compile_ahead
     from sitl.run.embedded import mission_of, run_embedded
     from sitl.scene import load_scenario, own_polar, scenario_wind

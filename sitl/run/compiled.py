@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from companion.kernels.build import prepare
-from companion.telemetry.preparing import Preparing
+from companion.telemetry.console import CompileProgress
 
 
 def compile_ahead(planner: str = "auto") -> None:
@@ -13,7 +13,7 @@ def compile_ahead(planner: str = "auto") -> None:
 
     The kernels of a planner of somebody's choice are not on the list of those that every voyage needs.
     """
-    with Preparing(sys.stderr) as preparing:
+    with CompileProgress(sys.stderr) as preparing:
         prepare(("companion", "sitl"), say=preparing.say)
         if planner != "auto":
             from companion.planner.solve import warm

@@ -276,7 +276,9 @@ def _with_broken(options: SailOptions, broken: Sequence[Outlet]) -> SailOptions:
         options = replace(options, http=Address(host=NOWHERE if "page" in broken else "127.0.0.1", port=0))
     if "socket" in broken:
         options = replace(options, socket=NO_FOLDER / "socket")
-    return options if "satellite" not in broken else replace(options, far=Far(folder=NO_FOLDER / FAR, key=KEY))
+    if "satellite" in broken:
+        options = replace(options, far=SatelliteLink(folder=NO_FOLDER / FAR, key=KEY))
+    return options
 
 
 def _guard_of(broken: Sequence[Outlet], seed: int) -> Guard:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from companion.errors import JobError
-from companion.telemetry.standing import StandingLine
+from companion.telemetry.console import StatusLine
 from companion.words import counted
 from sitl.means import Means
 from sitl.runner.cargo import Cargo
@@ -167,7 +167,7 @@ def _scenarios(job: Any) -> list[Path]:
     return [v for v in values if isinstance(v, Path) and v.suffix == ".toml" and v.is_file()]
 
 
-class _Progress(StandingLine):
+class _Progress(StatusLine):
     """How many are sailed, and how long the others take."""
 
     def __init__(self, of: int) -> None:

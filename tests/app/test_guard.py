@@ -27,7 +27,7 @@ from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.outputs import Outputs, outputs, wanted
 from companion.page import Address
 from companion.planner.worker import InlinePlanner
-from companion.telemetry import progress
+from companion.telemetry import console
 from companion.telemetry.folder import Logbook
 from companion.telemetry.folder.recorder import read_jsonl
 from companion.telemetry.state_file import StateFile
@@ -178,7 +178,7 @@ def test_with_all_that_is_beside_her_broken_at_the_start_and_under_way_she_arriv
 @pytest.mark.parametrize("from_s", [0.0, 1.5])
 def test_a_console_that_fails_is_no_end(from_s, tmp_path, monkeypatch):
     """Before an autopilot is heard a step is made each second, too."""
-    show, shown = progress.ProgressLine.show, []
+    show, shown = console.ProgressLine.show, []
 
     def broken(self, status, step):
         shown.append(now_s())
@@ -186,7 +186,7 @@ def test_a_console_that_fails_is_no_end(from_s, tmp_path, monkeypatch):
             raise RuntimeError("broken")
         show(self, status, step)
 
-    monkeypatch.setattr(progress.ProgressLine, "show", broken)
+    monkeypatch.setattr(console.ProgressLine, "show", broken)
     mission = MISSION.format(feed=free_port(), nmea=free_port()).replace("upload_fence = true", "")
     (tmp_path / "m.toml").write_text(mission)
     assert cli.main(["run", str(tmp_path / "m.toml"), "--link", f"udpin:127.0.0.1:{free_port()}", "--wait", "1.5",

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.app import far
+from companion.app import satellite
 from companion.app.operator_commands import OperatorCommands
 from companion.app.options import SatelliteLink, at_once
 from companion.app.satellite import ASIDE, IN, LOOK_S, MOST_ASIDE, OUT, TAKEN, TRIES, SatelliteMailbox
@@ -68,7 +68,8 @@ class Voyage:
             box = SatelliteMailbox(
                 SatelliteLink(folder=self.folder, key=KEY.key, every_s=600.0), 1, self.operator, disk=self.disk,
                 offload=at_once, is_durable=False, seen=lambda: seen(utc_s=self.utc_s), is_heard=lambda: True,
-                has_trouble=lambda: False, say=lambda severity, text: self.said.append(text), record=self.records.append)
+                has_trouble=lambda: False, say=lambda severity, text: self.said.append(text),
+                record=self.records.append)
             async with asyncio.TaskGroup() as group:
                 tasks = [group.create_task(box.run()), group.create_task(self.answer())]
                 await asyncio.sleep(LOOK_S / 2.0)
@@ -205,12 +206,12 @@ def unreadable(kind, path):
 @pytest.mark.parametrize("kind", ["loop", "pipe", "sick"])
 def test_a_message_that_cannot_be_read_is_put_aside_and_keeps_no_other_out(tmp_path, monkeypatch, kind):
     """One unreadable file stood in the way of every order behind it (issue 43, point 7)."""
-    def sick(path, most_bytes, read=far.read_regular, **how):
+    def sick(path, most_bytes, read=satellite.read_regular, **how):
         if path.name == "000000\x1b[2J.sbd" and kind == "sick":
             raise OSError(errno.EIO, "Input/output error", str(path))
         return read(path, most_bytes, **how)
 
-    monkeypatch.setattr(far, "read_regular", sick)
+    monkeypatch.setattr(satellite, "read_regular", sick)
     voyage = Voyage(tmp_path)
     status = voyage.sail(lambda: unreadable(kind, tmp_path / IN / "000000\x1b[2J.sbd"), voyage.put(sealed()),
                          *[lambda: None] * TRIES)

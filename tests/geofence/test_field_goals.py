@@ -12,7 +12,7 @@ from companion.geofence import load_mission
 from companion.geofence.mission.text import dump_options, parse_options
 from companion.sailable import judge, require_sailable
 from companion.skipper.way import Until
-from companion.telemetry.folder.copies import without_none
+from companion.telemetry.folder.logbook import without_none
 
 SQUARE = "POLYGON ((-1.3114 50.8161, -1.3086 50.8161, -1.3086 50.8179, -1.3114 50.8179, -1.3114 50.8161))"
 RING = f"""

@@ -7,10 +7,18 @@ import pytest
 
 from companion.mavlink.tlog import read_tlog, stamp
 from companion.telemetry.folder import read_decisions, read_rows
-from companion.telemetry.folder.names import DECISIONS, TLOG, TRACK, VOYAGE
-from companion.telemetry.folder.recorder import TRACK_COLUMNS, Recorder
-from companion.telemetry.folder.segments import closed, is_from_the_start, parts
-from companion.telemetry.folder.shelf import Shelf
+from companion.telemetry.folder.recorder import (
+    DECISIONS,
+    TLOG,
+    TRACK,
+    TRACK_COLUMNS,
+    VOYAGE,
+    Recorder,
+    VoyageArchive,
+    closed,
+    is_from_the_start,
+    parts,
+)
 
 DAY_S = 86_400
 BUDGET = 5_000_000   # a thousandth of what a boat has, as are the records: 330 kB a day
@@ -34,10 +42,10 @@ def write(recorder, t_s, noise):
 
 @pytest.mark.parametrize("restarts_every_days", [90, 7], ids=["one voyage", "a voyage a week"])
 def test_in_ninety_days_the_budget_is_never_exceeded(tmp_path, restarts_every_days):
-    shelf = Shelf(folder=tmp_path, budget_bytes=BUDGET)
+    archive = VoyageArchive(folder=tmp_path, budget_bytes=BUDGET)
     noise, worst = os.urandom, 0
     for voyage, day in enumerate(range(0, 90, restarts_every_days)):
-        with Recorder(tmp_path / f"{voyage:02}", shelf=shelf, is_durable=False) as recorder:
+        with Recorder(tmp_path / f"{voyage:02}", archive=archive, is_durable=False) as recorder:
             recorder.voyage({"mission": {"name": "long"}})
             end_day = min(90, day + restarts_every_days)
             for n, t_s in enumerate(range(day * DAY_S, end_day * DAY_S, 3600)):
@@ -55,8 +63,8 @@ def test_in_ninety_days_the_budget_is_never_exceeded(tmp_path, restarts_every_da
 
 
 def test_parts_are_read_as_one_record(tmp_path):
-    folder = tmp_path / "voyage"   # the shelf drops what else is on it, and above lie other tests' voyages
-    with Recorder(folder, shelf=Shelf(folder=tmp_path, budget_bytes=320_000), is_durable=False) as recorder:
+    folder = tmp_path / "voyage"   # the archive drops what else is in it, and above lie other tests' voyages
+    with Recorder(folder, archive=VoyageArchive(folder=tmp_path, budget_bytes=320_000), is_durable=False) as recorder:
         recorder.voyage({})
         for t_s in range(400):
             recorder.frame(stamp(int(1.7e15 + t_s * 1e6), FRAME))

@@ -14,7 +14,7 @@ from companion.messages import CompanionStatus, Mode
 from companion.skipper import Skipper
 from companion.skipper.step.actions import Announce, Severity
 from companion.skipper.step.config import SkipperConfig
-from companion.telemetry.progress import ProgressLine, left_behind, progress_text
+from companion.telemetry.console import ProgressLine, left_behind, progress_text
 from tests.skipper.world import World, voyage
 
 STATUS = CompanionStatus(t_s=0.0, state="waiting")

@@ -14,8 +14,7 @@ import pytest
 from companion.disk import NEW, Disk
 from companion.errors import JobError
 from companion.telemetry.folder import recorder as module
-from companion.telemetry.folder.names import DECISIONS, TLOG
-from companion.telemetry.folder.recorder import TRACK_COLUMNS, Recorder, jsonable, read_jsonl
+from companion.telemetry.folder.recorder import DECISIONS, TLOG, TRACK_COLUMNS, Recorder, jsonable, read_jsonl
 
 
 def test_records_survive_a_torn_last_line(tmp_path):

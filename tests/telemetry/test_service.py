@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from companion import cli
-from companion.telemetry.service import STATUS_CHARACTERS, ServiceManager
+from companion.telemetry.systemd import STATUS_CHARACTERS, ServiceManager
 from sitl.scene.ships import free_port
 
 UNIT = Path("deploy/companion@.service")

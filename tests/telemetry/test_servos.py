@@ -5,7 +5,7 @@ from pathlib import Path
 
 from companion import cli
 from companion.clock import run_virtual
-from companion.telemetry.folder.servos import Servos
+from companion.telemetry.folder.records import Servos
 from sitl.run.embedded import run_embedded
 from sitl.scene.scenario import load_scenario
 

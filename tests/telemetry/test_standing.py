@@ -4,8 +4,8 @@ import io
 
 import pytest
 
-from companion.telemetry import standing
-from companion.telemetry.standing import StandingLine
+from companion.telemetry import console
+from companion.telemetry.console import StatusLine
 
 
 class Terminal(io.StringIO):
@@ -16,13 +16,13 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def clock(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(standing.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
     return now
 
 
 def test_on_a_terminal_each_stands_in_place_of_the_last_and_covers_it():
     out = Terminal()
-    line = StandingLine(out, 30.0)
+    line = StatusLine(out, 30.0)
     line.show("12 of 100")
     line.show("9 of 9")
     line.stay("something else")
@@ -32,7 +32,7 @@ def test_on_a_terminal_each_stands_in_place_of_the_last_and_covers_it():
 
 def test_in_a_file_it_is_written_now_and_then_and_what_it_was_at_last(clock):
     out = io.StringIO()
-    line = StandingLine(out, 30.0)
+    line = StatusLine(out, 30.0)
     for second in range(71):
         clock[0] = 100.0 + second
         line.show(f"{second}")
@@ -43,12 +43,12 @@ def test_in_a_file_it_is_written_now_and_then_and_what_it_was_at_last(clock):
 
 def test_the_same_is_not_said_twice(clock):
     out = io.StringIO()
-    line = StandingLine(out, 30.0)
+    line = StatusLine(out, 30.0)
     line.show("still")
     clock[0] += 60.0
     line.show("still")
     line.end()
     assert out.getvalue() == "still\n"
     quiet = Terminal()
-    StandingLine(quiet, 30.0).end()
+    StatusLine(quiet, 30.0).end()
     assert quiet.getvalue() == ""

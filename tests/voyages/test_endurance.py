@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from companion.clock import run_virtual
-from companion.telemetry.folder.names import DECISIONS, STATE, TLOG, TRACK
+from companion.telemetry.folder.recorder import DECISIONS, STATE, TLOG, TRACK
 from sitl.run.embedded import run_embedded
 from sitl.scene.scenario import load_scenario
 

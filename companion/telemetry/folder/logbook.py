@@ -1,26 +1,126 @@
-"""What a voyage writes down, step by step: track, decisions, figures, and what a replay needs to sail it again."""
+"""What a voyage writes down, step by step: track, decisions, figures, and what a replay needs to sail it again.
+
+The copy is the mission as it was sailed, every option written out, with the names of the copied files in it.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Mapping
+import platform
+import sys
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
 from typing import Any
 
+import msgspec
+import tomli_w
+
+from companion import __version__
 from companion.clock import now_s
+from companion.disk import read_regular
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift
 from companion.geofence import Mission
+from companion.geofence.mission import is_file
 from companion.mavlink.tlog import stamp
 from companion.skipper.step import Permissions, Persisted, SkipperConfig
-from companion.skipper.way import Voyage
-from companion.telemetry.folder.copies import write_copies
-from companion.telemetry.folder.description import chart_record, voyage_record
-from companion.telemetry.folder.names import AREA
-from companion.telemetry.folder.recorder import Recorder
-from companion.telemetry.folder.records import action_record, track_row, water_record
-from companion.telemetry.folder.summary import VoyageFigures
+from companion.skipper.way import Goal, Voyage
+from companion.telemetry.folder.recorder import AREA, COPIES, Recorder, without_none
+from companion.telemetry.folder.records import VoyageFigures, action_record, track_row, water_record
+
+MISSION = "mission.toml"
+
+
+def write_copies(mission: Mission, recorder: Recorder) -> str:
+    """Put the copy into the voyage's folder; return its place there, "" when a file of the mission has gone."""
+    source = mission.path.parent
+    options: dict[str, Any] = {**msgspec.to_builtins(mission.options), "name": mission.name}
+    files: dict[str, Path] = {}
+
+    def copied(name: str) -> str:
+        # two files of one name may come from two folders
+        known = next((k for k, path in files.items() if path == source / name), None)
+        if known is not None:
+            return known
+        base, number = Path(name).name, 1
+        while (kept := base if number == 1 else f"{number}-{base}") in {*files, MISSION}:
+            number += 1
+        files[kept] = source / name
+        return kept
+
+    area = options["area"]
+    area["obstacles"] = [copied(name) for name in mission.options.area.obstacles]
+    if mission.options.area.fence is not None:
+        area["fence"] = copied(mission.options.area.fence)
+    for goal in options["goal"]:
+        if is_file(goal.get("polygon") or "("):
+            goal["polygon"] = copied(goal["polygon"])
+    for atom in options["field"].values():
+        if is_file(atom.get("polygon", "(")):
+            atom["polygon"] = copied(atom["polygon"])
+    if mission.polar_path is not None:
+        options["boat"]["polar"] = copied(str(mission.boat.polar))
+    if mission.current is not None and mission.current.table is not None:
+        options["current"]["table"] = copied(mission.current.table)
+    try:
+        for kept, path in files.items():
+            recorder.whole(f"{COPIES}/{kept}", read_regular(path))
+    except OSError:
+        return ""
+    recorder.whole(f"{COPIES}/{MISSION}", tomli_w.dumps(without_none(options)).encode())
+    return f"{COPIES}/{MISSION}"
+
+
+def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str, Any]:
+    """Return the content of area.json: local metres about its origin, obstacles as drawn and grown by the margin."""
+    area, origin = voyage.area, voyage.frame.origin
+    return {
+        "name": mission.name,
+        "origin": {"lat_deg": origin.lat_deg, "lon_deg": origin.lon_deg},
+        "goals": [
+            {"x": g.en_m[0], "y": g.en_m[1], "radius_m": g.radius_m, "name": g.name, "side": g.side.value,
+             **_task(g)}
+            for g in voyage.goals
+        ],
+        "obstacles": area.obstacles_wkt(0.0),
+        "grown": area.obstacles_wkt(margin_m),
+        "fence": area.fence_wkt(0.0),
+        "margin_m": margin_m,
+        "no_go_half_deg": mission.boat.no_go_half_deg,
+    }
+
+
+def _task(goal: Goal) -> dict[str, Any]:
+    """Return what else a chart says of a goal that is no point."""
+    if goal.line is not None:
+        return {"line": [list(goal.line.port_en_m), list(goal.line.starboard_en_m)]}
+    water = goal.box or goal.search
+    return {} if water is None else {"water": water.area_en.wkt}
+
+
+def voyage_record(mission: Mission, permissions: Permissions, run: dict[str, Any], copy: str) -> dict[str, Any]:
+    """Return the content of voyage.toml: the mission and its copy, how it is run, what is permitted, the versions."""
+    return {
+        "mission": {"name": mission.name, "path": str(mission.path), "copy": copy},
+        "run": run,
+        "permissions": {name: getattr(permissions, name) for name in type(permissions).__slots__},
+        "versions": {
+            "companion": __version__, "python": platform.python_version(), "machine": platform.machine(),
+            **dict(_versions("numpy", "numba", "shapely", "pymavlink", "filterpy")),
+        },
+        "argv": sys.argv[1:],
+    }
+
+
+def _versions(*names: str) -> Iterator[tuple[str, str]]:
+    """Yield those that are installed: filterpy is an extra's."""
+    for name in names:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            yield name, metadata.version(name)
 
 
 class Logbook:

@@ -23,9 +23,17 @@ from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift
 from companion.messages import GeoPoint
-from companion.telemetry.folder.names import AREA, DECISIONS, SUMMARY, TRACK, VOYAGE
-from companion.telemetry.folder.recorder import TRACK_COLUMNS, read_jsonl
-from companion.telemetry.folder.segments import parts, read_part
+from companion.telemetry.folder.recorder import (
+    AREA,
+    DECISIONS,
+    SUMMARY,
+    TRACK,
+    TRACK_COLUMNS,
+    VOYAGE,
+    parts,
+    read_jsonl,
+    read_part,
+)
 
 DAMAGED = "is the folder damaged, or another program's? take it from its copy"
 _WORDS = ("mode", "phase")

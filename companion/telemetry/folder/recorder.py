@@ -7,16 +7,27 @@ Whole files are written beside their place, synced and renamed.
 No record is worth the voyage. A disk that is full, read-only or sick pauses all records at once, so that none tells of
 what another lacks; they are counted, ``trouble`` says why, and ``tend`` takes them up again when the disk does, with a
 record of the gap. They stop before the disk is quite full: the state for a restart has the last of the room.
+
+``telemetry.tlog`` is written; when it is large or a day old it becomes ``telemetry-000001.tlog``, soon
+``telemetry-000001.tlog.gz``, and an empty one takes its place. So do track and decisions. Whoever reads a record reads
+its parts and then the open file (``parts``).
+
+The oldest finished voyages give way: first their telemetry logs, which are nearly all of it, then tracks and pictures,
+at last their decisions. A voyage that is being recorded holds the lock on its folder and is never touched, nor is a
+file that this program did not write.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import gzip
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -27,9 +38,198 @@ import tomli_w
 from companion.disk import Disk, is_mistake, open_regular, reason
 from companion.errors import JobError
 from companion.lock import FolderLock
-from companion.telemetry.folder.names import DECISIONS, SUMMARY, TLOG, TRACK, VOYAGE
-from companion.telemetry.folder.segments import Segments, closed, parts, read_part
-from companion.telemetry.folder.shelf import Shelf
+
+DECISIONS = "decisions.jsonl"
+TRACK = "track.csv"
+TLOG = "telemetry.tlog"
+SUMMARY = "summary.json"
+VOYAGE = "voyage.toml"
+AREA = "area.json"
+STATE = "state.json"
+PICTURE = "voyage.png"
+VERDICT = "verdict.json"    # of a scenario
+COPIES = "mission"          # the mission as it is sailed, with the files that it names
+
+
+MOST_BYTES = 8 << 20   # of the open file; compressing takes as much memory
+MOST_S = 86_400.0
+SHARE = 64             # a part is at most this share of what all may take
+DROPPED_IN_ORDER = (TLOG, TRACK, DECISIONS)
+
+
+def closed(path: Path) -> list[Path]:
+    """Return the closed parts of the record at ``path``, the oldest first."""
+    found = [p for p in path.parent.glob(f"{path.stem}-*") if _number(path, p)]
+    return sorted(found, key=lambda p: _number(path, p))
+
+
+def parts(path: Path) -> list[Path]:
+    """Return all parts of the record at ``path``: the closed ones, and the open file if it is there."""
+    return [*closed(path), *([path] if path.is_file() else [])]
+
+
+def is_from_the_start(path: Path) -> bool:
+    """Return whether no part of the record has been dropped."""
+    kept = closed(path)
+    return not kept or _number(path, kept[0]) == 1
+
+
+def read_part(path: Path) -> bytes:
+    """Return what is in a part."""
+    data = path.read_bytes()
+    return gzip.decompress(data) if path.suffix == ".gz" else data
+
+
+def _number(path: Path, part: Path) -> int:
+    found = re.fullmatch(rf"{re.escape(path.stem)}-(\d{{6}}){re.escape(path.suffix)}(\.gz)?", part.name)
+    return int(found[1]) if found else 0
+
+
+class Segments:
+    """The parts of one voyage's records. ``budget_bytes`` is what all voyages may take together."""
+
+    def __init__(self, folder: Path, disk: Disk, budget_bytes: int) -> None:
+        self._folder, self._disk = folder, disk
+        self.part_bytes = min(MOST_BYTES, budget_bytes // SHARE)
+        self.headroom_bytes = 2 * len(DROPPED_IN_ORDER) * self.part_bytes   # what is open, and its compressed copies
+        self._since_s: dict[str, float] = {}
+        self._plain: list[Path] | None = None   # closed and not yet compressed; None: not looked for yet
+
+    def is_due(self, name: str, size: int, t_s: float) -> bool:
+        """Return whether the open file of a record is to be closed."""
+        since_s = self._since_s.setdefault(name, t_s)
+        return size >= self.part_bytes or (size > 0 and t_s - since_s >= MOST_S)
+
+    def close(self, name: str, t_s: float) -> None:
+        """Give the open file its number. Raises OSError."""
+        path = self._folder / name
+        before = closed(path)
+        number = _number(path, before[-1]) + 1 if before else 1
+        part = path.with_name(f"{path.stem}-{number:06d}{path.suffix}")
+        self._disk.rename(path, part)
+        self._plain = [*(self._plain or []), part]
+        self._since_s[name] = t_s
+
+    def compress(self) -> None:
+        """Compress the closed parts that are not yet, also those that a power cut left. Raises OSError."""
+        if self._plain is None:
+            self._plain = [part for name in DROPPED_IN_ORDER for part in closed(self._folder / name)
+                           if part.suffix != ".gz"]
+        while self._plain:
+            part = self._plain[0]
+            self._disk.replace(part.with_name(f"{part.name}.gz"), gzip.compress(part.read_bytes(), mtime=0))
+            part.unlink()
+            del self._plain[0]
+
+    def drop(self, over_bytes: int) -> tuple[str, ...]:
+        """Remove the oldest parts, telemetry first and decisions last; return what was removed, in words.
+
+        The newest part of each stays: by its number it is known that others were there.
+        """
+        said: list[str] = []
+        for name in DROPPED_IN_ORDER:
+            for part in closed(self._folder / name)[:-1]:
+                if over_bytes <= 0:
+                    return tuple(said)
+                size = part.stat().st_size
+                part.unlink()
+                over_bytes -= size
+                said.append(f"{self._folder.name}: {part.name} ({size / 1e6:.1f} MB)")
+        return tuple(said)
+
+
+# Enough for half a month under way: a day of the endurance scenario writes 0.3 GB [bytes].
+DEFAULT_BUDGET_BYTES = 5_000_000_000
+# What is dropped first, second, last; a folder (the mission's copy) with all that is in it.
+_STAGES = ((TLOG,), (TRACK, PICTURE, AREA, COPIES), (DECISIONS, SUMMARY, VERDICT, STATE, VOYAGE))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoyageArchive:
+    """The voyages in ``folder``, which may take ``budget_bytes`` together."""
+
+    folder: Path
+    budget_bytes: int = DEFAULT_BUDGET_BYTES
+
+    def used_bytes(self) -> int:
+        """Return what all voyages take now."""
+        return sum(_size(voyage) for voyage in self._voyages())
+
+    def tidy(self, kept_free_bytes: int = 0) -> tuple[str, ...]:
+        """Drop what is over the budget, less what is to stay free of it; return what was dropped, in words."""
+        return self._drop(self.used_bytes() + kept_free_bytes - self.budget_bytes, stages=len(_STAGES))
+
+    def make_room(self, wanted_bytes: int) -> tuple[str, ...]:
+        """Drop telemetry logs, and nothing else, for a disk that something else has filled."""
+        return self._drop(wanted_bytes, stages=1)
+
+    def _drop(self, wanted_bytes: int, *, stages: int) -> tuple[str, ...]:
+        dropped: list[str] = []
+        for names in _STAGES[:stages]:
+            for voyage in self._voyages():
+                if wanted_bytes <= 0:
+                    return tuple(dropped)
+                lock = FolderLock(voyage)
+                try:
+                    if not lock.take():
+                        continue   # being recorded
+                    freed = _remove(voyage, names)
+                except OSError:
+                    continue
+                finally:
+                    lock.release()
+                if freed:
+                    dropped.append(f"{voyage.name}: {', '.join(names)} ({freed / 1e6:.1f} MB)")
+                wanted_bytes -= freed
+        return tuple(dropped)
+
+    def _voyages(self) -> list[Path]:
+        """Return the voyages, the oldest first: by when something was last decided."""
+        found: list[tuple[float, Path]] = []
+        with contextlib.suppress(OSError):
+            for entry in os.scandir(self.folder):
+                folder = Path(entry.path)
+                for name in (DECISIONS, VOYAGE):
+                    with contextlib.suppress(OSError):
+                        if entry.is_dir(follow_symlinks=False):
+                            found.append(((folder / name).stat().st_mtime, folder))
+                            break
+        return [folder for _, folder in sorted(found)]
+
+
+def _files(path: Path) -> Iterator[Path]:
+    """Yield ``path`` if it is a file, or the files below it."""
+    if path.is_symlink() or path.is_file():
+        yield path
+    elif path.is_dir():
+        for folder, _, names in os.walk(path):
+            yield from (Path(folder) / name for name in names)
+
+
+def _size(path: Path) -> int:
+    size = 0
+    for file in _files(path):
+        with contextlib.suppress(OSError):
+            size += file.lstat().st_size
+    return size
+
+
+def _remove(voyage: Path, names: tuple[str, ...]) -> int:
+    """Remove these of a voyage's files, and its folder when nothing is left in it; return the bytes freed."""
+    freed = 0
+    for name in names:
+        for file in [*_files(voyage / name), *closed(voyage / name)]:
+            with contextlib.suppress(OSError):
+                size = file.lstat().st_size
+                file.unlink()
+                freed += size
+        if (voyage / name).is_dir():
+            with contextlib.suppress(OSError):
+                (voyage / name).rmdir()
+    with contextlib.suppress(OSError):
+        voyage.rmdir()
+    return freed
+
 
 # The files of one voyage end here [bytes], restarts included: what comes later is dropped and counted. A day of the
 # endurance scenario writes about a tenth of it. Where all voyages together may take less, these are less in proportion.
@@ -71,7 +271,7 @@ class Recorder:
     Args:
         folder: of the voyage.
         disk: what is written to.
-        shelf: all voyages beside this one and what they may take together; None: there is no end to it.
+        archive: all voyages beside this one and what they may take together; None: there is no end to it.
         is_durable: force files to the disk, against power cuts.
 
     Attributes:
@@ -80,16 +280,16 @@ class Recorder:
     """
 
     def __init__(
-        self, folder: Path, *, disk: Disk | None = None, shelf: Shelf | None = None, is_durable: bool = True,
+        self, folder: Path, *, disk: Disk | None = None, archive: VoyageArchive | None = None, is_durable: bool = True,
     ) -> None:
         self.folder = folder
         self.dropped = 0
         self.trouble = ""
-        self._disk, self._shelf, self._is_durable = disk or Disk(), shelf, is_durable
-        share = 1.0 if shelf is None else min(1.0, shelf.budget_bytes / sum(MAX_BYTES.values()))
+        self._disk, self._shelf, self._is_durable = disk or Disk(), archive, is_durable
+        share = 1.0 if archive is None else min(1.0, archive.budget_bytes / sum(MAX_BYTES.values()))
         self._caps = {name: int(share * most) for name, most in MAX_BYTES.items()}
         self._segments = Segments(
-            folder, self._disk, sum(MAX_BYTES.values()) if shelf is None else shelf.budget_bytes)
+            folder, self._disk, sum(MAX_BYTES.values()) if archive is None else archive.budget_bytes)
         self._retired: list[int] = []   # files that were closed but for a write that may be under way
         self._lock = FolderLock(folder)
         self._bytes: dict[str, int] = {}

@@ -5,9 +5,7 @@ import os
 import pytest
 
 from companion.lock import FolderLock
-from companion.telemetry.folder.names import DECISIONS, TLOG, TRACK, VOYAGE
-from companion.telemetry.folder.recorder import Recorder, read_jsonl
-from companion.telemetry.folder.shelf import Shelf
+from companion.telemetry.folder.recorder import DECISIONS, TLOG, TRACK, VOYAGE, Recorder, VoyageArchive, read_jsonl
 
 STAMPS = {"t_s": 1.0, "utc": "then"}
 
@@ -31,15 +29,15 @@ def names(folder):
 
 
 def test_the_oldest_telemetry_goes_first_then_tracks_decisions_last(voyages):
-    assert Shelf(folder=voyages, budget_bytes=6000).tidy() == ()
-    dropped = Shelf(folder=voyages, budget_bytes=3500).tidy()
+    assert VoyageArchive(folder=voyages, budget_bytes=6000).tidy() == ()
+    dropped = VoyageArchive(folder=voyages, budget_bytes=3500).tidy()
     assert [text.split(":")[0] for text in dropped] == ["v0", "v1", "v2"]
     assert {n for n in names(voyages) if n.endswith(TLOG)} == {f"v3/{TLOG}", f"v4/{TLOG}"}
-    Shelf(folder=voyages, budget_bytes=600).tidy()
+    VoyageArchive(folder=voyages, budget_bytes=600).tidy()
     assert not any(n.endswith(TLOG) for n in names(voyages))
     assert f"v0/{TRACK}" not in names(voyages)
     assert {n for n in names(voyages) if n.endswith(DECISIONS)} == {f"v{k}/{DECISIONS}" for k in range(5)}
-    Shelf(folder=voyages, budget_bytes=250).tidy()
+    VoyageArchive(folder=voyages, budget_bytes=250).tidy()
     assert names(voyages) == {f"v{k}/{name}" for k in (3, 4) for name in (DECISIONS, VOYAGE)} | {"a.state.json"}
     assert not (voyages / "v0").exists()
 
@@ -54,7 +52,7 @@ def test_what_is_recorded_now_and_what_is_not_ours_stays(voyages):
     (voyages / "link").symlink_to(outside)
     lock = FolderLock(voyages / "v0")
     assert lock.take()
-    Shelf(folder=voyages, budget_bytes=0).tidy()
+    VoyageArchive(folder=voyages, budget_bytes=0).tidy()
     lock.release()
     assert {n for n in names(voyages) if n.startswith("v0")} == {
         f"v0/{n}" for n in (TLOG, TRACK, DECISIONS, VOYAGE, "mission/mission.toml")}
@@ -63,15 +61,15 @@ def test_what_is_recorded_now_and_what_is_not_ours_stays(voyages):
 
 
 def test_for_a_disk_that_something_else_has_filled_only_telemetry_is_given(voyages):
-    Shelf(folder=voyages).make_room(10**9)
+    VoyageArchive(folder=voyages).make_room(10**9)
     assert not any(n.endswith(TLOG) for n in names(voyages))
     assert f"v0/{TRACK}" in names(voyages)
 
 
 def test_a_voyage_keeps_the_budget_from_its_start_and_says_what_it_dropped(voyages):
     """Each restart made a folder with 3 GB of its own (issue 12, point 13)."""
-    with Recorder(voyages / "now", shelf=Shelf(folder=voyages, budget_bytes=2600)) as recorder:
-        assert Shelf(folder=voyages).used_bytes() <= 2600 + 300    # its own header has come since
+    with Recorder(voyages / "now", archive=VoyageArchive(folder=voyages, budget_bytes=2600)) as recorder:
+        assert VoyageArchive(folder=voyages).used_bytes() <= 2600 + 300    # its own header has come since
         recorder.decision({"kind": "start"})
         recorder.tend(STAMPS)
         for _ in range(200):
