@@ -35,17 +35,16 @@ from PIL import Image
 
 from companion.errors import InputError
 from companion.geofence import load_mission
+from companion.mission_check import field_preview, field_track, heading_fan
 from companion.planner import Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.plan import Plan, PlanStatus
 from companion.planner.reference.astar import search as search_astar
 from companion.planner.risk import simulate_entries
 from companion.planner.settings import AstarSettings
-from companion.plots.composed import field_figure
-from companion.plots.field import atoms_figure, encounter_figure, trees_figure
-from companion.plots.filter import filter_figure
+from companion.plots.field import atoms_figure, encounter_figure, field_figure, trees_figure
 from companion.plots.plan import draw_plan
-from companion.sailable.fields import fan_of, previewed, sailed
+from companion.plots.wind import filter_figure
 from companion.wind.study import characterise, parse_csv
 from companion.wind.study.records import weather
 from sitl.tasks.wrsc2013 import HALF_M
@@ -203,8 +202,9 @@ def field_trees():
 
 def field_composed():
     mission = load_mission("missions/field-ring.toml")
-    seen = previewed(mission)
-    save(field_figure(seen, fan_of(seen), sailed(seen), title=f"{mission.name}: {seen.tree.text}"), "field-composed")
+    seen = field_preview(mission)
+    figure = field_figure(seen, heading_fan(seen), field_track(seen), title=f"{mission.name}: {seen.tree.text}")
+    save(figure, "field-composed")
 
 
 def wrsc2013():

@@ -73,6 +73,11 @@ from companion.traffic.feeds import parse_feed
 from companion.wind import Estimator, make
 from companion.words import listed
 
+__all__ = [
+    "RECENTRE_M", "boat_of", "config_of", "displays_of", "estimator_of", "feeds_of", "permissions_of", "planner_of",
+    "polar_of", "target_limits_of", "voyage_of", "water_of", "waters_of",
+]
+
 _POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
 
 

@@ -74,13 +74,14 @@ API = ROOT / "docs" / "api"
 
 
 def faces() -> dict[str, list[str]]:
-    """Name the modules that others import from, and what they list: packages with ``__all__``, and messages."""
+    """Name the modules that others import from, and what they list: rooms with ``__all__``, and messages."""
     found: dict[str, list[str]] = {"companion.messages": []}
-    for file in sorted((ROOT / "companion").rglob("__init__.py")):
+    for file in sorted({*(ROOT / "companion").rglob("__init__.py"), *(ROOT / "companion").glob("*.py")}):
+        name = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
         assigned = [node for node in ast.parse(file.read_text()).body if isinstance(node, ast.Assign)]
         for node in assigned:
             if any(isinstance(target, ast.Name) and target.id == "__all__" for target in node.targets):
-                found[".".join(file.parent.relative_to(ROOT).parts)] = ast.literal_eval(node.value)
+                found[name] = ast.literal_eval(node.value)
     return found
 
 

@@ -26,7 +26,7 @@ from companion.mavlink.transports import SigningStore, Transport
 from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
 from companion.mavlink.wire import mission_hash
 from companion.messages import GeoPoint, MissionItem
-from companion.sailable import require_sailable
+from companion.mission_check import require_sailable
 from companion.skipper.board.mark import are_marked, is_remnant
 from companion.skipper.step import Severity
 from companion.telemetry.state_file import known_beside, read_state

@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     from companion.doctor import Level
     from companion.geofence import load_mission
     from companion.mavlink.transports import SigningStore, open_link
-    from companion.sailable import require_sailable
+    from companion.mission_check import require_sailable
 
     mission = require_sailable(load_mission(args.mission)) if args.mission is not None else None
     signing = SigningStore(args.signing_key, time.time()) if args.signing_key is not None else None

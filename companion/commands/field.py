@@ -12,7 +12,7 @@ from companion.program.arguments import out_file, picture, whole, wind
 
 if TYPE_CHECKING:
     from companion.geofence import Mission
-    from companion.sailable.fields import Previewed
+    from companion.mission_check import FieldPreview
 
 _EPILOG = """\
 examples:
@@ -46,19 +46,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 def run(args: argparse.Namespace) -> int:
     """Tell of a field, and draw it."""
     from companion.geofence import load_mission
-    from companion.sailable import require_sailable
-    from companion.sailable.fields import fan_of, previewed, sailed
+    from companion.mission_check import field_preview, field_track, heading_fan, require_sailable
 
     mission = require_sailable(load_mission(args.file))
-    seen = previewed(mission, number=args.goal, wind=args.wind)
-    fan, track = fan_of(seen), sailed(seen)
+    seen = field_preview(mission, number=args.goal, wind=args.wind)
+    fan, track = heading_fan(seen), field_track(seen)
     print("\n".join([*_words(mission, seen), *_in_the_wind(seen)]))
     end = math.dist(track[-1, 1:3], seen.place_en)
     print(f"the boat at {seen.here_en[0]:.0f} m east, {seen.here_en[1]:.0f} m north: the field says "
           f"{_heading(fan.wanted_rad)}, she is steered {_heading(fan.chosen_rad)}")
     print(f"sailed by it in a steady wind: {track[-1, 0]:.0f} s, ends {end:.0f} m from {seen.name}")
     if args.plot:
-        from companion.plots.composed import save_field
+        from companion.plots.field import save_field
 
         with patience("drawing"):
             save_field(seen, fan, track, args.plot, has_fans=args.fans,
@@ -69,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write_page(path: Path, mission: Mission, seen: Previewed) -> None:
+def _write_page(path: Path, mission: Mission, seen: FieldPreview) -> None:
     from companion.disk import Disk, reason
     from companion.errors import InputError
     from companion.page.fields import field_page
@@ -81,7 +80,7 @@ def _write_page(path: Path, mission: Mission, seen: Previewed) -> None:
     print(f"{path}: written; open it in a browser, no server is needed")
 
 
-def _words(mission: Mission, seen: Previewed) -> list[str]:
+def _words(mission: Mission, seen: FieldPreview) -> list[str]:
     """Return what the field is made of."""
     from companion.field.tree import Along, AwayFrom, AwayFromLine, Heading, OutOf, PointTo, Round, StayAt
 
@@ -111,9 +110,9 @@ def _words(mission: Mission, seen: Previewed) -> list[str]:
     return out
 
 
-def _in_the_wind(seen: Previewed) -> list[str]:
+def _in_the_wind(seen: FieldPreview) -> list[str]:
     """Return in which wind it is looked at, and how much of the water it says nothing of."""
-    from companion.sailable.fields import without_value
+    from companion.mission_check import without_value
 
     twd, out = seen.conditions.twd_from_rad, []
     out.append("a motorboat: no wind is needed" if twd is None else

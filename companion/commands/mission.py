@@ -121,10 +121,9 @@ def _check(args: argparse.Namespace) -> int:
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
     from companion.compose import field_words
-    from companion.sailable import judge, words_of
-    from companion.sailable.previews import wind_limit_words
+    from companion.mission_check import check_mission, current_words_of, wind_limit_words
 
-    judged = judge(Path(args.file), from_deg=args.wind[1] if args.wind else None)
+    judged = check_mission(Path(args.file), from_deg=args.wind[1] if args.wind else None)
     if judged.mission is None or judged.refusals:
         raise judged.refusals[0]
     mission = judged.mission
@@ -134,7 +133,7 @@ def _check(args: argparse.Namespace) -> int:
     if args.plot:
         preview(mission, args)
     if mission.is_passage:
-        from companion.sailable.previews import passage_words
+        from companion.mission_check import passage_words
 
         print(passage_words(mission))
         print(f"{args.file}: note: a passage needs FENCE_TYPE 4 on the autopilot, its polygons alone: with bit 2 the "
@@ -142,7 +141,7 @@ def _check(args: argparse.Namespace) -> int:
     limits = wind_limit_words(mission)
     if limits:
         print(f"{args.file}: {limits}")
-    for line in words_of(mission, time.time()):
+    for line in current_words_of(mission, time.time()):
         print(f"{args.file}: {line}")
     print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
           f"{counted(len(mission.area.solids), 'obstacle')}: "
@@ -442,12 +441,12 @@ def preview(mission: Mission, args: argparse.Namespace) -> None:
 def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
     """Return the planner's way from goal to goal, first lap, in a steady wind; and home, if the mission ends there."""
     from companion.compose import planner_of
+    from companion.mission_check import AssumedWind, legs, planned_legs
     from companion.planner import plan
-    from companion.sailable.previews import Wind, legs, walked
 
     by = planner_of(mission).about(mission.frame().origin)
-    return walked(
-        legs(mission, Wind(from_deg=math.degrees(twd_from_rad), speed_mps=tws_mps), unix_s=time.time()),
+    return planned_legs(
+        legs(mission, AssumedWind(from_deg=math.degrees(twd_from_rad), speed_mps=tws_mps), unix_s=time.time()),
         lambda problem: plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0, algorithm=by.algorithm,
                              settings=by.settings))
 

@@ -117,7 +117,7 @@ def _answer(problem: Problem, args: argparse.Namespace) -> tuple[Problem, Plan]:
 def _mission(args: argparse.Namespace) -> Mission:
     """Return the mission that is to be planned from its start."""
     from companion.geofence import load_mission
-    from companion.sailable import require_sailable
+    from companion.mission_check import require_sailable
 
     mission = require_sailable(load_mission(args.problem))
     if mission.start is None:
@@ -127,7 +127,7 @@ def _mission(args: argparse.Namespace) -> Mission:
 
 def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
     """Return the problems and plans of a mission from goal to goal, to the first that has no path."""
-    from companion.sailable.previews import Wind, legs, walked
+    from companion.mission_check import AssumedWind, legs, planned_legs
 
     tws_mps, from_deg = args.wind or (mission.wind.preview_speed_mps, mission.wind.preview_from_deg)
     answers: list[tuple[Problem, Plan]] = []
@@ -136,7 +136,8 @@ def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Prob
         answers.append(_answer(problem, args))
         return answers[-1][1]
 
-    walked(legs(mission, Wind(from_deg=from_deg, speed_mps=tws_mps), goes_home=False, unix_s=time.time()), answer)
+    wind = AssumedWind(from_deg=from_deg, speed_mps=tws_mps)
+    planned_legs(legs(mission, wind, goes_home=False, unix_s=time.time()), answer)
     return answers
 
 

@@ -20,7 +20,7 @@ from companion.errors import InputError
 from companion.guard import Auxiliary
 from companion.program import INTERRUPTED
 from companion.program.arguments import chart_option, host_name, http_address, number, out_folder, system_id, whole
-from companion.program.extras import missing
+from companion.program.commands import missing
 from companion.words import counted, file_name
 
 if TYPE_CHECKING:
@@ -143,9 +143,9 @@ def _run(args: argparse.Namespace) -> int:
     from companion.geofence.mission import NO_NAME
     from companion.guard import Guard
     from companion.mavlink.transports import parse_link
+    from companion.mission_check import require_sailable
     from companion.planner.nursery import Nursery
     from companion.planner.worker import answer_requests
-    from companion.sailable import require_sailable
     from companion.telemetry.console import Console
     from companion.traffic.feeds import parse_feed
 
@@ -537,7 +537,7 @@ def read_drawn(
     from companion.disk import Disk
     from companion.geofence.mission import NO_NAME
     from companion.mavlink.transports import open_link
-    from companion.sailable import require_sailable
+    from companion.mission_check import require_sailable
 
     def say(text: str) -> None:
         err.write(f"companion run: {text}\n")

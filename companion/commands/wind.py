@@ -372,7 +372,7 @@ def _figures(score: HorizonScore) -> dict[str, float]:
 
 def draw(found: Characterisation, picture: Path) -> None:
     """Draw the grid, and say where."""
-    from companion.plots.filter import save_filter
+    from companion.plots.wind import save_filter
 
     save_filter(found, picture)
     print(f"drawn in {picture}")

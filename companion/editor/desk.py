@@ -4,26 +4,235 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import contextlib
 import logging
-from collections.abc import Awaitable, Callable, Sequence
+import math
+import secrets
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 import h11
 import msgspec
+import numpy as np
+import shapely
 from msgspec import Meta, Struct
 
-from companion.disk import Disk
-from companion.editor.base import Base, read_base
-from companion.editor.draft import Draft, draft_of
-from companion.editor.findings import looked_at
-from companion.editor.plans import Previews, Superseded
-from companion.editor.saving import changed_meanwhile, save
+from companion import __version__
+from companion.compose import planner_of
+from companion.disk import Disk, reason
+from companion.editor.base import Base, area_files, read_base
+from companion.editor.draft import Draft, draft_of, looked_at
 from companion.editor.sketch import Sketch
-from companion.editor.state import state_of
-from companion.errors import CompanionError, InputError
-from companion.page import Chart, Refused, Reply, Stream, files, require_token, tile_at
-from companion.sailable.previews import Wind
+from companion.errors import CompanionError, InputError, JobError
+from companion.geofence import Circle, Document, Mission, Zone
+from companion.geofence.formats import FORMATS
+from companion.geofence.mission import MissionOptions, read_options
+from companion.geofence.shapes import center_of
+from companion.messages import GeoPoint
+from companion.mission_check import AssumedWind, continued_plans, leg_names, legs
+from companion.page import (
+    Address,
+    Chart,
+    Refused,
+    Reply,
+    Stream,
+    files,
+    listening,
+    plan_figures,
+    require_token,
+    tile_at,
+)
+from companion.planner import Plan, Problem
+from companion.planner.worker import PlannerWorker
+from companion.view.area import drawn as area_drawn
 from companion.words import counted, listed
+
+SIMPLER_DEG = 2e-6        # 0.2 m
+DEGREE_M = 111_195.0      # of latitude
+SIDES, FEW_SIDES = 48, 8  # of a circle, and of one of many
+MANY = 500
+MOST_SIBLINGS = 200       # missions in the folder that are asked whether they share a file
+PARTS = {"waypoints": ("mission", "fence", "rally")}
+_UNKNOWN = GeoPoint(lat_deg=50.817, lon_deg=-1.31)   # where a mission without any place begins: where the examples are
+_DRAWN = {"name", "goal", "refuge", "start", "area"}
+
+
+def state_of(base: Base) -> dict[str, Any]:
+    """Return what the page begins with."""
+    sketch = base.sketch()
+    frame = area_drawn("", _origin(base, sketch), [], [], [], None)
+    wind = base.options.wind
+    return {
+        "version": __version__, "file": base.path.name, "folder": str(base.path.parent), "is_new": base.is_new,
+        "called": base.options.name or base.path.stem, "disk": base.revision, "sketch": sketch,
+        "frame": {"lat": frame.origin_lat_deg, "lon": frame.origin_lon_deg, "lat_m": frame.lat_m, "lon_m": frame.lon_m},
+        "is_placed": _places(base, sketch) != [],
+        "files": [{"name": n, "zone": zone, "why": next((o.why for o in base.locked if o.name == n), ""),
+                   "shared_by": _sharing(base, n)} for n, zone in area_files(base.options)],
+        "locked": [part for other in base.locked for part in _shown(other.name, other.document, base)],
+        "wind": {"from_deg": wind.preview_from_deg, "speed_mps": wind.preview_speed_mps},
+        "formats": [{"ending": row.endings[0][1:], "said": row.said, "part": part}
+                    for row in FORMATS for part in PARTS.get(row.name, ("",))],
+        "kept": [t for t in MissionOptions.__struct_fields__ if t not in _DRAWN
+                 and getattr(base.options, t) != getattr(MissionOptions(), t)],
+        "said": "",
+    }
+
+
+def _origin(base: Base, sketch: Sketch) -> GeoPoint:
+    places = _places(base, sketch)
+    return GeoPoint(lat_deg=places[0][0], lon_deg=places[0][1]) if places else _UNKNOWN
+
+
+def _places(base: Base, sketch: Sketch) -> list[tuple[float, float]]:
+    """Return places of a mission, the best to begin its metres at first."""
+    out = [sketch.start.at] if sketch.start is not None else []
+    out += [p for g in sketch.goals for p in (g.at, g.port_mark, g.ring[0] if g.ring else None) if p is not None]
+    out += [r.at for r in sketch.refuges] + [ring[0] for s in sketch.shapes for ring in s.rings if ring]
+    for other in base.locked:
+        out += [(c.lat_deg, c.lon_deg) for c in (center_of(z.shape) for z in other.document.zones[:1])]
+        out += [(m.geometry.coords[0][1], m.geometry.coords[0][0]) for m in other.document.marks[:1]]
+    return out
+
+
+def _sharing(base: Base, name: str) -> list[str]:
+    """Return the names of other missions in the folder that name the same file."""
+    out = []
+    siblings = sorted(base.path.parent.glob("*.toml"))[:MOST_SIBLINGS] if Path(name).name == name else []
+    for path in siblings:
+        if path == base.path:
+            continue
+        with contextlib.suppress(InputError, OSError):
+            if name in {n for n, _ in area_files(read_options(path))}:
+                out.append(path.name)
+    return out
+
+
+def _shown(name: str, document: Document, base: Base) -> list[dict[str, Any]]:
+    """Return the zones of a file that is shown and not edited, as (lat, lon) rings."""
+    marks = document.with_zones(()).as_obstacles(base.options.area.point_radius_m)
+    zones = [*document.zones, *(o.zone() for o in marks)]
+    sides = SIDES if len(zones) <= MANY else FEW_SIDES
+    return [{"of": name, "zone": zone.kind.value, "rings": _rings(zone, sides)} for zone in zones]
+
+
+def _rings(zone: Zone, sides: int) -> list[list[list[float]]]:
+    """Return a zone as it is drawn: nothing is decided by the picture."""
+    if isinstance(zone.shape, Circle):
+        center, turns = zone.shape.center, 2.0 * np.pi * np.arange(sides) / sides
+        high_deg = zone.shape.radius_m / DEGREE_M
+        wide_deg = high_deg / max(0.01, math.cos(math.radians(center.lat_deg)))
+        ring = [center.lat_deg + high_deg * np.cos(turns), center.lon_deg + wide_deg * np.sin(turns)]
+        return [np.round(np.column_stack(ring), 7).tolist()]
+    polygon = shapely.simplify(zone.shape, SIMPLER_DEG)
+    return [np.round(shapely.get_coordinates(ring)[:-1, ::-1], 7).tolist()
+            for ring in (polygon.exterior, *polygon.interiors)]
+
+
+def changed_meanwhile(expected: Mapping[Path, bytes], files: Mapping[Path, bytes]) -> list[Path]:
+    """Return which of the ``files`` that are to be written are not what they are expected to be on the disk.
+
+    A file that is not among ``expected`` is expected not to be there.
+    """
+    out = []
+    for path in files:
+        try:
+            now: bytes | None = path.read_bytes()
+        except FileNotFoundError:
+            now = None
+        except OSError as error:
+            raise JobError(f"{path}: cannot be read ({reason(error)}); nothing is saved") from None
+        if now != expected.get(path):
+            out.append(path)
+    return out
+
+
+def save(files: Mapping[Path, bytes], disk: Disk) -> None:
+    """Write all files or none.
+
+    Raises:
+        JobError: one cannot be written; what was there is there.
+    """
+    try:
+        disk.replace_all(files)
+    except OSError as error:
+        raise JobError(f"{error.filename}: cannot be written ({reason(error)}); what was there is there") from None
+
+
+BUDGET_S = 0.5       # for a leg: near the best, and while one looks
+MOST_LEGS = 60
+
+
+class Superseded(Exception):  # noqa: N818
+    """A newer request has come."""
+
+
+class Previews:
+    """Plans with one worker; of requests that come meanwhile the newest is answered, the others are given up."""
+
+    def __init__(self, worker: PlannerWorker) -> None:
+        self._worker, self._newest = worker, 0
+        self._turn = asyncio.Lock()
+
+    def arrived(self) -> int:
+        """Return the number of a request that has just come: those before it are given up."""
+        self._newest += 1
+        return self._newest
+
+    async def make(self, mission: Mission, wind: AssumedWind, mine: int) -> dict[str, Any]:
+        """Return the plans of all legs in words and figures; ``error`` says why there is none.
+
+        ``mine``: the request's number.
+
+        Raises:
+            Superseded: a newer request has come before this was done.
+        """
+        if mission.start is None:
+            return {"error": "a plan begins somewhere: put the start on the chart", "legs": []}
+        async with self._turn:
+            by = planner_of(mission).about(mission.frame().origin)
+            words, walk = leg_names(mission), legs(mission, wind, unix_s=time.time())
+            made: list[dict[str, Any]] = []
+            error = ""
+            try:
+                problem: Problem | None = next(walk, None)
+                while problem is not None and len(made) < MOST_LEGS:
+                    if mine != self._newest:
+                        raise Superseded
+                    budget_s = min(BUDGET_S, mission.skipper.planning_budget_s)
+                    # Whoever hangs up must not end the worker's work, which would end the worker.
+                    plan = await asyncio.shield(self._worker.plan(
+                        problem, budget_s=budget_s, seed=0, algorithm=by.algorithm, settings=by.settings))
+                    to = words[len(made)]
+                    if not plan.has_path:
+                        error = f"no way to {to} was found: {plan.reason}"
+                        break
+                    made.append(_in_figures(plan, to, mission))
+                    problem = continued_plans(walk, plan)
+            except (InputError, ValueError) as trouble:
+                error = str(trouble)
+            if len(made) == MOST_LEGS < len(words):
+                error = f"only the first {MOST_LEGS} legs are planned here"
+            return {"error": error, "legs": made, **_together(made)}
+
+
+def _in_figures(plan: Plan, to: str, mission: Mission) -> dict[str, Any]:
+    way = mission.frame().array_lonlat_from_en(plan.waypoints_en)[:, ::-1]
+    return {"to": to, "why": plan.why.text, "way": np.round(way, 7).tolist(), **plan_figures(plan)}
+
+
+def _together(made: list[dict[str, Any]]) -> dict[str, Any]:
+    clear = [leg["clearance_m"] for leg in made if leg["clearance_m"] is not None]
+    return {
+        "time_s": round(sum(leg["time_s"] for leg in made), 1),
+        "length_m": round(sum(leg["length_m"] for leg in made), 1),
+        "tacks": sum(leg["tacks"] for leg in made), "gybes": sum(leg["gybes"] for leg in made),
+        "clearance_m": min(clear) if clear else None,
+    }
+
 
 MOST_BODY = 4_000_000     # bytes: 20,000 vertices are 0.6 MB
 MOST_BASES = 40           # that a sketch may be drawn upon: so often saved and undone
@@ -141,7 +350,7 @@ class Desk:
             return {"error": ": ".join(p for p in (first.place, first.problem) if p), "legs": []}
         wind = judged.mission.wind
         from_deg = wind.preview_from_deg if asked.from_deg is None else asked.from_deg
-        return await self._previews.make(judged.mission, Wind(
+        return await self._previews.make(judged.mission, AssumedWind(
             from_deg=from_deg % 360.0, speed_mps=asked.speed_mps, spread_deg=asked.spread_deg), mine)
 
     async def _save(self, asked: _Asked) -> dict[str, Any]:
@@ -191,3 +400,28 @@ class Desk:
         return {"name": name, "data": base64.b64encode(made.data).decode(),
                 "is_lossy": any(f.severity is Severity.ERROR for f in made.losses),
                 "losses": [{"severity": f.severity.value, "text": f.text} for f in losses]}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where the editor is: its address with the token behind ``#``, which no browser sends on."""
+
+    url: str
+    token: str
+
+
+@contextlib.asynccontextmanager
+async def editing(base: Base, address: Address, charts: Sequence[Chart] = ()) -> AsyncIterator[Place]:
+    """Serve the editor of a mission while the body runs. An address without a token gets one.
+
+    ``charts`` lie under the drawing, the lowest first.
+
+    Raises:
+        JobError: the port is in use, or it cannot be listened there.
+    """
+    token = address.token or secrets.token_urlsafe(24)
+    async with (
+        PlannerWorker(algorithm=base.options.skipper.planner) as worker,
+        listening(address, Desk(base, token, Previews(worker), charts)) as server,
+    ):
+        yield Place(url=f"{server.address.url}#{token}", token=token)

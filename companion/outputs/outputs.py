@@ -13,11 +13,9 @@ from companion.addresses import Displays
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.guard import Auxiliary, Guard
-from companion.outputs.deltas import Values, values_of
-from companion.outputs.nmea import Lines, lines_of
-from companion.outputs.nmea_outlets import TcpOutlet, UdpOutlet
+from companion.outputs.nmea import Lines, TcpOutlet, UdpOutlet, lines_of
 from companion.outputs.outlet import Outlet, Say
-from companion.outputs.signalk_outlets import TcpSignalK, WebSocketSignalK, require_websockets
+from companion.outputs.signalk import TcpSignalK, Values, WebSocketSignalK, require_websockets, values_of
 from companion.secret import read_secret
 from companion.view.values import View
 

@@ -14,12 +14,20 @@ import msgspec
 
 from companion.errors import InputError
 from companion.orders import phrase
-from companion.page.address import Address
 from companion.page.charts import Chart
-from companion.page.connections import Channel, Refused, Reply, Server, Stream, header, listening, require_token
-from companion.page.hub import Watcher
+from companion.page.connections import (
+    Address,
+    Channel,
+    Refused,
+    Reply,
+    Server,
+    Stream,
+    header,
+    listening,
+    require_token,
+)
 from companion.page.site import files
-from companion.page.sources import Live, Record
+from companion.page.sources import Live, Record, Watcher
 
 MOST_WATCHERS = 16
 MOST_BODY = 1_000

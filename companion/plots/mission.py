@@ -28,23 +28,12 @@ from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, LocalArea, Mission, ZoneKind
 from companion.geofence.fence import FenceStatus, fence_for_autopilot
+from companion.geofence.mission import free_water
 from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint
 from companion.planner.courses import courses
 from companion.plots.chart import place_words, save, scale_bar
-from companion.plots.tasks import (
-    PORT,
-    STARBOARD,
-    TASK_WATER,
-    corners_of,
-    draw_gate,
-    draw_sweeps,
-    draw_water,
-    gate_handles,
-    sweeps_of,
-    water_handle,
-)
-from companion.skipper.way import length_m
+from companion.skipper.way import Sweep, length_m, sweeps_over
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -52,11 +41,96 @@ if TYPE_CHECKING:
 
     from companion.planner import Plan
 
+
+PORT, STARBOARD, LINE = "#c0392b", "#1e8449", "#5b2c83"
+TASK_WATER = "box to stay in, area to search"
+ARROW_SHARE = 0.35   # of the line's length
+
+En = tuple[float, float]
+
+
+def draw_gate(axes: Axes, port: En, starboard: En, name: str) -> None:
+    """Draw two marks, the line between them and an arrow in the direction of crossing."""
+    axes.plot(*zip(port, starboard, strict=True), color=LINE, lw=1.4, ls=(0, (5, 2)), zorder=7)
+    for mark, colour in ((port, PORT), (starboard, STARBOARD)):
+        axes.plot(*mark, "o", color=colour, ms=6, mec="black", mew=0.6, zorder=8)
+    middle = ((port[0] + starboard[0]) / 2.0, (port[1] + starboard[1]) / 2.0)
+    way = heading_of(starboard[0] - port[0], starboard[1] - port[1]) - math.pi / 2.0
+    east, north = unit_en(way)
+    length_m = ARROW_SHARE * math.dist(port, starboard)
+    axes.annotate("", (middle[0] + length_m * east, middle[1] + length_m * north), middle,
+                  arrowprops={"arrowstyle": "-|>", "lw": 1.4, "color": LINE}, zorder=8)
+    axes.annotate(name, starboard, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
+
+
+def gate_handles() -> list[Line2D]:
+    """Return what a legend says of gates."""
+    return [
+        Line2D([], [], color=LINE, lw=1.4, ls=(0, (5, 2)), label="gate, crossed as its arrow points"),
+        Line2D([], [], color=PORT, marker="o", ls="", ms=6, mec="black", mew=0.6, label="port mark"),
+        Line2D([], [], color=STARBOARD, marker="o", ls="", ms=6, mec="black", mew=0.6, label="starboard mark"),
+    ]
+
+
+def draw_water(axes: Axes, area: BaseGeometry, name: str) -> None:
+    """Draw water that is a goal: a box to stay in, an area to search."""
+    for part in shapely.get_parts(area):
+        ring = np.asarray(part.exterior.coords)
+        axes.fill(ring[:, 0], ring[:, 1], fc=LINE, alpha=0.12, ec="none", zorder=3.5)
+        axes.plot(ring[:, 0], ring[:, 1], color=LINE, lw=1.3, zorder=7)
+    corners = shapely.get_coordinates(area)
+    top = corners[int(np.argmax(corners[:, 1]))]
+    axes.annotate(name, (float(top[0]), float(top[1])), xytext=(0, 4), textcoords="offset points", fontsize=8, zorder=9)
+
+
+def water_handle(label: str) -> Line2D:
+    """Return what a legend says of it."""
+    return Line2D([], [], color=LINE, lw=1.3, marker="s", mfc="none", label=label)
+
+
+def corners_of(mission: Mission) -> list[En]:
+    """Return what must be seen of goals that are no points: marks of gates, corners of boxes and searches."""
+    frame, out = mission.frame(), list[En]()
+    for goal in mission.goals:
+        water = goal.box or goal.search
+        if goal.gate is not None:
+            out += [frame.en_from_geo(goal.gate.port), frame.en_from_geo(goal.gate.starboard)]
+        elif water is not None:
+            west, south, east, north = polygon_en(water.shape, frame, cover=False).bounds
+            out += [(west, south), (east, north)]
+    return out
+
+
+def sweeps_of(
+    mission: Mission, local: LocalArea, start: En | None, twd_from_rad: float,
+) -> list[tuple[str, tuple[Sweep, ...]]]:
+    """Return the sweeps of each search as they would be laid for this wind; under way they are for the wind then."""
+    out = []
+    for goal in mission.goals:
+        if goal.search is None:
+            continue
+        water = free_water(goal.search.shape, mission.frame(), mission.area)
+        if local.polygons:
+            water = shapely.difference(water, local.buffered(mission.margin_m))
+        inner = local.water(mission.margin_m)
+        water = water if inner is None else shapely.intersection(water, inner)
+        near = start or mission.frame().en_from_geo(goal.point)
+        out.append((goal.name or "search", sweeps_over(water, goal.search.swath_m, twd_from_rad, near)))
+    return out
+
+
+def draw_sweeps(axes: Axes, sweeps: Sequence[tuple[str, tuple[Sweep, ...]]]) -> list[Line2D]:
+    """Draw sweeps; return the legend's handles."""
+    for _, laid in sweeps:
+        for a, b in laid:
+            axes.plot(*zip(a, b, strict=True), color=LINE, lw=1.0, zorder=6)
+    return [Line2D([], [], color=LINE, lw=1.0, label="sweeps in this wind")] if sweeps else []
+
+
 LAND, LAND_EDGE, SEA = "#d9cfb4", "#8d7f5a", "#eaf3f8"
 MARGIN, LIMIT, AUTOPILOT = "#f0b27a", "#34495e", "#8e44ad"
 PATH, START, GOAL, WIND = "#1f4e9c", "#00a3b4", "#d68910", "#1f4e79"
 
-En = tuple[float, float]
 Handle = Patch | Line2D
 Points = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.plots.chart import date_words, legend_above, legend_below, place_words, save, scale_bar
-from companion.plots.tasks import TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
+from companion.plots.mission import TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
 from companion.telemetry.folder import Chart, RecordedPlan, VoyageRecord
 from companion.words import counted
 

@@ -3,29 +3,107 @@
 Every command is a module of the program's ``package`` with ``add_parser(subparsers, summary)``, which sets ``run``, a
 function from the parsed arguments to an exit code. Modules are imported when asked for, so ``--help`` does not wait
 for numba.
+
+Names come from charts, from other vessels and from file systems; one with an escape sequence in it clears the screen,
+moves the cursor over what was said, or types into the shell of who reads.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import difflib
 import importlib
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType, ModuleType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TextIO, cast
 
 from companion import __version__
 from companion.disk import reason
-from companion.errors import CompanionError, InputError
-from companion.program.extras import missing
-from companion.program.printing import safe_streams
-from companion.words import one_line
+from companion.errors import CompanionError, InputError, JobError
+from companion.words import one_line, printable
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoints
+
+
+class Writes(Protocol):
+    """What takes text."""
+
+    def write(self, text: str, /) -> object:
+        """Write ``text``."""
+        ...
+
+
+class SafeStream:
+    """A text stream on which nothing but ``control`` moves a cursor; else as the stream that it writes to."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write text as ``printable`` shows it."""
+        self._stream.write(printable(text))
+        return len(text)
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        """Write each of them so."""
+        for line in lines:
+            self.write(line)
+
+    def control(self, text: str) -> None:
+        """Write text as it is."""
+        self._stream.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def control(stream: Writes, text: str) -> None:
+    """Write text as it is: what moves the cursor, and what has been made printable."""
+    getattr(stream, "control", stream.write)(text)
+
+
+@contextlib.contextmanager
+def safe_streams() -> Iterator[None]:
+    """Let standard output and standard error be safe while the body runs, whatever prints there."""
+    before = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = (
+        stream if stream is None or isinstance(stream, SafeStream) else cast("TextIO", SafeStream(stream))
+        for stream in before)
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = before
+
+
+NAME = "sailboat-companion"
+# By the library that is missed when it is loaded.
+EXTRAS = {
+    "matplotlib": "plots",
+    "mavsdk": "shore",
+    "rich": "shore",
+    "scipy": "shore",
+    "tomlkit": "shore",
+    "websockets": "signalk",
+    "distributed": "cluster",
+    "bokeh": "cluster",
+    "pyarrow": "results",
+    "filterpy": "papers",
+}
+
+
+def missing(error: ModuleNotFoundError) -> JobError | None:
+    """Return what to raise where a library of an extra is not installed, None when another module is missing."""
+    library = (error.name or "").partition(".")[0]
+    extra = EXTRAS.get(library)
+    if extra is None:
+        return None
+    return JobError(f"{library} is not installed, which this needs; pip install '{NAME}[{extra}]'")
+
 
 INTERRUPTED = 130
 # No option of ours begins with a digit, so this is a value; of all that begins with a minus argparse knows a lone

@@ -8,9 +8,8 @@ from companion.view.area import Area, area_of, drawn
 from companion.view.events import Event
 from companion.view.fold import ViewFold
 from companion.view.heard import HeardFold
-from companion.view.past import Past, Sample, Trail, sample_of
 from companion.view.recorded import RecordedViews, recorded_views
-from companion.view.values import SCHEMA, View
+from companion.view.values import SCHEMA, Past, Sample, Trail, View, sample_of
 
 __all__ = [
     "SCHEMA", "Area", "Event", "HeardFold", "Past", "RecordedViews", "Sample", "Trail", "View", "ViewFold", "area_of",

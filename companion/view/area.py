@@ -13,8 +13,7 @@ from shapely.geometry import Polygon
 
 from companion.messages import GeoPoint
 from companion.skipper.way import Voyage
-from companion.view.air import PointEn
-from companion.view.numbers import metres
+from companion.view.values import PointEn, metres
 
 if TYPE_CHECKING:
     from companion.geo.frame import LocalFrame

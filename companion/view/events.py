@@ -22,9 +22,8 @@ from companion.skipper.step import (
     UploadOutcome,
     UploadResult,
 )
-from companion.view.numbers import compass
 from companion.view.parts import level_of
-from companion.view.values import Level
+from companion.view.values import Level, compass
 from companion.words import counted
 
 LOUD = Severity.INFO

@@ -13,13 +13,22 @@ from companion.planner.explain import bounds_in_words
 from companion.skipper.step import Announce, PlanOutcome, RequestPlan, SkipperConfig
 from companion.skipper.way import PointEn, Voyage
 from companion.telemetry.folder import VoyageFigures
-from companion.view import air, parts, values
+from companion.view import parts, values
 from companion.view.area import area_of
-from companion.view.company import vessels_of
 from companion.view.events import Event, happenings
-from companion.view.numbers import place, rounded, tack_of
-from companion.view.way import Chosen, plan_of, predicted_of, safe_end_of
-from companion.view.wind import laylines_of, no_go_of, polar_of, water_of, wind_of
+from companion.view.parts import (
+    Chosen,
+    laylines_of,
+    no_go_of,
+    plan_of,
+    polar_of,
+    predicted_of,
+    safe_end_of,
+    vessels_of,
+    water_of,
+    wind_of,
+)
+from companion.view.values import place, rounded, tack_of
 
 TRACK_S = 60.0        # of the track that each view brings: what a page missed while its link was lost
 TRACK_STEP_S = 3.0
@@ -39,7 +48,7 @@ class ViewFold:
         self._whys: dict[int, str] = {}
         self._phase, self._phase_s = "", 0.0
         self._said: dict[str, str] = {}
-        self._track: deque[tuple[float, PointEn, air.Tack | None]] = deque()
+        self._track: deque[tuple[float, PointEn, values.Tack | None]] = deque()
         self._number = 0
 
     def unix_s(self, t_s: float) -> float | None:
@@ -96,7 +105,7 @@ class ViewFold:
             self._track.popleft()
 
     @staticmethod
-    def _tack(step: Step) -> air.Tack | None:
+    def _tack(step: Step) -> values.Tack | None:
         vehicle, twd_rad = step.snapshot.vehicle, step.snapshot.wind.present_twd_from_rad
         if vehicle is None or twd_rad is None:
             return None

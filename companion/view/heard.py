@@ -8,12 +8,11 @@ from companion.geo.angles import heading_of
 from companion.geo.frame import LocalFrame
 from companion.mavlink.wire import StatusReport
 from companion.messages import AutopilotStatus, VehicleState
-from companion.view import air, values
+from companion.view import values
 from companion.view.area import Area, drawn
-from companion.view.company import heard_vessel
 from companion.view.events import Event
-from companion.view.numbers import compass, place, rounded, signed, tack_of
-from companion.view.parts import by_age
+from companion.view.parts import by_age, heard_vessel
+from companion.view.values import compass, place, rounded, signed, tack_of
 
 ALARMED = frozenset({"warn", "act", "touch"})
 LATE_S = 10.0      # the companion speaks every two seconds; a radio loses some
@@ -110,11 +109,11 @@ class HeardFold:
         return out
 
 
-def _wind(report: StatusReport | None, vehicle: VehicleState | None) -> air.Wind | None:
+def _wind(report: StatusReport | None, vehicle: VehicleState | None) -> values.Wind | None:
     status = None if report is None else report.status
     if report is None or status is None or status.twd_from_rad is None:
         return None
-    return air.Wind(
+    return values.Wind(
         health="good", twd_from_deg=compass(status.twd_from_rad), tws_mps=rounded(status.tws_mps),
         mean_twd_from_deg=compass(status.twd_from_rad), mean_tws_mps=rounded(status.tws_mps),
         sigma_deg=None if status.twd_sigma_rad is None else rounded(math.degrees(status.twd_sigma_rad)),
@@ -123,11 +122,11 @@ def _wind(report: StatusReport | None, vehicle: VehicleState | None) -> air.Wind
         age_s=rounded(min((a for n, a in report.age_s.items() if n in {"status", "wind", "co_twd"}), default=None), 1))
 
 
-def _water(report: StatusReport | None) -> air.Water | None:
+def _water(report: StatusReport | None) -> values.Water | None:
     status = None if report is None else report.status
     if status is None or status.current_set_rad is None or status.current_drift_mps is None:
         return None
-    return air.Water(set_deg=compass(status.current_set_rad), drift_mps=rounded(status.current_drift_mps),
+    return values.Water(set_deg=compass(status.current_set_rad), drift_mps=rounded(status.current_drift_mps),
                      is_planned=True)
 
 

@@ -1,23 +1,95 @@
-"""State, boat, goals, orders, figures and health in the view."""
+"""The parts of a view, each made of a step: state, boat, goals, orders, health, wind, way and other vessels."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
+from companion.boat import AutopilotLimits, Boat
+from companion.current import over_water
 from companion.fold import Step
-from companion.geo.angles import difference_rad, heading_of
-from companion.messages import CompanionStatus
+from companion.geo.angles import difference_rad, heading_of, unit_en
+from companion.messages import Command, CompanionStatus, Mode, TrafficStatus, VehicleState, WindForecast
 from companion.orders import Verb, permitted
-from companion.skipper.step import WindHealth
+from companion.planner import Leg, Plan
+from companion.skipper.planning import next_tack_s
+from companion.skipper.step import Route, SkipperConfig, WindHealth
 from companion.skipper.watch.watchdogs import BY_NAME
-from companion.skipper.way import Goal, PointEn, Side, Voyage, gates_of
+from companion.skipper.way import (
+    Goal,
+    PointEn,
+    Side,
+    Voyage,
+    cross_track_m,
+    gates_of,
+    half_width_rad,
+    mean_twd_rad,
+    moved,
+)
 from companion.telemetry.console import DISK, GONE
 from companion.telemetry.folder import VoyageFigures
+from companion.traffic import Alarm, Assessment
 from companion.view import values
-from companion.view.company import alarms_of
-from companion.view.numbers import compass, metres, place, rounded, signed, tack_of
+from companion.view.values import compass, degrees, metres, place, rounded, signed, tack_of
+
+MOST = 40   # vessels in a view, the worst first
+
+
+def vessels_of(step: Step) -> tuple[values.Vessel, ...]:
+    """Return the vessels, the worst first; without our own position those heard last, with no approach."""
+    if step.state.watch:
+        return tuple(_seen(step, seen) for seen in step.state.watch[:MOST])
+    picture = step.snapshot.traffic
+    if picture is None:
+        return ()
+    newest = sorted(picture.vessels, key=picture.age_s)[:MOST]
+    return tuple(values.Vessel(
+        name=v.label, mmsi=v.mmsi, age_s=rounded(picture.age_s(v), 1), at_en_m=place(v.centre_en_m),
+        course_deg=None if v.course_rad is None else compass(v.course_rad), speed_mps=rounded(v.speed_mps),
+        length_m=metres(v.hull.length_m), beam_m=metres(v.hull.beam_m)) for v in newest)
+
+
+def _seen(step: Step, seen: Assessment) -> values.Vessel:
+    vessel, approach = seen.vessel, seen.approach
+    ve, vn = vessel.velocity_en_mps
+    east, north = vessel.centre_en_m
+    at = (east + ve * seen.age_s, north + vn * seen.age_s)
+    then_s = approach.time_s if approach.is_closing else None
+    here, own = step.snapshot.position_en_m, step.snapshot.vehicle
+    own_then = None
+    if then_s is not None and here is not None and own is not None:
+        own_then = place((here[0] + own.velocity_en_mps[0] * then_s, here[1] + own.velocity_en_mps[1] * then_s))
+    return values.Vessel(
+        name=vessel.label, mmsi=vessel.mmsi, age_s=rounded(seen.age_s, 1), at_en_m=place(at),
+        course_deg=None if vessel.course_rad is None else compass(vessel.course_rad),
+        speed_mps=rounded(vessel.speed_mps), heading_deg=None if vessel.bow_rad is None else compass(vessel.bow_rad),
+        length_m=metres(vessel.hull.length_m), beam_m=metres(vessel.hull.beam_m),
+        alarm=seen.alarm.name.lower(), role=seen.encounter.role.value, rule=seen.encounter.rule.value,
+        range_m=metres(approach.now_m), bearing_deg=compass(approach.bearing_rad), cpa_m=metres(approach.distance_m),
+        cpa_s=rounded(then_s, 0), own_cpa_en_m=own_then,
+        cpa_en_m=None if then_s is None else place((at[0] + ve * then_s, at[1] + vn * then_s)))
+
+
+def alarms_of(step: Step) -> tuple[values.Alarm, ...]:
+    """Return the alarms of vessels that come too near."""
+    levels: dict[Alarm, values.Level] = {Alarm.WARN: "warning", Alarm.ACT: "error", Alarm.TOUCH: "critical"}
+    return tuple(
+        values.Alarm(code="vessel", level=levels[seen.alarm], text=seen.sentence())
+        for seen in step.state.watch if seen.alarm in levels)
+
+
+def heard_vessel(traffic: TrafficStatus | None, age_s: float | None) -> tuple[values.Vessel, ...]:
+    """Return the one vessel that a radio's status tells of, the worst."""
+    if traffic is None or not traffic.alarm:
+        return ()
+    return (values.Vessel(
+        name=traffic.name, age_s=rounded(age_s, 1), alarm=traffic.alarm, role=traffic.role, rule=traffic.rule,
+        range_m=rounded(traffic.range_m, 1), cpa_m=rounded(traffic.cpa_m, 1), cpa_s=rounded(traffic.tcpa_s, 0),
+        bearing_deg=None if traffic.bearing_rad is None or not math.isfinite(traffic.bearing_rad)
+        else compass(traffic.bearing_rad)),)
+
 
 SILENT_S = 5.0        # what should come every second and has not for so long is bad ...
 LATE_S = 2.5          # ... and poor
@@ -205,3 +277,316 @@ def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
 def by_age(age_s: float | None) -> values.Grade:
     """Return how a part is that should be heard every second."""
     return "unknown" if age_s is None else "bad" if age_s > SILENT_S else "poor" if age_s > LATE_S else "good"
+
+
+HORIZONS_S = (0.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+WEDGES_S = (0.0, 60.0, 300.0)
+INTERVAL_LEVELS = (0.5, 0.8, 0.95)
+SWING_LEVEL = 0.8          # of the fan that a layline is drawn with
+SIGMA_AT_S = 60.0          # the spread in figures is that of a minute ahead, as in the status
+HAS_WAY_MPS = 0.2
+
+
+def planned_no_go_rad(config: SkipperConfig, voyage: Voyage, limits: AutopilotLimits | None) -> float:
+    """Return the half angle that plans keep out of, before it is widened."""
+    of_autopilot = config.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
+    return max(of_autopilot + config.no_go_pad_rad, voyage.boat.no_go_half_rad)
+
+
+@lru_cache(maxsize=64)   # asked for twice in every step, and the search takes longer than all else in a view
+def best_angles(boat: Boat, tws_mps: float, no_go_rad: float) -> tuple[float, float]:
+    """Return the best angles to windward and to leeward [rad]."""
+    beat = boat.polar.best_beat(tws_mps, no_go_half_rad=no_go_rad)
+    return beat.twa_rad, boat.polar.best_run(tws_mps, max_twa_rad=boat.max_twa_rad).twa_rad
+
+
+def wind_of(step: Step) -> values.Wind | None:
+    """Return the wind, None when none was ever heard."""
+    wind, vehicle = step.snapshot.wind, step.snapshot.vehicle
+    if wind.forecast is None and wind.present_twd_from_rad is None and wind.mean_twd_from_rad is None:
+        return None
+    forecast = wind.forecast
+    twd_rad, tws_mps = wind.present_twd_from_rad, wind.present_tws_mps
+    awa_rad, aws_mps = apparent(twd_rad, tws_mps, vehicle)
+    return values.Wind(
+        health=wind.health.value, verdict=wind.verdict,
+        twd_from_deg=None if twd_rad is None else compass(twd_rad), tws_mps=rounded(tws_mps),
+        mean_twd_from_deg=None if wind.mean_twd_from_rad is None else compass(wind.mean_twd_from_rad),
+        mean_tws_mps=rounded(wind.mean_tws_mps),
+        sigma_deg=None if forecast is None else degrees(_at(forecast, SIGMA_AT_S, "sigma_twd_rad")),
+        tws_sigma_mps=None if forecast is None else rounded(_at(forecast, SIGMA_AT_S, "sigma_tws_mps")),
+        twa_deg=None if twd_rad is None or vehicle is None else signed(difference_rad(twd_rad, vehicle.heading_rad)),
+        awa_deg=None if awa_rad is None else signed(awa_rad), aws_mps=rounded(aws_mps),
+        record_s=rounded(wind.record_s, 0),
+        correlation_s=None if forecast is None else rounded(forecast.correlation_time_s, 1),
+        age_s=None if forecast is None else rounded(max(0.0, step.snapshot.t_s - forecast.t_s), 1),
+        levels=() if forecast is None else INTERVAL_LEVELS, bands=() if forecast is None else bands_of(forecast))
+
+
+def water_of(step: Step) -> values.Water | None:
+    """Return the current, None before anything is known of the water."""
+    current, wind = step.snapshot.current, step.snapshot.wind
+    if current.sigma_mps == 0.0:
+        return None
+    over = None if wind.present_twd_from_rad is None or wind.present_tws_mps is None else over_water(
+        wind.present_twd_from_rad, wind.present_tws_mps, current.planned_en_mps)
+    return values.Water(
+        set_deg=compass(current.set_rad), drift_mps=rounded(current.drift_mps), sigma_mps=rounded(current.sigma_mps),
+        is_planned=current.is_significant, verdict=current.verdict,
+        twd_from_deg=None if over is None else compass(over[0]), tws_mps=None if over is None else rounded(over[1]))
+
+
+def bands_of(forecast: WindForecast) -> tuple[values.Band, ...]:
+    """Return the forecast at the view's horizons, as far as it reaches."""
+    last_s = float(forecast.horizon_s[-1])
+    return tuple(values.Band(
+        horizon_s=at_s, twd_from_deg=compass(mean_twd_rad(forecast, at_s)),
+        sigma_deg=degrees(_at(forecast, at_s, "sigma_twd_rad")), tws_mps=rounded(_at(forecast, at_s, "mean_tws_mps")),
+        tws_sigma_mps=rounded(_at(forecast, at_s, "sigma_tws_mps")),
+        half_deg=tuple(degrees(half_width_rad(forecast, at_s, level)) for level in INTERVAL_LEVELS),
+    ) for at_s in HORIZONS_S if at_s <= last_s)
+
+
+def apparent(
+    twd_from_rad: float | None, tws_mps: float | None, vehicle: VehicleState | None,
+) -> tuple[float | None, float | None]:
+    """Return the apparent wind, angle at the bow [rad] and speed [m/s], that a true wind makes on a moving boat."""
+    if twd_from_rad is None or tws_mps is None or vehicle is None:
+        return None, None
+    east = -tws_mps * math.sin(twd_from_rad) - vehicle.velocity_en_mps[0]
+    north = -tws_mps * math.cos(twd_from_rad) - vehicle.velocity_en_mps[1]
+    return difference_rad(heading_of(-east, -north), vehicle.heading_rad), math.hypot(east, north)
+
+
+def no_go_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.NoGo | None:
+    """Return the no-go zone now and later, widened as a plan that keeps the promise in force would have it."""
+    forecast, route = step.snapshot.wind.forecast, step.state.route
+    if forecast is None:
+        return None
+    delta_s = config.delta_s if route is None else route.delta_s
+    half_rad = planned_no_go_rad(config, voyage, step.snapshot.limits)
+    wedges = []
+    for at_s in WEDGES_S:
+        if at_s <= float(forecast.horizon_s[-1]):
+            widening_rad = half_width_rad(forecast, at_s, max(0.0, 2.0 * delta_s - 1.0))
+            wedges.append(values.Wedge(
+                horizon_s=at_s, from_deg=compass(mean_twd_rad(forecast, at_s)),
+                half_deg=degrees(min(math.pi, half_rad + widening_rad)), widening_deg=degrees(widening_rad)))
+    return values.NoGo(half_deg=degrees(half_rad), probability=round(delta_s, 4), wedges=tuple(wedges))
+
+
+def laylines_of(
+    step: Step, voyage: Voyage, config: SkipperConfig, name: str, mark_en: PointEn,
+) -> values.Laylines | None:
+    """Return the laylines of a mark; None where it is fetched on one course, or the wind is not known."""
+    snapshot, boat = step.snapshot, voyage.boat
+    here, wind, vehicle = snapshot.position_en_m, snapshot.wind, snapshot.vehicle
+    twd_rad, tws_mps, current = wind.mean_twd_from_rad, wind.mean_tws_mps, snapshot.current.planned_en_mps
+    if here is None or vehicle is None or twd_rad is None or tws_mps is None or math.dist(here, mark_en) < 1.0:
+        return None
+    twd_rad, tws_mps = over_water(twd_rad, tws_mps, current)
+    no_go_rad = planned_no_go_rad(config, voyage, snapshot.limits)
+    beat, run = best_angles(boat, round(tws_mps, 1), no_go_rad)
+    off_rad = abs(difference_rad(twd_rad, heading_of(mark_en[0] - here[0], mark_en[1] - here[1])))
+    if off_rad < beat:
+        angle_rad, is_beat = max(beat, no_go_rad), True
+    elif off_rad > run + 1e-3:
+        angle_rad, is_beat = run, False
+    else:
+        return None
+    speed_mps = max(HAS_WAY_MPS, boat.polar.speed_mps(angle_rad, tws_mps))
+    there_s = min(600.0, math.dist(here, mark_en) / speed_mps)
+    swing = 0.0 if wind.forecast is None else half_width_rad(wind.forecast, there_s, SWING_LEVEL)
+    lines = []
+    for tack, side in (("starboard", 1.0), ("port", -1.0)):
+        course_rad = twd_rad - side * angle_rad   # on starboard tack the wind is to the right of the bow
+        if current != (0.0, 0.0):
+            course_rad = heading_of(*(v * speed_mps + c for v, c in zip(unit_en(course_rad), current, strict=True)))
+        lines.append(values.Layline(
+            tack=tack, course_deg=compass(course_rad), swing_deg=degrees(swing),  # type: ignore[arg-type]
+            reach_s=rounded(_meets_s(here, vehicle, mark_en, course_rad), 0)))
+    return values.Laylines(
+        name=name, mark_en_m=place(mark_en), is_beat=is_beat, angle_deg=degrees(angle_rad), level=SWING_LEVEL,
+        lines=tuple(lines))
+
+
+def _meets_s(here: PointEn, vehicle: VehicleState, mark_en: PointEn, course_rad: float) -> float | None:
+    """Return when the boat, going on as she does, is on the line that fetches the mark [s]; None: not before it."""
+    if vehicle.speed_mps < HAS_WAY_MPS:
+        return None
+    east, north = math.sin(course_rad), math.cos(course_rad)
+    across_m = (here[0] - mark_en[0]) * north - (here[1] - mark_en[1]) * east
+    across_mps = vehicle.velocity_en_mps[0] * north - vehicle.velocity_en_mps[1] * east
+    if abs(across_mps) < 0.05:
+        return None
+    time_s = -across_m / across_mps
+    along_m = sum(u * (p + v * time_s - m) for u, p, v, m in zip(
+        (east, north), here, vehicle.velocity_en_mps, mark_en, strict=True))
+    return time_s if time_s > 0.0 and along_m < 0.0 else None
+
+
+def polar_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.Polar | None:
+    """Return the polar in the present wind with the boat's point; None without a wind."""
+    wind, vehicle = step.snapshot.wind, step.snapshot.vehicle
+    tws_mps = wind.mean_tws_mps if wind.mean_tws_mps is not None else wind.present_tws_mps
+    if tws_mps is None:
+        return None
+    polar = voyage.boat.polar
+    angles, speeds = polar.curve(tws_mps)
+    no_go_rad = planned_no_go_rad(config, voyage, step.snapshot.limits)
+    twd_rad = wind.present_twd_from_rad
+    beat, run = best_angles(voyage.boat, round(tws_mps, 1), no_go_rad)
+    has_way = vehicle is not None and twd_rad is not None
+    return values.Polar(
+        name=polar.name, tws_mps=rounded(tws_mps), twa_deg=tuple(degrees(float(a)) for a in angles),
+        speed_mps=tuple(rounded(float(v), 3) for v in speeds),
+        beat_deg=degrees(beat), run_deg=degrees(run),
+        live_twa_deg=signed(difference_rad(twd_rad, vehicle.heading_rad))
+        if has_way and vehicle is not None and twd_rad is not None else None,
+        live_mps=rounded(vehicle.speed_mps) if vehicle is not None else None)
+
+
+def _at(forecast: WindForecast, at_s: float, name: str) -> float:
+    import numpy as np
+
+    return float(np.interp(at_s, forecast.horizon_s, getattr(forecast, name)))
+
+
+SAME_M = 2.0          # a leg of the plan that ends so near a waypoint is the one that leads to it
+AHEAD_S = 900.0       # she is shown so far ahead ...
+AHEAD_STEP_S = 5.0    # ... reckoned in these steps
+MOST_AHEAD = 90       # points of it
+SLOW_MPS = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chosen:
+    """A plan as it was answered: when it was asked for, why, and what it says of itself."""
+
+    t_s: float
+    reason: str
+    plan: Plan
+    why: str = ""
+
+
+def plan_of(step: Step, voyage: Voyage, chosen: Chosen | None, legs: tuple[Leg, ...]) -> values.Plan | None:
+    """Return the plan that is sailed; ``legs`` are those of the plans that it was spliced from, the newest first."""
+    route, state = step.state.route, step.state
+    if route is None:
+        return None
+    begin, count = min(state.index, len(route.items)), len(route.items)
+    return values.Plan(
+        number=route.plan_id, age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),
+        reason="" if chosen is None else chosen.reason,
+        why=(chosen.why if chosen is not None and chosen.why else route.why), rung=route.rung,
+        bound_for=route.bound_for, twd_from_deg=compass(route.plan_twd_from_rad), tws_mps=rounded(route.plan_tws_mps),
+        delta_s=rounded(route.delta_s, 4), promised_risk=rounded(1.0 - route.delta_s, 4),
+        path_risk=rounded(route.risk, 4), vessel_risk=rounded(route.vessel_risk, 4),
+        margin_m=rounded(route.margin_m, 1), cost_s=rounded(route.cost_s, 1),
+        median_s=rounded(route.median_s, 0), late_s=rounded(route.late_s, 0),
+        expected_clearance_m=rounded(route.expected_clearance_m, 1),
+        bound_s=None if chosen is None else rounded(chosen.plan.lower_bound_s, 1), replans=state.replans,
+        next_tack_s=rounded(next_tack_s(step, voyage.boat.polar), 0),
+        leg=min(begin + 1, count) if count else None, count=count,
+        legs=tuple(_leg(route, n, legs) for n in range(begin, count)))
+
+
+def _leg(route: Route, number: int, legs: tuple[Leg, ...]) -> values.Leg:
+    start, end = route.leg_from_en_m[number], route.points_en_m[number]
+    is_loiter = route.items[number].command != Command.NAV_WAYPOINT
+    course_rad = heading_of(end[0] - start[0], end[1] - start[1])
+    known = None if is_loiter else next((leg for leg in legs if math.dist(leg.to_en, end) < SAME_M), None)
+    if known is None:
+        return values.Leg(
+            from_en_m=place(start), to_en_m=place(end), is_loiter=is_loiter,
+            course_deg=None if start == end else compass(course_rad), length_m=rounded(math.dist(start, end), 1),
+            twa_deg=None if start == end else signed(difference_rad(route.plan_twd_from_rad, course_rad)))
+    return values.Leg(
+        from_en_m=place(start), to_en_m=place(end), is_beat=known.is_beat, course_deg=compass(course_rad),
+        twa_deg=signed(known.twa_rad), length_m=rounded(math.dist(start, end), 1), speed_mps=rounded(known.speed_mps),
+        starts_s=rounded(known.start_s, 1), ends_s=rounded(known.end_s, 1), sigma_deg=degrees(known.sigma_rad),
+        no_go_half_deg=degrees(known.no_go_half_rad), clearance_m=rounded(known.clearance_m, 1),
+        risk=rounded(known.risk, 4), manoeuvre=known.manoeuvre)
+
+
+def safe_end_of(route: Route | None) -> values.Place | None:
+    """Return where the mission on board ends: a loiter."""
+    if route is None or not route.points_en_m:
+        return None
+    return values.Place(name="safe end", at_en_m=place(route.points_en_m[-1]))
+
+
+def predicted_of(step: Step, voyage: Voyage) -> tuple[values.Ahead, ...]:
+    """Return where she is expected: along the legs left, at her polar's speed, beating where the wind asks for it.
+
+    As the autopilot steers: straight to the waypoint where it can be sailed, else close-hauled within its corridor.
+    GUIDED has none.
+    """
+    snapshot, state, route = step.snapshot, step.state, step.state.route
+    here, wind, vehicle = snapshot.position_en_m, snapshot.wind, snapshot.vehicle
+    twd_rad, tws_mps = wind.mean_twd_from_rad, wind.mean_tws_mps
+    if here is None or vehicle is None or route is None or twd_rad is None or tws_mps is None or not state.sailing \
+            or state.over:
+        return ()
+    limits = snapshot.limits or AutopilotLimits()
+    if snapshot.autopilot is not None and snapshot.autopilot.mode is Mode.GUIDED:
+        limits = replace(limits, sail_xtrack_max_m=0.0)
+    legs = [(start, end) for item, start, end in zip(
+        route.items[state.index:], route.leg_from_en_m[state.index:], route.points_en_m[state.index:], strict=True)
+        if item.command == Command.NAV_WAYPOINT]
+    walker = _Walker(twd_rad, tws_mps, voyage, limits, is_right=difference_rad(twd_rad, vehicle.heading_rad) > 0.0)
+    at, time_s = here, 0.0
+    points = [values.Ahead(in_s=0.0, at_en_m=place(at), tack=tack_of(difference_rad(twd_rad, vehicle.heading_rad)))]
+    for start, end in legs:
+        while time_s < AHEAD_S and len(points) < MOST_AHEAD:
+            to_go_m = math.dist(at, end)
+            course_rad, speed_mps = walker.steer(at, start, end)
+            step_s = min(AHEAD_STEP_S, to_go_m / speed_mps)
+            at = moved(at, course_rad, speed_mps * step_s)
+            time_s += step_s
+            if to_go_m <= max(limits.wp_radius_m, speed_mps * step_s):
+                break
+            if len(points) < 2 or time_s - points[-1].in_s >= AHEAD_STEP_S or points[-1].tack != walker.tack:
+                points.append(values.Ahead(in_s=round(time_s, 1), at_en_m=place(at), tack=walker.tack))
+        points.append(values.Ahead(in_s=round(time_s, 1), at_en_m=place(at), tack=walker.tack))
+        if time_s >= AHEAD_S or len(points) >= MOST_AHEAD:
+            break
+    return tuple(points)
+
+
+class _Walker:
+    """Steers as the autopilot does in a steady wind; ``is_right``: the wind is to the right of the bow."""
+
+    def __init__(
+        self, twd_rad: float, tws_mps: float, voyage: Voyage, limits: AutopilotLimits, *, is_right: bool,
+    ) -> None:
+        self._twd_rad, self._tws_mps, self._polar, self._limits = twd_rad, tws_mps, voyage.boat.polar, limits
+        self._is_right = is_right
+
+    @property
+    def tack(self) -> values.Tack:
+        """The tack that she is on."""
+        return "starboard" if self._is_right else "port"
+
+    def steer(self, at: PointEn, start: PointEn, end: PointEn) -> tuple[float, float]:
+        """Return the course [rad] and speed [m/s] from ``at`` along the leg."""
+        no_go_rad = self._limits.sail_no_go_angle_rad
+        course_rad = heading_of(end[0] - at[0], end[1] - at[1])
+        off_rad = difference_rad(self._twd_rad, course_rad)
+        if abs(off_rad) < no_go_rad:
+            self._tack_at(at, start, end)
+            course_rad = self._twd_rad - no_go_rad if self._is_right else self._twd_rad + no_go_rad
+            off_rad = no_go_rad
+        else:
+            self._is_right = off_rad > 0.0
+        return course_rad, max(SLOW_MPS, self._polar.speed_mps(off_rad, self._tws_mps))
+
+    def _tack_at(self, at: PointEn, start: PointEn, end: PointEn) -> None:
+        """Tack at the corridor's edge, as the autopilot does."""
+        most_m, off_m = self._limits.sail_xtrack_max_m, cross_track_m(at, start, end)
+        if most_m <= 0.0 or abs(off_m) < most_m:
+            return
+        no_go_rad = self._limits.sail_no_go_angle_rad
+        course_rad = self._twd_rad - no_go_rad if self._is_right else self._twd_rad + no_go_rad
+        if abs(cross_track_m(moved(at, course_rad, 1.0), start, end)) > abs(off_m):
+            self._is_right = not self._is_right

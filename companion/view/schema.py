@@ -13,8 +13,7 @@ import msgspec
 
 from companion.view.area import Area
 from companion.view.events import Event
-from companion.view.past import Past
-from companion.view.values import View
+from companion.view.values import Past, View
 
 HERE = Path(__file__).parent
 FILE, TYPES = HERE / "view.schema.json", HERE / "view.d.ts"

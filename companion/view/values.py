@@ -7,10 +7,180 @@ JSON form has these names; ``python -m companion.view.schema`` writes its schema
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import Literal, overload
 
-from companion.view.air import Laylines, NoGo, PointEn, Polar, Tack, Water, Wind
+from companion.geo.angles import wrap_pi, wrap_two_pi
+from companion.geo.frame import LocalFrame
+from companion.geo.shift import Shift
+
+PointEn = tuple[float, float]   # metres east and north of the area's origin
+Tack = Literal["port", "starboard"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Band:
+    """The forecast at a horizon; ``half_deg``: half widths of the central intervals of ``Wind.levels``."""
+
+    horizon_s: float
+    twd_from_deg: float
+    sigma_deg: float
+    tws_mps: float
+    tws_sigma_mps: float
+    half_deg: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wind:
+    """The wind now (5 s mean), its 90 s mean, the forecast's quantiles; angles at the bow are positive to starboard.
+
+    ``awa_deg`` and ``aws_mps`` follow from the true wind and the motion over ground. ``health`` is none, settling,
+    good, light or untrusted, ``verdict`` says why it is not good.
+    """
+
+    health: str
+    verdict: str = ""
+    twd_from_deg: float | None = None
+    tws_mps: float | None = None
+    mean_twd_from_deg: float | None = None
+    mean_tws_mps: float | None = None
+    sigma_deg: float | None = None       # of the direction a minute ahead
+    tws_sigma_mps: float | None = None
+    twa_deg: float | None = None
+    awa_deg: float | None = None
+    aws_mps: float | None = None
+    record_s: float | None = None
+    correlation_s: float | None = None
+    age_s: float | None = None
+    levels: tuple[float, ...] = ()
+    bands: tuple[Band, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Water:
+    """The current: where it goes and how fast, the standard deviation in its most uncertain direction.
+
+    ``is_planned``: it is strong and sure enough for plans to reckon with it; ``verdict`` says what is not known of it.
+    ``twd_from_deg`` and ``tws_mps`` are the present wind over this water, which is what she sails by.
+    """
+
+    set_deg: float
+    drift_mps: float
+    sigma_mps: float | None = None
+    is_planned: bool = False
+    verdict: str = ""
+    twd_from_deg: float | None = None
+    tws_mps: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wedge:
+    """The no-go zone at a horizon: ``half_deg`` to either side of ``from_deg``, ``widening_deg`` of it the spread."""
+
+    horizon_s: float
+    from_deg: float
+    half_deg: float
+    widening_deg: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoGo:
+    """The no-go zone: the boat's own half angle, and with the wind's spread so that it holds with ``probability``."""
+
+    half_deg: float
+    probability: float
+    wedges: tuple[Wedge, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layline:
+    """The course that fetches the mark on ``tack``, and how far it swings to either side with the wind."""
+
+    tack: Tack
+    course_deg: float
+    swing_deg: float
+    reach_s: float | None = None         # until she meets it on her present course; None: she does not
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Laylines:
+    """The laylines of a mark that is sailed to against the wind, or before it (``is_beat`` False)."""
+
+    name: str
+    mark_en_m: PointEn
+    is_beat: bool
+    angle_deg: float
+    level: float                         # probability of the swing's interval
+    lines: tuple[Layline, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Polar:
+    """The speed by true wind angle in the wind of ``tws_mps``: nodes, linear between; best angles; the boat on it."""
+
+    name: str
+    tws_mps: float
+    twa_deg: tuple[float, ...]
+    speed_mps: tuple[float, ...]
+    beat_deg: float | None = None
+    run_deg: float | None = None
+    live_twa_deg: float | None = None
+    live_mps: float | None = None
+
+    def at_mps(self, twa_deg: float) -> float | None:
+        """Return its speed at an angle, None where it has no nodes about it."""
+        angle = abs(twa_deg)
+        for (low, slow), (high, fast) in pairwise(zip(self.twa_deg, self.speed_mps, strict=True)):
+            if low <= angle <= high and high > low:
+                return slow + (fast - slow) * (angle - low) / (high - low)
+        return None
+
+
+def metres(value_m: float) -> float:
+    """Return metres to the decimetre."""
+    return round(float(value_m), 1)
+
+
+def place(en_m: PointEn) -> PointEn:
+    """Return a place to the decimetre."""
+    return metres(en_m[0]), metres(en_m[1])
+
+
+@overload
+def rounded(value: float, digits: int = ...) -> float: ...
+@overload
+def rounded(value: float | None, digits: int = ...) -> float | None: ...
+def rounded(value: float | None, digits: int = 2) -> float | None:
+    """Return a figure rounded; None for what is unknown or not finite."""
+    return None if value is None or not math.isfinite(value) else round(float(value), digits)
+
+
+def compass(angle_rad: float) -> float:
+    """Return a direction in degrees, [0, 360).
+
+    >>> compass(-math.pi / 2), compass(2.0 * math.pi - 1e-9)
+    (270.0, 0.0)
+    """
+    return round(math.degrees(wrap_two_pi(angle_rad)), 1) % 360.0
+
+
+def signed(angle_rad: float) -> float:
+    """Return an angle in degrees, [-180, 180)."""
+    return round(math.degrees(wrap_pi(angle_rad)), 1)
+
+
+def degrees(angle_rad: float) -> float:
+    """Return the size of an angle in degrees."""
+    return round(math.degrees(angle_rad), 2)
+
+
+def tack_of(twa_rad: float) -> Tack:
+    """Return the tack by the angle of the wind to the bow: starboard, when it comes over the starboard side."""
+    return "starboard" if twa_rad > 0.0 else "port"
+
 
 SCHEMA = "companion.view/1"
 
@@ -270,3 +440,93 @@ class View:
     orders: Orders = Orders()
     figures: Figures = Figures()
     health: tuple[Part, ...] = ()
+
+
+MOST = 3600        # samples kept: an hour at one a second, a day at one in 24 s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """One moment of the track and the strips; the forecast is the one that was made then, for a minute ahead."""
+
+    t_s: float
+    east_m: float | None = None
+    north_m: float | None = None
+    heading_deg: float | None = None
+    sog_mps: float | None = None
+    twd_from_deg: float | None = None
+    tws_mps: float | None = None
+    clearance_m: float | None = None
+    starboard: bool | None = None          # tack
+    ahead_twd_deg: float | None = None     # the forecast's mean for a minute ahead ...
+    ahead_half_deg: float | None = None    # ... and the half width that holds 80 %
+    ahead_tws_mps: float | None = None
+    ahead_tws_sigma_mps: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Past:
+    """Samples by column, each as long as ``t_s``; names as in ``Sample``."""
+
+    unix_s: float | None = None            # of t_s = 0
+    t_s: tuple[float, ...] = ()
+    east_m: tuple[float | None, ...] = ()
+    north_m: tuple[float | None, ...] = ()
+    heading_deg: tuple[float | None, ...] = ()
+    sog_mps: tuple[float | None, ...] = ()
+    twd_from_deg: tuple[float | None, ...] = ()
+    tws_mps: tuple[float | None, ...] = ()
+    clearance_m: tuple[float | None, ...] = ()
+    starboard: tuple[bool | None, ...] = ()
+    ahead_twd_deg: tuple[float | None, ...] = ()
+    ahead_half_deg: tuple[float | None, ...] = ()
+    ahead_tws_mps: tuple[float | None, ...] = ()
+    ahead_tws_sigma_mps: tuple[float | None, ...] = ()
+
+    @classmethod
+    def of(cls, samples: Sequence[Sample], unix_s: float | None) -> Past:
+        """Return samples as columns."""
+        return cls(unix_s=unix_s, **{f.name: tuple(getattr(s, f.name) for s in samples) for f in fields(Sample)})
+
+
+class Trail:
+    """The samples of a voyage under way: the newest in full, and from ``MOST`` on every second of the older half."""
+
+    def __init__(self, most: int = MOST) -> None:
+        self._most = most
+        self.samples: list[Sample] = []
+
+    def follow(self, before: LocalFrame, after: LocalFrame) -> None:
+        """Let the metres of all samples count in another frame."""
+        if before != after:
+            shift = Shift(before, after)
+            self.samples = [_carried(sample, shift) for sample in self.samples]
+
+    def add(self, sample: Sample) -> None:
+        """Take the next one."""
+        self.samples.append(sample)
+        if len(self.samples) > self._most:
+            half = self._most // 2
+            self.samples = [*self.samples[:half][::2], *self.samples[half:]]
+
+
+def _carried(sample: Sample, shift: Shift) -> Sample:
+    if sample.east_m is None or sample.north_m is None:
+        return sample
+    east_m, north_m = place(shift.point((sample.east_m, sample.north_m)))
+    return replace(sample, east_m=east_m, north_m=north_m)
+
+
+def sample_of(view: View) -> Sample:
+    """Return what the track and the strips keep of a view."""
+    boat, wind = view.boat, view.wind
+    minute = None if wind is None else next((b for b in wind.bands if b.horizon_s == 60.0), None)
+    east, north = boat.at_en_m or (None, None)
+    return Sample(
+        t_s=view.t_s, east_m=east, north_m=north, heading_deg=boat.heading_deg, sog_mps=boat.sog_mps,
+        clearance_m=boat.clearance_m, starboard=None if boat.tack is None else boat.tack == "starboard",
+        twd_from_deg=None if wind is None else wind.twd_from_deg, tws_mps=None if wind is None else wind.tws_mps,
+        ahead_twd_deg=None if minute is None else minute.twd_from_deg,
+        ahead_half_deg=None if minute is None or len(minute.half_deg) < 2 else minute.half_deg[1],
+        ahead_tws_mps=None if minute is None else minute.tws_mps,
+        ahead_tws_sigma_mps=None if minute is None else minute.tws_sigma_mps)

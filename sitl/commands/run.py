@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import chart_option, http_address, number, out_folder, whole
-from companion.program.extras import missing
+from companion.program.commands import missing
 from companion.words import counted, file_name
 
 OURS = {path.stem: path for path in (Path(__file__).resolve().parents[1] / "scenarios").rglob("*.toml")}

@@ -11,8 +11,8 @@ import msgspec
 from companion.boat import AutopilotLimits
 from companion.errors import InputError
 from companion.geofence import Mission
+from companion.mission_check import require_sailable
 from companion.program.arguments import duration
-from companion.sailable import require_sailable
 from sitl.run.variation import Variation
 from sitl.scene import Scenario
 

@@ -13,8 +13,8 @@ from companion.compose import planner_of, water_of
 from companion.disk import Disk
 from companion.errors import InputError
 from companion.geofence import Mission
+from companion.mission_check import AssumedWind, leg_names, legs, planned_legs
 from companion.planner import Plan, Problem, plan
-from companion.sailable.previews import Wind, leg_names, legs, walked
 from sitl.rehearse.draw import Doubts
 from sitl.rehearse.wind import given_wind
 from sitl.run.embedded import EXPANSIONS, mission_of
@@ -64,7 +64,7 @@ def prepared(
                          "add lat and lon of where she will set sail")
     given = given_wind(wind, _mean(base, mission), wind_error)
     middle = given.middle
-    plans = _planned(mission, Wind(from_deg=middle[0], speed_mps=middle[1]))
+    plans = _planned(mission, AssumedWind(from_deg=middle[0], speed_mps=middle[1]))
     voyage_s = mission.skipper.laps * sum(p.cost_s for p in plans) + mission.skipper.station_s
     needs_more = any(goal.field or goal.search or goal.box for goal in mission.goals)
     scenario = msgspec.structs.replace(
@@ -92,7 +92,7 @@ def _hour(base: Scenario, mission: Mission) -> dt.datetime:
     return dt.datetime.fromtimestamp(rows[0].utc_s, dt.UTC) if rows else base.begins
 
 
-def _planned(mission: Mission, wind: Wind) -> list[Plan]:
+def _planned(mission: Mission, wind: AssumedWind) -> list[Plan]:
     """Return the plans from goal to goal; InputError for a goal to which no way leads."""
     if any(goal.field is not None for goal in mission.goals) or mission.autopilot.frame == "motor":
         return []
@@ -102,7 +102,7 @@ def _planned(mission: Mission, wind: Wind) -> list[Plan]:
         return plan(problem, expansions=EXPANSIONS, seed=0, algorithm=by.algorithm, settings=by.settings)
 
     try:
-        plans = walked(legs(mission, wind), answer)
+        plans = planned_legs(legs(mission, wind), answer)
     except ValueError as error:
         raise InputError(str(mission.path), "", str(error), "'companion mission check --plot' draws it") from None
     if not plans[-1].has_path:

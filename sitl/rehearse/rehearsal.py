@@ -14,7 +14,7 @@ from typing import Any
 from companion.disk import Disk, reason
 from companion.errors import CompanionError
 from companion.program import control
-from companion.program.extras import missing
+from companion.program.commands import missing
 from companion.words import counted
 from sitl.means import Means
 from sitl.rehearse.change import Change

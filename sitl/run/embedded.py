@@ -30,8 +30,8 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission, load_mission
 from companion.guard import Auxiliary, Guard
 from companion.messages import CompanionStatus, Mode
+from companion.mission_check import require_sailable
 from companion.page import Address
-from companion.sailable import require_sailable
 from companion.skipper.deeds import CALL
 from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT

@@ -14,7 +14,7 @@ import numpy as np
 from companion.errors import InputError
 from companion.geofence import Mission
 from companion.messages import WindForecast
-from companion.sailable import require_sailable
+from companion.mission_check import require_sailable
 from companion.wind import Estimator, WindRoom
 from sitl.world import Wind
 

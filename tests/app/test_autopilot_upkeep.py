@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 from companion.app.autopilot_upkeep import keep_parameters
 from companion.clock import run_virtual
-from companion.fold.parameters import ToldParameters
+from companion.fold import ToldParameters
 from companion.mavlink.wire import RANGES
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from companion.cli import main
 from companion.geofence import load_mission
-from companion.sailable.fields import fan_of, previewed, sailed, without_value
+from companion.mission_check import field_preview, field_track, heading_fan, without_value
 
 MISSIONS = Path("missions")
 
@@ -47,17 +47,17 @@ def test_what_is_refused_is_one_line(arguments, says, capsys):
 
 
 def test_the_track_by_a_field_comes_to_its_end_and_stays_off_what_is_solid():
-    seen = previewed(mission("field-rock"))
-    track = sailed(seen)
+    seen = field_preview(mission("field-rock"))
+    track = field_track(seen)
     assert math.dist(track[-1, 1:3], seen.place_en) <= 12.0
     assert np.hypot(track[:, 1] - 120.0, track[:, 2]).min() > 15.0
-    ring = previewed(mission("field-ring"))
-    assert ring.area.clearance_m(sailed(ring)[:, 1:3]).min() > 6.0
-    assert len(sailed(ring, 50.0)) == 50
+    ring = field_preview(mission("field-ring"))
+    assert ring.area.clearance_m(field_track(ring)[:, 1:3]).min() > 6.0
+    assert len(field_track(ring, 50.0)) == 50
 
 
 def test_the_fan_is_as_long_as_the_polar_and_shut_to_windward():
-    fan = fan_of(previewed(mission("field-lane")))
+    fan = heading_fan(field_preview(mission("field-lane")))
     off = np.abs((fan.headings_rad + math.pi) % (2.0 * math.pi) - math.pi)
     assert (fan.speeds_mps[off < math.radians(46.0)] == 0.0).all()
     assert (fan.speeds_mps[off > math.radians(48.0)] > 1.0).all()
@@ -67,8 +67,8 @@ def test_the_fan_is_as_long_as_the_polar_and_shut_to_windward():
 
 
 def test_a_mission_by_field_throughout_is_sailed_to_its_marks():
-    seen = previewed(mission("by-field"))
+    seen = field_preview(mission("by-field"))
     assert seen.tree.text == "mark"
     assert without_value(seen) < 0.01
-    out = previewed(mission("field-square"), number=2)
+    out = field_preview(mission("field-square"), number=2)
     assert 0.5 < without_value(out) < 0.9      # outside of the square there is nowhere to go

@@ -8,7 +8,7 @@ import pytest
 from companion import cli
 from companion.errors import InputError
 from companion.geofence import load_mission
-from companion.sailable import require_sailable
+from companion.mission_check import require_sailable
 from sitl.commands import run as sitl_run
 from sitl.run.embedded import permitted
 from sitl.scene.scenario import load_scenario

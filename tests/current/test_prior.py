@@ -8,7 +8,7 @@ from companion.compose import water_of
 from companion.current import Prior
 from companion.errors import InputError
 from companion.geofence import load_mission
-from companion.sailable import words_of
+from companion.mission_check import current_words_of
 
 GOAL = "[start]\nlat = 50.8\nlon = -1.3\n[[goal]]\nlat = 50.805\nlon = -1.3\n"
 TIDE = """# Solent, by the almanac
@@ -70,15 +70,15 @@ def test_a_missing_table_is_said_when_the_mission_is_read(tmp_path):
 
 
 def test_a_check_tells_of_the_current_and_whether_she_can_stem_it(tmp_path):
-    [weak] = words_of(mission(tmp_path, "set_deg = 180.0\ndrift_mps = 0.5"), NOON)
+    [weak] = current_words_of(mission(tmp_path, "set_deg = 180.0\ndrift_mps = 0.5"), NOON)
     assert "sets 180° 0.50 m/s" in weak
-    told = words_of(mission(tmp_path, "set_deg = 180.0\ndrift_mps = 2.5"), NOON)
+    told = current_words_of(mission(tmp_path, "set_deg = 180.0\ndrift_mps = 2.5"), NOON)
     assert "cannot make way against 2.50 m/s" in told[-1]
-    table = words_of(mission(tmp_path, 'table = "tide.csv"'), NOON + 86400.0)
+    table = current_words_of(mission(tmp_path, 'table = "tide.csv"'), NOON + 86400.0)
     assert "3 rows from 2026-11-21 12:00 to 2026-11-21 14:00 UTC" in table[0]
     assert "ended 22 h ago" in table[1]
     (tmp_path / "m.toml").write_text(GOAL)
-    assert words_of(load_mission(tmp_path / "m.toml"), NOON) == ()
+    assert current_words_of(load_mission(tmp_path / "m.toml"), NOON) == ()
 
 
 def test_nothing_said_of_the_water_is_wide_and_not_still():

@@ -11,8 +11,7 @@ from companion.boat import AutopilotLimits
 from companion.cli import main
 from companion.clock import run_virtual
 from companion.commands.doctor import as_json, as_text, diagnose, limits_at, needs_of
-from companion.doctor.checks import examine
-from companion.doctor.findings import Examined, Level, Needs
+from companion.doctor import Examined, Level, Needs, examine
 from companion.errors import LinkError
 from companion.geofence import load_mission
 from companion.mavlink.transports.signing import EPOCH_S, TICKS_PER_S, SigningStore

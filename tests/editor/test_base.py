@@ -7,9 +7,9 @@ import pytest
 
 from companion.cli import main
 from companion.editor import read_base
+from companion.editor.desk import state_of
 from companion.editor.draft import draft_of
 from companion.editor.sketch import MOST_VERTICES
-from companion.editor.state import state_of
 from companion.errors import InputError
 from companion.geofence import load_mission
 

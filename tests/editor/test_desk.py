@@ -340,8 +340,7 @@ def test_a_full_disk_loses_nothing(bay):
     from companion.clock import run
     from companion.disk import Disk
     from companion.editor.base import read_base
-    from companion.editor.desk import Desk
-    from companion.editor.plans import Previews
+    from companion.editor.desk import Desk, Previews
     from companion.page import Address, listening
     from tests.editor.asking import Asker
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.editor.ground import NotEditable, can_hold, ground_of, new_ground, written
+from companion.editor.base import NotEditable, can_hold, ground_of, new_ground, written
 from companion.editor.sketch import Shape, number
 
 WKT = """# a chart; no geometry

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.editor.blocks import blocks_of, text_of
-from companion.editor.toml import made, rewritten
+from companion.editor.toml import blocks_of, made, rewritten, text_of
 from companion.geofence.mission import MissionOptions, parse_options, read_options
 from companion.geofence.mission.goal_options import BoxOptions, GateOptions, MarkOptions, PointOptions
 from companion.geofence.mission.options import AreaOptions, RefugeOptions, SkipperOptions, StartOptions

@@ -10,7 +10,7 @@ from companion.errors import InputError
 from companion.field.tree import Along, AwayFrom, AwayFromLine, Heading, OutOf, PointTo, Round, StayAt
 from companion.geofence import load_mission
 from companion.geofence.mission.text import dump_options, parse_options
-from companion.sailable import judge, require_sailable
+from companion.mission_check import check_mission, require_sailable
 from companion.skipper.way import Until
 from companion.telemetry.folder.logbook import without_none
 
@@ -128,7 +128,7 @@ def test_what_is_wrong_is_one_line(tmp_path, old, new, says):
         load(tmp_path, RING.replace(old, new, 1))
     assert says in str(refused.value)
     assert "\n" not in str(refused.value)
-    assert judge(tmp_path / "m.toml").refusals
+    assert check_mission(tmp_path / "m.toml").refusals
 
 
 def test_time_needs_its_time(tmp_path):

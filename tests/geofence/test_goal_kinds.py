@@ -6,7 +6,7 @@ from companion.cli import main
 from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.geofence.mission.text import dump_options, parse_options
-from companion.sailable import require_sailable
+from companion.mission_check import require_sailable
 
 GATE = """
 name = "m"

@@ -6,7 +6,7 @@ from companion import cli
 from companion.compose import config_of, voyage_of, waters_of
 from companion.errors import InputError
 from companion.geofence import load_mission
-from companion.sailable import require_sailable
+from companion.mission_check import require_sailable
 
 START, FAR = (52.0, 179.5), (52.1, -178.9)   # 110 km over the date line
 WATER = "POLYGON ((179.0 51.8, 181.5 51.8, 181.5 52.3, 179.0 52.3, 179.0 51.8))"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.program.extras import EXTRAS, NAME
+from companion.program.commands import EXTRAS, NAME
 
 PROJECT = tomllib.loads(Path("pyproject.toml").read_text())["project"]
 # An import of these fails, as where they are not installed.

@@ -9,8 +9,7 @@ from companion.geo.frame import LocalFrame
 from companion.guard import Guard
 from companion.messages import GeoPoint
 from companion.outputs import wanted
-from companion.view.air import Polar, Wind
-from companion.view.values import Boat, Goal, Leg, Plan, State, View
+from companion.view.values import Boat, Goal, Leg, Plan, Polar, State, View, Wind
 
 ORIGIN = GeoPoint(lat_deg=50.8170, lon_deg=-1.3100)
 

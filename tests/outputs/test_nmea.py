@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
-from companion.outputs import sentences
+from companion.outputs import nmea
 from companion.outputs.nmea import lines_of
-from companion.view.air import Wind
-from companion.view.values import Boat, Goal, Leg, Plan, State, View
+from companion.view.values import Boat, Goal, Leg, Plan, State, View, Wind
 from tests.outputs.conftest import ORIGIN, view_of
 
 KNOT = 1852.0 / 3600.0
@@ -55,7 +54,7 @@ def degrees_apart(a, b):
 # ------------------------------------------------------------------------------------------ sentences
 @given(angles, speeds, st.booleans(), st.booleans())
 def test_the_wind_is_read_back(angle, speed, is_apparent, is_valid):
-    message = read(sentences.mwv(angle, speed, is_apparent=is_apparent, is_valid=is_valid))
+    message = read(nmea.mwv(angle, speed, is_apparent=is_apparent, is_valid=is_valid))
     assert degrees_apart(float(message.wind_angle), math.degrees(angle)) <= 0.051
     assert 0.0 <= float(message.wind_angle) < 360.0
     assert float(message.wind_speed) * KNOT == pytest.approx(speed, abs=0.03)
@@ -65,15 +64,15 @@ def test_the_wind_is_read_back(angle, speed, is_apparent, is_valid):
 
 @given(angles, speeds)
 def test_the_winds_direction_and_the_heading_are_read_back(angle, speed):
-    wind = read(sentences.mwd(angle, speed))
+    wind = read(nmea.mwd(angle, speed))
     assert degrees_apart(float(wind.direction_true), math.degrees(angle)) <= 0.051
     assert float(wind.wind_speed_meters) == pytest.approx(speed, abs=0.051)
-    assert degrees_apart(float(read(sentences.hdt(angle)).heading), math.degrees(angle)) <= 0.051
+    assert degrees_apart(float(read(nmea.hdt(angle)).heading), math.degrees(angle)) <= 0.051
 
 
 @given(points, speeds, angles, st.floats(0.0, 4e9))
 def test_where_she_is_is_read_back(point, speed, course, utc_s):
-    message = read(sentences.rmc(utc_s, point, speed, course))
+    message = read(nmea.rmc(utc_s, point, speed, course))
     assert message.status == "A"
     assert message.latitude == pytest.approx(point.lat_deg, abs=1e-6)
     assert message.longitude == pytest.approx(point.lon_deg, abs=1e-6)
@@ -86,7 +85,7 @@ def test_where_she_is_is_read_back(point, speed, course, utc_s):
 
 @given(st.floats(-40_000.0, 40_000.0), angles, angles, points, st.floats(0.0, 3e6), st.none() | st.floats(-60.0, 60.0))
 def test_the_waypoint_is_read_back(right, leg, bearing, point, distance, closing):
-    message = read(sentences.rmb(right, "FROM", "WWWWWW-8", point, distance, bearing, closing, has_arrived=False))
+    message = read(nmea.rmb(right, "FROM", "WWWWWW-8", point, distance, bearing, closing, has_arrived=False))
     assert message.status == "A"
     assert float(message.cross_track_error) == pytest.approx(min(9.99, abs(right) / 1852.0), abs=1e-4)
     assert message.cte_correction_dir == ("L" if right > 0.0 else "R")   # to steer: back to the leg
@@ -97,7 +96,7 @@ def test_the_waypoint_is_read_back(right, leg, bearing, point, distance, closing
     assert float(message.dest_range) == pytest.approx(min(999.9, distance / 1852.0), abs=coarse)
     assert degrees_apart(float(message.dest_true_bearing), math.degrees(bearing)) <= 0.051
     assert message.arrival_alarm == "V"
-    helm = read(sentences.apb(right, leg, bearing, "WWWWWW-8", is_inside=True, is_past=False))
+    helm = read(nmea.apb(right, leg, bearing, "WWWWWW-8", is_inside=True, is_past=False))
     assert (helm.dest_waypoint_id, helm.arr_circle_entered, helm.perp_passed) == ("WWWWWW-8", "A", "V")
     assert degrees_apart(float(helm.bearing_to_dest), math.degrees(leg)) <= 0.051
     assert helm.dir_steer == message.cte_correction_dir
@@ -105,7 +104,7 @@ def test_the_waypoint_is_read_back(right, leg, bearing, point, distance, closing
 
 @given(st.lists(st.from_regex(r"[A-Za-z0-9_-]{1,8}", fullmatch=True), min_size=1, max_size=200))
 def test_a_route_is_read_back_whole_however_long_it_is(names):
-    parts = [read(line) for line in sentences.rte("companion", names)]
+    parts = [read(line) for line in nmea.rte("companion", names)]
     assert [int(part.sen_num) for part in parts] == list(range(1, len(parts) + 1))
     assert {int(part.num_in_seq) for part in parts} == {len(parts)}
     assert [name for part in parts for name in part.waypoint_list] == names
@@ -113,15 +112,15 @@ def test_a_route_is_read_back_whole_however_long_it_is(names):
 
 @given(st.text(max_size=40))
 def test_any_name_of_a_goal_can_be_told(text):
-    name = sentences.name_of(text)
-    assert len(name) <= sentences.NAME_CHARACTERS
-    read(sentences.wpl(ORIGIN, name))
+    name = nmea.name_of(text)
+    assert len(name) <= nmea.NAME_CHARACTERS
+    read(nmea.wpl(ORIGIN, name))
 
 
 @pytest.mark.parametrize("field", ["a,b", "a*b", "a$b", "\r\n", "ä", "x" * 80])
 def test_what_would_break_a_sentence_is_never_written(field):
     with pytest.raises(ValueError, match="HDT"):
-        sentences.sentence("HDT", field)
+        nmea.sentence("HDT", field)
 
 
 # ----------------------------------------------------------------------------------------- the view

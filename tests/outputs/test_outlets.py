@@ -17,7 +17,7 @@ from companion.clock import run
 from companion.errors import InputError
 from companion.guard import Guard
 from companion.outputs import Outputs
-from companion.outputs.nmea_outlets import MOST_CLIENTS
+from companion.outputs.nmea import MOST_CLIENTS
 from companion.outputs.outlet import Slot
 from companion.outputs.outputs import read_token
 from companion.view.values import Alarm
@@ -116,7 +116,7 @@ def test_who_connects_is_told_the_route_first_and_again_when_it_changes(frame, v
 
 def test_one_that_never_reads_costs_nobody_anything(frame, view, monkeypatch):
     """Nor do twenty: the voyage is not held, the memory is bounded, and in the end they are hung up on."""
-    monkeypatch.setattr("companion.outputs.nmea_outlets.PATIENCE_S", 0.5)
+    monkeypatch.setattr("companion.outputs.nmea.PATIENCE_S", 0.5)
     port = free_port()
 
     async def body(outputs, _):
@@ -165,7 +165,7 @@ def test_a_port_in_use_is_said_once_and_tried_again(frame, view):
 
 def test_a_signal_k_server_that_takes_nothing_in_does_not_hold_the_voyage(frame, view, monkeypatch):
     """It is accepted and never read from: the slot drops, the connection is given up."""
-    monkeypatch.setattr("companion.outputs.signalk_outlets.STUCK_S", 0.3)
+    monkeypatch.setattr("companion.outputs.signalk.STUCK_S", 0.3)
     with socket.socket() as stuck:
         stuck.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
         stuck.bind(("127.0.0.1", 0))
@@ -294,7 +294,7 @@ def test_a_broadcast_that_is_not_permitted_is_told_of(frame, view, monkeypatch):
 
 
 def test_a_delta_is_small_and_plain_json(frame, view):
-    from companion.outputs.deltas import delta, values_of
+    from companion.outputs.signalk import delta, values_of
 
     text = json.dumps(delta(values_of(view, frame), {}), allow_nan=False)
     assert len(text) < 4000

@@ -10,7 +10,7 @@ import pytest
 from companion import cli
 from companion.compose import displays_of
 from companion.geofence import load_mission
-from companion.sailable import require_sailable
+from companion.mission_check import require_sailable
 from sitl.run.live import run_live
 from sitl.scene import Truth, load_scenario
 from sitl.scene.ships import free_port

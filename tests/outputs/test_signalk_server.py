@@ -152,7 +152,7 @@ def test_with_its_security_on_a_token_opens_it(secure, frame, view, tmp_path):
 
 @pytest.mark.parametrize("user", [None, "guest"])
 def test_a_server_that_takes_nothing_is_told_of(secure, frame, view, user, tmp_path, monkeypatch):
-    monkeypatch.setattr("companion.outputs.signalk_outlets.ECHO_S", 5.0)
+    monkeypatch.setattr("companion.outputs.signalk.ECHO_S", 5.0)
 
     async def look(outputs):
         await became(lambda: outputs.signalk[0].is_taken is not None)

@@ -13,8 +13,8 @@ import pytest
 
 from companion.cli import main
 from companion.geofence import load_mission
+from companion.mission_check import field_preview, heading_fan
 from companion.page.fields import field_page, page_data
-from companion.sailable.fields import fan_of, previewed
 from tests.page.browsing import Window, needs_browser
 from tests.page.test_javascript import tsc
 
@@ -74,7 +74,7 @@ def seen_of(case, tmp_path):
     if name is None:
         path.write_text(MIXED)
     mission = load_mission(path)
-    return mission, previewed(mission, number=number, wind=wind)
+    return mission, field_preview(mission, number=number, wind=wind)
 
 
 def points_of(seen):
@@ -94,7 +94,7 @@ return {
 
 def told_by_python(seen):
     points = points_of(seen)
-    fan = fan_of(seen)
+    fan = heading_fan(seen)
     projection = seen.projection
     return {
         "wanted": seen.wanted(points), "right": seen.sailable(points, 1), "left": seen.sailable(points, -1),

@@ -14,7 +14,7 @@ import pytest
 from companion.clock import run
 from companion.errors import JobError
 from companion.page import Address, Live, Record, connections, served
-from companion.page.hub import Hub, Watcher
+from companion.page.sources import Hub, Watcher
 from companion.view import Area, Past
 from tests.page.asking import event, free_port, hang_up, view_at, with_page
 

@@ -9,10 +9,10 @@ import pytest
 
 from companion import cli
 from companion.geofence import load_mission
+from companion.mission_check import AssumedWind, leg_problem
 from companion.planner import Problem
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.json_write import to_dict
-from companion.sailable.previews import Wind, leg_problem
 
 GOOD = {
     "id": "pond", "title": "Across the pond", "start": {"x": 0, "y": 0, "heading_deg": 0},
@@ -101,7 +101,7 @@ def test_a_missions_obstacles_keep_their_names_in_its_problem():
     def names(margin_m):
         grown = replace(mission, options=msgspec.structs.replace(
             mission.options, area=msgspec.structs.replace(mission.options.area, margin_m=margin_m)))
-        problem = leg_problem(grown, (0.0, 0.0), 0.0, goal, 10.0, wind=Wind(from_deg=0.0, speed_mps=5.0))
+        problem = leg_problem(grown, (0.0, 0.0), 0.0, goal, 10.0, wind=AssumedWind(from_deg=0.0, speed_mps=5.0))
         return [problem.obstacle_name(i) for i in range(len(problem.obstacles))]
 
     assert sorted(names(1.0)) == ["East bank", "Middle bank", "West bank"]

@@ -10,11 +10,11 @@ from companion.boat import ardurover_sitl
 from companion.compose import water_of
 from companion.current import CurrentEstimator, over_water
 from companion.geofence import load_mission
+from companion.mission_check import AssumedWind, expected_current, legs, planned_legs
 from companion.planner import Plan, plan
-from companion.sailable.previews import Wind, expected_current, legs, walked
 
 SOUTH = Path("missions/southern-tide.toml")
-WIND = Wind(from_deg=0.0, speed_mps=5.0)
+WIND = AssumedWind(from_deg=0.0, speed_mps=5.0)
 HIGH_S = 1_795_262_400.0      # 2026-11-21T12:00:00Z
 
 
@@ -71,7 +71,7 @@ def test_each_leg_has_the_row_of_a_tide_table_that_it_begins_in(mission_with):
 
 def test_the_way_of_a_preview_is_another_in_a_stream_and_keeps_the_margin():
     mission = load_mission(SOUTH)
-    found = walked(legs(mission, WIND), lambda problem: plan(problem, expansions=2000))
+    found = planned_legs(legs(mission, WIND), lambda problem: plan(problem, expansions=2000))
     assert all(isinstance(p, Plan) and p.has_path for p in found)
     first = found[0].legs[0]
     course = math.atan2(first.to_en[0] - first.from_en[0], first.to_en[1] - first.from_en[1])

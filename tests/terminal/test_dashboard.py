@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from companion.terminal import Frame, Helm, History, Shown, changes, draw, event_words, line_of
 from companion.terminal.screen import Style, clean
 from companion.view import View
-from companion.view.air import Polar, Wind
 from companion.view.fold import aged
-from companion.view.values import Alarm, Boat, Figures, Goal, Leg, Part, Plan, State, Vessel
+from companion.view.values import Alarm, Boat, Figures, Goal, Leg, Part, Plan, Polar, State, Vessel, Wind
 
 UNIX_S = 1_795_000_000.0
 LEGS = (Leg(from_en_m=(0.0, 0.0), to_en_m=(60.0, 80.0)), Leg(from_en_m=(60.0, 80.0), to_en_m=(160.0, 80.0)))

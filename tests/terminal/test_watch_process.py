@@ -21,7 +21,7 @@ import msgspec
 import pyte
 import pytest
 
-from companion.terminal.tty import ENTER, LEAVE
+from companion.terminal.screen import ENTER, LEAVE
 from companion.view.values import Orders
 from tests.terminal.test_dashboard import VIEW
 

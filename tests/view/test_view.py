@@ -16,8 +16,8 @@ from companion.messages import CompanionStatus, GeoPoint, VehicleState, WindFore
 from companion.skipper.step import SkipperConfig, SkipperState, Snapshot, WindHealth, WindView
 from companion.telemetry.folder import TLOG, VoyageFigures
 from companion.view import Past, ViewFold, recorded_views, sample_of
+from companion.view.parts import apparent, laylines_of, no_go_of
 from companion.view.schema import files, schema
-from companion.view.wind import apparent, laylines_of, no_go_of
 from tests.view.conftest import write_mission
 
 RULES = {name: jsonschema.Draft202012Validator({**schema(), "$ref": f"#/$defs/{name}"})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from companion.cli import main
-from companion.plots.filter import filter_figure
+from companion.plots.wind import filter_figure
 from companion.wind import make
 from companion.wind.estimators.kalman import R_DEG, WINDOW
 from companion.wind.study import Record, characterise, runs, score

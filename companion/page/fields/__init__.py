@@ -19,12 +19,12 @@ from companion.field.expression import Added, Expression, Longest, Named, Weighe
 from companion.field.leave import BEYOND_M, LOOK_S, MOST_LOOK_S
 from companion.field.tree import Along, Atom, AwayFrom, AwayFromLine, Heading, OutOf, PointTo, Round, StayAt
 from companion.geofence import Mission
-from companion.sailable.fields import Previewed
+from companion.mission_check import FieldPreview
 
 WINDS_MPS = [0.5 * n for n in range(2, 31)]   # what the slider stops at
 
 
-def field_page(mission: Mission, seen: Previewed, words: list[str]) -> bytes:
+def field_page(mission: Mission, seen: FieldPreview, words: list[str]) -> bytes:
     """Return the page of a goal's field as one HTML file."""
     web = resources.files("companion.page.fields").joinpath("web")
     data = msgspec.json.encode(page_data(mission, seen, words)).replace(b"<", b"\\u003c").decode()
@@ -35,7 +35,7 @@ def field_page(mission: Mission, seen: Previewed, words: list[str]) -> bytes:
     return page.encode()
 
 
-def page_data(mission: Mission, seen: Previewed, words: list[str]) -> dict[str, Any]:
+def page_data(mission: Mission, seen: FieldPreview, words: list[str]) -> dict[str, Any]:
     """Return what the page is made of."""
     habits, polar = seen.conditions.habits, boat_of(mission).polar
     tws = min(WINDS_MPS, key=lambda w: abs(w - seen.conditions.seen.tws_mps))

@@ -1,4 +1,4 @@
-"""A voyage's fold: every value, outcome and tick goes through it in order.
+"""The companion without its shell: values in, snapshots, steps and actions out.
 
 Nothing else decides. The application feeds it live; ``companion replay`` feeds it from a recorded voyage, and must get
 the same actions.
@@ -10,19 +10,22 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
+from companion.boat import AutopilotLimits
 from companion.current import FITS_S, STILL, CurrentEstimator, Prior, Sailing
-from companion.fold.air import Air
-from companion.fold.parameters import Change, ToldParameters
+from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
 from companion.mavlink.trust import GAP_S, UID_EVERY_S, Identity, Witness
 from companion.mavlink.wire import (
     AUTOPILOT_COMPONENT,
+    RANGES,
     Drop,
     Effect,
     Message,
     VehicleAssembler,
     autopilot_version,
+    believable,
+    effect_of,
     is_autopilot_heartbeat,
 )
 from companion.messages import (
@@ -55,7 +58,148 @@ from companion.skipper.step import (
     WindView,
 )
 from companion.traffic import TargetLimits, Targets
-from companion.wind import WindRoom
+from companion.wind import Estimator, Verdict, WindRoom, WindStatus, make
+
+__all__ = ["Step", "VoyageFold", "Waters", "begun"]
+
+# Wind is believed after this long a record [s]; until then its spread is a guess.
+SETTLED_S = 20.0
+
+# A spiking vane is not among them: its spikes are not fed, and what is left is widened.
+_UNTRUSTED = frozenset({
+    Verdict.FROZEN, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR, Verdict.TURNED,
+})
+
+
+class Air:
+    """The wind room with the means over 90 s and 5 s beside its forecast."""
+
+    def __init__(self, room: WindRoom) -> None:
+        self.room = room
+        self._begin()
+
+    def _begin(self) -> None:
+        self._mean90: Estimator = make("mean90")
+        self._mean5: Estimator = make("mean5")
+        self._first_s: float | None = None
+        self._last_s: float | None = None
+
+    def begin_anew(self) -> None:
+        """Forget all readings: what they were read by has been changed."""
+        self.room.begin_anew()
+        self._begin()
+
+    def take(self, value: WindSample | ApparentWind) -> None:
+        """Take what an instrument said, in the order of time."""
+        status = self.room.update(value)
+        if status is None or status.sample is None or status.sample.t_s == self._last_s:
+            return
+        sample = status.sample
+        self._last_s = sample.t_s
+        if self._first_s is None:
+            self._first_s = sample.t_s
+        self._mean90.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight,
+                            speed_weight=status.speed_weight)
+        # What a turned vane says now the autopilot sails by, and it is what her motion is held against.
+        is_turned = Verdict.TURNED in status.verdicts
+        self._mean5.update(sample.t_s, sample.twd_from_rad, sample.tws_mps,
+                           weight=1.0 if is_turned else status.weight,
+                           speed_weight=1.0 if is_turned else status.speed_weight)
+
+    def view(self, t_s: float) -> WindView:
+        """Return the wind at ``t_s``."""
+        status = self.room.status(t_s)
+        table = self.room.forecast_table(t_s)
+        if status is None or table is None or self._first_s is None:
+            return WindView()
+        mean_rad, _, mean_mps, _ = self._mean90.forecast(0.0)
+        now_rad, _, now_mps, _ = self._mean5.forecast(0.0)
+        record_s = t_s - self._first_s
+        health = _health(status, record_s)
+        return WindView(
+            health=health,
+            forecast=table,
+            mean_twd_from_rad=wrap_pi(mean_rad),
+            mean_tws_mps=max(0.0, mean_mps),
+            sigma_twd_rad=float(table.sigma_twd_rad[0]),
+            present_twd_from_rad=wrap_pi(now_rad),
+            present_tws_mps=max(0.0, now_mps),
+            record_s=record_s,
+            verdict="" if health is WindHealth.GOOD else status.reason,
+        )
+
+
+def _health(status: WindStatus, record_s: float) -> WindHealth:
+    is_calm = Verdict.CALM in status.verdicts
+    # In a calm the autopilot holds the old direction, by its least speed: that is the calm and no fault.
+    if any(v in _UNTRUSTED and not (is_calm and v is Verdict.HELD) for v in status.verdicts):
+        return WindHealth.UNTRUSTED
+    if is_calm:
+        return WindHealth.LIGHT
+    return WindHealth.SETTLING if record_s < SETTLED_S else WindHealth.GOOD
+
+
+# Parameters without which the autopilot's limits are not known.
+_LIMITS = frozenset({"SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """A parameter that changes what a sensor says, or how she sails, was set; ``before`` None: it was not known."""
+
+    name: str
+    before: float | None
+    after: float
+    effect: Effect
+
+
+class ToldParameters:
+    """The autopilot's parameters by ArduPilot's names, in its units."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, float] = {}
+        self.limits: AutopilotLimits | None = None
+        self._in_doubt: dict[str, float] = {}
+        self._answered: set[str] = set()
+
+    def take(
+        self, values: Mapping[str, float], *, is_set: bool = False,
+    ) -> tuple[dict[str, float], tuple[str, ...], tuple[Change, ...]]:
+        """Take what was told; return what of it is believed, why the rest cannot be, and what somebody has changed.
+
+        One that was known and has changed is in none of them: it is asked for again, and believed when it is told
+        twice. With ``is_set`` a first telling of one that has an effect was not asked for by us, as when somebody sets
+        it, and is treated likewise.
+        """
+        good, refused = believable(values)
+        self._answered |= values.keys()
+        changes: list[Change] = []
+        for name in tuple(good):
+            known, value, effect = self.values.get(name), good[name], effect_of(name)
+            is_news = known is not None or (is_set and name not in RANGES) or name in self._in_doubt
+            if known == value or not is_news or (name not in RANGES and effect is None):
+                self._in_doubt.pop(name, None)
+            elif self._in_doubt.get(name) != value:
+                self._in_doubt[name] = good.pop(name)
+            else:
+                del self._in_doubt[name]
+                if effect is not None:
+                    changes.append(Change(name=name, before=known, after=value, effect=effect))
+        self.values.update(good)
+        if self._answered >= _LIMITS:
+            self.limits = AutopilotLimits.from_params(self.values)
+        return good, refused, tuple(changes)
+
+    @property
+    def unread(self) -> tuple[str, ...]:
+        """The parameters that were not told yet, or once with another value: to be asked for."""
+        others = tuple(name for name in self._in_doubt if name not in RANGES)
+        return tuple(name for name in RANGES if name not in self._answered or name in self._in_doubt) + others
+
+    def doubt(self) -> None:
+        """Ask for all of them again: the autopilot was begun anew."""
+        self._answered.clear()
+
 
 # Modes in which the sheets are trimmed to sail; in HOLD they are eased, and by hand nobody knows.
 _SAILS = frozenset({Mode.AUTO, Mode.GUIDED, Mode.LOITER})
