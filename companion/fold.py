@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
+from companion.ahead import PRIOR_PACE, Ahead, Pace, ahead_of, paced
 from companion.boat import AutopilotLimits
 from companion.current import FITS_S, STILL, CurrentEstimator, Prior, Sailing
 from companion.geo.angles import wrap_pi
@@ -223,6 +224,11 @@ class Step:
     actions: tuple[Action, ...]
     voyage: Voyage
     shift: Shift | None = None
+    pace: Pace = PRIOR_PACE
+
+    def ahead(self) -> Ahead:
+        """Return where the boat is expected from here on, and when it is there."""
+        return ahead_of(self.snapshot, self.state, self.voyage, self.pace)
 
 
 class VoyageFold:
@@ -265,6 +271,7 @@ class VoyageFold:
         self._planner_alive = True
         self._events: list[Event] = []
         self._outcomes: list[Outcome] = []
+        self._pace = PRIOR_PACE
 
     # ------------------------------------------------------------------------------------- inputs
     def objection(self, t_s: float, message: Message) -> Drop | None:
@@ -401,8 +408,10 @@ class VoyageFold:
         snapshot = self._snapshot(t_s)
         self._events, self._outcomes = [], []
         self.state, actions = self.skipper.step(self.state, snapshot)
+        self._pace = paced(self._pace, snapshot, self.state, self.skipper.voyage)
         return Step(
-            snapshot=snapshot, state=self.state, actions=actions, voyage=self.skipper.voyage, shift=shift)
+            snapshot=snapshot, state=self.state, actions=actions, voyage=self.skipper.voyage, shift=shift,
+            pace=self._pace)
 
     def _follow(self) -> Shift | None:
         """Replace the frame by one about the boat when she has left its water; None: she has not."""

@@ -26,7 +26,7 @@ from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.messages import CompanionStatus, Mode
 from companion.program import control
-from companion.skipper.step import Announce, Phase, Route, Severity
+from companion.skipper.step import Announce, Phase, Severity
 from companion.telemetry.folder.records import sigma_ahead_rad
 from companion.words import one_line, printable
 
@@ -254,7 +254,7 @@ def wrapped(lines: list[str], columns: int) -> list[str]:
 
 
 def progress_text(step: Step, next_tack_s: float | None) -> str:
-    """Return the line: state, waypoint, wind mean and spread, next tack, cross-track, risk."""
+    """Return the line: state, waypoint, wind mean and spread, next tack, cross-track, clearance, arrival."""
     snapshot, state = step.snapshot, step.state
     autopilot, wind, route = snapshot.autopilot, snapshot.wind, state.route
     parts = [state.phase.value.upper()]
@@ -282,22 +282,16 @@ def progress_text(step: Step, next_tack_s: float | None) -> str:
         minutes = state.standing.age_s(snapshot.t_s) / 60.0
         parts.append(f"order {state.standing.words} of {state.standing.by}, {minutes:.0f} min")
     if route is not None:
-        parts.append(f"risk {100.0 * (1.0 - route.delta_s):.0f} %")
         if route.expected_clearance_m is not None:
             parts.append(f"clear {route.expected_clearance_m:.1f} m")
-        if under_way and route.median_s is not None:
-            parts.append(_arrives(route, snapshot.t_s))
+        ahead = step.ahead()
+        if under_way and ahead.there_s is not None:
+            late = "" if ahead.there_late_s is None else f" (90 %: {ahead.there_late_s:.0f} s)"
+            parts.append(f"there in {ahead.there_s:.0f} s{late}")
         parts.append(f"plans {state.replans}")
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)
     return " | ".join(parts)
-
-
-def _arrives(route: Route, t_s: float) -> str:
-    """Return when the plan's end is reached: in half of the winds, and in nine of ten."""
-    gone_s = t_s - route.plan_t_s
-    late = "" if route.late_s is None else f" (90 %: {max(0.0, route.late_s - gone_s):.0f} s)"
-    return f"there in {max(0.0, (route.median_s or 0.0) - gone_s):.0f} s{late}"
 
 
 def left_behind(step: Step) -> str:

@@ -322,8 +322,11 @@ def _plan(view: View, *, is_wide: bool) -> Row:
     plan = view.plan
     if plan is None:
         return "Plan", "none", Style.PLAIN
-    whole = "" if plan.path_risk is None or not is_wide else f", {share_text(plan.path_risk)} in all"
-    text = f"#{number_text(plan.number)} {span_text(plan.age_s)} old, risk {share_text(plan.promised_risk)}{whole}"
+    there = "" if plan.there_s is None else f"there in {span_text(plan.there_s)}"
+    late = "" if plan.there_late_s is None or not is_wide else f" (90 %: {span_text(plan.there_late_s)})"
+    risk = "" if plan.path_risk is None else f"off plan {share_text(plan.path_risk)}"
+    text = ", ".join(part for part in (
+        there + late, risk, f"#{number_text(plan.number)} {span_text(plan.age_s)} old") if part)
     return "Plan", f"{text}, {plan.bound_for}" if plan.bound_for else text, Style.PLAIN
 
 
@@ -523,8 +526,10 @@ def line_of(view: View, unix_s: float, *, knots: bool) -> str:
         parts.append(f"leg {plan.leg}/{number_text(plan.count)} {length_text(boat.waypoint_m)}")
     if boat.goal_m is not None:
         parts.append(f"goal {length_text(boat.goal_m)}")
-    if plan is not None and plan.promised_risk is not None:
-        parts.append(f"risk {share_text(plan.promised_risk)}")
+    if plan is not None and plan.there_s is not None:
+        parts.append(f"there in {span_text(plan.there_s)}")
+    if plan is not None and plan.path_risk is not None:
+        parts.append(f"off plan {share_text(plan.path_risk)}")
     if boat.battery_v is not None:
         parts.append(f"{boat.battery_v:.1f} V")
     parts += [f"{alarm.level.upper()} {alarm.code}" for alarm in view.alarms[:2]]

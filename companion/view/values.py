@@ -276,12 +276,14 @@ class Plan:
     tws_mps: float | None = None
     delta_s: float | None = None
     promised_risk: float | None = None   # at each instant
-    path_risk: float | None = None       # of the whole of it
+    path_risk: float | None = None       # off the plan before the next goal: the sum over the legs that are left
     vessel_risk: float | None = None
     margin_m: float | None = None
     cost_s: float | None = None
-    median_s: float | None = None        # there by then in half the winds of the forecast's spread ...
+    median_s: float | None = None        # from the plan's start to its end, in half the winds of the spread ...
     late_s: float | None = None          # ... and in nine of ten
+    there_s: float | None = None         # from now until the next goal is reached, at the pace that the boat keeps ...
+    there_late_s: float | None = None    # ... and in nine cases of ten
     expected_clearance_m: float | None = None   # of the hull on the track that is expected
     bound_s: float | None = None         # no plan is faster than that
     replans: int | None = None

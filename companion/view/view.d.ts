@@ -246,6 +246,8 @@ export interface Plan {
   cost_s: number | null;
   median_s: number | null;
   late_s: number | null;
+  there_s: number | null;
+  there_late_s: number | null;
   expected_clearance_m: number | null;
   bound_s: number | null;
   replans: number | null;

@@ -27,7 +27,8 @@ VIEW = View(
     wind=Wind(health="settling", age_s=0.5, twd_from_deg=80.0, tws_mps=5.0, sigma_deg=9.0, tws_sigma_mps=0.6,
               twa_deg=45.0, awa_deg=36.0, aws_mps=6.1),
     polar=Polar(name="p", tws_mps=5.0, twa_deg=(0.0, 90.0), speed_mps=(1.5, 1.5)),
-    plan=Plan(number=17, age_s=252.0, leg=2, count=4, promised_risk=0.1, path_risk=0.31, next_tack_s=100.0, legs=LEGS),
+    plan=Plan(number=17, age_s=252.0, leg=2, count=4, promised_risk=0.1, path_risk=0.31, next_tack_s=100.0, legs=LEGS,
+              there_s=192.0, there_late_s=250.0),
     vessels=(Vessel(name="FERRY", cpa_m=41.0, cpa_s=72.0, alarm="act"),),
     goals=(Goal(name="North mark", kind="point", at_en_m=(160.0, 80.0), is_next=True, distance_m=141.0,
                 bearing_deg=69.0),),
@@ -53,7 +54,7 @@ def test_what_it_says(columns, rows):
     for part in (
         "item 2 of 4 to North mark", "CRITICAL drifting 42 s: onto Rock in 120 s", "080°±9° 9.7±1.2 kn",
         "45°S, apparent 36°S 11.9", "HDG 035° COG 037° 2.9 kn", "2/4 60 m at 032°, xt +5 m", "1/2 141 m at 069° North",
-        "in 1:40, 3 done", "#17 4:12 old, risk 10 %", "11 m of land, FERRY 41 m", "wind too short", "now 080°",
+        "in 1:40, 3 done", "there in 3:12", "11 m of land, FERRY 41 m", "wind too short", "now 080°",
         "q quit  ? help  w why  h hold",
     ):
         assert part in text, f"{part!r} is not in\n{text}"

@@ -58,9 +58,12 @@ function alarms(view) {
   }
 }
 
-/** @param {string} name @param {string} value @param {string} unit @param {string} [kind] */
-function one(name, value, unit, kind = "") {
-  return el("div", { class: kind }, el("dt", {}, name), el("dd", {}, value, value === NONE || !unit ? "" : el("small", {}, ` ${unit}`)));
+const THERE = "The time until the next goal is reached, at the pace that the boat has lately kept; in nine cases of ten it is there by the second figure.";
+const OFF_PLAN = "The chance that the boat is forced off the plan before the next goal: that the wind makes it tack or bear away unplanned, or that a vessel comes too near.";
+
+/** @param {string} name @param {string} value @param {string} unit @param {string} [kind] @param {string} [hint] */
+function one(name, value, unit, kind = "", hint = "") {
+  return el("div", hint ? { class: kind, title: hint } : { class: kind }, el("dt", {}, name), el("dd", {}, value, value === NONE || !unit ? "" : el("small", {}, ` ${unit}`)));
 }
 
 /** @param {View | null} view */
@@ -72,7 +75,7 @@ function figures(view) {
     one("AWS", speed(wind?.aws_mps), speedUnit()), one("VMG", speed(boat?.vmg_mps), speedUnit()),
     one("COG", bearing(boat?.cog_deg), bearingUnit()), one("to mark", distance(boat?.goal_m), ""),
     one("TWD σ 1 min", wind?.sigma_deg == null ? NONE : `±${figure(wind.sigma_deg, 0)}°`, ""), one("clearance", distance(boat?.clearance_m), ""),
-    one("next tack", duration(plan?.next_tack_s), ""), one("risk, instant", percent(plan?.promised_risk), ""),
+    one("next tack", duration(plan?.next_tack_s), ""), one("there in", duration(plan?.there_s), "", "", THERE), one("off the plan", percent(plan?.path_risk), "", "", OFF_PLAN),
     one("off the leg", boat?.cross_track_m == null ? NONE : `${figure(Math.abs(boat.cross_track_m), 1)} m ${boat.cross_track_m < -0.05 ? "L" : boat.cross_track_m > 0.05 ? "R" : ""}`, ""),
     ...(view?.water?.is_planned ? [one("current", `${bearing(view.water.set_deg)} ${speed(view.water.drift_mps)}`, speedUnit())] : []),
     one("battery", figure(boat?.battery_v, 1), boat?.battery_share == null ? "V" : `V ${percent(boat.battery_share)}`));
@@ -87,13 +90,13 @@ function plan(view) {
     ["made for", p.twd_from_deg === null ? NONE : `${bearing(p.twd_from_deg)} ${speed(p.tws_mps)} ${speedUnit()}`],
     ["time", p.cost_s === null ? NONE : `${duration(p.cost_s)}${p.bound_s ? `, no less than ${duration(p.bound_s)}` : ""}`],
     ["in the wind's spread", p.median_s === null ? NONE : `${duration(p.median_s)}, nine of ten ${p.late_s === null ? "not in any time" : duration(p.late_s)}`],
-    ["risk each instant", percent(p.promised_risk)], ["risk of it all", percent(p.path_risk)],
+    ["there in", p.there_s === null ? NONE : `${duration(p.there_s)}, nine of ten ${duration(p.there_late_s)}`, THERE], ["off the plan", percent(p.path_risk), OFF_PLAN],
     ["margin", distance(p.margin_m)], ["clearance expected", distance(p.expected_clearance_m)], ["leg", `${p.leg ?? NONE} of ${p.count ?? NONE}`],
     ...(p.rung ? [["found by", p.rung]] : []), ...(p.bound_for ? [["bound for", p.bound_for]] : [])];
-  get("planfacts").replaceChildren(...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
+  get("planfacts").replaceChildren(...facts.map(([name, value, hint]) => el("div", hint ? { title: hint } : {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
   const legs = p?.legs ?? [];
   const first = p?.leg ?? 1;
-  keep("plantable", table("Legs that are left; spare: nearest beyond the margin", ["leg", "risk", "course", "TWA", "length", "no-go", "spare"], legs.map((leg, n) => [
+  keep("plantable", table("Legs that are left; spare: nearest beyond the margin", ["leg", "off plan", "course", "TWA", "length", "no-go", "spare"], legs.map((leg, n) => [
     `${first + n}${leg.is_loiter ? " loiter" : leg.manoeuvre ? ` ${leg.manoeuvre}` : leg.is_beat ? " beat" : ""}`, el("span", { class: `risk r${riskClass(leg.risk)}` }, percent(leg.risk)),
     bearing(leg.course_deg), atBow(leg.twa_deg), leg.is_loiter ? NONE : distance(leg.length_m), figure(leg.no_go_half_deg, 0, "°"), distance(leg.clearance_m)])));
 }

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
 from companion.boat.tracking import SHORT_S
 from companion.planner import Plan, PlanStatus
+from companion.planner.plan import Arrival
 from companion.planner.problem import evaluate, resolved
+from companion.planner.risk import arrival, path_risk
 from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.errands import Kind, errand
@@ -133,10 +136,11 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
             return False
     elif gain > max(turn.config.keep_gain_s, turn.config.keep_gain * old.time_s):
         return False
-    facts = pending.facts
+    facts, when, told = pending.facts, arrival(problem, old.legs), path_risk(problem, old.legs)
     turn.update(route=replace(
         route, plan_t_s=facts.plan_t_s, plan_twd_from_rad=facts.plan_twd_from_rad, plan_tws_mps=facts.plan_tws_mps,
-        plan_half_width_rad=facts.plan_half_width_rad, risk=plan.risk if gain <= 0.0 else route.risk,
+        plan_half_width_rad=facts.plan_half_width_rad, risk=told.total, vessel_risk=told.vessels.total,
+        cost_s=old.time_s, median_s=_time(when, "median_s"), late_s=_time(when, "late_s"),
     ))
     turn.say(
         Severity.INFO, "plan kept",
@@ -170,7 +174,7 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
         is_place=bound is not None and bound.kind is Kind.BOX and bound.name == pending.facts.bound_for)
     facts = replace(
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
-        median_s=_time(plan, "median_s"), late_s=_time(plan, "late_s"),
+        median_s=_time(plan.arrival, "median_s"), late_s=_time(plan.arrival, "late_s"),
         expected_clearance_m=expected_m, why=plan.why.text or plan.reason)
     old = turn.state.route
     if keep + len(tail.points_en) + 1 > turn.config.max_items and old is not None:
@@ -220,9 +224,9 @@ def _look_at_time(turn: Turn, route: Route) -> None:
                  f"winds of ten: {late}")
 
 
-def _time(plan: Plan, quantile: str) -> float | None:
+def _time(when: Arrival | None, quantile: Literal["median_s", "late_s"]) -> float | None:
     """Return a quantile of a plan's time [s], None: it is not told, or not in any time."""
-    value = math.inf if plan.arrival is None else getattr(plan.arrival, quantile)
+    value = math.inf if when is None else getattr(when, quantile)
     return float(value) if math.isfinite(value) else None
 
 

@@ -1,0 +1,338 @@
+"""Where the boat will be, and when it is there: the present wind, and the pace that it keeps.
+
+The boat is walked along the legs that are left as the autopilot steers: straight to a waypoint where that can be
+sailed, else close-hauled within its corridor, at its polar's speed, with the time that turns take. ``Pace`` is what it
+has lately made of such walks: a boat that is slower than its polar, or loses more in its tacks, is there later.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from companion.boat import AutopilotLimits, Boat
+from companion.current import over_water
+from companion.geo.angles import difference_rad, heading_of, unit_en
+from companion.messages import Command, Mode
+from companion.skipper.step import Route, SkipperState, Snapshot, WindView
+from companion.skipper.way import PointEn, Voyage, cross_track_m, gates_of, moved
+
+Disc = tuple[PointEn, float]               # centre and radius [m]
+Winds = tuple[tuple[float, float], ...]    # from [rad] and speed [m/s], for WIND_S each
+
+FOLLOWS = frozenset({Mode.AUTO, Mode.GUIDED})   # the modes in which the boat follows the legs on board
+STEP_S = 5.0          # of a walk
+REACH_S = 900.0       # walked so far in steps; the legs beyond that are taken whole
+WIND_S = 30.0         # the wind is taken to be one for so long
+SLOW_MPS = 0.2        # the least that it is taken to make
+TURN_RAD = math.radians(15.0)   # a smaller turn costs nothing
+LOOK_S = 30.0         # a walk to the end of the leg that is sailed then is held against what comes ...
+TRIED_S = 20.0        # ... after so long
+KEPT = math.exp(-TRIED_S / 150.0)   # of a try's weight with each that follows: they count for two and a half minutes
+PRIOR = 3.0           # tries that the polar counts as at first
+SLOWEST, FASTEST = 0.25, 1.6    # of the polar: what is outside says something else than how fast it sails
+PACE_SPREAD = 0.25    # standard deviation of what TRIED_S of sailing make of a walk
+LATE_LEAST_S = 2.0    # ... and of any time
+LATE_SIGMAS = 1.28    # of a normal: nine in ten are below
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waypoint:
+    """A place that the boat is expected at, ``in_s`` from now; ``is_starboard``: the tack that it is then on."""
+
+    in_s: float
+    at_en_m: PointEn
+    is_starboard: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Try:
+    """A walk to be held against what comes: to the end of item ``until`` of a plan, in ``winds``, in ``walk_s``."""
+
+    t_s: float
+    plan_id: int
+    until: int
+    winds: Winds
+    walk_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """How much of a walk the boat makes good: of the last minutes, in tries of ``TRIED_S``.
+
+    ``tries`` is how many it rests on, the older the less, ``took_s`` what they took and ``made_s`` by how much less was
+    then left to be walked; ``prior`` is what the polar counts beside them, and ``tried`` the walk that is being sailed.
+    """
+
+    tries: float = 0.0
+    prior: float = PRIOR
+    took_s: float = 0.0
+    made_s: float = 0.0
+    tried: Try | None = None
+
+    @property
+    def share(self) -> float:
+        """Return the pace as a share of the polar's."""
+        prior_s = self.prior * TRIED_S
+        return 1.0 if self.tries == 0.0 else min(
+            max((self.made_s + prior_s) / (self.took_s + prior_s), SLOWEST), FASTEST)
+
+    def is_due(self, t_s: float, plan_id: int) -> bool:
+        """Return whether a walk is to be begun: the last one is over, or was of another plan."""
+        return self.tried is None or self.tried.plan_id != plan_id or t_s - self.tried.t_s >= TRIED_S
+
+    def seen(self, t_s: float, left_s: float | None, fresh: Try | None) -> Pace:
+        """Return the pace where a walk ends and ``fresh`` begins.
+
+        ``left_s`` is what is left of the walk that was tried; None: that is not known, or the walk was given up.
+        """
+        tried, after = self.tried, replace(self, tried=fresh)
+        if tried is None or left_s is None or t_s - tried.t_s > 1.5 * TRIED_S:
+            return after
+        return replace(after, tries=KEPT * self.tries + 1.0, prior=KEPT * self.prior,
+                       took_s=KEPT * self.took_s + t_s - tried.t_s, made_s=KEPT * self.made_s + tried.walk_s - left_s)
+
+    def left_s(self, walk_s: float) -> float:
+        """Return how long a walk of ``walk_s`` will take [s]: half of the boats are there."""
+        return walk_s / self.share
+
+    def late_s(self, walk_s: float, spread: float) -> float:
+        """Return by when nine boats in ten have made a walk [s]; ``spread``: the wind's part of it, of the whole time.
+
+        What is not known of the pace itself goes with the time, what tacks and gusts do with its root.
+        """
+        time_s = self.left_s(walk_s)
+        each = PACE_SPREAD / self.share
+        known = each / math.sqrt(max(1.0, self.tries + self.prior))
+        sigma_s = math.hypot(time_s * math.hypot(spread, known), each * math.sqrt(TRIED_S * time_s), LATE_LEAST_S)
+        return time_s + LATE_SIGMAS * sigma_s
+
+
+PRIOR_PACE = Pace()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ahead:
+    """The way ahead at the boat's pace: places in the order of time, and when the goal that is next is reached.
+
+    ``there_s`` is in half of the cases [s], ``there_late_s`` in nine of ten; None: the way on board does not end there.
+    """
+
+    points: tuple[Waypoint, ...] = ()
+    there_s: float | None = None
+    there_late_s: float | None = None
+
+    def at(self, in_s: float) -> PointEn | None:
+        """Return where the boat is expected ``in_s`` from now; None: that is not known."""
+        for a, b in zip(self.points, self.points[1:], strict=False):
+            if a.in_s <= in_s <= b.in_s:
+                part = 0.0 if b.in_s == a.in_s else (in_s - a.in_s) / (b.in_s - a.in_s)
+                return (a.at_en_m[0] + part * (b.at_en_m[0] - a.at_en_m[0]),
+                        a.at_en_m[1] + part * (b.at_en_m[1] - a.at_en_m[1]))
+        return None
+
+
+NOTHING_AHEAD = Ahead()
+
+
+def ahead_of(snapshot: Snapshot, state: SkipperState, voyage: Voyage, pace: Pace) -> Ahead:
+    """Return where the boat is expected from here on; empty where it is not being sailed, or nothing is known."""
+    walk = _walk(snapshot, state, voyage)
+    if walk is None or state.route is None:
+        return NOTHING_AHEAD
+    points = tuple(replace(p, in_s=round(pace.left_s(p.in_s), 1)) for p in walk.points)
+    if walk.goal_s is None:
+        return Ahead(points=points)
+    spread = _wind_spread(state.route)
+    return Ahead(points=points, there_s=pace.left_s(walk.goal_s), there_late_s=pace.late_s(walk.goal_s, spread))
+
+
+def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -> Pace:
+    """Return the pace after a step."""
+    route, tried = state.route, pace.tried
+    autopilot = snapshot.autopilot
+    if route is None or state.doubt is not None or autopilot is None or not autopilot.is_armed:
+        return pace if tried is None else replace(pace, tried=None)
+    if not pace.is_due(snapshot.t_s, route.plan_id):
+        return pace
+    walk = _walk(snapshot, state, voyage, whole_s=LOOK_S)
+    fresh = None if walk is None or walk.last < 0 else Try(
+        t_s=snapshot.t_s, plan_id=route.plan_id, until=walk.last, winds=walk.winds, walk_s=walk.points[-1].in_s)
+    left = None
+    if tried is not None and tried.plan_id == route.plan_id and state.index <= tried.until:
+        left = _walk(snapshot, state, voyage, until=tried.until, winds=tried.winds)
+    return pace.seen(snapshot.t_s, None if left is None else left.points[-1].in_s, fresh)
+
+
+def _wind_spread(route: Route) -> float:
+    """Return the standard deviation of a plan's time that the wind's spread makes, as a share of the time."""
+    if route.median_s is None or route.late_s is None or route.median_s <= 0.0:
+        return 0.0
+    return max(0.0, route.late_s / route.median_s - 1.0) / LATE_SIGMAS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Walked:
+    points: tuple[Waypoint, ...]
+    winds: Winds
+    last: int                  # the item to whose end it has come, -1: none
+    goal_s: float | None
+
+
+def _walk(
+    snapshot: Snapshot, state: SkipperState, voyage: Voyage, *, whole_s: float = math.inf, until: int | None = None,
+    winds: Winds | None = None,
+) -> _Walked | None:
+    """Walk along the legs that are left; None where the boat is not being sailed.
+
+    The walk ends with the leg that is sailed after ``whole_s``, or with item ``until``; ``winds`` are taken in place of
+    those that are expected.
+    """
+    here, wind, vehicle, route = snapshot.position_en_m, snapshot.wind, snapshot.vehicle, state.route
+    autopilot = snapshot.autopilot
+    if here is None or vehicle is None or route is None or wind.mean_twd_from_rad is None or (
+            wind.mean_tws_mps is None) or not state.sailing or state.over or autopilot is None or (
+            autopilot.mode not in FOLLOWS):
+        return None
+    limits = snapshot.limits or AutopilotLimits()
+    if autopilot.mode is Mode.GUIDED:
+        limits = replace(limits, sail_xtrack_max_m=0.0)   # GUIDED has no corridor
+    winds = _winds(wind, wind.mean_twd_from_rad, wind.mean_tws_mps) if winds is None else winds
+    walker = _Walker(winds, snapshot.current.planned_en_mps, voyage.boat, limits, heading_rad=vehicle.heading_rad)
+    gates = gates_of(voyage, state.approaches)
+    goal = next((n for n in range(state.gate, len(gates)) if gates[n].ends_goal), None)
+    mark = None if goal is None else (gates[goal].en_m, gates[goal].radius_m)
+    at, time_s, last = here, 0.0, -1
+    goal_s: float | None = None
+    points = [Waypoint(in_s=0.0, at_en_m=at, is_starboard=walker.is_starboard)]
+    for n in range(state.index, len(route.items)):
+        if route.items[n].command != Command.NAV_WAYPOINT or time_s >= whole_s or (until is not None and n > until):
+            break
+        start, end, last = route.leg_from_en_m[n], route.points_en_m[n], n
+        ends_goal = goal is not None and route.gate_of[n] == goal
+        while time_s < REACH_S:
+            to_go_m = math.dist(at, end)
+            if to_go_m <= limits.wp_radius_m:
+                break
+            velocity_en, lost_s = walker.steer(time_s, at, start, end)
+            if lost_s > 0.0:
+                time_s += lost_s
+                points.append(Waypoint(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
+            step_s = min(STEP_S, to_go_m / math.hypot(*velocity_en))
+            before, at = at, (at[0] + step_s * velocity_en[0], at[1] + step_s * velocity_en[1])
+            if ends_goal and goal_s is None and mark is not None and (part := _entered(before, at, mark)) is not None:
+                goal_s = time_s + part * step_s
+            time_s += step_s
+            points.append(Waypoint(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
+        if math.dist(at, end) > limits.wp_radius_m:   # what is farther is taken whole
+            time_s, at = time_s + walker.whole_s(at, end), end
+            if until is not None or whole_s < math.inf:
+                points.append(Waypoint(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
+        if ends_goal and goal_s is None:
+            goal_s = time_s
+    return _Walked(points=tuple(points), winds=winds, last=last, goal_s=goal_s)
+
+
+def _entered(before: PointEn, at: PointEn, mark: Disc) -> float | None:
+    """Return where a step enters a disc, as a share of it; None: it does not."""
+    (east, north), radius_m = mark
+    if math.dist(at, (east, north)) > radius_m:
+        return None
+    step = (at[0] - before[0], at[1] - before[1])
+    off = (before[0] - east, before[1] - north)
+    a, b = step[0] ** 2 + step[1] ** 2, off[0] * step[0] + off[1] * step[1]
+    c = off[0] ** 2 + off[1] ** 2 - radius_m ** 2
+    return 0.0 if c <= 0.0 or a == 0.0 else (-b - math.sqrt(max(0.0, b * b - a * c))) / a
+
+
+def _winds(wind: WindView, twd_rad: float, tws_mps: float) -> Winds:
+    """Return the wind that is expected (from [rad], speed [m/s]) at the middle of each ``WIND_S`` from now."""
+    forecast = wind.forecast
+    if forecast is None:
+        return ((twd_rad, tws_mps),)
+    at_s = (np.arange(math.ceil(REACH_S / WIND_S)) + 0.5) * WIND_S
+    at_s = at_s[:1 + int(np.searchsorted(at_s, forecast.horizon_s[-1]))]
+    twd = np.interp(at_s, forecast.horizon_s, np.unwrap(forecast.mean_twd_from_rad))
+    tws = np.interp(at_s, forecast.horizon_s, forecast.mean_tws_mps)
+    return tuple(zip(twd.tolist(), tws.tolist(), strict=True))
+
+
+class _Walker:
+    """Steers as the autopilot does in the wind that is expected and a steady current."""
+
+    def __init__(
+        self, winds: Winds, current_en_mps: PointEn, boat: Boat, limits: AutopilotLimits,
+        *, heading_rad: float,
+    ) -> None:
+        self._winds = winds
+        self._twd_rad, self._tws_mps = over_water(*winds[0], current_en_mps)
+        self._current, self._boat, self._limits, self._heading_rad = current_en_mps, boat, limits, heading_rad
+        self.is_starboard = difference_rad(self._twd_rad, heading_rad) > 0.0   # the wind is to the right of the bow
+
+    def steer(self, time_s: float, at: PointEn, start: PointEn, end: PointEn) -> tuple[PointEn, float]:
+        """Return the velocity over ground [m/s] from ``at`` along the leg, and what the turn to it takes [s]."""
+        wind = self._winds[min(int(time_s / WIND_S), len(self._winds) - 1)]
+        self._twd_rad, self._tws_mps = over_water(*wind, self._current)
+        was_starboard = self.is_starboard
+        course_rad = heading_of(end[0] - at[0], end[1] - at[1])
+        off_rad = difference_rad(self._twd_rad, course_rad)
+        if abs(off_rad) < self._limits.sail_no_go_angle_rad:
+            self._tack_at(at, start, end)
+            course_rad = self._close_rad(is_starboard=self.is_starboard)
+            velocity_en = self._over_ground(course_rad)
+        else:
+            self.is_starboard = off_rad > 0.0
+            velocity_en = self._along(course_rad, off_rad)
+        turn_rad = abs(difference_rad(course_rad, self._heading_rad))
+        self._heading_rad = course_rad
+        lost_s = turn_rad / self._boat.turn_rate_radps if turn_rad > TURN_RAD else 0.0
+        if was_starboard != self.is_starboard:
+            is_tack = abs(difference_rad(self._twd_rad, course_rad)) < math.pi / 2.0
+            lost_s += self._boat.tack_loss_s if is_tack else self._boat.gybe_loss_s
+        return velocity_en, lost_s
+
+    def whole_s(self, at: PointEn, end: PointEn) -> float:
+        """Return how long the way to ``end`` takes, beaten where it asks for that [s]."""
+        length_m = math.dist(at, end)
+        if length_m < 1e-9:
+            return 0.0
+        no_go_rad = self._limits.sail_no_go_angle_rad
+        course_rad = heading_of(end[0] - at[0], end[1] - at[1])
+        off_rad = difference_rad(self._twd_rad, course_rad)
+        if abs(off_rad) >= no_go_rad:
+            return length_m / math.hypot(*self._along(course_rad, off_rad))
+        speed_mps = self._boat.polar.speed_mps(no_go_rad, self._tws_mps) * math.cos(no_go_rad) / math.cos(off_rad)
+        east, north = unit_en(course_rad)
+        return length_m / max(SLOW_MPS, speed_mps + east * self._current[0] + north * self._current[1])
+
+    def _close_rad(self, *, is_starboard: bool) -> float:
+        """Return the close-hauled course on a tack [rad]."""
+        no_go_rad = self._limits.sail_no_go_angle_rad
+        return self._twd_rad - no_go_rad if is_starboard else self._twd_rad + no_go_rad
+
+    def _over_ground(self, heading_rad: float) -> PointEn:
+        """Return the velocity over ground on a heading [m/s]."""
+        speed_mps = max(SLOW_MPS, self._boat.polar.speed_mps(
+            abs(difference_rad(self._twd_rad, heading_rad)), self._tws_mps))
+        east, north = unit_en(heading_rad)
+        return speed_mps * east + self._current[0], speed_mps * north + self._current[1]
+
+    def _along(self, course_rad: float, off_rad: float) -> PointEn:
+        """Return the velocity over ground of a boat that keeps to a course in the current [m/s]."""
+        speed_mps = self._boat.polar.speed_mps(abs(off_rad), self._tws_mps)
+        east, north = unit_en(course_rad)
+        along_mps = self._current[0] * east + self._current[1] * north
+        across_mps = self._current[0] * north - self._current[1] * east
+        made_mps = max(SLOW_MPS, along_mps + math.sqrt(max(0.0, speed_mps * speed_mps - across_mps * across_mps)))
+        return made_mps * east, made_mps * north
+
+    def _tack_at(self, at: PointEn, start: PointEn, end: PointEn) -> None:
+        """Tack at the corridor's edge, as the autopilot does."""
+        most_m, off_m = self._limits.sail_xtrack_max_m, cross_track_m(at, start, end)
+        if most_m <= 0.0 or abs(off_m) < most_m:
+            return
+        close_rad = self._close_rad(is_starboard=self.is_starboard)
+        if abs(cross_track_m(moved(at, close_rad, 1.0), start, end)) > abs(off_m):
+            self.is_starboard = not self.is_starboard

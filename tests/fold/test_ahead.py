@@ -1,0 +1,101 @@
+"""Where the boat will be and when it is there: what is told held against what came."""
+
+import statistics
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from companion.ahead import PRIOR_PACE, TRIED_S, Try
+from companion.clock import run_virtual
+from companion.messages import Mode
+from companion.skipper.step import Announce
+from sitl.run.embedded import run_embedded
+from sitl.scene import load_scenario
+
+DEMO = Path("sitl/scenarios/demo.toml")
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    """The demonstration's steps, and when its goal was reached."""
+    steps = []
+    run_virtual(run_embedded(load_scenario(DEMO), DEMO, 0, tmp_path_factory.mktemp("demo") / "voyage",
+                             on_status=lambda _, step: steps.append(step)))
+    return steps, next(step.snapshot.t_s for step in steps if step.state.reached)
+
+
+def told(demo):
+    """Yield a step, what it tells and how long it took from there [s]."""
+    steps, reached_s = demo
+    for step in steps:
+        ahead, left_s = step.ahead(), reached_s - step.snapshot.t_s
+        if ahead.there_s is not None and left_s > 0.0:
+            yield step, ahead, left_s
+
+
+def test_the_time_that_is_told_in_the_demo_comes(demo):
+    """It said "there in 131 s (90 %: 148 s)" 15 s before the mark."""
+    last = [ahead.there_s - left_s for _, ahead, left_s in told(demo) if left_s <= 60.0]
+    assert len(last) > 50
+    assert abs(statistics.median(last)) <= 10.0
+    assert max(map(abs, last)) <= 20.0
+    whole = [(ahead, left_s) for _, ahead, left_s in told(demo)]
+    assert len(whole) > 200
+    assert abs(statistics.median(ahead.there_s - left_s for ahead, left_s in whole)) <= 15.0
+    assert 0.8 <= statistics.mean(left_s <= ahead.there_late_s for ahead, left_s in whole) <= 1.0
+    assert all(ahead.there_late_s > ahead.there_s for ahead, _ in whole)
+
+
+def test_a_plan_that_is_kept_has_its_own_time_and_the_new_clock(demo):
+    """It had the clock of the plan that was not taken, and the length that it had when it was made itself."""
+    kept = 0
+    for step in demo[0]:
+        for said in step.actions:
+            if isinstance(said, Announce) and "the old plan stays" in said.text:
+                kept += 1
+                assert f"({step.state.route.cost_s:.0f} s;" in said.text
+                assert step.state.route.median_s is None or (
+                    0.5 < step.state.route.median_s / step.state.route.cost_s < 2.0)
+    assert kept > 0
+
+
+def test_a_boat_that_is_not_sailing_the_plan_is_told_nothing(demo):
+    step, ahead, _ = next(told(demo))
+    assert ahead.points
+    for changed in (
+        replace(step, snapshot=replace(step.snapshot, autopilot=replace(step.snapshot.autopilot, mode=Mode.LOITER))),
+        replace(step, state=replace(step.state, route=None)),
+        replace(step, snapshot=replace(step.snapshot, position_en_m=None)),
+    ):
+        assert changed.ahead().there_s is None
+        assert not changed.ahead().points
+
+
+def paced(share, *, seconds=300.0):
+    """Return the pace of a boat that has made ``share`` of its polar's speed for a time."""
+    pace, t_s, left_s = PRIOR_PACE, 0.0, 1000.0
+    while t_s < seconds:
+        if pace.is_due(t_s, 1):
+            pace = pace.seen(t_s, left_s, Try(t_s=t_s, plan_id=1, until=0, winds=(), walk_s=left_s))
+        t_s, left_s = t_s + 1.0, left_s - share
+    return pace
+
+
+@pytest.mark.parametrize("share", [0.5, 0.8, 1.2])
+def test_a_boat_that_is_not_its_polars_is_there_when_it_is(share):
+    pace = paced(share)
+    assert pace.share == pytest.approx(share, abs=0.1 * abs(1.0 - share) + 0.02)
+    assert pace.left_s(100.0) == pytest.approx(100.0 / share, rel=0.1)
+    barely = replace(pace, prior=0.0, tries=2.0, took_s=40.0, made_s=40.0 * pace.share)
+    assert pace.left_s(100.0) < pace.late_s(100.0, 0.0) < pace.late_s(100.0, 0.2) < barely.late_s(100.0, 0.2)
+
+
+def test_a_walk_on_another_plan_or_after_a_pause_tells_nothing():
+    first = Try(t_s=0.0, plan_id=1, until=3, winds=(), walk_s=100.0)
+    begun = PRIOR_PACE.seen(0.0, None, first)
+    assert begun.is_due(1.0, 2)
+    assert not begun.is_due(1.0, 1)
+    assert begun.seen(5.0, None, replace(first, plan_id=2)).share == 1.0
+    assert begun.seen(2.0 * TRIED_S, 90.0, None).share == 1.0
+    assert begun.seen(TRIED_S, 90.0, None).share < 1.0
