@@ -16,6 +16,8 @@ from companion.current import FITS_S, STILL, CurrentEstimator, Prior, Sailing
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
+from companion.geofence import Zone
+from companion.geofence.formats import Findings, items_to_zones
 from companion.mavlink.trust import GAP_S, UID_EVERY_S, Identity, Witness
 from companion.mavlink.wire import (
     AUTOPILOT_COMPONENT,
@@ -34,6 +36,7 @@ from companion.messages import (
     ApparentWind,
     AutopilotStatus,
     GeoPoint,
+    MissionItem,
     Mode,
     StatusText,
     VehicleState,
@@ -267,6 +270,7 @@ class VoyageFold:
         self._autopilot: AutopilotStatus | None = None
         self._heartbeat_s: float | None = None
         self._mission = MissionOnBoard()
+        self._fence: tuple[Zone, ...] = ()   # drawn on the autopilot
         self._mode: Mode | None = None
         self._planner_alive = True
         self._events: list[Event] = []
@@ -335,6 +339,13 @@ class VoyageFold:
         if isinstance(outcome, ReadOutcome) and outcome.items is not None:
             self._mission = MissionOnBoard(items=outcome.items, read_t_s=t_s)
         self._outcomes.append(outcome)
+
+    def fence(self, items: tuple[MissionItem, ...]) -> None:
+        """Take what is drawn on the autopilot as its fence; what of it cannot be is said and left out."""
+        findings = Findings()
+        self._fence, _ = items_to_zones(items, findings, first=1)
+        for finding in findings:
+            self._disbelieve(f"fence {finding.place}", f"the fence on the autopilot, {finding.place}: {finding.text}")
 
     def event(self, event: Event) -> None:
         """Take something that happened outside the autopilot's messages: an order of the crew."""
@@ -450,6 +461,7 @@ class VoyageFold:
             has_company=self._has_company,
             shore_age_s=None if self._shore_s is None else t_s - self._shore_s,
             limits=self._parameters.limits,
+            fence=self._fence,
             permissions=self.permissions,
             planner_alive=self._planner_alive,
             traffic=self._targets.picture(t_s) if self._targets.last_heard_s is not None else None,

@@ -151,7 +151,7 @@ class Recorded:
         ends = [*(start[0] for start in self._starts[1:]), last_s]
         fed: dict[float, list[dict[str, Any]]] = {}
         for record in self._decisions:
-            if record["kind"] in {"ais", "others", "order"}:
+            if record["kind"] in {"ais", "others", "order", "fence read"}:
                 fed.setdefault(float(record["t_s"]), []).append(record)
         for (start_s, persisted, known, epoch_s), end_s, gap_s in zip(
                 self._starts, ends, _gaps(self._decisions), strict=True):
@@ -193,6 +193,8 @@ class Recorded:
                         fold.take(ais_of(record))
                     elif record["kind"] == "order":
                         fold.event(Order.from_dict(record["order"]))
+                    elif record["kind"] == "fence read":
+                        fold.fence(_items(record["items"]))
                     else:
                         fold.others(tuple(record["neighbours"]), has_company=record["company"],
                                     has_shore=record.get("shore", False))
@@ -294,6 +296,12 @@ def _plain(record: dict[str, Any]) -> dict[str, Any]:
     return plain
 
 
+def _items(rows: list[list[Any]]) -> tuple[MissionItem, ...]:
+    return tuple(
+        MissionItem(command=c, lat_e7=lat, lon_e7=lon, alt_m=alt, frame=frame, params=(p[0], p[1], p[2], p[3]))
+        for c, lat, lon, alt, frame, p in rows)
+
+
 def _outcome(record: dict[str, Any]) -> Outcome:
     if record["kind"] == "plan":
         plan = None if record["plan"] is None else Plan.from_dict(record["plan"])
@@ -305,11 +313,7 @@ def _outcome(record: dict[str, Any]) -> Outcome:
     if kind == "ReadOutcome":
         items = record["items"]
         return ReadOutcome(
-            read_id=record["read_id"], text=record["text"], items=None if items is None else tuple(
-                MissionItem(command=c, lat_e7=lat, lon_e7=lon, alt_m=alt, frame=frame,
-                            params=(p[0], p[1], p[2], p[3]))
-                for c, lat, lon, alt, frame, p in items
-            ))
+            read_id=record["read_id"], text=record["text"], items=None if items is None else _items(items))
     return CommandOutcome(
         command_id=record["command_id"], result=CommandResult[record["result"]], text=record["text"])
 

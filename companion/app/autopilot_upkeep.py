@@ -18,6 +18,7 @@ from companion.mavlink.link import Link
 from companion.mavlink.transfers import CommandAnswer
 from companion.mavlink.trust import LISTEN_S, OWN_COMPONENT, type_words, yields_to
 from companion.mavlink.wire import RANGES
+from companion.messages import MissionItem
 from companion.skipper.step import Severity, is_given_up
 
 LOOK_S = 1.0
@@ -26,6 +27,10 @@ PARAMETER_AGAIN_S = 10.0
 # All are read again this often: what was changed, damaged or forged does not stay [s].
 PARAMETERS_EVERY_S = 300.0
 FENCE_TRIES = 5
+FENCE_EVERY_S = 15.0   # between two looks at what is drawn on the autopilot
+FENCE_AGAIN_S = 5.0    # ... when it could not be read
+FENCE_READ_S = 3.0     # that one takes at the most
+YIELDS_S = 0.1         # so soon an upload has the link to itself
 
 Record = Callable[[dict[str, Any]], None]
 
@@ -56,7 +61,59 @@ async def keep_parameters(fold: VoyageFold, autopilot: Autopilot) -> None:
         await asyncio.sleep(LOOK_S)
 
 
-async def keep_fence(fold: VoyageFold, autopilot: Autopilot, mission: Mission, record: Record) -> None:
+async def keep_fence(
+    fold: VoyageFold, autopilot: Autopilot, mission: Mission, record: Record,
+    take: Callable[[tuple[MissionItem, ...]], None],
+) -> None:
+    """Upload the fence, where it may be, once the autopilot is known to be ours, and read what somebody draws there.
+
+    ``take`` hears what is drawn on the autopilot when that has changed.
+    """
+    await _place_fence(fold, autopilot, mission, record)
+    await _read_fence(fold, autopilot, take)
+
+
+async def _read_fence(
+    fold: VoyageFold, autopilot: Autopilot, take: Callable[[tuple[MissionItem, ...]], None],
+) -> None:
+    """Read the fence now and then while there is one in force, and when the autopilot says anything new of it.
+
+    Nothing on the link tells of a fence that is drawn anew.
+    """
+    told: tuple[MissionItem, ...] | None = None
+    seen: tuple[bool | None, int | None] = None, None
+    next_s = -math.inf
+    while True:
+        status = autopilot.status
+        shown = (None, None) if status is None else (status.fence_breached, status.fence_breaches)
+        if shown != seen:
+            seen, next_s = shown, -math.inf
+        if shown[0] is not None and now_s() >= next_s and autopilot.link.is_alive and (
+            fold.state.is_ours and fold.state.pending_upload is None
+        ):
+            items = await _fence_items(fold, autopilot)
+            next_s = now_s() + (FENCE_EVERY_S if items is not None else FENCE_AGAIN_S)
+            if items is not None and items != told:
+                told = items
+                take(items)
+        await asyncio.sleep(LOOK_S)
+
+
+async def _fence_items(fold: VoyageFold, autopilot: Autopilot) -> tuple[MissionItem, ...] | None:
+    """Return what is drawn on the autopilot; None: it could not be read, or a plan is to be uploaded instead."""
+    reading = asyncio.create_task(autopilot.read_fence(), name="fence read")
+    end_s = now_s() + FENCE_READ_S
+    try:
+        while now_s() < end_s and fold.state.pending_upload is None:
+            await asyncio.wait({reading}, timeout=YIELDS_S)
+            if reading.done():
+                return reading.result().items
+        return None
+    finally:
+        reading.cancel()
+
+
+async def _place_fence(fold: VoyageFold, autopilot: Autopilot, mission: Mission, record: Record) -> None:
     """Upload the fence, where it may be, once the autopilot is known to be ours; begun again when that was in doubt."""
     upload: asyncio.Task[None] | None = None
     try:

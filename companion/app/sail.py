@@ -42,11 +42,11 @@ from companion.mavlink.link import Link
 from companion.mavlink.transports import Transport
 from companion.mavlink.trust import LinkIdentity, LinkStats
 from companion.mavlink.wire import Drop
-from companion.messages import CompanionStatus
+from companion.messages import CompanionStatus, MissionItem
 from companion.skipper import Skipper
 from companion.skipper.step import Phase, Severity, Snapshot
 from companion.telemetry.console import DISK, GONE, left_behind
-from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, order_record, outcome_record
+from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, fence_record, order_record, outcome_record
 from companion.telemetry.state_file import StateFile
 from companion.telemetry.status import TelemetrySender, companion_status, speak_high_latency, unix_of_boat
 from companion.traffic.listening import Feeds
@@ -113,6 +113,7 @@ class _Shell:
         self._named = mission.autopilot.system     # of our autopilot: as named, or as of the voyage that goes on
         self._refusals: list[str] = []
         self.feeds = Feeds()
+        self._fences: list[tuple[MissionItem, ...]] = []   # that were read of the autopilot since the last step
         self._system: int | None = None            # of our autopilot, as heard
         self._others = NOBODY
         self._autopilot: Autopilot | None = None
@@ -180,7 +181,8 @@ class _Shell:
         keep(Auxiliary.ADOPTION, adoption.run)
         keep(Auxiliary.IDENTITY, lambda: keep_identity(self.fold, autopilot))
         keep(Auxiliary.PARAMETERS, lambda: keep_parameters(self.fold, autopilot))
-        keep(Auxiliary.FENCE, lambda: keep_fence(self.fold, autopilot, self.mission, self._record))
+        keep(Auxiliary.FENCE, lambda: keep_fence(
+            self.fold, autopilot, self.mission, self._record, self._fences.append))
         keep(Auxiliary.RADIO, TelemetrySender(
             autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble).run)
         keep(Auxiliary.HIGH_LATENCY, lambda: speak_high_latency(
@@ -283,6 +285,10 @@ class _Shell:
         for report in self.feeds.take():
             self._note(t_s, ais_record(report))
             self.fold.take(report)
+        for items in self._fences:
+            self._note(t_s, fence_record(items))
+            self.fold.fence(items)
+        self._fences.clear()
         for order in () if self._crew is None else self._crew.take():
             self._note(t_s, order_record(order))
             self.fold.event(order)

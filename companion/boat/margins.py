@@ -37,6 +37,7 @@ class AutopilotLimits:
         "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS", "TURN_RADIUS", "WP_SPEED", "WP_ACCEL", "WP_JERK",
         "ATC_ACCEL_MAX", "FENCE_ENABLE", "FENCE_ACTION", "FENCE_TYPE", "FENCE_RADIUS")
     CIRCLE_BIT: ClassVar[int] = 2   # of FENCE_TYPE
+    POLYGON_BIT: ClassVar[int] = 4
 
     sail_no_go_angle_rad: float = math.radians(45.0)
     sail_xtrack_max_m: float = 10.0  # 0: no corridor, long boards to the layline
@@ -47,6 +48,7 @@ class AutopilotLimits:
     wp_jerk_mps3: float = 1.0
     fence_action: int | None = None  # None: no fence guards this obstacle; 0 report .. 4, see FENCE_ACTION
     fence_circle_m: float | None = None   # radius of the fence around home, if something would be done about it
+    fence_polygons: bool = True      # what is drawn on the autopilot is kept, too
     rc_channels: tuple[int, ...] = (1, 3, 8)  # of the rudder, the throttle and the mode switch, from 1
 
     def __post_init__(self) -> None:
@@ -79,6 +81,7 @@ class AutopilotLimits:
             wp_accel_mps2=accel, wp_jerk_mps3=params.get("WP_JERK", 0.0) or accel,
             fence_action=action if fenced else None,
             fence_circle_m=params.get("FENCE_RADIUS") if is_circled else None,
+            fence_polygons=bool(int(params.get("FENCE_TYPE", cls.POLYGON_BIT)) & cls.POLYGON_BIT),
             rc_channels=tuple(int(params.get(name, channel)) for name, channel in zip(
                 ("RCMAP_ROLL", "RCMAP_THROTTLE", "MODE_CH"), default.rc_channels, strict=True)),
         )

@@ -32,6 +32,8 @@ QUADRANT_SEGMENTS = 4
 OUTWARDS = 1.0 / math.cos(0.75 * math.pi / (2.0 * QUADRANT_SEGMENTS))
 CIRCLE_SEGMENTS = 16   # of a quarter of a circle: 0.1 % of its radius is given away
 MANY_POINTS = 500  # from here on the grid pays for being built and compiled
+SLACK_M = 1.0      # a fence's items are rounded, its circles drawn with sides, its earth another sphere
+AROUND_M = 20_000.0   # of what is known, where nothing limits the water: nobody sails so far in one frame
 
 
 def buffer_out(shape: BaseGeometry, distance_m: float) -> BaseGeometry:
@@ -150,6 +152,56 @@ class LocalArea:
         area = replace(self, limits=limits, edge_name=name if self.limits is None else f"{self.edge_name} or {name}")
         area.__dict__["unfenced"] = self.unfenced   # what was computed of the obstacles serves both
         return area
+
+    @functools.lru_cache(maxsize=4)  # noqa: B019 - an area lives as long as its voyage
+    def taken_by(self, zones: tuple[Zone, ...], margin_m: float) -> BaseGeometry:
+        """Return the water that a fence's zones take and that the margin leaves, prepared; empty where there is none.
+
+        A fence along the mission's own obstacles and edges, which keeps within their margin, takes nothing.
+        """
+        here = shapely.points((0.0, 0.0)) if self.limits is None else self.limits
+        shapes = [(zone.kind, polygon_en(zone.shape, self.frame, cover=zone.kind is ZoneKind.EXCLUSION))
+                  for zone in zones]
+        x0, y0, x1, y1 = shapely.total_bounds([here, *self.polygons, *(shape for _, shape in shapes)])
+        world = shapely.box(x0 - AROUND_M, y0 - AROUND_M, x1 + AROUND_M, y1 + AROUND_M)
+        water = world if self.limits is None else buffer_in(self.limits, margin_m + SLACK_M)
+        left = world
+        for kind, shape in shapes:
+            cut = shapely.intersection if kind is ZoneKind.INCLUSION else shapely.difference
+            left = cut(left, shapely.make_valid(shape))
+        beyond = shapely.difference(world, left)
+        free = shapely.difference(water, self.buffered(margin_m + SLACK_M))
+        wide = shapely.buffer(shapely.intersection(free, beyond), -SLACK_M)
+        # and what of the margin lies beside it
+        taken = shapely.union_all(parts(shapely.intersection(
+            shapely.buffer(wide, margin_m + 3.0 * SLACK_M, quad_segs=QUADRANT_SEGMENTS), beyond)))
+        shapely.prepare(taken)
+        return taken
+
+    @functools.lru_cache(maxsize=4)  # noqa: B019 - an area lives as long as its voyage
+    def without(self, taken: BaseGeometry, name: str) -> LocalArea:
+        """Return the area whose limits leave ``taken`` out, too, by ``name``."""
+        if self.limits is None:
+            x0, y0, x1, y1 = shapely.total_bounds([taken, *self.polygons])
+            limits = shapely.box(x0 - AROUND_M, y0 - AROUND_M, x1 + AROUND_M, y1 + AROUND_M)
+        else:
+            limits = self.limits
+        area = replace(self, limits=shapely.difference(limits, taken),
+                       edge_name=name if self.limits is None else f"{self.edge_name} or {name}")
+        area.__dict__["unfenced"] = self.unfenced   # what was computed of the obstacles serves both
+        return area
+
+    def roomy_en(self, near_en: tuple[float, float], room_m: float) -> tuple[float, float] | None:
+        """Return the place nearest to ``near_en`` that has ``room_m`` about it, or half of that, or ...; None: none."""
+        here = shapely.points(near_en)
+        while room_m >= SLACK_M:
+            water = self.water(room_m)
+            free = shapely.difference(here if water is None else water, self.buffered(room_m))
+            if not free.is_empty:
+                x, y = shapely.get_coordinates(shapely.shortest_line(free, here))[0].tolist()
+                return x, y
+            room_m *= 0.5
+        return None
 
     @functools.cached_property
     def solid(self) -> BaseGeometry:

@@ -18,7 +18,7 @@ from companion.skipper.composed import follow_field
 from companion.skipper.deeds.adrift import follow_ground
 from companion.skipper.deeds.brake import brakes
 from companion.skipper.deeds.doubt import follow
-from companion.skipper.deeds.failsafe import follow_answer, follow_stops, take_over
+from companion.skipper.deeds.failsafe import follow_answer, follow_stops, keeps_off, take_over
 from companion.skipper.deeds.helm import is_busy
 from companion.skipper.deeds.launch import finished, launch, start
 from companion.skipper.deeds.ordered import holds_ashore, leaves_alone, take_orders
@@ -32,6 +32,7 @@ from companion.skipper.intake import (
     take_events,
     take_outcomes,
 )
+from companion.skipper.planning.errands import speak_of_fence
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.step.actions import Action, CancelPlan, RequestPlan, Severity
@@ -109,6 +110,7 @@ class Skipper:
         take_orders(turn)
         _decide(turn, fresh)
         speak_of_stop(turn)
+        speak_of_fence(turn)
         remember_fix(turn)
         return turn.state, tuple(turn.actions)
 
@@ -163,7 +165,7 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
         phase = Phase.WAITING if not state.sailing else turn.state.phase
         turn.phase(phase, f"waiting to hear the autopilot: {heard}")
         return
-    if stand_by(turn) or leaves_alone(turn) or _operator_has_it(turn):
+    if stand_by(turn) or leaves_alone(turn) or keeps_off(turn) or _operator_has_it(turn):
         return
     notice_truncation(turn)
     if not mission_is_known(turn):

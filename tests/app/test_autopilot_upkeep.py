@@ -3,10 +3,11 @@
 import asyncio
 from types import SimpleNamespace
 
-from companion.app.autopilot_upkeep import keep_parameters
-from companion.clock import run_virtual
+from companion.app.autopilot_upkeep import FENCE_EVERY_S, FENCE_READ_S, keep_fence, keep_parameters
+from companion.clock import now_s, run_virtual
 from companion.fold import ToldParameters
 from companion.mavlink.wire import RANGES
+from companion.messages import MissionItem
 
 
 def test_a_parameter_that_seems_to_have_been_set_is_asked_for_again_whether_a_voyage_reads_it_or_not():
@@ -31,3 +32,52 @@ def test_a_parameter_that_seems_to_have_been_set_is_asked_for_again_whether_a_vo
     run_virtual(keep())
     assert asked.count("AHRS_ORIENTATION") == 1
     assert set(asked) == {*RANGES, "AHRS_ORIENTATION"}
+
+
+def test_what_is_drawn_on_the_autopilot_is_read_while_a_fence_is_in_force_and_no_plan_waits_for_it():
+    """Its content was never looked at: a fence that a person drew under way was not known of."""
+    one, other = (MissionItem(command=5003, params=(100.0, 0, 0, 0)),), (MissionItem(command=5003),)
+    shown = SimpleNamespace(fence_breached=None, fence_breaches=None)
+    state = SimpleNamespace(is_ours=True, pending_upload=None)
+    fold = SimpleNamespace(state=state, permissions=SimpleNamespace(may_upload_fence=False))
+    read_s, ended, taken, answers = [], [], [], []
+
+    async def read_fence():
+        read_s.append(now_s())
+        try:
+            await asyncio.sleep(0.0 if answers else 1e6)   # a link that answers nothing
+        except asyncio.CancelledError:
+            ended.append(now_s())
+            raise
+        return SimpleNamespace(items=answers[-1])
+
+    autopilot = SimpleNamespace(link=SimpleNamespace(is_alive=True), status=shown, read_fence=read_fence)
+
+    async def lived():
+        task = asyncio.create_task(keep_fence(fold, autopilot, None, None, taken.append))
+        await asyncio.sleep(30.0)
+        assert read_s == []                                  # there is none in force
+        shown.fence_breached = False
+        await asyncio.sleep(FENCE_READ_S + 2.0)
+        assert len(read_s) == 1
+        answers.append(one)
+        await asyncio.sleep(3.0 * FENCE_EVERY_S)
+        assert (len(taken), taken[-1]) == (1, one)           # told once
+        answers.append(other)
+        shown.fence_breached, before = True, len(read_s)
+        await asyncio.sleep(2.0)
+        assert len(read_s) == before + 1                     # at once, when anything new is said of it
+        assert taken == [one, other]
+        answers.clear()
+        shown.fence_breaches = 1
+        await asyncio.sleep(1.5)                             # it is being read, to no end ...
+        assert len(ended) == 1
+        state.pending_upload = object()                      # ... and gives way
+        await asyncio.sleep(0.2)
+        assert len(ended) == 2
+        before = len(read_s)
+        await asyncio.sleep(60.0)
+        assert len(read_s) == before
+        task.cancel()
+
+    run_virtual(lived())

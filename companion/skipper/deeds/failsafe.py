@@ -7,11 +7,13 @@ one it was a person, and so it was when the sticks or the mode switch moved.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
 from companion.boat import AutopilotLimits
-from companion.messages import AutopilotStatus, Mode, StatusText
+from companion.messages import AutopilotStatus, Command, Mode, StatusText
+from companion.skipper.deeds.helm import set_mode
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.causes import (
     CRITICAL,
@@ -28,10 +30,19 @@ from companion.skipper.step.causes import (
 )
 from companion.skipper.step.state import PATIENT, Phase, Signs, Stop
 from companion.skipper.step.turn import Turn
+from companion.skipper.way.geometry import bearing_rad, distance_m, moved
+from companion.skipper.way.voyage import PointEn
 
 TOLD_S = 5.0          # a sign this long before or after the change of mode belongs to it
 ASKED_S = 30.0        # an AUTO that shows so long after it was accepted is the one that was asked for
 FILTER_S = 30.0       # a heartbeat that is critical so soon after the filter failed is critical because of it
+NEAR_S = 25.0         # somebody else's way is let be until what it leads over is so near: a LOITER needs half of it
+SLOW_MPS = 1.0
+HULL_M = 2.0          # the way of her antenna is not that of her hull
+CLOSER_M = 1.0        # what leads away from something is let be
+KEPT_OFF, KEPT_OFF_S = "kept off", 1800.0
+_SAILED_TO = frozenset(
+    {Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TIME, Command.NAV_LOITER_TURNS})
 MOVED_US = 100        # a stick or switch that is moved moves by more than this; at rest it trembles by a few
 SAILED = frozenset({Mode.AUTO, Mode.GUIDED, *STOPPING}) - {Mode.HOLD}
 
@@ -131,6 +142,56 @@ def take_over(turn: Turn) -> bool:
     turn.say(Severity.WARNING, f"{stop.cause} failsafe",
              f"put into {stop.mode.name} by the autopilot's {stop.cause} failsafe: {answer.value}", every_s=0.0)
     return True
+
+
+def keeps_off(turn: Turn) -> bool:
+    """Loiter before the hull touches, where somebody else's way is sailed that is not ours to plan; True: it is asked.
+
+    A mission that is not ours stays on board, and so does a mode that a person set. But legs that lead over something
+    solid, and a failsafe's straight way home, are nobody's wish. Once: who sets AUTO again has been told, and means it.
+    """
+    boat, vehicle = turn.boat_en, turn.snapshot.vehicle
+    whose, way = _others_way(turn)
+    if boat is None or vehicle is None or not way or turn.is_said(KEPT_OFF, KEPT_OFF_S):
+        return False
+    near = _begin([boat, *way], NEAR_S * max(vehicle.speed_mps, SLOW_MPS))
+    solid = turn.voyage.area.unfenced
+    if solid.path_clearance_m(near) > min(HULL_M, float(solid.clearance_m([boat])[0]) - CLOSER_M):
+        return False
+    text = f"{whose} leads over {turn.voyage.area.nearest_name(near[-1]) or 'something'}: loitering"
+    if not set_mode(turn, Mode.LOITER, text):
+        return False
+    turn.phase(Phase.HOLDING, f"{text}; waiting for a person")
+    turn.say(Severity.CRITICAL, KEPT_OFF, f"{text}; take her in MANUAL, or AUTO if it is meant", every_s=0.0)
+    return True
+
+
+def _others_way(turn: Turn) -> tuple[str, list[PointEn]]:
+    """Return whose way is sailed that is not ours to plan, and its points ahead; none where it is ours, or no way."""
+    state, stop, status = turn.state, turn.state.stop, turn.autopilot
+    if status is None or not status.is_armed or not (state.foreign or not turn.snapshot.permissions.may_upload):
+        return "", []
+    if status.mode is Mode.AUTO and state.foreign and state.read_items is not None and status.mission_seq:
+        items = [item for item in state.read_items[status.mission_seq - 1:] if item.command in _SAILED_TO]
+        return "the mission on the autopilot, which is not ours,", [
+            turn.voyage.frame.en_from_geo(item.point) for item in items]
+    far_m, course, boat = status.waypoint_distance_m, status.target_bearing_rad, turn.boat_en
+    is_homeward = stop is not None and stop.cause != PERSON and {stop.mode, status.mode} <= HOMEWARD
+    if stop is None or not is_homeward or far_m is None or course is None or boat is None:
+        return "", []
+    return f"the straight way home of the {stop.cause} failsafe", [moved(boat, course, far_m)]
+
+
+def _begin(way: list[PointEn], far_m: float) -> list[PointEn]:
+    """Return the beginning of a way."""
+    out = way[:1]
+    for a, b in itertools.pairwise(way):
+        step_m = distance_m(a, b)
+        if step_m >= far_m:
+            return [*out, moved(a, bearing_rad(a, b), far_m)]
+        out.append(b)
+        far_m -= step_m
+    return out
 
 
 def is_answered(turn: Turn) -> bool:

@@ -23,10 +23,12 @@ from companion.skipper.planning.ends import (
     end_of,
 )
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
+from companion.skipper.step.actions import Severity
 from companion.skipper.step.causes import SHORE, Answer
 from companion.skipper.step.config import End, SafeEnd
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.barriers import disc_wkt
+from companion.skipper.way.circle import Circle, Drawn
 from companion.skipper.way.gates import Gate, marks_of
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import PointEn, Refuge
@@ -35,6 +37,7 @@ DRAGGED = "dragged off"   # a watchdog
 HOME, REST = "home", "the place to rest"
 GOAL_RADIUS_M = 10.0     # a place that is named under way: there within this
 HOME_RADIUS_M = 15.0     # home is where she was armed: a place in the water or at its edge, not a mark
+FENCE_SAID_S = 600.0     # between two words on a fence that is drawn
 
 
 class Kind(enum.Enum):
@@ -181,29 +184,45 @@ def _at_the_end(turn: Turn) -> Errand | None:
 
 def _kept_in(turn: Turn) -> Errand | None:
     """Return where she waits when the autopilot's own fence lies between her and the next goal."""
-    trouble, here = fenced_off(turn, turn.gate), turn.boat_en
-    if not trouble or turn.circle is None:
+    fence, trouble = _fence_before(turn, turn.gate)
+    here = turn.boat_en
+    if fence is None:
         return None
     # From the edge a loiter strays across it: she goes so far in, and is there when she has come there.
-    room_m = min(turn.config.margin_m + 2.0 * turn.config.loiter_radius_m, 0.5 * turn.circle.radius_m)
-    name = f"a place inside {turn.circle.words}"
+    room_m = min(turn.config.margin_m + 2.0 * turn.config.loiter_radius_m, fence.most_room_m)
+    name = f"a place inside {fence.words}"
     route = turn.state.route
     is_bound = route is not None and route.bound_for == name
-    if here is None or (turn.circle.inside_m(here) >= room_m and not is_bound):
+    if here is None or (fence.inside_m(here) >= room_m and not is_bound):
         staying = _stay(turn, trouble)
         if staying is not None or here is None:
             return staying
     place = route.points_en_m[turn.last_waypoint()] if route is not None and is_bound else (
-        turn.circle.place_inside(turn.voyage.area, here, room_m))
+        fence.place_inside(turn.voyage.area, here, room_m))
     return Errand(kind=Kind.INSIDE, name=name, why=trouble, en_m=place)
 
 
 def fenced_off(turn: Turn, gate: Gate | None) -> str:
     """Return why a goal cannot be sailed to for the autopilot's own fence (empty: it can)."""
-    if gate is None or turn.circle is None or turn.state.over:
-        return ""
-    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
-    return turn.circle.trouble(gate.name or "the goal", gate.en_m, floor_m)
+    return _fence_before(turn, gate)[1]
+
+
+def _fence_before(turn: Turn, gate: Gate | None) -> tuple[Circle | Drawn | None, str]:
+    """Return the autopilot's own fence that a goal cannot be sailed to for, and why; None: there is none."""
+    if gate is not None and not turn.state.over:
+        floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
+        for fence in turn.fences:
+            trouble = fence.trouble(gate.name or "the goal", gate.en_m, floor_m)
+            if trouble:
+                return fence, trouble
+    return None, ""
+
+
+def speak_of_fence(turn: Turn) -> None:
+    """Say that somebody has drawn a fence on the autopilot that takes water which the mission leaves."""
+    if turn.drawn is not None:
+        turn.say(Severity.WARNING, "fence drawn", f"{turn.drawn.words} takes water of the mission's: plans keep inside "
+                 "of it", every_s=FENCE_SAID_S)
 
 
 def _found(turn: Turn, end: End, why: str) -> Errand | None:

@@ -75,6 +75,10 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return Trigger(reason=ReplanReason.ORDER, text=state.asked)
     if state.missed_s is not None and bound is None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
+    boat = turn.boat_en
+    if turn.drawn is not None and turn.drawn.cuts([boat, *turn.ahead()]):
+        return Trigger(reason=ReplanReason.OBSTACLE, text=f"{turn.drawn.words} cuts the way", urgent=True,
+                       interval_s=config.no_go_replan_interval_s)
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
     if turn.guidance is Guidance.FIELD and turn.steers:

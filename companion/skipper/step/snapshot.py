@@ -12,6 +12,7 @@ from typing import Any
 
 from companion.boat import AutopilotLimits
 from companion.current import STILL_WATER, Doubt, WaterCurrent
+from companion.geofence import Zone
 from companion.mavlink.trust import Identity
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
 from companion.orders import Order
@@ -172,6 +173,7 @@ class Snapshot:
     shore_age_s: float | None = None       # since a ground station was heard
     has_company: bool = False              # another companion speaks with our ids
     limits: AutopilotLimits | None = None  # None: not read yet
+    fence: tuple[Zone, ...] = ()           # drawn on the autopilot, as last read; (): nothing is, or it was not read
     permissions: Permissions = DRY_RUN
     planner_alive: bool = True
     traffic: TrafficPicture | None = None  # None: no vessel was ever heard

@@ -34,7 +34,7 @@ from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import Snapshot, wind_mean, wind_now
 from companion.skipper.step.state import Phase, Retry, SkipperState, is_given_up
 from companion.skipper.step.still_air import still_air
-from companion.skipper.way.circle import Circle, circle_of
+from companion.skipper.way.circle import Circle, Drawn, circle_of, drawn_of
 from companion.skipper.way.gates import Approach, Gate, gates_of
 from companion.skipper.way.geometry import bearing_rad
 from companion.skipper.way.stemming import Water
@@ -66,21 +66,32 @@ def permitted(action: Action, permissions: Permissions) -> bool:
     return True
 
 
-def _kept_in(voyage: Voyage, circle: Circle | None) -> Voyage:
+def _kept_in(voyage: Voyage, drawn: Drawn | None, circle: Circle | None) -> Voyage:
     """Return the voyage in what the autopilot's own fence leaves of its water."""
+    if drawn is not None:
+        voyage = replace(voyage, area=drawn.left)
     if circle is None:
         return voyage
     return replace(voyage, area=voyage.area.within(circle.en_m, circle.radius_m, circle.words))
 
 
+def _is_fence_off(state: SkipperState, snapshot: Snapshot) -> bool:
+    """Return whether the autopilot keeps a fence no more: under way not for a moment's silence, but by the watchdog."""
+    if state.sailing:
+        return "fence off" in [raised.name for raised in state.raised]
+    return snapshot.autopilot is not None and snapshot.autopilot.fence_on is False
+
+
 class Turn:
-    """The work of one step. ``voyage`` is in the water that the autopilot's own ``circle`` leaves."""
+    """The work of one step. ``voyage`` is in the water that the autopilot's fences leave: ``circle`` and ``drawn``."""
 
     def __init__(
         self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot,
     ) -> None:
         self.circle = circle_of(voyage, snapshot.limits, snapshot.autopilot, snapshot.position_en_m)
-        self.voyage, self.config = _kept_in(voyage, self.circle), config
+        self.drawn = drawn_of(voyage.area, snapshot.fence, snapshot.limits, config.margin_m,
+                              is_off=_is_fence_off(state, snapshot))
+        self.voyage, self.config = _kept_in(voyage, self.drawn, self.circle), config
         self.state = state
         self.snapshot = snapshot if config.sails else replace(snapshot, wind=still_air(snapshot.t_s))
         self.actions: list[Action] = []
@@ -299,6 +310,11 @@ class Turn:
     def known_config(self) -> SkipperConfig:
         """The configuration, with what has been read of the autopilot in place of its defaults."""
         return replace(self.config, no_go_half_rad=self.no_go_half_rad, tack_corridor_m=self.tack_corridor_m)
+
+    @property
+    def fences(self) -> tuple[Circle | Drawn, ...]:
+        """The autopilot's own fences, where it has any that matter."""
+        return tuple(fence for fence in (self.circle, self.drawn) if fence is not None)
 
     @property
     def gate(self) -> Gate | None:

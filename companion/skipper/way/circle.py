@@ -1,15 +1,22 @@
-"""The autopilot's own fence around home: water that it takes the boat out of again, whatever a mission wants.
+"""The autopilot's own fence: water that it takes the boat out of again, whatever a mission wants.
 
-ArduPilot's FENCE_TYPE has it beside the polygons, and by default; outside FENCE_RADIUS the autopilot acts as
-FENCE_ACTION says. No mission file knows of it, so it is added to the area while the boat sails.
+The circle around home, which ArduPilot's FENCE_TYPE has beside the polygons, and by default: outside FENCE_RADIUS the
+autopilot acts as FENCE_ACTION says. And what is drawn on it, by a person, before or under way: polygons and circles to
+keep inside of, or out of. No mission file knows of either, so they are added to the area while the boat sails.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
+
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from companion.boat import AutopilotLimits
+from companion.geofence import Zone
 from companion.messages import AutopilotStatus
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.voyage import Area, PointEn, Voyage
@@ -25,6 +32,11 @@ class Circle:
 
     en_m: PointEn
     radius_m: float
+
+    @property
+    def most_room_m(self) -> float:
+        """Return the most room that may be asked for about a place inside [m]."""
+        return 0.5 * self.radius_m
 
     @property
     def words(self) -> str:
@@ -54,6 +66,50 @@ class Circle:
                 return place
             far_m -= STEP_M
         return self.en_m
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawn:
+    """What is drawn on the autopilot: the water that it takes of the voyage's, and the area that it leaves."""
+
+    taken: BaseGeometry
+    left: Area
+
+    words: ClassVar[str] = "the fence that is drawn on the autopilot"
+    most_room_m: ClassVar[float] = math.inf
+
+    def inside_m(self, en_m: PointEn) -> float:
+        """Return how far a place is from what is taken [m], negative in it."""
+        point = shapely.points(en_m)
+        off_m = float(shapely.distance(self.taken, point))
+        return off_m if off_m > 0.0 else -float(shapely.distance(self.taken.boundary, point))
+
+    def cuts(self, way_en: Sequence[PointEn]) -> bool:
+        """Return whether a way leads into what is taken; one that begins in it is on its way out."""
+        return len(way_en) > 1 and self.inside_m(way_en[0]) > 0.0 and bool(
+            shapely.intersects(self.taken, shapely.linestrings(way_en)))
+
+    def trouble(self, what: str, en_m: PointEn, floor_m: float) -> str:
+        """Return why a place cannot be sailed to (empty: what is drawn does not forbid it)."""
+        inside_m = self.inside_m(en_m)
+        if inside_m >= floor_m:
+            return ""
+        where = "outside" if inside_m < 0.0 else f"less than {floor_m:g} m inside"
+        return f"{what} is {where} {self.words}: draw it anew, or switch it off"
+
+    def place_inside(self, area: Area, from_en: PointEn, room_m: float) -> PointEn:  # noqa: ARG002 - as a circle's
+        """Return the nearest place with ``room_m`` about it; where she is without one."""
+        return self.left.roomy_en(from_en, room_m) or from_en
+
+
+def drawn_of(
+    area: Area, zones: tuple[Zone, ...], limits: AutopilotLimits | None, margin_m: float, *, is_off: bool,
+) -> Drawn | None:
+    """Return what is drawn on the autopilot, None: it is off, or takes no water that the margin leaves."""
+    if is_off or not zones or (limits is not None and not limits.fence_polygons):
+        return None
+    taken = area.taken_by(zones, margin_m)
+    return None if taken.is_empty else Drawn(taken=taken, left=area.without(taken, Drawn.words))
 
 
 def circle_of(

@@ -18,6 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from companion.boat import Boat, outline_en_m
 from companion.field.tree import Tree
 from companion.geo.frame import LocalFrame
+from companion.geofence import Zone
 
 PointEn = tuple[float, float]
 
@@ -146,6 +147,18 @@ class Area(Protocol):
 
     def within(self, centre_en: PointEn, radius_m: float, name: str) -> Area:
         """Return the area with one limit more: a circle."""
+        ...
+
+    def taken_by(self, zones: tuple[Zone, ...], margin_m: float) -> BaseGeometry:
+        """Return the water that a fence's zones take and that the margin leaves; empty where there is none."""
+        ...
+
+    def without(self, taken: BaseGeometry, name: str) -> Area:
+        """Return the area whose limits leave ``taken`` out, too."""
+        ...
+
+    def roomy_en(self, near_en: PointEn, room_m: float) -> PointEn | None:
+        """Return the nearest place with ``room_m`` about it, or half of that, or ...; None: there is none."""
         ...
 
     @property

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -18,7 +19,7 @@ from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift
 from companion.mavlink.wire import mission_hash
-from companion.messages import AisReport, Command, GeoPoint, Mode
+from companion.messages import AisReport, Command, GeoPoint, MissionItem, Mode
 from companion.orders import Order
 from companion.skipper.step import (
     Action,
@@ -100,6 +101,15 @@ def ais_of(record: dict[str, Any]) -> AisReport:
     return AisReport(**values)
 
 
+def fence_record(items: Sequence[MissionItem]) -> dict[str, Any]:
+    """Return what is drawn on the autopilot as its fence, as it was read."""
+    return {"kind": "fence read", "count": len(items), "items": _rows(items)}
+
+
+def _rows(items: Sequence[MissionItem]) -> list[list[Any]]:
+    return [[i.command, i.lat_e7, i.lon_e7, i.alt_m, i.frame, list(i.params)] for i in items]
+
+
 def order_record(order: Order) -> dict[str, Any]:
     """Return an order of the crew as it came: a replay takes it back with ``Order.from_dict``."""
     return {"kind": "order", "order": order.to_dict()}
@@ -118,8 +128,7 @@ def outcome_record(outcome: Outcome) -> dict[str, Any]:
         return {
             "kind": "outcome", "outcome": "ReadOutcome", "read_id": outcome.read_id, "text": outcome.text,
             "count": None if items is None else len(items), "hash": None if items is None else mission_hash(items),
-            "items": None if items is None else [
-                [i.command, i.lat_e7, i.lon_e7, i.alt_m, i.frame, list(i.params)] for i in items],
+            "items": None if items is None else _rows(items),
         }
     values = {f.name: jsonable(getattr(outcome, f.name)) for f in dataclasses.fields(outcome)}
     return {"kind": "outcome", "outcome": type(outcome).__name__, **values}

@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 from shapely.geometry import box
 
-from companion.messages import Command, Mode, StatusText
+from companion.messages import Command, MissionItem, Mode, StatusText, waypoint
 from companion.skipper.step import actions as act
 from companion.skipper.step.causes import TABLE, Answer
 from companion.skipper.step.config import Ends
@@ -408,3 +408,47 @@ def test_the_mission_says_what_is_done_about_each(name, words, is_over, answer):
     world.system_status = 4
     world.run(200)
     assert (distance_m(world.position, place) > 100.0) is is_over
+
+
+# ------------------------------------------------------------------------------ somebody else's way
+def with_their_mission(*places, obstacles=(ISLAND,)):
+    world = under_way(obstacles=obstacles)
+    world.install((*(waypoint(FRAME.geo_from_en(*place)) for place in places), MissionItem(command=20)))
+    world.seq = 1
+    text(world, "Flight plan received")
+    return world
+
+
+def test_a_mission_of_somebody_else_s_that_leads_over_something_is_loitered_before_and_only_once():
+    """Its legs led over an island, and she was let touch it: 40 s before the hull did that was known."""
+    world = with_their_mission((0.0, 300.0))
+    assert world.run(120, lambda w: w.mode is Mode.LOITER)
+    assert world.state.foreign
+    assert float(world.skipper.voyage.area.clearance_m([world.position])[0]) > 15.0
+    assert "which is not ours, leads over" in said(world, "kept off")[0][2]
+    uploads = world.count(act.UploadMission)
+    world.set_mode(Mode.AUTO)      # told, he means it
+    world.run(60)
+    assert world.mode is Mode.AUTO
+    assert world.count(act.UploadMission) == uploads
+    assert len(said(world, "kept off")) == 1
+
+
+def test_a_mission_of_somebody_else_s_that_is_clear_is_left_alone():
+    world = with_their_mission((300.0, 100.0))
+    world.run(60)
+    assert world.state.foreign
+    assert world.mode is Mode.AUTO
+    assert not said(world, "kept off")
+
+
+def test_a_failsafe_s_way_home_over_something_is_loitered_before_where_a_stranger_s_mission_is_on_board():
+    world = with_their_mission((400.0, 0.0), obstacles=(box(60, -40, 100, 40),))
+    world.skipper, behind = under_way(obstacles=()).skipper, world.skipper
+    assert world.run(120, lambda w: w.state.foreign and w.position[0] > 115.0)
+    world.skipper = behind
+    stop(world, Mode.RTL, fence_breached=True, waypoint_distance_m=110.0, target_bearing_rad=-0.5 * math.pi)
+    world.drift_mps = 0.0
+    world.run(4)
+    assert world.mode is Mode.LOITER
+    assert "straight way home of the fence failsafe leads over" in said(world, "kept off")[0][2]
