@@ -298,7 +298,7 @@ def test_who_is_told_may_fail_and_may_be_what_is_gone():
     assert reason(TimeoutError()) == "no answer"
 
 
-FLYING = ("app", "commands/run.py", "compose.py", "fold", "geofence", "mavlink", "outputs", "page",
+FLYING = ("app", "commands/run.py", "compose.py", "fold.py", "geofence", "mavlink", "outputs", "page",
           "skipper", "telemetry", "traffic")
 # A key that is asked for by hand, exclusively; the log of a link, which is appended to.
 NOT_WHOLE = {"mavlink/transports/signing.py", "mavlink/tlog.py"}
