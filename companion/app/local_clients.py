@@ -35,7 +35,7 @@ from companion.planner import Plan
 from companion.skipper.step import SkipperConfig
 from companion.skipper.way import Voyage
 from companion.telemetry.folder import VoyageFigures
-from companion.view import Area, Event, View, ViewFold
+from companion.view import AreaView, Event, View, ViewFold
 
 OnView = Callable[[View, tuple[Event, ...], Step], None]
 
@@ -55,7 +55,7 @@ class ViewBroadcast:
         self.is_kept = False   # made although nobody watches yet: who comes later wants to know of the plan in force
 
     @property
-    def area(self) -> Area:
+    def area(self) -> AreaView:
         """The area of the voyage, as it is drawn."""
         return self._fold.area
 

@@ -24,7 +24,7 @@ from companion.geo.frame import LocalFrame
 from companion.geo.units import M_PER_NM, MPS_PER_KNOT
 from companion.messages import GeoPoint
 from companion.outputs.outlet import Outlet, Say
-from companion.view.values import Goal, Leg, PointEn, View
+from companion.view.values import GoalView, LegView, PointEn, View
 
 TALKER = "II"          # integrated instrumentation
 MAX_CHARACTERS = 82    # from $ to the line end, both included
@@ -218,7 +218,7 @@ def course_of(view: View) -> Course | None:
         along_m=off[0] * east + off[1] * north, length_m=length_m, closing_mps=closing_mps)
 
 
-def legs_ahead(view: View) -> tuple[Leg, ...]:
+def legs_ahead(view: View) -> tuple[LegView, ...]:
     """Return the legs that are not sailed yet, but for the loiter at the end."""
     return () if view.plan is None else tuple(
         leg for leg in view.plan.legs if not leg.is_done and not leg.is_loiter)
@@ -248,7 +248,7 @@ def is_fresh(age_s: float | None) -> bool:
     return age_s is not None and age_s <= FRESH_S
 
 
-def _is_at(goal: Goal, en_m: PointEn) -> bool:
+def _is_at(goal: GoalView, en_m: PointEn) -> bool:
     return math.dist(goal.at_en_m, en_m) <= SAME_M
 
 

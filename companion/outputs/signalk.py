@@ -24,7 +24,7 @@ from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.outputs.nmea import UNTRUSTED, course_of, is_fresh, place_of
 from companion.outputs.outlet import Outlet, Say
-from companion.view.values import Alarm, PointEn, View
+from companion.view.values import AlarmView, PointEn, View
 
 # As $source: into a source with a label a server puts a label of its own.
 LABEL = "sailboat-companion"
@@ -154,7 +154,7 @@ def _helm(view: View) -> Values:
     }
 
 
-def _notification(alarm: Alarm) -> Values:
+def _notification(alarm: AlarmView) -> Values:
     state = STATES.get(alarm.level)
     if state is None:
         return {}

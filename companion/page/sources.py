@@ -20,7 +20,7 @@ import msgspec
 from companion import __version__
 from companion.orders import Answer, Wanted
 from companion.planner import Plan
-from companion.view import SCHEMA, Area, Event, Past, Trail, View, sample_of
+from companion.view import SCHEMA, AreaView, Event, Past, Trail, View, sample_of
 
 KEPT = 600        # events: at most a few hundred kB
 
@@ -128,10 +128,10 @@ class Live:
     preview: Preview | None = None
     permitted: tuple[str, ...] = ()
     hub: Hub = field(default_factory=Hub)
-    area: Area | None = None
+    area: AreaView | None = None
     trail: Trail = field(default_factory=Trail)
 
-    def show(self, view: View, events: Sequence[Event], area: Area | None) -> None:
+    def show(self, view: View, events: Sequence[Event], area: AreaView | None) -> None:
         """Show the next step."""
         if self.area is not None and area is not None and area.hash != self.area.hash:
             self.trail.follow(self.area.frame, area.frame)   # a passage: the metres count from elsewhere now
@@ -154,7 +154,7 @@ class Live:
 class Record:
     """A recorded voyage, whole in memory: its views packed by chunks."""
 
-    def __init__(self, name: str, area: Area, *, is_whole: bool, count: int) -> None:
+    def __init__(self, name: str, area: AreaView, *, is_whole: bool, count: int) -> None:
         self.name, self.area, self.is_whole = name, area, is_whole
         self._every = max(1, -(-count // MOST_MOMENTS))
         self.trail = Trail(most=2 * MOST_MOMENTS)

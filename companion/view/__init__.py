@@ -4,7 +4,7 @@
 ashore; all give a ``View`` and the ``Event``s that led to it.
 """
 
-from companion.view.area import Area, area_of, drawn
+from companion.view.area import AreaView, area_of, drawn
 from companion.view.events import Event
 from companion.view.fold import ViewFold
 from companion.view.heard import HeardFold
@@ -12,6 +12,7 @@ from companion.view.recorded import RecordedViews, recorded_views
 from companion.view.values import SCHEMA, Past, Sample, Trail, View, sample_of
 
 __all__ = [
-    "SCHEMA", "Area", "Event", "HeardFold", "Past", "RecordedViews", "Sample", "Trail", "View", "ViewFold", "area_of",
+    "SCHEMA", "AreaView", "Event", "HeardFold", "Past", "RecordedViews", "Sample", "Trail", "View", "ViewFold",
+    "area_of",
     "drawn", "recorded_views", "sample_of",
 ]

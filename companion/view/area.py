@@ -25,7 +25,7 @@ Ring = tuple[PointEn, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Area:
+class AreaView:
     """Obstacles as drawn, as grown by the margin, and the limits: polygons, each an outer ring and its holes.
 
     Metres east and north of ``origin_lat_deg`` and ``origin_lon_deg``; ``lat_m`` and ``lon_m`` are the metres in a
@@ -51,7 +51,7 @@ class Area:
         return LocalFrame(GeoPoint(lat_deg=self.origin_lat_deg, lon_deg=self.origin_lon_deg))
 
 
-def area_of(voyage: Voyage, margin_m: float) -> Area:
+def area_of(voyage: Voyage, margin_m: float) -> AreaView:
     """Return the area of a voyage."""
     fence = voyage.area.fence_wkt(0.0)
     return drawn(
@@ -62,7 +62,7 @@ def area_of(voyage: Voyage, margin_m: float) -> Area:
 def drawn(
     name: str, origin: GeoPoint, obstacles: Iterable[str], grown: Iterable[str], limits: Iterable[str],
     margin_m: float | None,
-) -> Area:
+) -> AreaView:
     """Return the area of WKT polygons in local metres."""
     from companion.geo.frame import LocalFrame
 
@@ -72,7 +72,7 @@ def drawn(
     north_m = frame.en_from_geo(GeoPoint(lat_deg=origin.lat_deg + step, lon_deg=origin.lon_deg))[1]
     aside_deg = origin.lon_deg - 0.01 if origin.lon_deg > 0.0 else origin.lon_deg + 0.01
     east_m = frame.en_from_geo(GeoPoint(lat_deg=origin.lat_deg, lon_deg=aside_deg))[0]
-    area = Area(
+    area = AreaView(
         name=name, origin_lat_deg=origin.lat_deg, origin_lon_deg=origin.lon_deg, lat_m=round(north_m / step, 3),
         lon_m=round(abs(east_m) / 0.01, 3), obstacles=_shapes(obstacles), grown=_shapes(grown), limits=_shapes(limits),
         margin_m=margin_m)

@@ -9,7 +9,7 @@ from companion.geo.frame import LocalFrame
 from companion.mavlink.wire import StatusReport
 from companion.messages import AutopilotStatus, VehicleState
 from companion.view import values
-from companion.view.area import Area, drawn
+from companion.view.area import AreaView, drawn
 from companion.view.events import Event
 from companion.view.parts import by_age, heard_vessel
 from companion.view.values import compass, place, rounded, signed, tack_of
@@ -22,7 +22,7 @@ class HeardFold:
     """Turns reports into views. The local metres begin where the boat was first heard of."""
 
     def __init__(self, name: str = "") -> None:
-        self.area: Area | None = None
+        self.area: AreaView | None = None
         self._name = name
         self._frame: LocalFrame | None = None
         self._phase, self._phase_s, self._alert = "", 0.0, ""
@@ -42,14 +42,14 @@ class HeardFold:
         age_s = None if report is None else report.age_s
         status_age_s = None if age_s is None else age_s.get("status", min(age_s.values()))
         ages = [a for a in (status_age_s, None if vehicle is None else t_s - vehicle.t_s) if a is not None]
-        alarms: tuple[values.Alarm, ...] = ()
+        alarms: tuple[values.AlarmView, ...] = ()
         if status is not None and status.alert_code:
-            alarms = (values.Alarm(code=status.alert_code, level="warning", text=status.alert_text,
+            alarms = (values.AlarmView(code=status.alert_code, level="warning", text=status.alert_text,
                                    age_s=rounded(status_age_s, 1)),)
         view = values.View(
             source="radio", name=self._name, t_s=round(t_s, 3), unix_s=unix_s,
             age_s=rounded(min(ages), 1) if ages else None, area=None if self.area is None else self.area.hash,
-            state=values.State(
+            state=values.StateView(
                 phase="not heard" if status is None else status.state or "state not heard yet",
                 why="no companion is heard on this link" if status is None else status.alert_text,
                 age_s=None if status is None else rounded(t_s - self._phase_s, 1),
@@ -58,7 +58,7 @@ class HeardFold:
             alarms=alarms, boat=self._boat(t_s, report, vehicle), wind=_wind(report, vehicle), water=_water(report),
             plan=_plan(report), vessels=heard_vessel(
                 None if status is None else status.traffic, None if age_s is None else age_s.get("traffic")),
-            orders=values.Orders(standing=None if status is None or not status.order else values.Standing(
+            orders=values.Orders(standing=None if status is None or not status.order else values.StandingView(
                 verb=status.order, words=status.order, age_s=rounded(status.order_age_s, 0))),
             figures=values.Figures(
                 tacks=None if status is None else status.tacks, replans=None if status is None else status.replans,
@@ -67,14 +67,14 @@ class HeardFold:
             health=_health(t_s, report, vehicle, autopilot))
         return view, events
 
-    def _boat(self, t_s: float, report: StatusReport | None, vehicle: VehicleState | None) -> values.Boat:
+    def _boat(self, t_s: float, report: StatusReport | None, vehicle: VehicleState | None) -> values.BoatView:
         status = None if report is None else report.status
         position = vehicle.position if vehicle is not None else None if status is None else status.position
         if position is None or self._frame is None:
-            return values.Boat()
+            return values.BoatView()
         age_s = t_s - vehicle.t_s if vehicle is not None else None if report is None else report.age_s.get("status")
         twd_rad = None if status is None else status.twd_from_rad
-        return values.Boat(
+        return values.BoatView(
             age_s=rounded(age_s, 1), lat_deg=rounded(position.lat_deg, 7), lon_deg=rounded(position.lon_deg, 7),
             at_en_m=place(self._frame.en_from_geo(position)),
             tack=None if twd_rad is None or vehicle is None else tack_of(
@@ -109,11 +109,11 @@ class HeardFold:
         return out
 
 
-def _wind(report: StatusReport | None, vehicle: VehicleState | None) -> values.Wind | None:
+def _wind(report: StatusReport | None, vehicle: VehicleState | None) -> values.WindView | None:
     status = None if report is None else report.status
     if report is None or status is None or status.twd_from_rad is None:
         return None
-    return values.Wind(
+    return values.WindView(
         health="good", twd_from_deg=compass(status.twd_from_rad), tws_mps=rounded(status.tws_mps),
         mean_twd_from_deg=compass(status.twd_from_rad), mean_tws_mps=rounded(status.tws_mps),
         sigma_deg=None if status.twd_sigma_rad is None else rounded(math.degrees(status.twd_sigma_rad)),
@@ -122,19 +122,19 @@ def _wind(report: StatusReport | None, vehicle: VehicleState | None) -> values.W
         age_s=rounded(min((a for n, a in report.age_s.items() if n in {"status", "wind", "co_twd"}), default=None), 1))
 
 
-def _water(report: StatusReport | None) -> values.Water | None:
+def _water(report: StatusReport | None) -> values.WaterView | None:
     status = None if report is None else report.status
     if status is None or status.current_set_rad is None or status.current_drift_mps is None:
         return None
-    return values.Water(set_deg=compass(status.current_set_rad), drift_mps=rounded(status.current_drift_mps),
+    return values.WaterView(set_deg=compass(status.current_set_rad), drift_mps=rounded(status.current_drift_mps),
                      is_planned=True)
 
 
-def _plan(report: StatusReport | None) -> values.Plan | None:
+def _plan(report: StatusReport | None) -> values.PlanView | None:
     status = None if report is None else report.status
     if status is None or (status.plan_id is None and status.promised_risk is None):
         return None
-    return values.Plan(
+    return values.PlanView(
         number=status.plan_id, age_s=rounded(status.plan_age_s, 1), promised_risk=rounded(status.promised_risk, 4),
         delta_s=None if status.promised_risk is None else rounded(1.0 - status.promised_risk, 4),
         replans=status.replans, next_tack_s=rounded(status.next_tack_s, 0), leg=status.waypoint_seq,

@@ -36,7 +36,7 @@ from companion.view.values import compass, degrees, metres, place, rounded, sign
 MOST = 40   # vessels in a view, the worst first
 
 
-def vessels_of(step: Step) -> tuple[values.Vessel, ...]:
+def vessels_of(step: Step) -> tuple[values.VesselView, ...]:
     """Return the vessels, the worst first; without our own position those heard last, with no approach."""
     if step.state.watch:
         return tuple(_seen(step, seen) for seen in step.state.watch[:MOST])
@@ -44,13 +44,13 @@ def vessels_of(step: Step) -> tuple[values.Vessel, ...]:
     if picture is None:
         return ()
     newest = sorted(picture.vessels, key=picture.age_s)[:MOST]
-    return tuple(values.Vessel(
+    return tuple(values.VesselView(
         name=v.label, mmsi=v.mmsi, age_s=rounded(picture.age_s(v), 1), at_en_m=place(v.centre_en_m),
         course_deg=None if v.course_rad is None else compass(v.course_rad), speed_mps=rounded(v.speed_mps),
         length_m=metres(v.hull.length_m), beam_m=metres(v.hull.beam_m)) for v in newest)
 
 
-def _seen(step: Step, seen: Assessment) -> values.Vessel:
+def _seen(step: Step, seen: Assessment) -> values.VesselView:
     vessel, approach = seen.vessel, seen.approach
     ve, vn = vessel.velocity_en_mps
     east, north = vessel.centre_en_m
@@ -60,7 +60,7 @@ def _seen(step: Step, seen: Assessment) -> values.Vessel:
     own_then = None
     if then_s is not None and here is not None and own is not None:
         own_then = place((here[0] + own.velocity_en_mps[0] * then_s, here[1] + own.velocity_en_mps[1] * then_s))
-    return values.Vessel(
+    return values.VesselView(
         name=vessel.label, mmsi=vessel.mmsi, age_s=rounded(seen.age_s, 1), at_en_m=place(at),
         course_deg=None if vessel.course_rad is None else compass(vessel.course_rad),
         speed_mps=rounded(vessel.speed_mps), heading_deg=None if vessel.bow_rad is None else compass(vessel.bow_rad),
@@ -71,19 +71,19 @@ def _seen(step: Step, seen: Assessment) -> values.Vessel:
         cpa_en_m=None if then_s is None else place((at[0] + ve * then_s, at[1] + vn * then_s)))
 
 
-def alarms_of(step: Step) -> tuple[values.Alarm, ...]:
+def alarms_of(step: Step) -> tuple[values.AlarmView, ...]:
     """Return the alarms of vessels that come too near."""
     levels: dict[Alarm, values.Level] = {Alarm.WARN: "warning", Alarm.ACT: "error", Alarm.TOUCH: "critical"}
     return tuple(
-        values.Alarm(code="vessel", level=levels[seen.alarm], text=seen.sentence())
+        values.AlarmView(code="vessel", level=levels[seen.alarm], text=seen.sentence())
         for seen in step.state.watch if seen.alarm in levels)
 
 
-def heard_vessel(traffic: TrafficStatus | None, age_s: float | None) -> tuple[values.Vessel, ...]:
+def heard_vessel(traffic: TrafficStatus | None, age_s: float | None) -> tuple[values.VesselView, ...]:
     """Return the one vessel that a radio's status tells of, the worst."""
     if traffic is None or not traffic.alarm:
         return ()
-    return (values.Vessel(
+    return (values.VesselView(
         name=traffic.name, age_s=rounded(age_s, 1), alarm=traffic.alarm, role=traffic.role, rule=traffic.rule,
         range_m=rounded(traffic.range_m, 1), cpa_m=rounded(traffic.cpa_m, 1), cpa_s=rounded(traffic.tcpa_s, 0),
         bearing_deg=None if traffic.bearing_rad is None or not math.isfinite(traffic.bearing_rad)
@@ -102,10 +102,10 @@ def level_of(severity: int) -> values.Level:
     return "critical" if severity < 2 else LEVELS.get(severity, "info")
 
 
-def state_of(step: Step, since_s: float) -> values.State:
+def state_of(step: Step, since_s: float) -> values.StateView:
     """Return what she does and why."""
     state, autopilot = step.state, step.snapshot.autopilot
-    return values.State(
+    return values.StateView(
         phase=state.phase.value, why=state.why, task=state.task, age_s=rounded(step.snapshot.t_s - since_s, 1),
         mode=None if autopilot is None or autopilot.mode is None else autopilot.mode.name,
         is_armed=None if autopilot is None else autopilot.is_armed, is_sailing=state.sailing,
@@ -113,16 +113,16 @@ def state_of(step: Step, since_s: float) -> values.State:
         wants=state.wants)
 
 
-def alarms(step: Step, status: CompanionStatus, said: Mapping[str, str]) -> tuple[values.Alarm, ...]:
+def alarms(step: Step, status: CompanionStatus, said: Mapping[str, str]) -> tuple[values.AlarmView, ...]:
     """Return what somebody should look at: watchdogs, vessels too near, trouble with the disk."""
     t_s = step.snapshot.t_s
-    out = [values.Alarm(
+    out = [values.AlarmView(
         code=raised.name, level=level_of(BY_NAME[raised.name].severity),
         text=said.get(raised.name, BY_NAME[raised.name].watches), age_s=rounded(t_s - raised.since_s, 1),
     ) for raised in step.state.raised]
     out += alarms_of(step)
     if status.alert_code in {DISK, GONE}:
-        out.append(values.Alarm(code=status.alert_code, level="warning", text=status.alert_text))
+        out.append(values.AlarmView(code=status.alert_code, level="warning", text=status.alert_text))
     return tuple(out)
 
 
@@ -132,11 +132,11 @@ def next_goal(step: Step, voyage: Voyage) -> int:
     return gates[step.state.gate].goal if step.state.gate < len(gates) else len(voyage.legs)
 
 
-def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.Boat:
+def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatView:
     """Return where she is and how she moves."""
     snapshot, autopilot = step.snapshot, step.snapshot.autopilot
     vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
-    at_rest = values.Boat(
+    at_rest = values.BoatView(
         length_m=voyage.boat.hull.length_m, battery_v=None if autopilot is None else rounded(autopilot.battery_v),
         battery_share=None if autopilot is None else rounded(autopilot.battery_remaining))
     if vehicle is None or here is None:
@@ -170,13 +170,13 @@ def kind_of(goal: Goal) -> str:
     return "box" if goal.box is not None else "point" if goal.side is Side.NONE else "buoy"
 
 
-def goals_of(step: Step, voyage: Voyage) -> tuple[values.Goal, ...]:
+def goals_of(step: Step, voyage: Voyage) -> tuple[values.GoalView, ...]:
     """Return the goals of one lap; of several laps ``is_reached`` tells of the present one."""
     here, following, lap = step.snapshot.position_en_m, next_goal(step, voyage), len(voyage.goals)
     begin = min(following, len(voyage.legs) - 1) // lap * lap
     out = []
     for number, goal in enumerate(voyage.goals):
-        out.append(values.Goal(
+        out.append(values.GoalView(
             name=goal.name or f"goal {number + 1}", kind=kind_of(goal), at_en_m=place(goal.en_m),
             radius_m=metres(goal.radius_m), side="" if goal.side is Side.NONE else goal.side.value,
             line_en_m=None if goal.line is None else (
@@ -187,19 +187,19 @@ def goals_of(step: Step, voyage: Voyage) -> tuple[values.Goal, ...]:
     return tuple(out)
 
 
-def home_of(step: Step, voyage: Voyage) -> values.Place | None:
+def home_of(step: Step, voyage: Voyage) -> values.PlaceView | None:
     """Return where she was armed, as the autopilot tells."""
     autopilot = step.snapshot.autopilot
     home: PointEn | None = voyage.home_en_m
     if autopilot is not None and autopilot.home is not None:
         home = voyage.frame.en_from_geo(autopilot.home)
-    return None if home is None else values.Place(name="home", at_en_m=place(home))
+    return None if home is None else values.PlaceView(name="home", at_en_m=place(home))
 
 
-def refuges_of(voyage: Voyage) -> tuple[values.Place, ...]:
+def refuges_of(voyage: Voyage) -> tuple[values.PlaceView, ...]:
     """Return the refuges."""
     return tuple(
-        values.Place(name=r.name, at_en_m=place(r.en_m), radius_m=rounded(r.radius_m, 1)) for r in voyage.refuges)
+        values.PlaceView(name=r.name, at_en_m=place(r.en_m), radius_m=rounded(r.radius_m, 1)) for r in voyage.refuges)
 
 
 def orders_of(step: Step) -> values.Orders:
@@ -207,7 +207,7 @@ def orders_of(step: Step) -> values.Orders:
     state, t_s = step.state, step.snapshot.t_s
     standing, last = state.standing, max(state.answered, key=lambda a: a.t_s, default=None)
     return values.Orders(
-        standing=None if standing is None else values.Standing(
+        standing=None if standing is None else values.StandingView(
             verb=standing.verb.value, words=standing.words, by=standing.by, age_s=rounded(standing.age_s(t_s), 0),
             at_en_m=None if standing.en_m is None else place(standing.en_m)),
         permitted=tuple(verb.value for verb in Verb if permitted(verb, step.snapshot.permissions.local_orders)),
@@ -299,7 +299,7 @@ def best_angles(boat: Boat, tws_mps: float, no_go_rad: float) -> tuple[float, fl
     return beat.twa_rad, boat.polar.best_run(tws_mps, max_twa_rad=boat.max_twa_rad).twa_rad
 
 
-def wind_of(step: Step) -> values.Wind | None:
+def wind_of(step: Step) -> values.WindView | None:
     """Return the wind, None when none was ever heard."""
     wind, vehicle = step.snapshot.wind, step.snapshot.vehicle
     if wind.forecast is None and wind.present_twd_from_rad is None and wind.mean_twd_from_rad is None:
@@ -307,7 +307,7 @@ def wind_of(step: Step) -> values.Wind | None:
     forecast = wind.forecast
     twd_rad, tws_mps = wind.present_twd_from_rad, wind.present_tws_mps
     awa_rad, aws_mps = apparent(twd_rad, tws_mps, vehicle)
-    return values.Wind(
+    return values.WindView(
         health=wind.health.value, verdict=wind.verdict,
         twd_from_deg=None if twd_rad is None else compass(twd_rad), tws_mps=rounded(tws_mps),
         mean_twd_from_deg=None if wind.mean_twd_from_rad is None else compass(wind.mean_twd_from_rad),
@@ -322,14 +322,14 @@ def wind_of(step: Step) -> values.Wind | None:
         levels=() if forecast is None else INTERVAL_LEVELS, bands=() if forecast is None else bands_of(forecast))
 
 
-def water_of(step: Step) -> values.Water | None:
+def water_of(step: Step) -> values.WaterView | None:
     """Return the current, None before anything is known of the water."""
     current, wind = step.snapshot.current, step.snapshot.wind
     if current.sigma_mps == 0.0:
         return None
     over = None if wind.present_twd_from_rad is None or wind.present_tws_mps is None else over_water(
         wind.present_twd_from_rad, wind.present_tws_mps, current.planned_en_mps)
-    return values.Water(
+    return values.WaterView(
         set_deg=compass(current.set_rad), drift_mps=rounded(current.drift_mps), sigma_mps=rounded(current.sigma_mps),
         is_planned=current.is_significant, verdict=current.verdict,
         twd_from_deg=None if over is None else compass(over[0]), tws_mps=None if over is None else rounded(over[1]))
@@ -424,7 +424,7 @@ def _meets_s(here: PointEn, vehicle: VehicleState, mark_en: PointEn, course_rad:
     return time_s if time_s > 0.0 and along_m < 0.0 else None
 
 
-def polar_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.Polar | None:
+def polar_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.PolarView | None:
     """Return the polar in the present wind with the boat's point; None without a wind."""
     wind, vehicle = step.snapshot.wind, step.snapshot.vehicle
     tws_mps = wind.mean_tws_mps if wind.mean_tws_mps is not None else wind.present_tws_mps
@@ -436,7 +436,7 @@ def polar_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.Polar 
     twd_rad = wind.present_twd_from_rad
     beat, run = best_angles(voyage.boat, round(tws_mps, 1), no_go_rad)
     has_way = vehicle is not None and twd_rad is not None
-    return values.Polar(
+    return values.PolarView(
         name=polar.name, tws_mps=rounded(tws_mps), twa_deg=tuple(degrees(float(a)) for a in angles),
         speed_mps=tuple(rounded(float(v), 3) for v in speeds),
         beat_deg=degrees(beat), run_deg=degrees(run),
@@ -468,14 +468,14 @@ class Chosen:
 
 def plan_of(
     step: Step, voyage: Voyage, ahead: Ahead, chosen: Chosen | None, legs: tuple[Leg, ...],
-) -> values.Plan | None:
+) -> values.PlanView | None:
     """Return the plan that is sailed; ``legs`` are those of the plans that it was spliced from, the newest first."""
     route, state = step.state.route, step.state
     if route is None:
         return None
     begin, count = min(state.index, len(route.items)), len(route.items)
     left = tuple(_leg(route, n, legs) for n in range(begin, count))
-    return values.Plan(
+    return values.PlanView(
         number=route.plan_id, age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),
         reason="" if chosen is None else chosen.reason,
         why=(chosen.why if chosen is not None and chosen.why else route.why), rung=route.rung,
@@ -492,24 +492,24 @@ def plan_of(
         legs=left)
 
 
-def _risk_left(route: Route, left: tuple[values.Leg, ...]) -> float | None:
+def _risk_left(route: Route, left: tuple[values.LegView, ...]) -> float | None:
     """Return the chance of being forced off the plan on the legs left; a leg's own is that it happens first there."""
     risks = [leg.risk for leg in left if not leg.is_loiter]
     known = [risk for risk in risks if risk is not None]
     return route.risk if len(known) < len(risks) or not risks else min(1.0, sum(known))
 
 
-def _leg(route: Route, number: int, legs: tuple[Leg, ...]) -> values.Leg:
+def _leg(route: Route, number: int, legs: tuple[Leg, ...]) -> values.LegView:
     start, end = route.leg_from_en_m[number], route.points_en_m[number]
     is_loiter = route.items[number].command != Command.NAV_WAYPOINT
     course_rad = heading_of(end[0] - start[0], end[1] - start[1])
     known = None if is_loiter else next((leg for leg in legs if math.dist(leg.to_en, end) < SAME_M), None)
     if known is None:
-        return values.Leg(
+        return values.LegView(
             from_en_m=place(start), to_en_m=place(end), is_loiter=is_loiter,
             course_deg=None if start == end else compass(course_rad), length_m=rounded(math.dist(start, end), 1),
             twa_deg=None if start == end else signed(difference_rad(route.plan_twd_from_rad, course_rad)))
-    return values.Leg(
+    return values.LegView(
         from_en_m=place(start), to_en_m=place(end), is_beat=known.is_beat, course_deg=compass(course_rad),
         twa_deg=signed(known.twa_rad), length_m=rounded(math.dist(start, end), 1), speed_mps=rounded(known.speed_mps),
         starts_s=rounded(known.start_s, 1), ends_s=rounded(known.end_s, 1), sigma_deg=degrees(known.sigma_rad),
@@ -517,11 +517,11 @@ def _leg(route: Route, number: int, legs: tuple[Leg, ...]) -> values.Leg:
         risk=rounded(known.risk, 4), manoeuvre=known.manoeuvre)
 
 
-def safe_end_of(route: Route | None) -> values.Place | None:
+def safe_end_of(route: Route | None) -> values.PlaceView | None:
     """Return where the mission on board ends: a loiter."""
     if route is None or not route.points_en_m:
         return None
-    return values.Place(name="safe end", at_en_m=place(route.points_en_m[-1]))
+    return values.PlaceView(name="safe end", at_en_m=place(route.points_en_m[-1]))
 
 
 def predicted_of(ahead: Ahead) -> tuple[values.Ahead, ...]:

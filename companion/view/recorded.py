@@ -22,13 +22,13 @@ from companion.telemetry.folder import (
 )
 from companion.telemetry.status import companion_status
 from companion.view import values
-from companion.view.area import Area, drawn
+from companion.view.area import AreaView, drawn
 from companion.view.events import Event
 from companion.view.fold import ViewFold
 from companion.view.values import View, place, rounded, tack_of
 
 
-def area_of_chart(record: VoyageRecord) -> Area:
+def area_of_chart(record: VoyageRecord) -> AreaView:
     """Return the area of a recorded voyage."""
     chart = record.chart
     return drawn(
@@ -36,11 +36,11 @@ def area_of_chart(record: VoyageRecord) -> Area:
         [chart.fence] if chart.fence else [], chart.margin_m)
 
 
-def views_of_rows(record: VoyageRecord, area: Area) -> Iterator[values.View]:
+def views_of_rows(record: VoyageRecord, area: AreaView) -> Iterator[values.View]:
     """Yield a view for each row of the track."""
     chart, columns = record.chart, record.columns
     plans = [p for p in record.plans if p.plan is not None and p.plan.waypoints]
-    goals = tuple(values.Goal(
+    goals = tuple(values.GoalView(
         name=g.name or f"goal {n}", kind="buoy" if g.side != "none" else "line" if g.line else "point",
         at_en_m=place((g.x, g.y)), radius_m=rounded(g.radius_m, 1), side="" if g.side == "none" else g.side,
         line_en_m=g.line) for n, g in enumerate(chart.goals, start=1))
@@ -54,7 +54,7 @@ def views_of_rows(record: VoyageRecord, area: Area) -> Iterator[values.View]:
         yield values.View(
             source="recorded", name=chart.name, t_s=round(t_s, 3), area=area.hash, age_s=0.0,
             unix_s=None if record.epoch_s is None else round(record.epoch_s + t_s, 3),
-            state=values.State(phase=record.texts["phase"][row], mode=record.texts["mode"][row] or None),
+            state=values.StateView(phase=record.texts["phase"][row], mode=record.texts["mode"][row] or None),
             boat=_boat(cell, here), wind=_wind(cell),
             plan=None if number < 0 else _plan(plans[number], t_s), goals=goals)
 
@@ -88,28 +88,28 @@ def _twa_deg(cell: dict[str, float | None]) -> float | None:
     return round(math.remainder(cell["twd_deg"] - cell["heading_deg"], 360.0), 1)
 
 
-def _boat(cell: dict[str, float | None], here: values.PointEn | None) -> values.Boat:
+def _boat(cell: dict[str, float | None], here: values.PointEn | None) -> values.BoatView:
     twa_deg = _twa_deg(cell)
-    return values.Boat(
+    return values.BoatView(
         age_s=None if here is None else 0.0, lat_deg=cell["lat_deg"], lon_deg=cell["lon_deg"],
         at_en_m=None if here is None else place(here), heading_deg=cell["heading_deg"], cog_deg=cell["cog_deg"],
         sog_mps=cell["sog_mps"], clearance_m=cell["clearance_m"], cross_track_m=cell["cross_track_m"],
         tack=None if twa_deg is None else tack_of(twa_deg))
 
 
-def _wind(cell: dict[str, float | None]) -> values.Wind | None:
+def _wind(cell: dict[str, float | None]) -> values.WindView | None:
     if cell["twd_deg"] is None:
         return None
-    return values.Wind(
+    return values.WindView(
         health="recorded", twd_from_deg=cell["twd_deg"], tws_mps=cell["tws_mps"], mean_twd_from_deg=cell["twd_deg"],
         mean_tws_mps=cell["tws_mps"], sigma_deg=cell["twd_sigma_deg"], twa_deg=_twa_deg(cell))
 
 
-def _plan(recorded: RecordedPlan, t_s: float) -> values.Plan:
+def _plan(recorded: RecordedPlan, t_s: float) -> values.PlanView:
     assert recorded.plan is not None
     way = recorded.plan.waypoints
-    legs = tuple(values.Leg(from_en_m=place(a), to_en_m=place(b)) for a, b in pairwise(way))
-    return values.Plan(number=recorded.request_id, age_s=round(t_s - recorded.t_s, 1), reason=recorded.reason or "",
+    legs = tuple(values.LegView(from_en_m=place(a), to_en_m=place(b)) for a, b in pairwise(way))
+    return values.PlanView(number=recorded.request_id, age_s=round(t_s - recorded.t_s, 1), reason=recorded.reason or "",
                        twd_from_deg=rounded(recorded.twd_deg, 1), legs=legs, count=len(legs))
 
 
@@ -124,7 +124,7 @@ class RecordedViews:
     """
 
     name: str
-    area: Area
+    area: AreaView
     count: int
     is_whole: bool
     moments: Iterator[Moment]
@@ -148,7 +148,7 @@ def recorded_views(folder: Path) -> RecordedViews:
                          moments=zip(views_of_rows(record, area), events_of_record(record), strict=True))
 
 
-def _folded(recorded: Recorded, fold: ViewFold, area: Area) -> Iterator[Moment]:
+def _folded(recorded: Recorded, fold: ViewFold, area: AreaView) -> Iterator[Moment]:
     figures = VoyageFigures()
     for folded in recorded.steps():
         if folded.step is None:

@@ -6,23 +6,26 @@ Every object has all of its keys and no other; what is not known is null.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from companion.view.area import Area
+from companion.view.area import AreaView
 from companion.view.events import Event
 from companion.view.values import Past, View
 
 HERE = Path(__file__).parent
 FILE, TYPES = HERE / "view.schema.json", HERE / "view.d.ts"
-TOPS = (View, Area, Event, Past)
+TOPS = (View, AreaView, Event, Past)
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (2020-12): a View; Area, Event and Past beside it under ``$defs``."""
-    _, components = msgspec.json.schema_components(TOPS, ref_template="#/$defs/{name}")
+    _, made = msgspec.json.schema_components(TOPS, ref_template="#/$defs/{name}")
+    # In the JSON a WindView is the view's Wind: the classes have longer names, to mean one thing in this project.
+    components = json.loads(re.sub(r'("#/\$defs/|"title": ")?(\w+)View"', r'\1\2"', json.dumps(made)))
     for component in components.values():
         if component.get("type") == "object":
             component["additionalProperties"] = False

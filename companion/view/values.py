@@ -34,7 +34,7 @@ class Band:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wind:
+class WindView:
     """The wind now (5 s mean), its 90 s mean, the forecast's quantiles; angles at the bow are positive to starboard.
 
     ``awa_deg`` and ``aws_mps`` follow from the true wind and the motion over ground. ``health`` is none, settling,
@@ -60,7 +60,7 @@ class Wind:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Water:
+class WaterView:
     """The current: where it goes and how fast, the standard deviation in its most uncertain direction.
 
     ``is_planned``: it is strong and sure enough for plans to reckon with it; ``verdict`` says what is not known of it.
@@ -118,7 +118,7 @@ class Laylines:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Polar:
+class PolarView:
     """The speed by true wind angle in the wind of ``tws_mps``: nodes, linear between; best angles; the boat on it."""
 
     name: str
@@ -190,7 +190,7 @@ Grade = Literal["good", "poor", "bad", "unknown"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class State:
+class StateView:
     """What she does and why, in words; ``wants`` is what is missing for her to go on. ``age_s``: since it began."""
 
     phase: str
@@ -207,7 +207,7 @@ class State:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Alarm:
+class AlarmView:
     """Something that somebody should look at: since ``age_s``."""
 
     code: str
@@ -217,7 +217,7 @@ class Alarm:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Boat:
+class BoatView:
     """Where she is and how she moves. ``age_s``: of the position. ``cross_track_m`` is positive right of the leg."""
 
     age_s: float | None = None
@@ -241,7 +241,7 @@ class Boat:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Leg:
+class LegView:
     """A leg of the plan. ``starts_s`` and ``ends_s`` count from the plan; the last leg may be the loiter at the end."""
 
     from_en_m: PointEn
@@ -263,7 +263,7 @@ class Leg:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class PlanView:
     """The plan that is sailed: ``legs`` from the one that is next; what was promised, why it was chosen."""
 
     number: int | None = None
@@ -290,7 +290,7 @@ class Plan:
     next_tack_s: float | None = None
     leg: int | None = None               # the leg that is sailed, from 1 ...
     count: int | None = None             # ... of so many
-    legs: tuple[Leg, ...] = ()
+    legs: tuple[LegView, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -312,7 +312,7 @@ class TrackPoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Vessel:
+class VesselView:
     """Another vessel and the closest approach to her, hull to hull, if both go on; ``cpa_s`` None: she draws away."""
 
     name: str
@@ -336,7 +336,7 @@ class Vessel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class PlaceView:
     """A place on the chart."""
 
     name: str
@@ -345,7 +345,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Goal:
+class GoalView:
     """A goal of the voyage: a point, a buoy to round (``side``), a line, a box, a search, or a place of a field."""
 
     name: str
@@ -361,7 +361,7 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Standing:
+class StandingView:
     """The order that stands."""
 
     verb: str
@@ -375,7 +375,7 @@ class Standing:
 class Orders:
     """The order that stands, the last answer, and what the mission permits whoever may open the socket on board."""
 
-    standing: Standing | None = None
+    standing: StandingView | None = None
     permitted: tuple[str, ...] | None = None
     answer: str = ""
     answer_age_s: float | None = None
@@ -423,22 +423,22 @@ class View:
     unix_s: float | None = None
     age_s: float | None = None
     area: str | None = None
-    state: State
-    alarms: tuple[Alarm, ...] = ()
-    boat: Boat = Boat()
-    wind: Wind | None = None
-    water: Water | None = None
+    state: StateView
+    alarms: tuple[AlarmView, ...] = ()
+    boat: BoatView = BoatView()
+    wind: WindView | None = None
+    water: WaterView | None = None
     no_go: NoGo | None = None
     laylines: Laylines | None = None
-    polar: Polar | None = None
-    plan: Plan | None = None
+    polar: PolarView | None = None
+    plan: PlanView | None = None
     predicted: tuple[Ahead, ...] = ()
     track: tuple[TrackPoint, ...] = ()
-    vessels: tuple[Vessel, ...] = ()
-    goals: tuple[Goal, ...] = ()
-    refuges: tuple[Place, ...] = ()
-    home: Place | None = None
-    safe_end: Place | None = None
+    vessels: tuple[VesselView, ...] = ()
+    goals: tuple[GoalView, ...] = ()
+    refuges: tuple[PlaceView, ...] = ()
+    home: PlaceView | None = None
+    safe_end: PlaceView | None = None
     orders: Orders = Orders()
     figures: Figures = Figures()
     health: tuple[Part, ...] = ()

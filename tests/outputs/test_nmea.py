@@ -13,7 +13,7 @@ from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from companion.outputs import nmea
 from companion.outputs.nmea import lines_of
-from companion.view.values import Boat, Goal, Leg, Plan, State, View, Wind
+from companion.view.values import BoatView, GoalView, LegView, PlanView, StateView, View, WindView
 from tests.outputs.conftest import ORIGIN, view_of
 
 KNOT = 1852.0 / 3600.0
@@ -163,13 +163,13 @@ def test_without_the_time_by_gps_none_is_told(view):
 
 
 def test_a_boat_that_does_not_sail_steers_nowhere(view):
-    told_ = told(replace(view, state=State(phase="waiting", is_sailing=False)))
+    told_ = told(replace(view, state=StateView(phase="waiting", is_sailing=False)))
     assert {"APB", "RMB"}.isdisjoint(told_)
     assert "RTE" in told_
 
 
 def test_two_goals_of_one_name_are_two_waypoints():
-    goals = tuple(Goal(name="Mark", kind="point", at_en_m=(east, 80.0)) for east in (60.0, 160.0))
+    goals = tuple(GoalView(name="Mark", kind="point", at_en_m=(east, 80.0)) for east in (60.0, 160.0))
     assert told(view_of(goals=goals))["RTE"][0].waypoint_list == ["Mark", "W3"]
 
 
@@ -177,19 +177,21 @@ numbers, turns = st.none() | st.floats(0.0, 359.9), st.none() | st.floats(-180.0
 ages = st.none() | st.floats(0.0, 30.0)
 places = st.tuples(st.floats(-4e4, 4e4), st.floats(-4e4, 4e4))
 boats = st.builds(
-    Boat, age_s=ages, lat_deg=st.none() | st.floats(-90.0, 90.0), lon_deg=st.none() | st.floats(-180.0, 180.0),
+    BoatView, age_s=ages, lat_deg=st.none() | st.floats(-90.0, 90.0), lon_deg=st.none() | st.floats(-180.0, 180.0),
     at_en_m=st.none() | places, heading_deg=numbers, cog_deg=numbers, sog_mps=st.none() | speeds,
     roll_deg=st.none() | st.floats(-90.0, 90.0), battery_v=st.none() | st.floats(0.0, 30.0))
 winds = st.none() | st.builds(
-    Wind, health=st.sampled_from(["none", "settling", "good", "light", "untrusted"]), age_s=ages, twd_from_deg=numbers,
+    WindView, health=st.sampled_from(["none", "settling", "good", "light", "untrusted"]), age_s=ages,
+    twd_from_deg=numbers,
     tws_mps=st.none() | speeds, twa_deg=turns, awa_deg=turns, aws_mps=st.none() | speeds)
-legs = st.builds(Leg, from_en_m=places, to_en_m=places, is_done=st.booleans(), is_loiter=st.booleans())
-plans = st.none() | st.builds(Plan, leg=st.none() | st.integers(1, 300), legs=st.lists(legs, max_size=12).map(tuple))
-marks = st.builds(Goal, name=st.text(max_size=12), kind=st.just("point"), at_en_m=places)
+legs = st.builds(LegView, from_en_m=places, to_en_m=places, is_done=st.booleans(), is_loiter=st.booleans())
+plans = st.none() | st.builds(PlanView, leg=st.none() | st.integers(1, 300), legs=st.lists(legs,
+                                                                                           max_size=12).map(tuple))
+marks = st.builds(GoalView, name=st.text(max_size=12), kind=st.just("point"), at_en_m=places)
 views = st.builds(
     View, source=st.just("live"), name=st.just("t"), t_s=st.floats(0.0, 1e6), boat=boats, wind=winds, plan=plans,
     goals=st.lists(marks, max_size=3).map(tuple),
-    state=st.builds(State, phase=st.just("standard"), is_sailing=st.none() | st.booleans()))
+    state=st.builds(StateView, phase=st.just("standard"), is_sailing=st.none() | st.booleans()))
 
 
 @given(views, st.none() | st.floats(0.0, 4e9))

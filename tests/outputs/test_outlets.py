@@ -20,7 +20,7 @@ from companion.outputs import Outputs
 from companion.outputs.nmea import MOST_CLIENTS
 from companion.outputs.outlet import Slot
 from companion.outputs.outputs import read_token
-from companion.view.values import Alarm
+from companion.view.values import AlarmView
 from sitl.scene.ships import free_port
 from tests.outputs.conftest import chosen, view_of
 
@@ -171,7 +171,7 @@ def test_a_signal_k_server_that_takes_nothing_in_does_not_hold_the_voyage(frame,
         stuck.bind(("127.0.0.1", 0))
         stuck.listen()
 
-        big = Alarm(code="x", level="error", text="a" * 100_000)   # fills it at once
+        big = AlarmView(code="x", level="error", text="a" * 100_000)   # fills it at once
 
         async def body(outputs, said):
             worst_s = 0.0

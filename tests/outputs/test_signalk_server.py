@@ -7,14 +7,14 @@ from dataclasses import replace
 import pytest
 
 from companion.outputs import Outputs
-from companion.view.values import Alarm
+from companion.view.values import AlarmView
 from sitl.scene.ships import free_port
 from tests.outputs.conftest import chosen, view_of
 from tests.outputs.signalk_server import MISSING, PROGRAM, Server
 
 pytestmark = [pytest.mark.signalk, pytest.mark.skipif(PROGRAM is None, reason=MISSING)]
-LEAK = Alarm(code="leaking", level="critical", text="to the nearest refuge")
-SILENT = Alarm(code="link silent", level="error", text="no actions")
+LEAK = AlarmView(code="leaking", level="critical", text="to the nearest refuge")
+SILENT = AlarmView(code="link silent", level="error", text="no actions")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from companion.clock import run
 from companion.orders import Answer, Result
 from companion.page import Address, Live, served
 from companion.view import Event, View
-from companion.view.values import State
+from companion.view.values import StateView
 
 TOKEN = "a-token-of-enough-characters"
 
@@ -22,7 +22,7 @@ def free_port():
 
 
 def view_at(t_s, why=""):
-    return View(source="live", name="test", t_s=t_s, state=State(phase="standard", why=why))
+    return View(source="live", name="test", t_s=t_s, state=StateView(phase="standard", why=why))
 
 
 def event(number):

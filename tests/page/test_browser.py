@@ -266,12 +266,12 @@ def test_a_link_that_breaks_is_said_and_healed_without_a_reload(sailed):
 def test_words_of_others_are_shown_as_words(sailed):
     from dataclasses import replace
 
-    from companion.view.values import Alarm, Vessel
+    from companion.view.values import AlarmView, VesselView
 
     nasty = "<img src=x onerror=alert(1)><script>alert(2)</script>"
     view = next(v for v in sailed.views if v.state.is_sailing)
-    view = replace(view, name=nasty, alarms=(Alarm(code="x", level="error", text=nasty, age_s=1.0),),
-                   vessels=(Vessel(name=nasty, at_en_m=(10.0, 10.0), alarm="act", range_m=10.0),))
+    view = replace(view, name=nasty, alarms=(AlarmView(code="x", level="error", text=nasty, age_s=1.0),),
+                   vessels=(VesselView(name=nasty, at_en_m=(10.0, 10.0), alarm="act", range_m=10.0),))
     live = Live(name=nasty, unix_s=0.0)
     live.show(view, (), sailed.area)
     with serving(live) as (url, _), Window() as window:

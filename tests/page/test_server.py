@@ -15,7 +15,7 @@ from companion.clock import run
 from companion.errors import JobError
 from companion.page import Address, Live, Record, connections, served
 from companion.page.sources import Hub, Watcher
-from companion.view import Area, Past
+from companion.view import AreaView, Past
 from tests.page.asking import event, free_port, hang_up, view_at, with_page
 
 
@@ -220,7 +220,7 @@ def test_blueos_finds_the_page():
 
 
 def record_of(count, every=1):
-    area = Area(name="test", origin_lat_deg=50.0, origin_lon_deg=-1.0, lat_m=111_000.0, lon_m=70_000.0, hash="x")
+    area = AreaView(name="test", origin_lat_deg=50.0, origin_lon_deg=-1.0, lat_m=111_000.0, lon_m=70_000.0, hash="x")
     record = Record("test", area, is_whole=True, count=count)
     for n in range(count):
         record.take(view_at(float(n)), (event(n + 1),) if n % 100 == every else ())

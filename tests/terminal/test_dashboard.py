@@ -12,25 +12,39 @@ from companion.terminal import Frame, Helm, History, Shown, changes, draw, event
 from companion.terminal.screen import Style, clean
 from companion.view import View
 from companion.view.fold import aged
-from companion.view.values import Alarm, Boat, Figures, Goal, Leg, Part, Plan, Polar, State, Vessel, Wind
+from companion.view.values import (
+    AlarmView,
+    BoatView,
+    Figures,
+    GoalView,
+    LegView,
+    Part,
+    PlanView,
+    PolarView,
+    StateView,
+    VesselView,
+    WindView,
+)
 
 UNIX_S = 1_795_000_000.0
-LEGS = (Leg(from_en_m=(0.0, 0.0), to_en_m=(60.0, 80.0)), Leg(from_en_m=(60.0, 80.0), to_en_m=(160.0, 80.0)))
+LEGS = (LegView(from_en_m=(0.0, 0.0), to_en_m=(60.0, 80.0)), LegView(from_en_m=(60.0, 80.0), to_en_m=(160.0, 80.0)))
 VIEW = View(
     source="live", name="bay", t_s=600.0, age_s=0.4,
-    state=State(phase="standard", why="item 2 of 4 to North mark", mode="AUTO", is_armed=True, is_sailing=True),
-    alarms=(Alarm(code="drifting", level="critical", text="drifting: onto Rock in 120 s", age_s=42.0),
-            Alarm(code="battery low", level="warning", text="19 %", age_s=5.0)),
-    boat=Boat(age_s=0.4, at_en_m=(28.0, 29.0), heading_deg=35.0, cog_deg=37.0, sog_mps=1.5, roll_deg=-12.0, vmg_mps=1.0,
+    state=StateView(phase="standard", why="item 2 of 4 to North mark", mode="AUTO", is_armed=True, is_sailing=True),
+    alarms=(AlarmView(code="drifting", level="critical", text="drifting: onto Rock in 120 s", age_s=42.0),
+            AlarmView(code="battery low", level="warning", text="19 %", age_s=5.0)),
+    boat=BoatView(age_s=0.4, at_en_m=(28.0, 29.0), heading_deg=35.0, cog_deg=37.0, sog_mps=1.5, roll_deg=-12.0,
+                  vmg_mps=1.0,
               cross_track_m=5.0, waypoint_m=60.0, goal_m=140.0, clearance_m=11.4, tack="starboard", battery_v=12.13,
               battery_share=0.8),
-    wind=Wind(health="settling", age_s=0.5, twd_from_deg=80.0, tws_mps=5.0, sigma_deg=9.0, tws_sigma_mps=0.6,
+    wind=WindView(health="settling", age_s=0.5, twd_from_deg=80.0, tws_mps=5.0, sigma_deg=9.0, tws_sigma_mps=0.6,
               twa_deg=45.0, awa_deg=36.0, aws_mps=6.1),
-    polar=Polar(name="p", tws_mps=5.0, twa_deg=(0.0, 90.0), speed_mps=(1.5, 1.5)),
-    plan=Plan(number=17, age_s=252.0, leg=2, count=4, promised_risk=0.1, path_risk=0.31, next_tack_s=100.0, legs=LEGS,
+    polar=PolarView(name="p", tws_mps=5.0, twa_deg=(0.0, 90.0), speed_mps=(1.5, 1.5)),
+    plan=PlanView(number=17, age_s=252.0, leg=2, count=4, promised_risk=0.1, path_risk=0.31, next_tack_s=100.0,
+                  legs=LEGS,
               there_s=192.0, there_late_s=250.0),
-    vessels=(Vessel(name="FERRY", cpa_m=41.0, cpa_s=72.0, alarm="act"),),
-    goals=(Goal(name="North mark", kind="point", at_en_m=(160.0, 80.0), is_next=True, distance_m=141.0,
+    vessels=(VesselView(name="FERRY", cpa_m=41.0, cpa_s=72.0, alarm="act"),),
+    goals=(GoalView(name="North mark", kind="point", at_en_m=(160.0, 80.0), is_next=True, distance_m=141.0,
                 bearing_deg=69.0),),
     figures=Figures(goals=2, goals_reached=0, tacks=3), health=(Part(name="wind", grade="poor", text="too short"),),
 )
@@ -66,8 +80,9 @@ def test_it_counts_the_alarms_that_it_has_no_room_for():
 
 
 @pytest.mark.parametrize("view", [
-    None, View(source="radio", name="", t_s=0.0, state=State(phase="not heard")),
-    View(source="radio", name="", t_s=0.0, state=State(phase="x"), boat=Boat(), wind=Wind(health="good"), plan=Plan())])
+    None, View(source="radio", name="", t_s=0.0, state=StateView(phase="not heard")),
+    View(source="radio", name="", t_s=0.0, state=StateView(phase="x"), boat=BoatView(), wind=WindView(health="good"),
+         plan=PlanView())])
 def test_what_is_not_known_is_no_zero(view):
     text = draw(shown(view), 80, 24).text
     text = re.sub(r"\d\d:\d\d:\d\d|udpin:x|for 0 s", "", text)
@@ -93,7 +108,7 @@ def test_nothing_that_somebody_sends_reaches_the_terminal_as_a_command():
     """A vessel may call herself anything."""
     evil = "\x1b[2J\x1b]0;x\x07\r\n\u202e\u0000\x9b31m"
     view = replace(VIEW, vessels=(replace(VIEW.vessels[0], name=evil),), state=replace(VIEW.state, why=evil),
-                   alarms=(Alarm(code=evil, level="error", text=evil),))
+                   alarms=(AlarmView(code=evil, level="error", text=evil),))
     frame = draw(shown(view, said=evil), 80, 24)
     assert all(len(c) == 1 and c.isprintable() for row in frame.cells for c, _ in row)
 
