@@ -19,7 +19,7 @@ from companion.mavlink.wire import believable
 from companion.messages import MissionItem
 from companion.skipper.step import ends_safely
 
-__all__ = ["RATES_HZ", "Examined", "Finding", "Level", "Needs", "examine"]
+__all__ = ["RATES_HZ", "DoctorFinding", "Examined", "Level", "Needs", "examine"]
 
 
 class Level(enum.IntEnum):
@@ -31,7 +31,7 @@ class Level(enum.IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class DoctorFinding:
     """One finding: what is, why it matters, and what to set (``wanted`` None: nothing that a parameter can do)."""
 
     level: Level
@@ -80,7 +80,7 @@ class Report:
 
     def __init__(self, parameters: Mapping[str, float]) -> None:
         self.parameters = parameters
-        self.findings: list[Finding] = []
+        self.findings: list[DoctorFinding] = []
 
     def get(self, name: str) -> float | None:
         """Return a parameter under any of its names, None when it was not answered."""
@@ -92,7 +92,7 @@ class Report:
         """Add a finding, about parameter ``name`` if one is given."""
         value = self.get(name) if name is not None else None
         self.findings.append(
-            Finding(level=level, code=code, what=what, why=why, parameter=name, value=value, wanted=wanted))
+            DoctorFinding(level=level, code=code, what=what, why=why, parameter=name, value=value, wanted=wanted))
 
     def expect(self, level: Level, name: str, wanted: float, why: str) -> None:
         """Add a finding if a parameter was answered and is not as wanted."""
@@ -264,7 +264,7 @@ def streams(report: Report, seen: Examined) -> None:
             report.add(Level.WARNING, "streams", f"{name} comes {rate:.1f} times a second", f"{wanted:g} are needed")
 
 
-def examine(seen: Examined, needs: Needs) -> tuple[Finding, ...]:
+def examine(seen: Examined, needs: Needs) -> tuple[DoctorFinding, ...]:
     """Return the findings, worst first, each once."""
     report = Report(seen.parameters)
     if not seen.parameters:

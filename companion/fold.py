@@ -75,7 +75,7 @@ _UNTRUSTED = frozenset({
 })
 
 
-class Air:
+class StepWind:
     """The wind room with the means over 90 s and 5 s beside its forecast."""
 
     def __init__(self, room: WindRoom) -> None:
@@ -148,7 +148,7 @@ _LIMITS = frozenset({"SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
+class ParameterChange:
     """A parameter that changes what a sensor says, or how she sails, was set; ``before`` None: it was not known."""
 
     name: str
@@ -157,7 +157,7 @@ class Change:
     effect: Effect
 
 
-class ToldParameters:
+class ParameterStore:
     """The autopilot's parameters by ArduPilot's names, in its units."""
 
     def __init__(self) -> None:
@@ -168,7 +168,7 @@ class ToldParameters:
 
     def take(
         self, values: Mapping[str, float], *, is_set: bool = False,
-    ) -> tuple[dict[str, float], tuple[str, ...], tuple[Change, ...]]:
+    ) -> tuple[dict[str, float], tuple[str, ...], tuple[ParameterChange, ...]]:
         """Take what was told; return what of it is believed, why the rest cannot be, and what somebody has changed.
 
         One that was known and has changed is in none of them: it is asked for again, and believed when it is told
@@ -177,7 +177,7 @@ class ToldParameters:
         """
         good, refused = believable(values)
         self._answered |= values.keys()
-        changes: list[Change] = []
+        changes: list[ParameterChange] = []
         for name in tuple(good):
             known, value, effect = self.values.get(name), good[name], effect_of(name)
             is_news = known is not None or (is_set and name not in RANGES) or name in self._in_doubt
@@ -188,7 +188,7 @@ class ToldParameters:
             else:
                 del self._in_doubt[name]
                 if effect is not None:
-                    changes.append(Change(name=name, before=known, after=value, effect=effect))
+                    changes.append(ParameterChange(name=name, before=known, after=value, effect=effect))
         self.values.update(good)
         if self._answered >= _LIMITS:
             self.limits = AutopilotLimits.from_params(self.values)
@@ -253,7 +253,7 @@ class VoyageFold:
         self._anew = ""    # why the wind is learned anew, until it is ...
         self._anew_s: float | None = None   # ... and since when
         self.skipper, self.permissions = skipper, permissions
-        self._air = Air(wind)
+        self._air = StepWind(wind)
         self.state: SkipperState = skipper.initial(persisted, known)
         self.assembler = VehicleAssembler()
         self._witness = Witness()
@@ -263,7 +263,7 @@ class VoyageFold:
         self._has_company = False
         self._has_shore = False
         self._shore_s: float | None = None   # when a ground station was last heard
-        self._parameters = ToldParameters()
+        self._parameters = ParameterStore()
         self._disbelieved: set[str] = set()
         self._targets = Targets.empty(skipper.voyage.frame, traffic)
         self._vehicle: VehicleState | None = None
@@ -367,7 +367,7 @@ class VoyageFold:
         for change in changes:
             self._changed(change)
 
-    def _changed(self, change: Change) -> None:
+    def _changed(self, change: ParameterChange) -> None:
         """Say that a parameter was set, and forget what was learned by another value of it."""
         before = "a value that was not known" if change.before is None else f"{change.before:g}"
         text = f"{change.name} was set from {before} to {change.after:g} ({change.effect.value})"

@@ -103,7 +103,7 @@ class Folded:
     recorded: list[dict[str, Any]] = field(default_factory=list)
 
 
-class Recorded:
+class RecordedInput:
     """The voyage in ``folder``, to be folded again.
 
     Args:
@@ -214,7 +214,7 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
     Raises:
         InputError: a file is missing or is not one of a voyage, or the telemetry log is empty.
     """
-    voyage = Recorded(folder, mission_path)
+    voyage = RecordedInput(folder, mission_path)
     differences: list[Difference] = []
     steps = unrecorded = messages = lost = actions = 0
     for folded in voyage.steps():

@@ -30,7 +30,7 @@ from companion.fold import Step, VoyageFold
 from companion.guard import Auxiliary, Guard
 from companion.messages import CompanionStatus
 from companion.orders import LOCAL, Answer, Result, Verb, Wanted, permitted, phrase
-from companion.page import Address, Chart, Guests, Live, plan_figures, served
+from companion.page import Address, Guests, LiveSource, TileChart, plan_figures, served
 from companion.planner import Plan
 from companion.skipper.step import SkipperConfig
 from companion.skipper.way import Voyage
@@ -88,7 +88,7 @@ class LivePage:
     """Shows the steps of a voyage on ``live``."""
 
     def __init__(
-        self, live: Live, views: ViewBroadcast, fold: VoyageFold, planner: Planner, operator: OperatorCommands,
+        self, live: LiveSource, views: ViewBroadcast, fold: VoyageFold, planner: Planner, operator: OperatorCommands,
     ) -> None:
         self._live, self._showing, self._fold, self._planner, self._crew = live, views, fold, planner, operator
         self._step: Step | None = None
@@ -135,7 +135,7 @@ def _in_figures(plan: Plan) -> dict[str, Any]:
 
 async def live_page(
     address: Address, fold: VoyageFold, planner: Planner, operator: OperatorCommands, views: ViewBroadcast, *,
-    pace: float, charts: Sequence[Chart],
+    pace: float, charts: Sequence[TileChart],
 ) -> None:
     """Serve the page of a voyage until cancelled. ``pace``: seconds of the loop for each second.
 
@@ -144,7 +144,7 @@ async def live_page(
         Exception: a step could not be shown.
     """
     verbs = fold.permissions.local_orders
-    live = Live(name=fold.skipper.voyage.name, unix_s=views.epoch_s, area=views.area,
+    live = LiveSource(name=fold.skipper.voyage.name, unix_s=views.epoch_s, area=views.area,
                 permitted=tuple(verb.value for verb in Verb if permitted(verb, verbs)))
     page = LivePage(live, views, fold, planner, operator)
     if address.token:

@@ -10,7 +10,7 @@ from pathlib import Path
 from companion.app.from_autopilot import DrawnSettings
 from companion.disk import Disk
 from companion.mavlink.transports import SigningStore
-from companion.page import Address, Chart
+from companion.page import Address, TileChart
 from companion.telemetry.folder import VoyageArchive
 from companion.wind import Estimator, WindRoom
 
@@ -88,7 +88,7 @@ class SailOptions:
     settings: DrawnSettings | None = None
     socket: Path | None = None
     http: Address | None = None
-    charts: tuple[Chart, ...] = ()
+    charts: tuple[TileChart, ...] = ()
     far: SatelliteLink | None = None
     known: tuple[str, ...] = ()
     signing: SigningStore | None = None

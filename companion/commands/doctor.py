@@ -20,7 +20,7 @@ from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.boat import AutopilotLimits
-    from companion.doctor import Examined, Finding, Needs
+    from companion.doctor import DoctorFinding, Examined, Needs
     from companion.geofence import Mission
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.transports import SigningStore, Transport
@@ -41,7 +41,7 @@ Exit codes: 0 nothing in the way, 1 an error was found or the autopilot did not 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
+class ParameterFix:
     """A parameter that was set, or was to be: what it reads afterwards (None: not set)."""
 
     name: str
@@ -150,7 +150,7 @@ def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> 
 async def diagnose(
     transport: Transport, needs: Needs, *, wait_s: float = 30.0, listen_s: float = LISTEN_S, apply: bool = False,
     signing: SigningStore | None = None, system: int | None = None,
-) -> tuple[tuple[Finding, ...], tuple[Change, ...]]:
+) -> tuple[tuple[DoctorFinding, ...], tuple[ParameterFix, ...]]:
     """Read everything, judge it, and set what is to be set if ``apply``.
 
     Raises:
@@ -208,29 +208,29 @@ async def read(autopilot: Autopilot, listen_s: float = LISTEN_S, *, has_key: boo
     )
 
 
-async def _apply(autopilot: Autopilot, findings: Sequence[Finding]) -> tuple[Change, ...]:
+async def _apply(autopilot: Autopilot, findings: Sequence[DoctorFinding]) -> tuple[ParameterFix, ...]:
     """Set what warnings and errors want, worst first, each parameter once, and read it back."""
     from companion.doctor import Level
 
-    changes: dict[str, Change] = {}
+    changes: dict[str, ParameterFix] = {}
     for finding in findings:
         name, wanted = finding.parameter, finding.wanted
         if finding.level is Level.INFO or name is None or wanted is None or name in changes:
             continue
         written = await autopilot.set_parameter(name, wanted)
         seen = await autopilot.get_parameter(name)
-        changes[name] = Change(
+        changes[name] = ParameterFix(
             name=seen.name or name, before=finding.value, wanted=wanted, after=seen.value if seen.is_ok else None,
             text=written.text)
     return tuple(changes.values())
 
 
-def _is_cured(finding: Finding, changes: Sequence[Change]) -> bool:
+def _is_cured(finding: DoctorFinding, changes: Sequence[ParameterFix]) -> bool:
     return any(change.before == finding.value and change.wanted == finding.wanted and change.is_done
                for change in changes) and finding.wanted is not None
 
 
-def as_json(findings: Sequence[Finding], changes: Sequence[Change]) -> dict[str, Any]:
+def as_json(findings: Sequence[DoctorFinding], changes: Sequence[ParameterFix]) -> dict[str, Any]:
     """Return findings and changes as JSON values."""
     return {
         "findings": [
@@ -245,7 +245,7 @@ def as_json(findings: Sequence[Finding], changes: Sequence[Change]) -> dict[str,
     }
 
 
-def as_text(findings: Sequence[Finding], changes: Sequence[Change], *, applied: bool) -> str:
+def as_text(findings: Sequence[DoctorFinding], changes: Sequence[ParameterFix], *, applied: bool) -> str:
     """Return the findings as lines for a person, worst first."""
     from companion.doctor import Level
 

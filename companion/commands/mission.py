@@ -384,7 +384,7 @@ def add_edit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 def run_edit(args: argparse.Namespace) -> int:
     """Serve the editor until it is ended; return the exit code."""
     from companion.clock import run as run_loop
-    from companion.editor import Base, editing, read_base
+    from companion.editor import SourceFiles, editing, read_base
     from companion.page import Address, open_charts
 
     path = Path(args.file)
@@ -393,7 +393,7 @@ def run_edit(args: argparse.Namespace) -> int:
                          "make one of a drawing: companion mission new OUT.toml --from FILE")
     import tomlkit  # noqa: F401 - said now where it is missing, and not when somebody saves
 
-    base: Base = read_base(path)
+    base: SourceFiles = read_base(path)
     host, port = args.http
     charts = open_charts(args.chart)
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from companion.geofence import Mission
     from companion.geofence.mission import MissionOptions
     from companion.guard import Guard
-    from companion.outputs import Wanted
+    from companion.outputs import DisplayOptions
     from companion.planner.nursery import Nursery
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
@@ -289,7 +289,7 @@ def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 async def _sail(
     mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager,
-    nursery: Nursery | None, out: Console, told: Wanted, guard: Guard,
+    nursery: Nursery | None, out: Console, told: DisplayOptions, guard: Guard,
 ) -> dict[str, Any] | None:
     """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker

@@ -80,11 +80,11 @@ def run(args: argparse.Namespace) -> int:
 
 def read_record(folder: Path) -> Any:
     """Return the recorded voyage for the page. Raises InputError."""
-    from companion.page import Record
+    from companion.page import RecordedSource
     from companion.view import recorded_views
 
     recorded = recorded_views(folder)
-    record = Record(recorded.name, recorded.area, is_whole=recorded.is_whole, count=recorded.count)
+    record = RecordedSource(recorded.name, recorded.area, is_whole=recorded.is_whole, count=recorded.count)
     for number, (view, events) in enumerate(recorded.moments, start=1):
         record.take(view, events)
         if number % SAID_EVERY == 0 and sys.stderr.isatty():
@@ -130,7 +130,7 @@ async def ashore(args: argparse.Namespace, charts: Any) -> int:
     from companion.mavlink.trust import SHORE
     from companion.mavlink.wire import StatusReader, VehicleAssembler
     from companion.messages import VehicleState
-    from companion.page import Address, Live
+    from companion.page import Address, LiveSource
     from companion.view import HeardFold
 
     reader, assembler, fold = StatusReader(), VehicleAssembler(), HeardFold(args.link)
@@ -142,7 +142,7 @@ async def ashore(args: argparse.Namespace, charts: Any) -> int:
 
     host, port = args.http
     epoch_s = time.time() - now_s()
-    live = Live(name=args.link, kind="radio", unix_s=epoch_s)
+    live = LiveSource(name=args.link, kind="radio", unix_s=epoch_s)
     async with Link(
         open_link(args.link), identity=SHORE, target_system=args.system, streams=(), is_quiet=True,
     ) as link:

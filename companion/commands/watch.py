@@ -82,7 +82,7 @@ async def _watch(args: argparse.Namespace) -> int:
         return 0
 
 
-def _source(args: argparse.Namespace) -> Source:
+def _source(args: argparse.Namespace) -> ViewSource:
 
     if args.socket is not None:
         return OnBoard(args.socket)
@@ -91,14 +91,14 @@ def _source(args: argparse.Namespace) -> Source:
         from companion.mavlink.transports import SigningStore
 
         signing = SigningStore(args.signing_key, time.time())
-    return Radio(args.link, system=args.system, timeout_s=args.timeout, signing=signing)
+    return RadioSource(args.link, system=args.system, timeout_s=args.timeout, signing=signing)
 
 
-async def _draw(args: argparse.Namespace, source: Source, over: asyncio.Event) -> int:
+async def _draw(args: argparse.Namespace, source: ViewSource, over: asyncio.Event) -> int:
     """Draw until somebody ends it."""
-    from companion.terminal import Helm, History, Shown, Terminal, draw
+    from companion.terminal import History, KeyCommands, Shown, Terminal, draw
 
-    helm, history, said = Helm(knots=args.units == "kn"), History(), ""
+    helm, history, said = KeyCommands(knots=args.units == "kn"), History(), ""
     is_due = asyncio.Event()
     giving: asyncio.Task[str] | None = None
     began_s = now_s()
@@ -138,7 +138,7 @@ async def _draw(args: argparse.Namespace, source: Source, over: asyncio.Event) -
     return 0
 
 
-async def _given(source: Source, wanted: Wanted, give_up_s: float) -> str:
+async def _given(source: ViewSource, wanted: Wanted, give_up_s: float) -> str:
     """Give an order and return its answer in words."""
     try:
         answer = await source.give(wanted, give_up_s)
@@ -147,7 +147,7 @@ async def _given(source: Source, wanted: Wanted, give_up_s: float) -> str:
     return f"{wanted.words}: {answer.result.value}: {answer.text}"
 
 
-async def _tell(args: argparse.Namespace, source: Source, over: asyncio.Event) -> int:
+async def _tell(args: argparse.Namespace, source: ViewSource, over: asyncio.Event) -> int:
     """Write a line now and then, and what happens."""
     from companion.terminal import event_words, line_of
 
@@ -179,7 +179,7 @@ class _Told(TypedDict):
     events: tuple[Event, ...]
 
 
-class Source(ABC):
+class ViewSource(ABC):
     """Views, and a way for orders. A context manager. ``trouble``: why there is no end to the waiting, empty: none."""
 
     def __init__(self, name: str) -> None:
@@ -210,7 +210,7 @@ class Source(ABC):
         """Hear until cancelled."""
 
 
-class Radio(Source):
+class RadioSource(ViewSource):
     """What an autopilot's link brings of its companion; speaks once, and for orders."""
 
     def __init__(self, name: str, *, system: int | None, timeout_s: float, signing: Any = None) -> None:
@@ -272,7 +272,7 @@ class Radio(Source):
                 return
 
 
-class OnBoard(Source):
+class OnBoard(ViewSource):
     """What the companion on board tells at its socket: every step, whole."""
 
     def __init__(self, path: Path) -> None:

@@ -272,7 +272,7 @@ class Locked:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Base:
+class SourceFiles:
     """What was read. ``data`` holds the bytes of each file that is there; ``order`` the area's files as named."""
 
     path: Path
@@ -319,7 +319,7 @@ def text_of(data: bytes, source: str) -> Text:
     return Text(text=text, mark=mark, line_end=line_end)
 
 
-def read_base(path: Path) -> Base:
+def read_base(path: Path) -> SourceFiles:
     """Read a mission file with its area's files, or begin an empty one where there is none.
 
     Raises:
@@ -331,7 +331,7 @@ def read_base(path: Path) -> Base:
     if not path.exists():
         if not path.parent.is_dir():
             raise InputError(str(path), "", "its folder is not there", "make the folder first")
-        return Base(path=path, data={}, toml=Text(text=EMPTY), options=_empty())
+        return SourceFiles(path=path, data={}, toml=Text(text=EMPTY), options=_empty())
     data = {path: read_bytes(path)}
     toml = text_of(data[path], str(path))
     options = parse_options(toml.text, str(path))
@@ -366,7 +366,8 @@ def read_base(path: Path) -> Base:
             why = str(reason)
         if why:
             locked.append(Locked(name=name, why=why, document=document))
-    return Base(path=path, data=data, toml=toml, options=options, grounds=grounds, texts=texts, locked=tuple(locked))
+    return SourceFiles(path=path, data=data, toml=toml, options=options, grounds=grounds, texts=texts,
+                       locked=tuple(locked))
 
 
 def area_files(options: MissionOptions) -> list[tuple[str, Zone]]:

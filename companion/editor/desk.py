@@ -23,7 +23,7 @@ from msgspec import Meta, Struct
 from companion import __version__
 from companion.compose import planner_of
 from companion.disk import Disk, reason
-from companion.editor.base import Base, area_files, read_base
+from companion.editor.base import SourceFiles, area_files, read_base
 from companion.editor.draft import Draft, draft_of, looked_at
 from companion.editor.sketch import Sketch
 from companion.errors import CompanionError, InputError, JobError
@@ -35,10 +35,10 @@ from companion.messages import GeoPoint
 from companion.mission_check import AssumedWind, continued_plans, leg_names, legs
 from companion.page import (
     Address,
-    Chart,
-    Refused,
-    Reply,
+    HttpRefusal,
+    HttpReply,
     Stream,
+    TileChart,
     files,
     listening,
     plan_figures,
@@ -60,7 +60,7 @@ _UNKNOWN = GeoPoint(lat_deg=50.817, lon_deg=-1.31)   # where a mission without a
 _DRAWN = {"name", "goal", "refuge", "start", "area"}
 
 
-def state_of(base: Base) -> dict[str, Any]:
+def state_of(base: SourceFiles) -> dict[str, Any]:
     """Return what the page begins with."""
     sketch = base.sketch()
     frame = area_drawn("", _origin(base, sketch), [], [], [], None)
@@ -82,12 +82,12 @@ def state_of(base: Base) -> dict[str, Any]:
     }
 
 
-def _origin(base: Base, sketch: Sketch) -> GeoPoint:
+def _origin(base: SourceFiles, sketch: Sketch) -> GeoPoint:
     places = _places(base, sketch)
     return GeoPoint(lat_deg=places[0][0], lon_deg=places[0][1]) if places else _UNKNOWN
 
 
-def _places(base: Base, sketch: Sketch) -> list[tuple[float, float]]:
+def _places(base: SourceFiles, sketch: Sketch) -> list[tuple[float, float]]:
     """Return places of a mission, the best to begin its metres at first."""
     out = [sketch.start.at] if sketch.start is not None else []
     out += [p for g in sketch.goals for p in (g.at, g.port_mark, g.ring[0] if g.ring else None) if p is not None]
@@ -98,7 +98,7 @@ def _places(base: Base, sketch: Sketch) -> list[tuple[float, float]]:
     return out
 
 
-def _sharing(base: Base, name: str) -> list[str]:
+def _sharing(base: SourceFiles, name: str) -> list[str]:
     """Return the names of other missions in the folder that name the same file."""
     out = []
     siblings = sorted(base.path.parent.glob("*.toml"))[:MOST_SIBLINGS] if Path(name).name == name else []
@@ -111,7 +111,7 @@ def _sharing(base: Base, name: str) -> list[str]:
     return out
 
 
-def _shown(name: str, document: Document, base: Base) -> list[dict[str, Any]]:
+def _shown(name: str, document: Document, base: SourceFiles) -> list[dict[str, Any]]:
     """Return the zones of a file that is shown and not edited, as (lat, lon) rings."""
     marks = document.with_zones(()).as_obstacles(base.options.area.point_radius_m)
     zones = [*document.zones, *(o.zone() for o in marks)]
@@ -170,7 +170,7 @@ class Superseded(Exception):  # noqa: N818
     """A newer request has come."""
 
 
-class Previews:
+class PlanPreviews:
     """Plans with one worker; of requests that come meanwhile the newest is answered, the others are given up."""
 
     def __init__(self, worker: PlannerWorker) -> None:
@@ -254,16 +254,17 @@ class _Asked(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     part: str = ""
 
 
-class Desk:
+class EditorApi:
     """Serves the editor of one mission file; see ``companion.page.connections.App``."""
 
     def __init__(
-        self, base: Base, token: str, previews: Previews, charts: Sequence[Chart] = (), disk: Disk | None = None,
+        self, base: SourceFiles, token: str, previews: PlanPreviews, charts: Sequence[TileChart] = (),
+        disk: Disk | None = None,
     ) -> None:
         self._path, self._token, self._previews, self._disk = base.path, token, previews, disk or Disk()
         self._files = {**files(), **files("companion.editor")}
         self._charts = {chart.tag: chart for chart in charts}
-        self._bases: dict[str, Base] = {}
+        self._bases: dict[str, SourceFiles] = {}
         self._own: dict[Any, bytes] = {}      # files that were made here, as they were written
         self._turn, self._newest = asyncio.Lock(), 0
         self._keep(base)
@@ -273,42 +274,42 @@ class Desk:
         if request.method != b"POST":
             return 0
         if path != "/api/mission" and path not in self._acts():
-            raise Refused(404, "there is nothing to post to here")
+            raise HttpRefusal(404, "there is nothing to post to here")
         require_token(request, self._token)
         return MOST_BODY
 
-    async def reply(self, request: h11.Request, path: str, body: bytes) -> Reply | Stream:
+    async def reply(self, request: h11.Request, path: str, body: bytes) -> HttpReply | Stream:
         """Answer a request. Raises Refused."""
         if request.method != b"POST":
             file, tile = self._files.get(path), await tile_at(self._charts, path)
             if tile is not None:
                 return tile
             if file is None:
-                raise Refused(404, "there is nothing here")
-            return Reply(kind=file.kind, data=file.data, tag=file.tag, packed=file.packed)
+                raise HttpRefusal(404, "there is nothing here")
+            return HttpReply(kind=file.kind, data=file.data, tag=file.tag, packed=file.packed)
         act = self._acts().get(path)
         try:
             if act is None:
-                return Reply(data=msgspec.json.encode(await self._load()))
+                return HttpReply(data=msgspec.json.encode(await self._load()))
             asked = msgspec.json.decode(body, type=_Asked)
-            return Reply(data=msgspec.json.encode(await act(asked)))
+            return HttpReply(data=msgspec.json.encode(await act(asked)))
         except (msgspec.ValidationError, msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise Refused(400, f"this is no sketch: {error}") from None
+            raise HttpRefusal(400, f"this is no sketch: {error}") from None
         except Superseded:
-            raise Refused(409, "a newer request has come") from None
+            raise HttpRefusal(409, "a newer request has come") from None
         except CompanionError as error:
-            raise Refused(422, str(error)) from None
-        except Refused:
+            raise HttpRefusal(422, str(error)) from None
+        except HttpRefusal:
             raise
         except Exception as error:
             _LOG.exception("%s failed", path)
-            raise Refused(500, f"the editor failed at this: {type(error).__name__}; nothing is written") from None
+            raise HttpRefusal(500, f"the editor failed at this: {type(error).__name__}; nothing is written") from None
 
     def _acts(self) -> dict[str, Callable[[_Asked], Awaitable[dict[str, Any]]]]:
         return {"/api/check": self._check, "/api/plan": self._plan, "/api/save": self._save,
                 "/api/export": self._export}
 
-    def _keep(self, base: Base) -> str:
+    def _keep(self, base: SourceFiles) -> str:
         revision = base.revision
         self._bases.pop(revision, None)
         self._bases[revision] = base
@@ -316,10 +317,10 @@ class Desk:
             self._bases.pop(next(iter(self._bases)))
         return revision
 
-    def _base(self, revision: str) -> Base:
+    def _base(self, revision: str) -> SourceFiles:
         base = self._bases.get(revision)
         if base is None:
-            raise Refused(410, "the mission was read too long ago: reload the page")
+            raise HttpRefusal(410, "the mission was read too long ago: reload the page")
         return base
 
     def _draft(self, sketch: Sketch) -> Draft:
@@ -330,7 +331,7 @@ class Desk:
         self._keep(base)
         return await self._state(base)
 
-    async def _state(self, base: Base) -> dict[str, Any]:
+    async def _state(self, base: SourceFiles) -> dict[str, Any]:
         charts = [chart.facts() for chart in self._charts.values()]
         return {**await asyncio.to_thread(state_of, base), "charts": charts}
 
@@ -356,14 +357,14 @@ class Desk:
     async def _save(self, asked: _Asked) -> dict[str, Any]:
         on_disk = self._base(asked.disk)
 
-        def work() -> tuple[Base, list[str], dict[str, Any]]:
+        def work() -> tuple[SourceFiles, list[str], dict[str, Any]]:
             draft = self._draft(asked.sketch)
             _, found = looked_at(draft, asked.from_deg)
             known = {**self._own, **on_disk.data}
             changed = changed_meanwhile(known, {**draft.files, self._path: b""})
             if changed and not asked.is_forced:
                 names = listed([path.name for path in changed])
-                raise Refused(409, f"{names}: changed by another program since it was read")
+                raise HttpRefusal(409, f"{names}: changed by another program since it was read")
             files = {path: data for path, data in draft.files.items() if path in changed or known.get(path) != data}
             save(files, self._disk)
             self._own.update({path: data for path, data in files.items() if path in self._own or path not in known})
@@ -403,7 +404,7 @@ class Desk:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class EditorAddress:
     """Where the editor is: its address with the token behind ``#``, which no browser sends on."""
 
     url: str
@@ -411,7 +412,8 @@ class Place:
 
 
 @contextlib.asynccontextmanager
-async def editing(base: Base, address: Address, charts: Sequence[Chart] = ()) -> AsyncIterator[Place]:
+async def editing(base: SourceFiles, address: Address,
+                  charts: Sequence[TileChart] = ()) -> AsyncIterator[EditorAddress]:
     """Serve the editor of a mission while the body runs. An address without a token gets one.
 
     ``charts`` lie under the drawing, the lowest first.
@@ -422,6 +424,6 @@ async def editing(base: Base, address: Address, charts: Sequence[Chart] = ()) ->
     token = address.token or secrets.token_urlsafe(24)
     async with (
         PlannerWorker(algorithm=base.options.skipper.planner) as worker,
-        listening(address, Desk(base, token, Previews(worker), charts)) as server,
+        listening(address, EditorApi(base, token, PlanPreviews(worker), charts)) as server,
     ):
-        yield Place(url=f"{server.address.url}#{token}", token=token)
+        yield EditorAddress(url=f"{server.address.url}#{token}", token=token)

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 import shapely
 
-from companion.editor.base import Base, Ground, can_hold, new_ground, written
+from companion.editor.base import Ground, SourceFiles, can_hold, new_ground, written
 from companion.editor.sketch import Shape, Sketch, options_of
 from companion.editor.toml import rewritten
 from companion.errors import InputError, JobError
@@ -37,7 +37,7 @@ class Draft:
     files: Mapping[Path, bytes]
 
 
-def draft_of(base: Base, sketch: Sketch, own: AbstractSet[Path] = frozenset()) -> Draft:
+def draft_of(base: SourceFiles, sketch: Sketch, own: AbstractSet[Path] = frozenset()) -> Draft:
     """Return the files that a sketch makes of its base. ``own``: files that were made here before, and may be again.
 
     Raises:
@@ -75,7 +75,7 @@ def _toml(text: str) -> str:
 
 
 def _area(
-    base: Base, sketch: Sketch, options: MissionOptions, own: AbstractSet[Path],
+    base: SourceFiles, sketch: Sketch, options: MissionOptions, own: AbstractSet[Path],
 ) -> tuple[dict[str, str], MissionOptions]:
     """Return the texts of the area's files with the sketch's shapes in them, and the options that name them."""
     grounds = dict(base.grounds)
@@ -106,7 +106,7 @@ def _area(
 
 
 def _place_for(
-    shape: Shape, base: Base, options: MissionOptions, grounds: Mapping[str, Ground], own: AbstractSet[Path],
+    shape: Shape, base: SourceFiles, options: MissionOptions, grounds: Mapping[str, Ground], own: AbstractSet[Path],
 ) -> str:
     """Return the file that a new shape goes into: one of its zone that has words for it, else a new one."""
     for name, ground in grounds.items():

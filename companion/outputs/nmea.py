@@ -176,7 +176,7 @@ SAME_M = 1.0          # a waypoint nearer to a goal than this is the goal's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Course:
+class ActiveLeg:
     """The leg and the boat on it: ``right_m`` to the right of it, ``closing_mps`` the speed towards its end."""
 
     start_en_m: PointEn
@@ -195,7 +195,7 @@ class Course:
         return self.along_m >= self.length_m
 
 
-def course_of(view: View) -> Course | None:
+def course_of(view: View) -> ActiveLeg | None:
     """Return the course; None where she sails none, or where she is is not known."""
     legs = legs_ahead(view)
     boat = view.boat
@@ -212,7 +212,7 @@ def course_of(view: View) -> Course | None:
     closing_mps = None
     if boat.sog_mps is not None and boat.cog_deg is not None:
         closing_mps = boat.sog_mps * math.cos(math.radians(boat.cog_deg) - bearing_rad)
-    return Course(
+    return ActiveLeg(
         start_en_m=leg.from_en_m, end_en_m=leg.to_en_m, leg_rad=wrap_two_pi(leg_rad), distance_m=math.hypot(*left),
         bearing_rad=wrap_two_pi(bearing_rad), right_m=off[0] * north - off[1] * east,
         along_m=off[0] * east + off[1] * north, length_m=length_m, closing_mps=closing_mps)
@@ -318,7 +318,7 @@ def _water(view: View) -> list[str]:
         vdr(math.radians(water.set_deg), water.drift_mps)]
 
 
-def _course(course: Course, name: str, point: GeoPoint, *, has_arrived: bool) -> list[str]:
+def _course(course: ActiveLeg, name: str, point: GeoPoint, *, has_arrived: bool) -> list[str]:
     is_inside = course.distance_m <= INSIDE_M
     return [
         apb(course.right_m, course.leg_rad, course.bearing_rad, name, is_inside=is_inside,

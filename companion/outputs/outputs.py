@@ -23,14 +23,14 @@ MOST_TOKEN = 8192   # characters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wanted:
+class DisplayOptions:
     """Whom to tell, and the token that a Signal K server asks for."""
 
     displays: Displays
     token: str = field(default="", repr=False)
 
 
-def wanted(displays: Displays, guard: Guard) -> Wanted:
+def wanted(displays: Displays, guard: Guard) -> DisplayOptions:
     """Return whom to tell, with the token that was read; what cannot be, ``guard`` knows.
 
     A server is told without a token that cannot be read, and not at all without the library that its kind needs.
@@ -47,7 +47,7 @@ def wanted(displays: Displays, guard: Guard) -> Wanted:
             token = read_token(displays.token_file)
         except InputError as error:
             guard.lost(Auxiliary.SIGNALK_TOKEN, f"{error}", for_good=True)
-    return Wanted(displays=displays, token=token)
+    return DisplayOptions(displays=displays, token=token)
 
 
 def read_token(path: Path) -> str:
@@ -62,7 +62,7 @@ class Outputs:
     """The receivers that are wanted, while it is open. ``say`` hears how they stand, in words; ``guard`` knows it."""
 
     def __init__(
-        self, chosen: Wanted, frame: LocalFrame, say: Say, *, seed: int = 0, guard: Guard | None = None,
+        self, chosen: DisplayOptions, frame: LocalFrame, say: Say, *, seed: int = 0, guard: Guard | None = None,
     ) -> None:
         self._frame = frame
         self._guard = guard or Guard(lambda name, why: say(

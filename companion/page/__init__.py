@@ -1,12 +1,12 @@
 """The page: a voyage in a browser, served by the companion itself, and the files that it is made of."""
 
-from companion.page.charts import Chart, open_charts
+from companion.page.charts import TileChart, open_charts
 from companion.page.connections import (
     Address,
     Guests,
-    Refused,
-    Reply,
-    Server,
+    HttpRefusal,
+    HttpReply,
+    HttpServer,
     Stream,
     listening,
     read_token,
@@ -14,9 +14,10 @@ from companion.page.connections import (
 )
 from companion.page.server import served, tile_at
 from companion.page.site import export, files
-from companion.page.sources import Live, Record, plan_figures
+from companion.page.sources import LiveSource, RecordedSource, plan_figures
 
 __all__ = [
-    "Address", "Chart", "Guests", "Live", "Record", "Refused", "Reply", "Server", "Stream", "export", "files",
-    "listening", "open_charts", "plan_figures", "read_token", "require_token", "served", "tile_at",
+    "Address", "Guests", "HttpRefusal", "HttpReply", "HttpServer", "LiveSource", "RecordedSource", "Stream",
+    "TileChart", "export", "files", "listening", "open_charts", "plan_figures", "read_token", "require_token",
+    "served", "tile_at",
 ]

@@ -39,7 +39,7 @@ class Tiles(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Chart:
+class TileChart:
     """A file of tiles. ``bounds_deg``: west, south, east, north; ``tag`` is another one when the file is."""
 
     name: str
@@ -80,12 +80,12 @@ def picture_of(data: bytes) -> str:
     return "image/webp" if data[:4] == b"RIFF" and data[8:12] == b"WEBP" else ""
 
 
-def open_charts(paths: Sequence[Path]) -> tuple[Chart, ...]:
+def open_charts(paths: Sequence[Path]) -> tuple[TileChart, ...]:
     """Open charts, the lowest first. Raises InputError: one is none, or cannot be read."""
     return tuple(open_chart(path) for path in paths)
 
 
-def open_chart(path: Path) -> Chart:
+def open_chart(path: Path) -> TileChart:
     """Open a chart. Raises InputError: it is none, cannot be read, or has no pictures in it."""
     try:
         with open_regular(path) as file:
@@ -129,7 +129,7 @@ class Mbtiles:
         return bytes(rows[0][0]) if rows and rows[0][0] else None
 
 
-def _mbtiles(path: Path, tag: str) -> Chart:
+def _mbtiles(path: Path, tag: str) -> TileChart:
     tiles = Mbtiles(path)
     try:
         said = {str(name): str(value) for name, value in tiles.ask("SELECT name, value FROM metadata")}
@@ -184,7 +184,7 @@ class Pmtiles:
         return said if isinstance(said, dict) else {}
 
 
-def _pmtiles(path: Path, tag: str) -> Chart:
+def _pmtiles(path: Path, tag: str) -> TileChart:
     tiles = Pmtiles(path)
     header = tiles.header
     _require_raster(path, header["tile_type"].name.lower())
@@ -207,12 +207,12 @@ def _require_raster(path: Path, kind: str) -> None:
 
 def _chart(
     path: Path, tag: str, tiles: Tiles, *, name: Any, credit: Any, bounds: list[float] | None, zooms: tuple[int, int],
-) -> Chart:
+) -> TileChart:
     """Return a chart; where a file does not say its bounds, or says what cannot be, it is looked for everywhere."""
     west, south, east, north = bounds or (-180.0, -90.0, 180.0, 90.0)
     if not (-180.0 <= west < east <= 180.0 and -90.0 <= south < north <= 90.0):
         west, south, east, north = -180.0, -90.0, 180.0, 90.0
-    return Chart(
+    return TileChart(
         name=str(name or path.stem)[:80], credit=_plain(str(credit or ""))[:200], tag=tag, tiles=tiles,
         bounds_deg=(west, south, east, north), least_zoom=max(0, min(zooms)), most_zoom=min(MOST_ZOOM, max(zooms)))
 

@@ -130,7 +130,7 @@ JSON = "application/json"
 MARK = b"x-companion"     # no form and no picture can send it
 
 
-class Refused(Exception):  # noqa: N818
+class HttpRefusal(Exception):  # noqa: N818
     """An answer other than 200."""
 
     def __init__(self, status: int, text: str, *, closes: bool = False) -> None:
@@ -139,7 +139,7 @@ class Refused(Exception):  # noqa: N818
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reply:
+class HttpReply:
     """An answer: content and its kind; ``packed`` where it lies there gzipped already.
 
     ``tag``: it may be kept, and is asked for again by this. ``is_fixed``: what is at this path is never another.
@@ -177,7 +177,7 @@ class App(Protocol):
     def admit(self, request: h11.Request, path: str) -> int:
         """Return how many bytes of body are read of a request, before any is. Raises Refused: it may not be asked."""
 
-    async def reply(self, request: h11.Request, path: str, body: bytes) -> Reply | Stream:
+    async def reply(self, request: h11.Request, path: str, body: bytes) -> HttpReply | Stream:
         """Answer what was let in. Raises Refused."""
 
 
@@ -223,13 +223,13 @@ class Guests:
 
 
 @contextlib.asynccontextmanager
-async def listening(address: Address, app: App, *, pace: float = 1.0) -> AsyncIterator[Server]:
+async def listening(address: Address, app: App, *, pace: float = 1.0) -> AsyncIterator[HttpServer]:
     """Serve while the body runs. ``pace``: seconds of the loop for each second.
 
     Raises:
         JobError: the port is in use, or it cannot be listened there.
     """
-    server = Server(address, app, pace)
+    server = HttpServer(address, app, pace)
     try:
         listener = await asyncio.start_server(
             server.accept, address.host, address.port, limit=MOST_HEAD, backlog=MOST_CONNECTIONS)
@@ -247,7 +247,7 @@ async def listening(address: Address, app: App, *, pace: float = 1.0) -> AsyncIt
         await server.end()
 
 
-class Server:
+class HttpServer:
     """The connections of an app."""
 
     def __init__(self, address: Address, app: App, pace: float) -> None:
@@ -300,26 +300,26 @@ class Server:
         """
         hosts = [v.decode("latin-1") for k, v in request.headers if k == b"host"]
         if len(hosts) != 1 or not is_known(hosts[0], self.address):
-            raise Refused(421, "this is not the host that was asked for; name it with --http-name", closes=True)
+            raise HttpRefusal(421, "this is not the host that was asked for; name it with --http-name", closes=True)
         origin = header(request, b"origin")
         if origin and not is_own(origin, hosts[0]):
-            raise Refused(403, "asked for by a page from elsewhere", closes=True)
+            raise HttpRefusal(403, "asked for by a page from elsewhere", closes=True)
         if request.method not in {b"GET", b"HEAD", b"POST"}:
-            raise Refused(405, "there is GET, and POST for orders", closes=True)
+            raise HttpRefusal(405, "there is GET, and POST for orders", closes=True)
         if request.method == b"POST" and not origin:
-            raise Refused(403, "an order names the page that it comes from (Origin)", closes=True)
+            raise HttpRefusal(403, "an order names the page that it comes from (Origin)", closes=True)
         if header(request, b"transfer-encoding"):   # of chunks of a byte each a body costs minutes of the loop
-            raise Refused(411, "what is posted says how long it is (Content-Length)", closes=True)
+            raise HttpRefusal(411, "what is posted says how long it is (Content-Length)", closes=True)
         most = self.app.admit(request, path_of(request))
         if int(header(request, b"content-length") or 0) > most:   # h11 has seen that it is a number
-            raise Refused(413, f"at most {most} bytes are taken", closes=True)
+            raise HttpRefusal(413, f"at most {most} bytes are taken", closes=True)
         return most
 
 
 class _Connection:
     """One connection: requests one after another, or one stream of events."""
 
-    def __init__(self, server: Server, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    def __init__(self, server: HttpServer, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._server, self._reader, self._writer = server, reader, writer
         self._h11 = h11.Connection(h11.SERVER, max_incomplete_event_size=MOST_HEAD)
 
@@ -334,7 +334,7 @@ class _Connection:
                 self._server.guests.is_answered(self._writer)
                 if await self._answer(*asked):
                     return
-            except Refused as refused:
+            except HttpRefusal as refused:
                 await self._send(refused.status, JSON, msgspec.json.encode({"error": refused.text}), closes=True)
                 await self._linger()
                 return
@@ -387,13 +387,13 @@ class _Connection:
     async def _answer(self, request: h11.Request, body: bytes) -> bool:
         """Answer a request; True: the connection is used up."""
         reply = await self._server.app.reply(request, path_of(request), body)
-        if not isinstance(reply, Reply):
+        if not isinstance(reply, HttpReply):
             await self._stream(reply)
             return True
         await self._send_reply(request, reply)
         return False
 
-    async def _send_reply(self, request: h11.Request, reply: Reply) -> None:
+    async def _send_reply(self, request: h11.Request, reply: HttpReply) -> None:
         kind, data, tag, packed = reply.kind, reply.data, reply.tag, reply.packed
         keeping = "private, max-age=86400, immutable" if reply.is_fixed else "no-cache" if tag else "no-store"
         headers = [("Cache-Control", keeping)]
@@ -469,10 +469,10 @@ class _Connection:
 def require_token(request: h11.Request, token: str) -> None:
     """Raise Refused for a POST that is not JSON of a page of ours, or does not know the token."""
     if header(request, b"content-type").partition(";")[0].strip() != JSON or header(request, MARK) != "1":
-        raise Refused(403, "what is posted is JSON, with X-Companion: 1")
+        raise HttpRefusal(403, "what is posted is JSON, with X-Companion: 1")
     given = header(request, b"authorization")
     if not (token and hmac.compare_digest(given.encode(), f"Bearer {token}".encode())):
-        raise Refused(401, "the token is missing or wrong")
+        raise HttpRefusal(401, "the token is missing or wrong")
 
 
 def path_of(request: h11.Request) -> str:

@@ -14,20 +14,20 @@ import msgspec
 
 from companion.errors import InputError
 from companion.orders import phrase
-from companion.page.charts import Chart
+from companion.page.charts import TileChart
 from companion.page.connections import (
     Address,
     Channel,
-    Refused,
-    Reply,
-    Server,
+    HttpRefusal,
+    HttpReply,
+    HttpServer,
     Stream,
     header,
     listening,
     require_token,
 )
 from companion.page.site import files
-from companion.page.sources import Live, Record, Watcher
+from companion.page.sources import LiveSource, RecordedSource, Watcher
 
 MOST_WATCHERS = 16
 MOST_BODY = 1_000
@@ -37,8 +37,8 @@ ANSWER_S = 8.0            # for the answer to an order
 
 @contextlib.asynccontextmanager
 async def served(
-    address: Address, source: Live | Record, *, pace: float = 1.0, charts: Sequence[Chart] = (),
-) -> AsyncIterator[Server]:
+    address: Address, source: LiveSource | RecordedSource, *, pace: float = 1.0, charts: Sequence[TileChart] = (),
+) -> AsyncIterator[HttpServer]:
     """Serve a page while the body runs. ``pace``: seconds of the loop for each second; ``charts``: the lowest first.
 
     Raises:
@@ -48,14 +48,15 @@ async def served(
         try:
             yield server
         finally:
-            if isinstance(source, Live):
+            if isinstance(source, LiveSource):
                 source.hub.close()
 
 
 class Page:
     """One page over one source."""
 
-    def __init__(self, address: Address, source: Live | Record, pace: float, charts: Sequence[Chart]) -> None:
+    def __init__(self, address: Address, source: LiveSource | RecordedSource, pace: float,
+                 charts: Sequence[TileChart]) -> None:
         self._address, self._source, self._pace = address, source, pace
         self._charts = {chart.tag: chart for chart in charts}
         self._files = files()
@@ -66,33 +67,33 @@ class Page:
         if request.method != b"POST":
             return 0
         if path not in {"/api/order", "/api/preview"}:
-            raise Refused(404, "there is nothing to post to here")
+            raise HttpRefusal(404, "there is nothing to post to here")
         if not self._takes_orders:
-            raise Refused(403, "orders are not taken here: begin with --http-token FILE")
+            raise HttpRefusal(403, "orders are not taken here: begin with --http-token FILE")
         require_token(request, self._address.token)
         return MOST_BODY
 
-    async def reply(self, request: h11.Request, path: str, body: bytes) -> Reply | Stream:
+    async def reply(self, request: h11.Request, path: str, body: bytes) -> HttpReply | Stream:
         """Answer a request. Raises Refused."""
         if request.method == b"POST":
-            return Reply(data=await self._order(body, is_preview=path == "/api/preview"))
-        if path == "/api/stream" and isinstance(self._source, Live):
+            return HttpReply(data=await self._order(body, is_preview=path == "/api/preview"))
+        if path == "/api/stream" and isinstance(self._source, LiveSource):
             return self._stream(request, self._source)
         file = self._files.get(path)
         if file is not None:
-            return Reply(kind=file.kind, data=file.data, tag=file.tag, packed=file.packed)
+            return HttpReply(kind=file.kind, data=file.data, tag=file.tag, packed=file.packed)
         chunk = re.fullmatch(r"/api/moments/([0-9]{1,6})", path)
-        if chunk is not None and isinstance(self._source, Record) and int(chunk[1]) < len(self._source.chunks):
+        if chunk is not None and isinstance(self._source, RecordedSource) and int(chunk[1]) < len(self._source.chunks):
             packed = self._source.chunks[int(chunk[1])]
-            return Reply(data=await asyncio.to_thread(gzip.decompress, packed), packed=packed)
+            return HttpReply(data=await asyncio.to_thread(gzip.decompress, packed), packed=packed)
         tile = await tile_at(self._charts, path)
         if tile is not None:
             return tile
         make = self._made(path)
         if make is None:
-            raise Refused(404, "there is nothing here")
+            raise HttpRefusal(404, "there is nothing here")
         # An hour of samples takes tens of milliseconds: not on the voyage's loop.
-        return Reply(data=await asyncio.to_thread(make))
+        return HttpReply(data=await asyncio.to_thread(make))
 
     def _made(self, path: str) -> Callable[[], bytes] | None:
         """Return what makes the content of a path from what is known now; None: there is nothing."""
@@ -105,8 +106,8 @@ class Page:
         if path == "/api/past":
             return source.past()
         if path == "/api/log":
-            return source.hub.log() if isinstance(source, Live) else source.log
-        if path == "/api/beside" and isinstance(source, Record):
+            return source.hub.log() if isinstance(source, LiveSource) else source.log
+        if path == "/api/beside" and isinstance(source, RecordedSource):
             return source.compared()
         if path == "/register_service":
             return _json(self._service())
@@ -115,7 +116,7 @@ class Page:
     @property
     def _takes_orders(self) -> bool:
         """Whether somebody with the token may give orders."""
-        return bool(self._address.token) and isinstance(self._source, Live) and self._source.ask is not None
+        return bool(self._address.token) and isinstance(self._source, LiveSource) and self._source.ask is not None
 
     def _service(self) -> dict[str, Any]:
         """Return how BlueOS lists the page. In a window of its own: nobody may frame it."""
@@ -127,33 +128,33 @@ class Page:
 
     async def _order(self, body: bytes, *, is_preview: bool) -> bytes:
         """Take an order of one who was let in, or show what it would lead to; return the answer."""
-        assert isinstance(self._source, Live)
+        assert isinstance(self._source, LiveSource)
         assert self._source.ask is not None
         try:
             words = msgspec.json.decode(body, type=dict[str, str])["order"]
             wanted = phrase(words.split())
         except (msgspec.DecodeError, msgspec.ValidationError, KeyError, UnicodeDecodeError):
-            raise Refused(400, 'an order is {"order": "hold"}') from None
+            raise HttpRefusal(400, 'an order is {"order": "hold"}') from None
         except InputError as error:
-            raise Refused(400, str(error)) from None
+            raise HttpRefusal(400, str(error)) from None
         if self._ordering.locked():
-            raise Refused(409, "another order is being answered: again in a moment")
+            raise HttpRefusal(409, "another order is being answered: again in a moment")
         async with self._ordering:
             try:
                 async with asyncio.timeout(ANSWER_S * self._pace):
                     if is_preview:
                         if self._source.preview is None:
-                            raise Refused(501, "nothing can be previewed here")
+                            raise HttpRefusal(501, "nothing can be previewed here")
                         return msgspec.json.encode(await self._source.preview(wanted))
                     answer = await self._source.ask(wanted)
             except TimeoutError:
-                raise Refused(504, "no answer: it may have been taken all the same") from None
+                raise HttpRefusal(504, "no answer: it may have been taken all the same") from None
         return msgspec.json.encode({"result": answer.result.value, "text": answer.text})
 
-    def _stream(self, request: h11.Request, live: Live) -> Stream:
+    def _stream(self, request: h11.Request, live: LiveSource) -> Stream:
         """Return what writes the events of a voyage to one who watches."""
         if live.hub.watchers >= MOST_WATCHERS:
-            raise Refused(503, f"{MOST_WATCHERS} watch already")
+            raise HttpRefusal(503, f"{MOST_WATCHERS} watch already")
         last = header(request, b"last-event-id")
         number = int(last) if last.isascii() and last.isdigit() and len(last) < 12 else 0
 
@@ -168,14 +169,14 @@ class Page:
         return watch
 
 
-async def tile_at(charts: Mapping[str, Chart], path: str) -> Reply | None:
+async def tile_at(charts: Mapping[str, TileChart], path: str) -> HttpReply | None:
     """Return the tile of one of the charts, by their tags, that a path names; None: it names none."""
     tile = re.fullmatch(r"/tiles/([0-9a-f]{12})/([0-9]{1,2})/([0-9]{1,8})/([0-9]{1,8})", path)
     chart = charts.get(tile[1]) if tile is not None else None
     if tile is None or chart is None:
         return None
     kind, data = await asyncio.to_thread(chart.tile, int(tile[2]), int(tile[3]), int(tile[4]))
-    return Reply(kind=kind, data=data, is_fixed=True)
+    return HttpReply(kind=kind, data=data, is_fixed=True)
 
 
 def _json(value: Any) -> Callable[[], bytes]:

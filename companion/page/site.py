@@ -11,7 +11,7 @@ from importlib import resources
 
 import msgspec
 
-from companion.page.sources import Record
+from companion.page.sources import RecordedSource
 
 TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8",
          ".js": "text/javascript; charset=utf-8", ".svg": "image/svg+xml", ".json": "application/json"}
@@ -39,7 +39,7 @@ def files(package: str = "companion.page") -> dict[str, File]:
     return {**out, "/": out["/index.html"]} if "/index.html" in out else out
 
 
-def export(record: Record) -> bytes:
+def export(record: RecordedSource) -> bytes:
     """Return the page with the voyage in it.
 
     The modules go in as data: URLs by an import map, for a file has no neighbours that a browser would load.

@@ -118,7 +118,7 @@ Preview = Callable[[Wanted], Awaitable[dict[str, Any]]]
 
 
 @dataclass(kw_only=True)
-class Live:
+class LiveSource:
     """A voyage under way (or the radio's): ``show`` takes the steps; ``ask`` and ``preview`` None: it only shows."""
 
     name: str
@@ -151,7 +151,7 @@ class Live:
         return lambda: msgspec.json.encode(Past.of(samples, unix_s))
 
 
-class Record:
+class RecordedSource:
     """A recorded voyage, whole in memory: its views packed by chunks."""
 
     def __init__(self, name: str, area: AreaView, *, is_whole: bool, count: int) -> None:
@@ -166,7 +166,7 @@ class Record:
         self.unix_s: float | None = None
         self.sails_s: float | None = None
         self.last: View | None = None
-        self.beside: Record | None = None   # another voyage, to compare with
+        self.beside: RecordedSource | None = None   # another voyage, to compare with
 
     def take(self, view: View, events: Sequence[Event]) -> None:
         """Take the next moment; of a very long voyage those in which nothing happened are thinned out."""
@@ -208,7 +208,7 @@ class Record:
         """Return what makes the JSON of the voyage beside this one, in this one's metres; None: there is none."""
         return None if self.beside is None else partial(self._compared, self.beside)
 
-    def _compared(self, other: Record) -> bytes:
+    def _compared(self, other: RecordedSource) -> bytes:
         east_m = (other.area.origin_lon_deg - self.area.origin_lon_deg) * self.area.lon_m
         north_m = (other.area.origin_lat_deg - self.area.origin_lat_deg) * self.area.lat_m
         moved = [replace(

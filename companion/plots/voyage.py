@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from companion.plots.chart import date_words, legend_above, legend_below, place_words, save, scale_bar
 from companion.plots.mission import TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
-from companion.telemetry.folder import Chart, RecordedPlan, VoyageRecord
+from companion.telemetry.folder import RecordedChart, RecordedPlan, VoyageRecord
 from companion.words import counted
 
 PORT_RED, STARBOARD_GREEN, WIND_BLUE, PLAN_GREY = "#b3261e", "#1b7f3b", "#1f5fa8", "#5b6472"
@@ -122,7 +122,7 @@ def _chart(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
     legend_below(axes)
 
 
-def _goals(axes: Any, chart: Chart) -> None:
+def _goals(axes: Any, chart: RecordedChart) -> None:
     """Draw the goals, each by its name or its place in the order."""
     from matplotlib.patches import Circle
 
@@ -146,7 +146,7 @@ def _goals(axes: Any, chart: Chart) -> None:
         axes.plot([], [], "o", color=GOAL, markeredgecolor="black", markersize=8, label="goal and its radius")
 
 
-def _fans(axes: Any, chart: Chart, plans: list[RecordedPlan]) -> None:
+def _fans(axes: Any, chart: RecordedChart, plans: list[RecordedPlan]) -> None:
     """Draw the no-go zone at each waypoint of the first plan: the boat's own, and as the forecast widened it."""
     from matplotlib.patches import Wedge
 

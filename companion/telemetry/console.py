@@ -88,7 +88,7 @@ class Console:
                     self._fd = None   # for good: the number may be another file's by and by
 
 
-class Stream(Protocol):
+class TextStream(Protocol):
     """What lines are written to: a file, or the console of a voyage."""
 
     def write(self, text: str, /) -> object:
@@ -107,7 +107,7 @@ class Stream(Protocol):
 class StatusLine:
     """One line on ``stream``; where that is no terminal it is written every ``every_s`` at most, and at the end."""
 
-    def __init__(self, stream: Stream, every_s: float) -> None:
+    def __init__(self, stream: TextStream, every_s: float) -> None:
         self._stream, self._every_s = stream, every_s
         self._is_terminal = stream.isatty()
         self._widest, self._last = 0, ""
@@ -159,7 +159,7 @@ PREPARING_EVERY_S = 10.0  # between two lines where there is no terminal
 class CompileProgress:
     """Says how far it is on ``stream``. A context manager: the last line is left standing."""
 
-    def __init__(self, stream: Stream) -> None:
+    def __init__(self, stream: TextStream) -> None:
         self._line = StatusLine(stream, PREPARING_EVERY_S)
         self._patient_until_s = time.monotonic() + PREPARING_PATIENCE_S
 
@@ -192,7 +192,7 @@ class ProgressLine:
     ``epoch_s`` is the Unix time [s] of the loop's time 0.
     """
 
-    def __init__(self, stream: Stream, epoch_s: float = 0.0) -> None:
+    def __init__(self, stream: TextStream, epoch_s: float = 0.0) -> None:
         self._stream, self._epoch_s = stream, epoch_s
         self._is_terminal = stream.isatty()
         self._last: tuple[float, str] = (-math.inf, "")

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.geo.units import MPS_PER_KNOT
-from companion.terminal.keys import KEYS, Helm, shown
+from companion.terminal.keys import KEYS, KeyCommands, shown
 from companion.terminal.screen import Frame, Style
 from companion.view import Event, View
 from companion.words import counted, one_line
@@ -96,7 +96,7 @@ EVENTS = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Bin:
+class WindBin:
     """The wind of a stretch of time: ``twd_from_deg`` is its mean, ``spread_deg`` half of what it swung through."""
 
     ago_s: float
@@ -134,7 +134,7 @@ class History:
         while view.t_s - self._winds[0].t_s > KEPT_S:
             self._winds.popleft()
 
-    def bins(self, t_s: float, each_s: float, count: int) -> list[Bin | None]:
+    def bins(self, t_s: float, each_s: float, count: int) -> list[WindBin | None]:
         """Return the last stretches of ``each_s``, the newest first; None where nothing was heard."""
         found: list[list[_Wind]] = [[] for _ in range(count)]
         for wind in reversed(self._winds):
@@ -145,10 +145,10 @@ class History:
         return [_bin(number * each_s, winds) if winds else None for number, winds in enumerate(found)]
 
 
-def _bin(ago_s: float, winds: list[_Wind]) -> Bin:
+def _bin(ago_s: float, winds: list[_Wind]) -> WindBin:
     mean = math.atan2(sum(math.sin(w.twd_rad) for w in winds), sum(math.cos(w.twd_rad) for w in winds))
     off = [math.degrees(wrap_pi(w.twd_rad - mean)) for w in winds]
-    return Bin(ago_s, math.degrees(wrap_two_pi(mean)), sum(w.tws_mps for w in winds) / len(winds),
+    return WindBin(ago_s, math.degrees(wrap_two_pi(mean)), sum(w.tws_mps for w in winds) / len(winds),
                0.5 * (max(off) - min(off)), winds[0].tack)
 
 
@@ -191,7 +191,7 @@ def tape(frame: Frame, row: int, view: View) -> None:
 
 
 def wind_strip(
-    frame: Frame, row: int, column: int, rows: int, bins: Sequence[Bin | None], *, knots: bool,
+    frame: Frame, row: int, column: int, rows: int, bins: Sequence[WindBin | None], *, knots: bool,
 ) -> None:
     """Draw the wind's history, the newest on top, a shift to the left to the left; S and P are the tack then."""
     width = frame.columns - column
@@ -380,7 +380,7 @@ class Shown:
     link: str
     view: View | None
     history: History
-    helm: Helm
+    helm: KeyCommands
     unix_s: float
     orders: Collection[str] | None = None
     said: str = ""

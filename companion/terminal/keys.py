@@ -41,7 +41,7 @@ BY_KEY = {key.key: key for key in KEYS}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Helm:
+class KeyCommands:
     """Where the typing stands: a key that waits for words (``typed``), a wanted order that waits for a yes.
 
     ``order`` and ``is_over`` are what the last key asked of the program: to give an order, to end.
@@ -56,7 +56,7 @@ class Helm:
     has_help: bool = False
     knots: bool = True
 
-    def press(self, key: str, orders: Collection[str] | None) -> Helm:
+    def press(self, key: str, orders: Collection[str] | None) -> KeyCommands:
         """Return the helm behind a key; ``orders`` are the verbs that are permitted, None: not known here."""
         helm = replace(self, order=None)
         if key == "\x03":
@@ -94,7 +94,7 @@ class Helm:
         return ""
 
 
-def _type(helm: Helm, chosen: Key, key: str) -> Helm:
+def _type(helm: KeyCommands, chosen: Key, key: str) -> KeyCommands:
     if key == ESCAPE:
         return replace(helm, typing=None, typed="", said=f"{chosen.label}: not given")
     if key in ENTER:
@@ -106,7 +106,7 @@ def _type(helm: Helm, chosen: Key, key: str) -> Helm:
     return replace(helm, typed=(helm.typed + key)[:MOST]) if key.isprintable() else helm
 
 
-def _wanted(helm: Helm, chosen: Key, words: list[str]) -> Helm:
+def _wanted(helm: KeyCommands, chosen: Key, words: list[str]) -> KeyCommands:
     try:
         wanted = phrase([chosen.verb, *words])
     except InputError as error:

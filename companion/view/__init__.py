@@ -13,6 +13,5 @@ from companion.view.values import SCHEMA, Past, Sample, Trail, View, sample_of
 
 __all__ = [
     "SCHEMA", "AreaView", "Event", "HeardFold", "Past", "RecordedViews", "Sample", "Trail", "View", "ViewFold",
-    "area_of",
-    "drawn", "recorded_views", "sample_of",
+    "area_of", "drawn", "recorded_views", "sample_of",
 ]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from companion.geo.shift import Shift, carried
 from companion.messages import GeoPoint
-from companion.replay import Recorded
+from companion.replay import RecordedInput
 from companion.telemetry.folder import (
     TLOG,
     RecordedPlan,
@@ -138,7 +138,7 @@ def recorded_views(folder: Path) -> RecordedViews:
     """
     heard = [part for part in parts(folder / TLOG) if part.stat().st_size > 0]
     if heard and is_from_the_start(folder / TLOG):
-        recorded = Recorded(folder)
+        recorded = RecordedInput(folder)
         fold = ViewFold(recorded.voyage, recorded.config, source="recorded", epoch_s=recorded.epoch_s)
         return RecordedViews(name=recorded.mission.name, area=fold.area, count=len(recorded.rows), is_whole=True,
                              moments=_folded(recorded, fold, fold.area))
@@ -148,7 +148,7 @@ def recorded_views(folder: Path) -> RecordedViews:
                          moments=zip(views_of_rows(record, area), events_of_record(record), strict=True))
 
 
-def _folded(recorded: Recorded, fold: ViewFold, area: AreaView) -> Iterator[Moment]:
+def _folded(recorded: RecordedInput, fold: ViewFold, area: AreaView) -> Iterator[Moment]:
     figures = VoyageFigures()
     for folded in recorded.steps():
         if folded.step is None:

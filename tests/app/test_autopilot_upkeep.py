@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 from companion.app.autopilot_upkeep import FENCE_EVERY_S, FENCE_READ_S, keep_fence, keep_parameters
 from companion.clock import now_s, run_virtual
-from companion.fold import ToldParameters
+from companion.fold import ParameterStore
 from companion.mavlink.wire import RANGES
 from companion.messages import MissionItem
 
 
 def test_a_parameter_that_seems_to_have_been_set_is_asked_for_again_whether_a_voyage_reads_it_or_not():
-    parameters, asked = ToldParameters(), []
+    parameters, asked = ParameterStore(), []
     parameters.take(dict.fromkeys(RANGES, 1.0))
     parameters.take({"AHRS_ORIENTATION": 8.0}, is_set=True)
 

@@ -340,7 +340,7 @@ def test_a_full_disk_loses_nothing(bay):
     from companion.clock import run
     from companion.disk import Disk
     from companion.editor.base import read_base
-    from companion.editor.desk import Desk, Previews
+    from companion.editor.desk import EditorApi, PlanPreviews
     from companion.page import Address, listening
     from tests.editor.asking import Asker
 
@@ -352,7 +352,7 @@ def test_a_full_disk_loses_nothing(bay):
     before = {p: p.read_bytes() for p in bay.parent.iterdir()}
 
     async def whole():
-        desk = Desk(read_base(bay), TOKEN, Previews(None), disk=Full())
+        desk = EditorApi(read_base(bay), TOKEN, PlanPreviews(None), disk=Full())
         async with listening(Address(host="127.0.0.1", port=0), desk) as server:
             asker = Asker(server.address.port)
             state = await begun(asker)

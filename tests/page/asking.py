@@ -7,7 +7,7 @@ import socket
 
 from companion.clock import run
 from companion.orders import Answer, Result
-from companion.page import Address, Live, served
+from companion.page import Address, LiveSource, served
 from companion.view import Event, View
 from companion.view.values import StateView
 
@@ -92,7 +92,7 @@ def with_page(talk, source=None, token="", names=(), charts=()):
     """Return what ``talk(browser, source, server)`` returns while the page is served."""
     async def whole():
         port = free_port()
-        mine = source if source is not None else Live(name="test")
+        mine = source if source is not None else LiveSource(name="test")
         address = Address(host="127.0.0.1", port=port, token=token, names=names)
         async with served(address, mine, charts=charts) as server:
             return await talk(Browser(port), mine, server)
@@ -103,5 +103,5 @@ def with_page(talk, source=None, token="", names=(), charts=()):
 def taking_orders(talk, asked=None):
     """The same for a page that takes orders; returns (answer of talk, orders)."""
     asked = asked or Asked()
-    live = Live(name="test", ask=asked.ask, preview=asked.preview, permitted=("hold",))
+    live = LiveSource(name="test", ask=asked.ask, preview=asked.preview, permitted=("hold",))
     return with_page(talk, live, TOKEN), asked.orders

@@ -10,7 +10,7 @@ import pytest
 from companion.clock import run
 from companion.errors import InputError
 from companion.orders import Answer, Result
-from companion.page import Live, connections, read_token
+from companion.page import LiveSource, connections, read_token
 from companion.page.connections import MOST_CONNECTIONS, MOST_HEAD
 from companion.page.server import MOST_BODY, MOST_WATCHERS
 from tests.page.asking import TOKEN, Asked, hang_up, taking_orders, view_at, with_page
@@ -295,7 +295,7 @@ def test_sixty_four_who_ask_for_nothing_shut_nobody_out_and_who_watches_stays(se
             writer.transport.abort()
         return statuses
 
-    live = Live(name="test", ask=Asked().ask)
+    live = LiveSource(name="test", ask=Asked().ask)
     assert with_page(talk, live, TOKEN) == [200, 200, 200]
 
 

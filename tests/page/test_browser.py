@@ -17,7 +17,7 @@ import pytest
 
 from companion.clock import run
 from companion.commands.view import read_record
-from companion.page import Address, Live, export, served
+from companion.page import Address, LiveSource, export, served
 from companion.page.charts import open_chart
 from tests.page.asking import Asked, free_port
 from tests.page.browsing import Window, needs_browser
@@ -202,7 +202,7 @@ def test_a_voyage_in_one_file_needs_nothing_and_nobody(record, tmp_path):
 
 def test_live_views_are_shown_the_link_is_lost_and_comes_back_and_old_data_look_old(sailed):
     port = free_port()
-    live = Live(name="beat", unix_s=0.0)
+    live = LiveSource(name="beat", unix_s=0.0)
     moments = [m for m in sailed.moments if m[0].state.is_sailing]
     with Window() as window:
         with serving(live, port=port) as (url, call):
@@ -220,7 +220,7 @@ def test_live_views_are_shown_the_link_is_lost_and_comes_back_and_old_data_look_
             assert window.complaints() == []
             port_before = live.hub
         # the companion is gone, and comes back at the same port with what it goes on to do
-        again = Live(name="beat", unix_s=0.0)
+        again = LiveSource(name="beat", unix_s=0.0)
         window.until("return companion.isOver || !companion.isUp")
         assert port_before.is_closed
         window.driver.refresh()   # who reloads meanwhile gets the browser's own page
@@ -243,7 +243,7 @@ def test_live_views_are_shown_the_link_is_lost_and_comes_back_and_old_data_look_
 def test_a_link_that_breaks_is_said_and_healed_without_a_reload(sailed):
     port = free_port()
     moments = [m for m in sailed.moments if m[0].state.is_sailing]
-    live = Live(name="beat", unix_s=0.0)
+    live = LiveSource(name="beat", unix_s=0.0)
     for view, events in moments[:10]:
         live.show(view, events, sailed.area)
     with Window() as window:
@@ -254,7 +254,7 @@ def test_a_link_that_breaks_is_said_and_healed_without_a_reload(sailed):
         window.until("return !companion.isUp")
         window.until("return document.body.classList.contains('stale')")
         assert "No link" in window.text("stale")
-        again = Live(name="beat", unix_s=0.0)
+        again = LiveSource(name="beat", unix_s=0.0)
         for view, events in moments[:30]:
             again.show(view, events, sailed.area)
         with serving(again, port=port):
@@ -272,7 +272,7 @@ def test_words_of_others_are_shown_as_words(sailed):
     view = next(v for v in sailed.views if v.state.is_sailing)
     view = replace(view, name=nasty, alarms=(AlarmView(code="x", level="error", text=nasty, age_s=1.0),),
                    vessels=(VesselView(name=nasty, at_en_m=(10.0, 10.0), alarm="act", range_m=10.0),))
-    live = Live(name=nasty, unix_s=0.0)
+    live = LiveSource(name=nasty, unix_s=0.0)
     live.show(view, (), sailed.area)
     with serving(live) as (url, _), Window() as window:
         window.open(url)
@@ -285,7 +285,7 @@ def test_words_of_others_are_shown_as_words(sailed):
 
 def test_an_order_asks_for_the_token_once_and_a_wrong_one_is_told(sailed):
     asked = Asked()
-    live = Live(name="beat", unix_s=0.0, ask=asked.ask, preview=asked.preview, permitted=("hold", "go_on", "why"))
+    live = LiveSource(name="beat", unix_s=0.0, ask=asked.ask, preview=asked.preview, permitted=("hold", "go_on", "why"))
     view = next(v for v in sailed.views if v.state.is_sailing)
     live.show(view, (), sailed.area)
     with serving(live, token="the-right-token-of-24-letters") as (url, _), Window() as window:

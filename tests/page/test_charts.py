@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from companion.errors import InputError
-from companion.page import Live, open_charts
+from companion.page import LiveSource, open_charts
 from companion.page.charts import NO_TILE, open_chart
 from tests.page.asking import with_page
 from tests.page.charting import BOUNDS, mbtiles, painted, pmtiles, tile_of
@@ -127,7 +127,7 @@ def test_the_page_serves_tiles_that_a_browser_keeps_and_no_others(both):
             f"/tiles/{charts[0].tag}/1/1/999999999", f"/tiles/..%2f{charts[0].tag}/1/1/1")]
         return hello, told, others, painted(12, x, y)
 
-    hello, told, others, right = with_page(talk, Live(name="a"), charts=charts)
+    hello, told, others, right = with_page(talk, LiveSource(name="a"), charts=charts)
     assert [chart["name"] for chart in hello["charts"]] == ["Painted depths"] * 2
     assert "path" not in json.dumps(hello)
     for status, headers, body in told:

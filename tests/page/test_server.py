@@ -13,7 +13,7 @@ import pytest
 
 from companion.clock import run
 from companion.errors import JobError
-from companion.page import Address, Live, Record, connections, served
+from companion.page import Address, LiveSource, RecordedSource, connections, served
 from companion.page.sources import Hub, Watcher
 from companion.view import AreaView, Past
 from tests.page.asking import event, free_port, hang_up, view_at, with_page
@@ -179,9 +179,9 @@ def test_twelve_watch_and_one_never_reads_and_the_loop_is_not_held(monkeypatch):
 def test_a_port_in_use_is_one_line():
     async def twice():
         address = Address(host="127.0.0.1", port=free_port())
-        async with served(address, Live(name="a")):
+        async with served(address, LiveSource(name="a")):
             with pytest.raises(JobError, match="the port is in use") as error:
-                async with served(address, Live(name="b")):
+                async with served(address, LiveSource(name="b")):
                     pass
         return str(error.value)
 
@@ -190,7 +190,7 @@ def test_a_port_in_use_is_one_line():
 
 def test_a_host_that_is_none_is_one_line():
     async def whole():
-        async with served(Address(host="no-such-host.invalid", port=free_port()), Live(name="a")):
+        async with served(Address(host="no-such-host.invalid", port=free_port()), LiveSource(name="a")):
             pass
 
     with pytest.raises(JobError, match="cannot listen there"):
@@ -221,7 +221,7 @@ def test_blueos_finds_the_page():
 
 def record_of(count, every=1):
     area = AreaView(name="test", origin_lat_deg=50.0, origin_lon_deg=-1.0, lat_m=111_000.0, lon_m=70_000.0, hash="x")
-    record = Record("test", area, is_whole=True, count=count)
+    record = RecordedSource("test", area, is_whole=True, count=count)
     for n in range(count):
         record.take(view_at(float(n)), (event(n + 1),) if n % 100 == every else ())
     record.finish()

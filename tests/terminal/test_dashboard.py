@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.terminal import Frame, Helm, History, Shown, changes, draw, event_words, line_of
+from companion.terminal import Frame, History, KeyCommands, Shown, changes, draw, event_words, line_of
 from companion.terminal.screen import Style, clean
 from companion.view import View
 from companion.view.fold import aged
@@ -54,7 +54,8 @@ def shown(view, **changed):
     history = History()
     if view is not None:
         history.take(view, ())
-    return Shown(**{"link": "udpin:x", "view": view, "history": history, "helm": Helm(), "unix_s": UNIX_S, **changed})
+    return Shown(**{"link": "udpin:x", "view": view, "history": history, "helm": KeyCommands(), "unix_s": UNIX_S,
+                    **changed})
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(80, 24), (60, 20)])
@@ -122,7 +123,7 @@ def test_any_text_takes_one_cell_a_character(text):
 @settings(max_examples=60)
 @given(st.integers(1, 200), st.integers(1, 60), st.booleans(), st.booleans())
 def test_it_can_be_drawn_at_any_size(columns, rows, knows, has_help):
-    frame = draw(shown(VIEW if knows else None, helm=Helm(has_help=has_help)), columns, rows)
+    frame = draw(shown(VIEW if knows else None, helm=KeyCommands(has_help=has_help)), columns, rows)
     assert [len(row) for row in frame.cells] == [columns] * rows
 
 
@@ -163,7 +164,7 @@ def test_it_redraws_little_all_the_voyage_long(beat):
     for view, events in beat.moments:
         history.take(view, events)
         for half in (0.0, 0.5):
-            frame = draw(Shown(link="x", view=aged(view, half), history=history, helm=Helm(),
+            frame = draw(Shown(link="x", view=aged(view, half), history=history, helm=KeyCommands(),
                                unix_s=UNIX_S + view.t_s + half), 80, 24)
             sizes.append(len(changes(before, frame).encode()))
             before = frame
@@ -182,7 +183,7 @@ def test_the_winds_history_is_that_of_the_voyage(beat):
     newest = [v.wind.twd_from_deg for v in beat.views[-50:] if v.wind is not None]
     off = [(b.twd_from_deg - newest[0] + 180.0) % 360.0 - 180.0 for b in bins if b is not None]
     assert max(map(abs, off)) < 40.0
-    text = draw(Shown(link="x", view=beat.views[-1], history=history, helm=Helm(), unix_s=UNIX_S), 80, 24).text
+    text = draw(Shown(link="x", view=beat.views[-1], history=history, helm=KeyCommands(), unix_s=UNIX_S), 80, 24).text
     assert any(event_words(e)[:20] in text for e in list(history.events)[-3:])
 
 

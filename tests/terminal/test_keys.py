@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.orders import BY_VERB, Verb, phrase
-from companion.terminal import Helm, words_of
+from companion.terminal import KeyCommands, words_of
 from companion.terminal.keys import KEYS
 
 ASKED = {Verb.GO_ON, Verb.REFUGE, Verb.HOME, Verb.GOAL, Verb.SKIP_GOAL, Verb.STOP, Verb.ADOPT, Verb.REPLACE}
 
 
 def typed(keys, orders=None):
-    helm, given_ = Helm(), []
+    helm, given_ = KeyCommands(), []
     for key in keys:
         helm = helm.press(key, orders)
         if helm.order is not None:

@@ -2,7 +2,7 @@
 
 from companion.telemetry.folder.logbook import Logbook
 from companion.telemetry.folder.reading import (
-    Chart,
+    RecordedChart,
     RecordedPlan,
     VoyageRecord,
     believed,
@@ -38,7 +38,8 @@ from companion.telemetry.folder.records import (
 )
 
 __all__ = [
-    "DECISIONS", "DEFAULT_BUDGET_BYTES", "PICTURE", "STATE", "TLOG", "TRACK", "VERDICT", "VOYAGE", "Chart", "Logbook",
+    "DECISIONS", "DEFAULT_BUDGET_BYTES", "PICTURE", "STATE", "TLOG", "TRACK", "VERDICT", "VOYAGE", "Logbook",
+    "RecordedChart",
     "RecordedPlan", "Recorder", "VoyageArchive", "VoyageFigures", "VoyageRecord", "action_record", "ais_of",
     "ais_record", "believed", "fence_record", "is_from_the_start", "jsonable", "order_record", "outcome_record",
     "parts", "read_decisions", "read_description", "read_rows", "read_voyage", "require_files",

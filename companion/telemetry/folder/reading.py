@@ -59,7 +59,7 @@ class ChartGoal(Struct, frozen=True, kw_only=True):
     water: str | None = None   # of a box or a search, WKT
 
 
-class Chart(Struct, frozen=True, kw_only=True):
+class RecordedChart(Struct, frozen=True, kw_only=True):
     """area.json: obstacles as drawn and as grown by the margin, and the fence, as WKT in local metres."""
 
     name: str
@@ -148,7 +148,7 @@ class VoyageRecord:
     columns: dict[str, NDArray[np.float64]]
     texts: dict[str, list[str]]
     plans: tuple[RecordedPlan, ...]
-    chart: Chart
+    chart: RecordedChart
     figures: dict[str, Any]
     summary: Summary
     began_utc: str = ""
@@ -174,7 +174,7 @@ def read_voyage(folder: Path) -> VoyageRecord:
         raise InputError(str(folder / SUMMARY), "", "is no table of figures", DAMAGED)
     description = read_description(folder) if (folder / VOYAGE).is_file() else {}
     run = _converted(description.get("run", {}), _Run, folder / VOYAGE, "[run] ")
-    chart = _converted(_read_json(folder / AREA), Chart, folder / AREA)
+    chart = _converted(_read_json(folder / AREA), RecordedChart, folder / AREA)
     for wkt in (*chart.obstacles, *chart.grown, *([chart.fence] if chart.fence else [])):
         with believed(folder / AREA, f"{wkt[:30]!r}"):
             shapely.from_wkt(wkt)

@@ -18,7 +18,7 @@ from pyproj import Geod
 from companion.clock import run_virtual
 from companion.compose import config_of, voyage_of
 from companion.geofence import load_mission
-from companion.page.sources import Live
+from companion.page.sources import LiveSource
 from companion.replay import replay
 from companion.telemetry.folder import VoyageFigures, read_decisions, read_voyage
 from companion.view import ViewFold
@@ -46,7 +46,7 @@ class Watched:
         self.folder, self.steps, self.views = folder, [], []
         self.mission = load_mission(scenario.mission_path(path))
         self.fold = ViewFold(voyage_of(self.mission), config_of(self.mission))
-        self.live = Live(name="date-line", area=self.fold.area)
+        self.live = LiveSource(name="date-line", area=self.fold.area)
         scenario = msgspec.structs.replace(scenario, events=(*scenario.events, *kills), expect=msgspec.structs.replace(
             scenario.expect, max_silence_s=30.0))
         self.verdict = run_virtual(run_embedded(scenario, path, 0, folder, on_status=self.look))
