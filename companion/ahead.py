@@ -140,20 +140,20 @@ NOTHING_AHEAD = Ahead()
 def ahead_of(snapshot: Snapshot, state: SkipperState, voyage: Voyage, pace: Pace) -> Ahead:
     """Return where the boat is expected from here on; empty where it is not being sailed, or nothing is known."""
     walk = _walk(snapshot, state, voyage)
-    if walk is None or state.route is None:
+    if walk is None or state.mission.route is None:
         return NOTHING_AHEAD
     points = tuple(replace(p, in_s=round(pace.left_s(p.in_s), 1)) for p in walk.points)
     if walk.goal_s is None:
         return Ahead(points=points)
-    spread = _wind_spread(state.route)
+    spread = _wind_spread(state.mission.route)
     return Ahead(points=points, there_s=pace.left_s(walk.goal_s), there_late_s=pace.late_s(walk.goal_s, spread))
 
 
 def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -> Pace:
     """Return the pace after a step."""
-    route, tried = state.route, pace.tried
+    route, tried = state.mission.route, pace.tried
     autopilot = snapshot.autopilot
-    if route is None or state.doubt is not None or autopilot is None or not autopilot.is_armed:
+    if route is None or state.position.doubt is not None or autopilot is None or not autopilot.is_armed:
         return pace if tried is None else replace(pace, tried=None)
     if not pace.is_due(snapshot.t_s, route.plan_id):
         return pace
@@ -161,7 +161,7 @@ def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -
     fresh = None if walk is None or walk.last < 0 else Try(
         t_s=snapshot.t_s, plan_id=route.plan_id, until=walk.last, winds=walk.winds, walk_s=walk.points[-1].in_s)
     left = None
-    if tried is not None and tried.plan_id == route.plan_id and state.index <= tried.until:
+    if tried is not None and tried.plan_id == route.plan_id and state.mission.index <= tried.until:
         left = _walk(snapshot, state, voyage, until=tried.until, winds=tried.winds)
     return pace.seen(snapshot.t_s, None if left is None else left.points[-1].in_s, fresh)
 
@@ -190,10 +190,10 @@ def _walk(
     The walk ends with the leg that is sailed after ``whole_s``, or with item ``until``; ``winds`` are taken in place of
     those that are expected.
     """
-    here, wind, vehicle, route = snapshot.position_en_m, snapshot.wind, snapshot.vehicle, state.route
+    here, wind, vehicle, route = snapshot.position_en_m, snapshot.wind, snapshot.vehicle, state.mission.route
     autopilot = snapshot.autopilot
     if here is None or vehicle is None or route is None or wind.mean_twd_from_rad is None or (
-            wind.mean_tws_mps is None) or not state.sailing or state.over or autopilot is None or (
+            wind.mean_tws_mps is None) or not state.voyage.sailing or state.voyage.over or autopilot is None or (
             autopilot.mode not in FOLLOWS):
         return None
     limits = snapshot.limits or AutopilotLimits()
@@ -201,13 +201,13 @@ def _walk(
         limits = replace(limits, sail_xtrack_max_m=0.0)   # GUIDED has no corridor
     winds = _winds(wind, wind.mean_twd_from_rad, wind.mean_tws_mps) if winds is None else winds
     walker = _Walker(winds, snapshot.current.planned_en_mps, voyage.boat, limits, heading_rad=vehicle.heading_rad)
-    gates = gates_of(voyage, state.approaches)
-    goal = next((n for n in range(state.gate, len(gates)) if gates[n].ends_goal), None)
+    gates = gates_of(voyage, state.progress.approaches)
+    goal = next((n for n in range(state.progress.gate, len(gates)) if gates[n].ends_goal), None)
     mark = None if goal is None else (gates[goal].en_m, gates[goal].radius_m)
     at, time_s, last = here, 0.0, -1
     goal_s: float | None = None
     points = [Waypoint(in_s=0.0, at_en_m=at, is_starboard=walker.is_starboard)]
-    for n in range(state.index, len(route.items)):
+    for n in range(state.mission.index, len(route.items)):
         if route.items[n].command != Command.NAV_WAYPOINT or time_s >= whole_s or (until is not None and n > until):
             break
         start, end, last = route.leg_from_en_m[n], route.points_en_m[n], n

@@ -301,7 +301,7 @@ class VoyageFold:
                 self._events.append(WaypointReached(seq=int(message.seq)))
             elif kind == "PARAM_VALUE":
                 self.parameters({message.param_id: float(message.param_value)}, is_set=(
-                    message.param_index == _NO_INDEX and self.state.sailing))
+                    message.param_index == _NO_INDEX and self.state.voyage.sailing))
             elif kind == "AUTOPILOT_VERSION":
                 self._uid_s = t_s
                 self._identity = self._identity.told(message.get_srcSystem(), autopilot_version(message).uid)
@@ -389,7 +389,7 @@ class VoyageFold:
 
     def wants_uid(self, t_s: float) -> bool:
         """Return whether the autopilot is to be asked who it is."""
-        is_known = self._identity.is_confirmed and self.state.uid in {None, self._identity.uid}
+        is_known = self._identity.is_confirmed and self.state.vehicle.uid in {None, self._identity.uid}
         return not is_known or t_s - self._uid_s >= UID_EVERY_S
 
     def others(self, neighbours: tuple[str, ...], *, has_company: bool, has_shore: bool) -> None:

@@ -1,7 +1,7 @@
 """Copies of frozen values with changes, as ``dataclasses.replace`` makes them, for the few that are made all the time.
 
 ``dataclasses.replace`` looks at every field anew each time: a status of thirty fields takes longer to copy than most
-messages to decode, and the skipper's state of ninety changes a dozen times a step.
+messages to decode, and parts of the skipper's state change a dozen times a step.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ import functools
 import operator
 from collections.abc import Callable
 from dataclasses import fields
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+__all__ = ["changed"]
 
 T = TypeVar("T")
 
@@ -26,7 +28,7 @@ def _parts(kind: type[Any]) -> tuple[tuple[str, ...], frozenset[str], Callable[[
     return names, frozenset(names), operator.attrgetter(*names), is_plain
 
 
-def changed(value: T, **changes: Any) -> T:
+def _changed(value: T, **changes: Any) -> T:
     """Return ``value`` with ``changes``, checked as it is when it is made; itself when every change is what it holds.
 
     Raises:
@@ -48,3 +50,9 @@ def changed(value: T, **changes: Any) -> T:
     own.update(value.__dict__)
     own.update(changes)
     return copy
+
+
+if TYPE_CHECKING:
+    from dataclasses import replace as changed  # mypy knows the fields and their types of this one
+else:
+    changed = _changed

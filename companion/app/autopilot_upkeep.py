@@ -89,7 +89,7 @@ async def _read_fence(
         if shown != seen:
             seen, next_s = shown, -math.inf
         if shown[0] is not None and now_s() >= next_s and autopilot.link.is_alive and (
-            fold.state.is_ours and fold.state.pending_upload is None
+            fold.state.vehicle.is_ours and fold.state.pending.upload is None
         ):
             items = await _fence_items(fold, autopilot)
             next_s = now_s() + (FENCE_EVERY_S if items is not None else FENCE_AGAIN_S)
@@ -104,7 +104,7 @@ async def _fence_items(fold: VoyageFold, autopilot: Autopilot) -> tuple[MissionI
     reading = asyncio.create_task(autopilot.read_fence(), name="fence read")
     end_s = now_s() + FENCE_READ_S
     try:
-        while now_s() < end_s and fold.state.pending_upload is None:
+        while now_s() < end_s and fold.state.pending.upload is None:
             await asyncio.wait({reading}, timeout=YIELDS_S)
             if reading.done():
                 return reading.result().items
@@ -118,7 +118,7 @@ async def _place_fence(fold: VoyageFold, autopilot: Autopilot, mission: Mission,
     upload: asyncio.Task[None] | None = None
     try:
         while fold.permissions.may_upload_fence:
-            is_ours = fold.state.is_ours and not is_given_up(fold.state)
+            is_ours = fold.state.vehicle.is_ours and not is_given_up(fold.state)
             if upload is None and is_ours:
                 upload = asyncio.create_task(_upload_fence(autopilot, mission, record), name="fence upload")
             elif upload is not None and upload.done():

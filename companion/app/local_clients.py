@@ -111,7 +111,7 @@ class LivePage:
         asked = self._fold.skipper.preview(step.state, step.snapshot, wanted)
         if isinstance(asked, str):
             return {"error": asked}
-        if step.state.pending_plan is not None or (self._plan is not None and not self._plan.done()):
+        if step.state.pending.plan is not None or (self._plan is not None and not self._plan.done()):
             return {"error": "a plan is being made: again in a moment"}
         # A task of its own: who hangs up must not end the planner's work, which would end the planner.
         self._plan = asyncio.create_task(

@@ -234,7 +234,7 @@ class _Shell:
             self._changed(name, why, is_said=True)
         if self.state_file.refusal:
             self._refuse("saved state", self.state_file.refusal)
-        elif persisted is not None and self.fold.state.adoptable is None and not options.is_again:
+        elif persisted is not None and self.fold.state.mission.adoptable is None and not options.is_again:
             self._refuse("saved state", f"{self.state_file.path.name} is not used: {self.fold.state.why}")
 
     # -------------------------------------------------------------------------------------- inputs
@@ -306,9 +306,9 @@ class _Shell:
             if step.state.phase is Phase.DONE and self.options.exit_on_arrival:
                 done_s = t_s if done_s is None else done_s
                 # an upload under way is brought to its end: what stays on the autopilot is one plan
-                is_busy = step.state.pending_upload is not None
+                is_busy = step.state.pending.upload is not None
                 if t_s - done_s >= (LINGER_BUSY_S if is_busy else LINGER_S):
-                    self.end_reason = "arrived" if step.state.arrived else "over"
+                    self.end_reason = "arrived" if step.state.voyage.arrived else "over"
                     return
             else:
                 done_s = None
@@ -425,13 +425,13 @@ class _Shell:
         goals = len(self.voyage.legs)
         return {
             "mission": self.mission.name,
-            "arrived": state.arrived,
+            "arrived": state.voyage.arrived,
             "arrived_before": self._arrived_before and not self.log.figures.uploads,
             **self.log.figures.to_dict(),
-            "goals_reached": min(goals, len(state.reached)),
+            "goals_reached": min(goals, len(state.progress.reached)),
             "goals": goals,
             "searched": [{"goal": self.voyage.legs[goal].name or f"goal {goal + 1}", "covered": share}
-                         for goal, share in state.covered if goal < goals],
+                         for goal, share in state.progress.covered if goal < goals],
             "end_phase": state.phase.value,
             "end_reason": self.end_reason,
             "end_why": state.why,

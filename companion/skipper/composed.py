@@ -13,6 +13,7 @@ from dataclasses import replace
 import shapely
 
 from companion.field.tree import LEAST
+from companion.frozen import changed
 from companion.skipper.deeds.by_field import situation, strength
 from companion.skipper.planning.errands import errand
 from companion.skipper.planning.waits import stay_left_s, utc_s
@@ -35,32 +36,33 @@ INSIDE_M = 1.5        # a vessel is in the water when it is so far in: its posit
 def follow_field(turn: Turn) -> None:
     """See whether the goal that is next is sailed by its field, and let go of one that is over or leads nowhere."""
     gate, memory = turn.gate, turn.state.by_field
-    has_field = gate is not None and gate.field is not None and turn.state.sailing and not turn.state.over
+    has_field = gate is not None and gate.field is not None and turn.state.voyage.sailing and not turn.state.voyage.over
     if gate is not None and gate.field is not None and has_field:
         _weigh(turn, gate.name, gate.field)
         memory = turn.state.by_field
     elif memory.lost:
         memory = replace(memory, lost="", weak_since_s=None, strong_since_s=None)
-        turn.update(by_field=memory)
+        turn.set(by_field=memory)
     if has_field and errand(turn) is None:
         if gate is not None and gate.field is not None and not (memory.composed and memory.left_s is None):
             turn.say(Severity.NOTICE, "field", f"{gate.name}: steered by {gate.field.tree.text}, "
                      f"{gate.field.until_words}", every_s=0.0)
-        turn.update(by_field=replace(memory, composed=True, left_s=None))
+        turn.set(by_field=replace(memory, composed=True, left_s=None))
     elif memory.composed:
         left_s = turn.t_s if memory.left_s is None else memory.left_s
-        turn.update(by_field=replace(memory, composed=not _is_left(turn, left_s), left_s=left_s))
+        turn.set(by_field=replace(memory, composed=not _is_left(turn, left_s), left_s=left_s))
         if not turn.state.by_field.composed:
-            turn.update(by_field=replace(turn.state.by_field, left_s=None, way_out_rad=None))
+            turn.set(by_field=replace(turn.state.by_field, left_s=None, way_out_rad=None))
 
 
 def _is_left(turn: Turn, since_s: float) -> bool:
     """Return whether she need not be steered on: a plan asked for since then is in place, or none can be waited for."""
     state, bound = turn.state, errand(turn)
-    goes_on = state.sailing and not state.over and (bound.has_place if bound is not None else turn.gate is not None)
+    goes_on = state.voyage.sailing and not state.voyage.over and (
+        bound.has_place if bound is not None else turn.gate is not None)
     if not goes_on or turn.config.guidance is Guidance.FIELD or situation(turn) is None:
         return True
-    is_planned = state.last_plan_s >= since_s - STEP_S and state.pending_plan is None and state.pending_upload is None
+    is_planned = state.plans.last_s >= since_s - STEP_S and state.pending.plan is None and state.pending.upload is None
     return is_planned or turn.t_s - since_s > LEAVE_S
 
 
@@ -83,20 +85,22 @@ def _weigh(turn: Turn, name: str, field: Composed) -> None:
     elif not lost and weak is not None and turn.t_s - weak >= PATIENCE_S:
         lost = why
         turn.say(Severity.WARNING, "no field", f"{name}: {why}: by plan to its place, and a loiter there", every_s=0.0)
-    turn.update(by_field=replace(memory, weak_since_s=weak, strong_since_s=strong, lost=lost))
+    turn.set(by_field=replace(memory, weak_since_s=weak, strong_since_s=strong, lost=lost))
 
 
 def has_sailed(turn: Turn, gate: Gate, boat: PointEn) -> bool:
     """Count the time by a goal's field; True when it is over, which is said."""
-    field, inside = gate.field, turn.state.inside
+    field, inside = gate.field, turn.state.progress.inside
     assert field is not None
     if inside is None or inside.goal != gate.goal:
         inside = Inside(goal=gate.goal, t_s=turn.t_s, utc_s=utc_s(turn))
-        turn.update(inside=inside)
+        turn.set(progress=changed(turn.state.progress, inside=inside))
     why = _over(turn, gate, field, boat)
     if not why:
         return False
-    turn.update(gate=turn.state.gate + 1, reached=(*turn.state.reached, gate.goal), closest_m=math.inf, inside=None)
+    turn.set(progress=changed(
+        turn.state.progress, gate=turn.state.progress.gate + 1, reached=(*turn.state.progress.reached, gate.goal),
+        closest_m=math.inf, inside=None))
     turn.say(Severity.NOTICE, "goal", f"{gate.name}: {why} after {inside.age_s(turn.t_s, utc_s(turn)):.0f} s by field",
              every_s=0.0)
     return True
@@ -104,11 +108,11 @@ def has_sailed(turn: Turn, gate: Gate, boat: PointEn) -> bool:
 
 def _over(turn: Turn, gate: Gate, field: Composed, boat: PointEn) -> str:
     """Return why a goal's field is over, empty: it is not."""
-    if turn.state.released == gate.goal:
+    if turn.state.progress.released == gate.goal:
         return "told to go on"
     if stay_left_s(turn, gate) <= 0.0:
         return "her time is over"
-    if field.until is Until.PLACE and turn.state.closest_m <= gate.radius_m:
+    if field.until is Until.PLACE and turn.state.progress.closest_m <= gate.radius_m:
         return f"{distance_m(boat, gate.en_m):.1f} m from its place"
     if field.water_en is None:
         return ""

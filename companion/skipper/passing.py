@@ -6,6 +6,7 @@ import math
 
 import shapely
 
+from companion.frozen import changed
 from companion.skipper.composed import has_sailed
 from companion.skipper.planning.searching import end_search, follow_search, lay_sweeps
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, utc_s, waits_for_gun
@@ -28,10 +29,10 @@ def pass_gates(turn: Turn) -> None:
     _approach(turn)
     _cross(turn)
     if turn.gate is not None and turn.gate.line is not None and not waits_for_gun(turn, turn.gate):
-        turn.update(released=turn.gate.goal)
+        turn.set(progress=changed(turn.state.progress, released=turn.gate.goal))
     follow_search(turn)
-    while turn.gate is not None and turn.state.route is not None:
-        gate, number = turn.gate, turn.state.gate
+    while turn.gate is not None and turn.state.mission.route is not None:
+        gate, number = turn.gate, turn.state.progress.gate
         if gate.box is not None:
             if not _has_stayed(turn, gate, boat):
                 return
@@ -44,21 +45,21 @@ def pass_gates(turn: Turn) -> None:
             lay_sweeps(turn, gate)
             return
         if gate.is_crossed:
-            if number in turn.state.route.gate_of[: turn.state.index]:
+            if number in turn.state.mission.route.gate_of[: turn.state.mission.index]:
                 _begin_again(turn, gate, boat, f"{gate.name} was passed by outside of its marks: again")
             return
         left = distance_m(boat, gate.en_m)
-        counted = number in turn.state.route.gate_of[: turn.state.index]
+        counted = number in turn.state.mission.route.gate_of[: turn.state.mission.index]
         near = max(gate.radius_m, turn.config.grid_size_m)
-        if not (turn.state.closest_m <= gate.radius_m or (counted and left <= near and not _is_last(turn))
+        if not (turn.state.progress.closest_m <= gate.radius_m or (counted and left <= near and not _is_last(turn))
                 or _is_near_enough(turn, gate, counted) or _is_before(gate, boat)):
             if counted and left > near and not _is_last(turn):
                 # The autopilot has left it behind and we were never near.
                 turn.void_route()
                 missed(turn)
             return
-        if is_on_wrong_side(gate, turn.state.bearing_rad):
-            turn.approach(again(gate, boat, turn.state.bearing_rad))
+        if is_on_wrong_side(gate, turn.state.progress.bearing_rad):
+            turn.approach(again(gate, boat, turn.state.progress.bearing_rad))
             missed(turn)
             turn.say(Severity.WARNING, "buoy missed", f"{gate.name} was left on the wrong side: again", every_s=0.0)
             return
@@ -67,28 +68,30 @@ def pass_gates(turn: Turn) -> None:
                 return
             end_search(turn, gate)
             return
-        closest = turn.state.closest_m
-        reached = (*turn.state.reached, gate.goal) if gate.ends_goal else turn.state.reached
-        turn.update(gate=number + 1, reached=reached, closest_m=math.inf)
+        closest = turn.state.progress.closest_m
+        reached = (*turn.state.progress.reached, gate.goal) if gate.ends_goal else turn.state.progress.reached
+        turn.set(progress=changed(turn.state.progress, gate=number + 1, reached=reached, closest_m=math.inf))
         if gate.ends_goal:
-            turn.update(bearing_rad=0.0)
+            turn.set(progress=changed(turn.state.progress, bearing_rad=0.0))
             turn.say(Severity.NOTICE, "goal", f"{gate.name} reached, {min(left, closest):.1f} m from it", every_s=0.0)
 
 
 def _has_stayed(turn: Turn, gate: Gate, boat: PointEn) -> bool:
     """Count the time in a box from entry on; True when it is over, or she was told to go on."""
-    box, inside = gate.box, turn.state.inside
+    box, inside = gate.box, turn.state.progress.inside
     assert box is not None
     if inside is None or inside.goal != gate.goal:
         if not shapely.covers(box.area_en, shapely.points(boat)):
             return False
         inside = Inside(goal=gate.goal, t_s=turn.t_s, utc_s=utc_s(turn))
-        turn.update(inside=inside)
+        turn.set(progress=changed(turn.state.progress, inside=inside))
         turn.say(Severity.NOTICE, "box", f"{gate.name} entered", every_s=0.0)
-    is_told = turn.state.released == gate.goal
+    is_told = turn.state.progress.released == gate.goal
     if stay_left_s(turn, gate) > 0.0 and not is_told:
         return False
-    turn.update(gate=turn.state.gate + 1, reached=(*turn.state.reached, gate.goal), closest_m=math.inf, inside=None)
+    turn.set(progress=changed(
+        turn.state.progress, gate=turn.state.progress.gate + 1, reached=(*turn.state.progress.reached, gate.goal),
+        closest_m=math.inf, inside=None))
     why = "told to go on" if is_told else "her time is over"
     turn.say(Severity.NOTICE, "goal", f"{gate.name}: {why} after {inside.age_s(turn.t_s, utc_s(turn)):.0f} s in it",
              every_s=0.0)
@@ -103,11 +106,11 @@ def _is_before(gate: Gate, boat: PointEn) -> bool:
 
 def _cross(turn: Turn) -> None:
     """Count a line that was crossed since the last fix; say so where that was too early, or the wrong way."""
-    boat, gate, last = turn.boat_en, turn.gate, turn.state.last_seen
+    boat, gate, last = turn.boat_en, turn.gate, turn.state.position.last_seen
     if boat is None or turn.is_raised("position jump"):
         return
-    is_blind = turn.state.is_blind or last is None or turn.t_s - last.t_s > GAP_S
-    turn.update(is_blind=False)
+    is_blind = turn.state.progress.is_blind or last is None or turn.t_s - last.t_s > GAP_S
+    turn.set(progress=changed(turn.state.progress, is_blind=False))
     if gate is None or gate.line is None:
         return
     found = crossing(gate.line, last.en_m, boat) if last is not None and not is_blind else None
@@ -123,15 +126,16 @@ def _cross(turn: Turn) -> None:
     left_s = gun_in_s(turn, gate.line)
     if gate.line.is_start and (left_s is None or left_s > 0.0):
         early = "before its time is known" if left_s is None else f"{left_s:.0f} s before the gun"
-        turn.update(released=-1)
+        turn.set(progress=changed(turn.state.progress, released=-1))
         _begin_again(turn, gate, boat, f"{gate.name} was crossed {early}: back and again", code="early start")
         return
     following = next((n for n, g in enumerate(turn.gates) if g.goal > gate.goal), len(turn.gates))
     if not gate.is_crossed:
         # Her route leads to the place before the line, which is behind her.
-        turn.update(asked=f"{gate.name} is crossed")
-    turn.update(
-        gate=following, reached=(*turn.state.reached, gate.goal), closest_m=math.inf, bearing_rad=0.0, missed_s=None)
+        turn.set(plans=changed(turn.state.plans, asked=f"{gate.name} is crossed"))
+    turn.set(progress=changed(
+        turn.state.progress, gate=following, reached=(*turn.state.progress.reached, gate.goal), closest_m=math.inf,
+        bearing_rad=0.0, missed_s=None))
     how = "while nobody looked" if found is None else (
         f"{min(found.from_port_m, width_m(gate.line) - found.from_port_m):.1f} m inside of the nearer mark")
     after = f", {-left_s:.0f} s after the gun" if gate.line.is_start and left_s is not None else ""
@@ -147,13 +151,13 @@ def _begin_again(turn: Turn, gate: Gate, boat: PointEn, why: str, *, code: str =
 
 def _approach(turn: Turn) -> None:
     """Keep the smallest distance to the gate, between the last fix and this one too."""
-    boat, gate, last = turn.boat_en, turn.gate, turn.state.last_seen
+    boat, gate, last = turn.boat_en, turn.gate, turn.state.position.last_seen
     if boat is None or gate is None:
         return
     way = distance_m(boat, gate.en_m)
     if last is not None and turn.t_s - last.t_s <= GAP_S and not turn.is_raised("position jump"):
         way = min(way, leg_distance_m(gate.en_m, last.en_m, boat))
-    turn.update(closest_m=min(turn.state.closest_m, way))
+    turn.set(progress=changed(turn.state.progress, closest_m=min(turn.state.progress.closest_m, way)))
 
 
 def _is_near_enough(turn: Turn, gate: Gate, counted: bool) -> bool:
@@ -161,19 +165,21 @@ def _is_near_enough(turn: Turn, gate: Gate, counted: bool) -> bool:
 
     The boat has been at the waypoint by the autopilot's count and loiters in the mission's safe end.
     """
-    route = turn.state.route
-    if route is None or not counted or not _is_last(turn) or turn.state.closest_m > turn.config.grid_size_m:
+    route = turn.state.mission.route
+    if route is None or not counted or not _is_last(turn) or turn.state.progress.closest_m > turn.config.grid_size_m:
         return False
-    at_end = turn.state.index >= len(route.items) - 1
+    at_end = turn.state.mission.index >= len(route.items) - 1
     return at_end and (distance_m(route.points_en_m[-1], gate.en_m) > gate.radius_m or turn.is_raised("mission ended"))
 
 
 def _is_last(turn: Turn) -> bool:
-    return turn.state.gate == len(turn.gates) - 1
+    return turn.state.progress.gate == len(turn.gates) - 1
 
 
 def missed(turn: Turn) -> None:
     """Have the gate that is next planned for from where the boat is; what is being planned was for another."""
-    if turn.state.pending_plan is not None:
-        turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
-    turn.update(missed=turn.state.missed + 1, missed_s=turn.t_s, pending_plan=None)
+    if turn.state.pending.plan is not None:
+        turn.act(CancelPlan(request_id=turn.state.pending.plan.request_id))
+    turn.set(
+        progress=changed(turn.state.progress, missed=turn.state.progress.missed + 1, missed_s=turn.t_s),
+        pending=changed(turn.state.pending, plan=None))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from companion.frozen import changed
 from companion.geo.shift import Shift
 from companion.messages import GeoPoint, Mode
 from companion.orders import Wanted
@@ -40,7 +41,21 @@ from companion.skipper.step.causes import PERSON
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import Snapshot
-from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, SkipperState, saved_of, standing_saved
+from companion.skipper.step.state import (
+    PATIENT,
+    Adrift,
+    ByField,
+    LoadedMission,
+    Orders,
+    Phase,
+    PositionState,
+    Signs,
+    SkipperState,
+    VehicleIdentity,
+    VoyageState,
+    saved_of,
+    standing_saved,
+)
 from companion.skipper.step.tacking import Tacking
 from companion.skipper.step.turn import Turn
 from companion.skipper.step.water import in_water
@@ -70,14 +85,17 @@ class Skipper:
         that earlier voyages of ours may have left there.
         """
         if persisted is None:
-            return SkipperState(known=known)
+            return SkipperState(mission=LoadedMission(known=known))
         if not self.fits(persisted):
-            return SkipperState(why="the saved state is of another voyage", known=(*known, *persisted.names))
+            return SkipperState(
+                why="the saved state is of another voyage", mission=LoadedMission(known=(*known, *persisted.names)))
         return SkipperState(
-            adoptable=persisted, known=known, under_way_s=persisted.under_way_s, arrived=persisted.arrived,
-            uid=persisted.uid, system=persisted.system, standing=persisted.standing, skipped=persisted.skipped,
-            set_sail_utc_s=persisted.set_sail_utc_s, place=persisted.place,
-            restored=persisted.place,
+            vehicle=VehicleIdentity(uid=persisted.uid, system=persisted.system),
+            mission=LoadedMission(adoptable=persisted, known=known),
+            voyage=VoyageState(
+                under_way_s=persisted.under_way_s, arrived=persisted.arrived, set_sail_utc_s=persisted.set_sail_utc_s),
+            orders=Orders(standing=persisted.standing, skipped=persisted.skipped),
+            position=PositionState(place=persisted.place, restored=persisted.place),
             tacking=Tacking(tried=persisted.tacks[0], failed=persisted.tacks[1]))
 
     def fits(self, persisted: Persisted) -> bool:
@@ -131,8 +149,9 @@ class Skipper:
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
         water = self.voyage.frame.origin if self.voyage.is_passage else None
-        if state.adoptable is not None and (state.foreign or not state.checked_mission):
-            return replace(state.adoptable, standing=standing_saved(state), skipped=state.skipped, water=water)
+        if state.mission.adoptable is not None and (state.mission.foreign or not state.mission.checked):
+            return replace(
+                state.mission.adoptable, standing=standing_saved(state), skipped=state.orders.skipped, water=water)
         return replace(saved_of(state, self.voyage.name), water=water)
 
     def leaves_water(self, state: SkipperState, here: GeoPoint) -> bool:
@@ -142,13 +161,13 @@ class Skipper:
         position that has just jumped, which may be false.
         """
         voyage = self.voyage
-        if voyage.recentre_m is None or state.pending_plan is not None:
+        if voyage.recentre_m is None or state.pending.plan is not None:
             return False
         en_m = voyage.frame.en_from_geo(here)
         if math.hypot(*en_m) <= voyage.recentre_m:
             return False
-        last = state.last_seen
-        return last is None or (state.doubt is None and math.dist(en_m, last.en_m) <= voyage.recentre_m)
+        last = state.position.last_seen
+        return last is None or (state.position.doubt is None and math.dist(en_m, last.en_m) <= voyage.recentre_m)
 
     def in_water(self, voyage: Voyage, state: SkipperState) -> tuple[Skipper, SkipperState]:
         """Return the skipper and the state in the metres of ``voyage``'s frame."""
@@ -157,28 +176,28 @@ class Skipper:
 
 def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
     state = turn.state
-    if state.rebooted:
+    if state.vehicle.rebooted:
         _rebooted(turn)
     if turn.autopilot is None:
         age = turn.snapshot.heartbeat_age_s
         heard = "nothing yet" if age is None else f"silent for {age:.0f} s; what it has on board sails on"
-        phase = Phase.WAITING if not state.sailing else turn.state.phase
+        phase = Phase.WAITING if not state.voyage.sailing else turn.state.phase
         turn.phase(phase, f"waiting to hear the autopilot: {heard}")
         return
     if stand_by(turn) or leaves_alone(turn) or keeps_off(turn) or _operator_has_it(turn):
         return
     notice_truncation(turn)
     if not mission_is_known(turn):
-        if turn.state.after_operator and not turn.state.foreign:
+        if turn.state.operator.is_back and not turn.state.mission.foreign:
             brakes(turn)   # a mode changes no mission, and a step may be all that is left of the water
         return
     if holds_ashore(turn):
         return
-    if turn.gate is None and not turn.state.sailing:
+    if turn.gate is None and not turn.state.voyage.sailing:
         finished(turn)
-    elif turn.state.route is None:
+    elif turn.state.mission.route is None:
         start(turn)
-    elif not turn.state.sailing:
+    elif not turn.state.voyage.sailing:
         launch(turn)
     else:
         sail(turn, fresh)
@@ -186,36 +205,40 @@ def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
 
 def _rebooted(turn: Turn) -> None:
     """Begin again after the autopilot's reboot: the mission is compared, mode and arming are gone."""
-    since = turn.state.operator_since_s
+    since = turn.state.operator.since_s
     keeps = turn.state.phase is Phase.OPERATOR and since is not None and turn.t_s - since > REBOOT_RACE_S
-    turn.update(
-        checked_mission=False, read_since_s=turn.t_s, own_mode=None, steering_until_s=None, pending_command=None,
-        by_field=ByField(), answering="", stop=None, signs=Signs(), adrift=Adrift(),
-    )
+    turn.set(
+        mission=changed(turn.state.mission, checked=False, read_since_s=turn.t_s),
+        steering=changed(turn.state.steering, own_mode=None, until_s=None),
+        pending=changed(turn.state.pending, command=None),
+        by_field=ByField(),
+        operator=changed(turn.state.operator, answering="", stop=None, signs=Signs()),
+        adrift=Adrift())
     if not keeps:
-        turn.update(sailing=False, operator_since_s=None)
+        turn.set(voyage=changed(turn.state.voyage, sailing=False), operator=changed(turn.state.operator, since_s=None))
         turn.phase(Phase.WAITING, "the autopilot rebooted: waiting for its mission to be read")
 
 
 def _operator_has_it(turn: Turn) -> bool:
     """Notice that somebody else has the boat, and that it is given back. Nothing is asked of it meanwhile."""
     status, state = turn.autopilot, turn.state
-    if status is None or not state.sailing or state.foreign:
+    if status is None or not state.voyage.sailing or state.mission.foreign:
         return False  # a stranger's mission is not an operator's mode: ``mission_is_known`` stands by it
     gone = turn.is_taken
     if state.phase is not Phase.OPERATOR:
         if not gone:
-            held = state.steering_until_s is not None or state.by_field.resort.engaged or turn.steers or (
-                state.own_mode is Mode.LOITER and is_busy(turn, Mode.LOITER.name))
-            if status.mode is Mode.AUTO and state.own_mode is not None and not held:
-                turn.update(own_mode=None)
+            held = state.steering.until_s is not None or state.by_field.resort.engaged or turn.steers or (
+                state.steering.own_mode is Mode.LOITER and is_busy(turn, Mode.LOITER.name))
+            if status.mode is Mode.AUTO and state.steering.own_mode is not None and not held:
+                turn.set(steering=changed(turn.state.steering, own_mode=None))
             return False
-        if state.pending_plan is not None:
-            turn.act(CancelPlan(request_id=state.pending_plan.request_id))
-        turn.update(
-            operator_since_s=turn.t_s, pending_plan=None, own_mode=None, steering_until_s=None, pending_command=None,
-            by_field=ByField(),
-        )
+        if state.pending.plan is not None:
+            turn.act(CancelPlan(request_id=state.pending.plan.request_id))
+        turn.set(
+            operator=changed(turn.state.operator, since_s=turn.t_s),
+            pending=changed(turn.state.pending, plan=None, command=None),
+            steering=changed(turn.state.steering, own_mode=None, until_s=None),
+            by_field=ByField())
         if take_over(turn):
             return False
         turn.phase(Phase.OPERATOR, f"{_taken(turn)}, not by us: the companion does nothing until AUTO comes back")
@@ -226,11 +249,12 @@ def _operator_has_it(turn: Turn) -> bool:
             return False
         turn.phase(Phase.OPERATOR, f"{_taken(turn)}: waiting for AUTO")
         return True
-    since = state.operator_since_s if state.operator_since_s is not None else turn.t_s
-    turn.update(
-        operator_since_s=None, checked_mission=False, read_since_s=turn.t_s, after_operator=True, plan_retry=PATIENT,
-        answering="", history=(), given_back_s=turn.t_s,
-    )
+    since = state.operator.since_s if state.operator.since_s is not None else turn.t_s
+    turn.set(
+        operator=changed(turn.state.operator, since_s=None, is_back=True, answering="", given_back_s=turn.t_s),
+        mission=changed(turn.state.mission, checked=False, read_since_s=turn.t_s),
+        plans=changed(turn.state.plans, retry=PATIENT),
+        progress=changed(turn.state.progress, history=()))
     turn.phase(Phase.WAITING, "AUTO is back: waiting for the mission on board to be compared")
     turn.say(Severity.NOTICE, "operator back", f"AUTO is back after {turn.t_s - since:.0f} s", every_s=0.0)
     return False
@@ -238,7 +262,7 @@ def _operator_has_it(turn: Turn) -> bool:
 
 def _taken(turn: Turn) -> str:
     """Return in words what she was put into, and by which failsafe if by one."""
-    status, stop = turn.autopilot, turn.state.stop
+    status, stop = turn.autopilot, turn.state.operator.stop
     mode = status.mode.name if status is not None and status.mode is not None else "unknown"
     what = f"mode {mode}" if status is None or status.is_armed else f"mode {mode}, disarmed"
     return what if stop is None or stop.cause == PERSON else f"{what} by the {stop.cause} failsafe"

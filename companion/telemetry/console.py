@@ -256,15 +256,15 @@ def wrapped(lines: list[str], columns: int) -> list[str]:
 def progress_text(step: Step, next_tack_s: float | None) -> str:
     """Return the line: state, waypoint, wind mean and spread, next tack, cross-track, clearance, arrival."""
     snapshot, state = step.snapshot, step.state
-    autopilot, wind, route = snapshot.autopilot, snapshot.wind, state.route
+    autopilot, wind, route = snapshot.autopilot, snapshot.wind, state.mission.route
     parts = [state.phase.value.upper()]
     if snapshot.heartbeat_age_s is not None and snapshot.heartbeat_age_s > SILENT_S:
         parts.append(f"autopilot silent for {snapshot.heartbeat_age_s:.0f} s: what follows is old")
-    under_way = route is not None and state.sailing and state.phase is not Phase.DONE
+    under_way = route is not None and state.voyage.sailing and state.phase is not Phase.DONE
     if under_way and route is not None and autopilot is not None:
         distance = autopilot.waypoint_distance_m
         at = "" if distance is None else f" {distance:.0f} m"
-        parts.append(f"wp {state.index + 1}/{len(route.items)}{at}")
+        parts.append(f"wp {state.mission.index + 1}/{len(route.items)}{at}")
     if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
         sigma_rad = sigma_ahead_rad(snapshot) or 0.0
         twd_deg = math.degrees(wrap_two_pi(wind.mean_twd_from_rad))
@@ -276,11 +276,11 @@ def progress_text(step: Step, next_tack_s: float | None) -> str:
             parts.append(f"next tack {next_tack_s:.0f} s")
         if autopilot is not None and autopilot.cross_track_m is not None:
             parts.append(f"xt {autopilot.cross_track_m:+.1f} m")
-    if state.task:
-        parts.append(state.task)
-    if state.standing is not None:
-        minutes = state.standing.age_s(snapshot.t_s) / 60.0
-        parts.append(f"order {state.standing.words} of {state.standing.by}, {minutes:.0f} min")
+    if state.progress.task:
+        parts.append(state.progress.task)
+    if state.orders.standing is not None:
+        minutes = state.orders.standing.age_s(snapshot.t_s) / 60.0
+        parts.append(f"order {state.orders.standing.words} of {state.orders.standing.by}, {minutes:.0f} min")
     if route is not None:
         if route.expected_clearance_m is not None:
             parts.append(f"clear {route.expected_clearance_m:.1f} m")
@@ -288,7 +288,7 @@ def progress_text(step: Step, next_tack_s: float | None) -> str:
         if under_way and ahead.there_s is not None:
             late = "" if ahead.there_late_s is None else f" (90 %: {ahead.there_late_s:.0f} s)"
             parts.append(f"there in {ahead.there_s:.0f} s{late}")
-        parts.append(f"plans {state.replans}")
+        parts.append(f"plans {state.plans.replans}")
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)
     return " | ".join(parts)
@@ -296,14 +296,14 @@ def progress_text(step: Step, next_tack_s: float | None) -> str:
 
 def left_behind(step: Step) -> str:
     """Return what the boat does without us: what a person who stops the companion has to know."""
-    status, route = step.snapshot.autopilot, step.state.route
+    status, route = step.snapshot.autopilot, step.state.mission.route
     if status is None:
         return "the autopilot is not heard: what it does is not known"
     if not status.is_armed:
         return "the boat is disarmed"
-    if status.mode is not Mode.AUTO or route is None or step.state.foreign:
+    if status.mode is not Mode.AUTO or route is None or step.state.mission.foreign:
         return f"the boat is left in {status.mode.name if status.mode is not None else 'an unknown mode'}, armed"
     end = route.items[-1].point
-    left = len(route.items) - step.state.index
+    left = len(route.items) - step.state.mission.index
     way = f"{left} items to go, the last a loiter" if left > 1 else "she loiters"
     return f"the boat sails on in AUTO: {way} at {end.lat_deg:.5f}, {end.lon_deg:.5f}"

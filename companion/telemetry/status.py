@@ -31,10 +31,10 @@ def companion_status(
 ) -> CompanionStatus:
     """Return the status at ``step``. The wind's spread is that of a minute ahead, which the plan lives on."""
     snapshot, state = step.snapshot, step.state
-    autopilot, wind, route, vehicle = snapshot.autopilot, snapshot.wind, state.route, snapshot.vehicle
+    autopilot, wind, route, vehicle = snapshot.autopilot, snapshot.wind, state.mission.route, snapshot.vehicle
     legs = voyage.legs
-    gates = gates_of(voyage, state.approaches)
-    goal = gates[state.gate].goal if state.gate < len(gates) else len(legs) - 1
+    gates = gates_of(voyage, state.progress.approaches)
+    goal = gates[state.progress.gate].goal if state.progress.gate < len(gates) else len(legs) - 1
     here = snapshot.position_en_m
     code, text = _alert(step)
     tws_sigma = None if wind.forecast is None else float(wind.forecast.sigma_tws_mps[0])
@@ -43,7 +43,7 @@ def companion_status(
         state=state.phase.value,
         goal_index=goal,
         goal_count=len(legs),
-        waypoint_seq=state.index + 1 if route is not None else None,
+        waypoint_seq=state.mission.index + 1 if route is not None else None,
         waypoint_count=None if route is None else len(route.items),
         waypoint_distance_m=None if autopilot is None else autopilot.waypoint_distance_m,
         goal_distance_m=None if here is None else math.dist(here, legs[goal].en_m),
@@ -59,14 +59,14 @@ def companion_status(
         promised_risk=None if route is None else risk_of(route),
         plan_id=None if route is None else route.plan_id,
         plan_age_s=None if route is None else max(0.0, snapshot.t_s - route.plan_t_s),
-        replans=state.replans,
+        replans=state.plans.replans,
         tacks=figures.tacks,
         battery_v=None if autopilot is None else autopilot.battery_v,
         position=None if vehicle is None else vehicle.position,
         bytes_out_per_s=bytes_out_per_s,
         traffic=traffic_status(step, feeds, ais_dropped),
-        order="" if state.standing is None else state.standing.verb.value,
-        order_age_s=None if state.standing is None else state.standing.age_s(snapshot.t_s),
+        order="" if state.orders.standing is None else state.orders.standing.verb.value,
+        order_age_s=None if state.orders.standing is None else state.orders.standing.age_s(snapshot.t_s),
         alert_code=code,
         alert_text=text,
     )
@@ -78,7 +78,7 @@ def traffic_status(step: Step, feeds: Sequence[AisFeed], dropped: int) -> Traffi
     if picture is None and not feeds:
         return None
     counts = TrafficCounts() if picture is None else picture.counts
-    route = step.state.route
+    route = step.state.mission.route
     seen = TrafficStatus(
         vessels=0 if picture is None else len(picture.vessels),
         refused=counts.stale + counts.far + dropped + sum(feed.counts.refused for feed in feeds),
@@ -87,9 +87,9 @@ def traffic_status(step: Step, feeds: Sequence[AisFeed], dropped: int) -> Traffi
         promised_risk=None if route is None else route.vessels_part,
         path_risk=None if route is None else route.vessel_risk,
     )
-    if not step.state.watch:
+    if not step.state.traffic.watch:
         return seen
-    worst = step.state.watch[0]
+    worst = step.state.traffic.watch[0]
     approach = worst.approach
     return replace(
         seen, name=worst.vessel.label, alarm=worst.alarm.name.lower(), role=worst.encounter.role.value,
@@ -108,8 +108,8 @@ def _alert(step: Step) -> tuple[str, str]:
     if said:
         worst = min(said, key=lambda a: a.severity)
         return worst.code, worst.text
-    if step.state.raised:
-        return step.state.raised[0].name, step.state.why
+    if step.state.alarms.raised:
+        return step.state.alarms.raised[0].name, step.state.why
     if step.state.phase in {Phase.HOLDING, Phase.OPERATOR}:
         return step.state.phase.value, step.state.why
     return "", step.state.why
@@ -128,7 +128,8 @@ def unix_of_boat(snapshot: Snapshot, t_s: float) -> float | None:
 
 def worst_watchdog(step: Step) -> str:
     """Return the name of the most severe watchdog that is raised, empty: none is."""
-    return min((raised.name for raised in step.state.raised), key=lambda name: BY_NAME[name].severity, default="")
+    names = (raised.name for raised in step.state.alarms.raised)
+    return min(names, key=lambda name: BY_NAME[name].severity, default="")
 
 
 def far_status(
@@ -137,11 +138,12 @@ def far_status(
 ) -> FarStatus:
     """Return what is told far away; ``order`` and ``reply`` are those of the order that came last."""
     snapshot, traffic = step.snapshot, status.traffic
-    unix_s, autopilot, standing = unix_of_boat(snapshot, status.t_s), snapshot.autopilot, step.state.standing
+    unix_s, autopilot, standing = unix_of_boat(snapshot, status.t_s), snapshot.autopilot, step.state.orders.standing
     goal = None if status.goal_index is None else status.goal_index + 1
     return FarStatus(
         phase=status.state, sequence=sequence, minute=None if unix_s is None else minutes_of(unix_s),
-        is_heard=is_heard, is_armed=autopilot is not None and autopilot.is_armed, is_under_way=step.state.sailing,
+        is_heard=is_heard, is_armed=autopilot is not None and autopilot.is_armed,
+        is_under_way=step.state.voyage.sailing,
         has_trouble=has_trouble, standing=None if standing is None else standing.verb, position=status.position,
         goal_m=status.goal_distance_m, waypoint_m=status.waypoint_distance_m,
         speed_mps=None if snapshot.vehicle is None else snapshot.vehicle.speed_mps,

@@ -115,7 +115,7 @@ class ViewFold:
 
     def _view(self, step: Step, status: CompanionStatus, figures: VoyageFigures) -> values.View:
         snapshot, state, voyage, config = step.snapshot, step.state, self._voyage, self._config
-        t_s, route = snapshot.t_s, step.state.route
+        t_s, route = snapshot.t_s, step.state.mission.route
         # a loiter that nobody planned has the number of the plan before it, and none of its reasons
         chosen = None if route is None or route.cost_s is None else self._plans.get(route.plan_id)
         legs: tuple[Leg, ...] = tuple(leg for known in reversed(self._plans.values()) for leg in known.plan.legs)
@@ -129,7 +129,7 @@ class ViewFold:
             state=parts.state_of(step, self._phase_s), alarms=parts.alarms(step, status, self._said),
             boat=parts.boat_of(step, status, voyage), wind=wind_of(step), water=water_of(step),
             no_go=no_go_of(step, voyage, config),
-            laylines=None if following is None or state.over else laylines_of(
+            laylines=None if following is None or state.voyage.over else laylines_of(
                 step, voyage, config, following.name, following.at_en_m),
             polar=polar_of(step, voyage, config),
             plan=plan_of(step, voyage, ahead, chosen, legs),

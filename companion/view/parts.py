@@ -38,8 +38,8 @@ MOST = 40   # vessels in a view, the worst first
 
 def vessels_of(step: Step) -> tuple[values.VesselView, ...]:
     """Return the vessels, the worst first; without our own position those heard last, with no approach."""
-    if step.state.watch:
-        return tuple(_seen(step, seen) for seen in step.state.watch[:MOST])
+    if step.state.traffic.watch:
+        return tuple(_seen(step, seen) for seen in step.state.traffic.watch[:MOST])
     picture = step.snapshot.traffic
     if picture is None:
         return ()
@@ -76,7 +76,7 @@ def alarms_of(step: Step) -> tuple[values.AlarmView, ...]:
     levels: dict[Alarm, values.Level] = {Alarm.WARN: "warning", Alarm.ACT: "error", Alarm.TOUCH: "critical"}
     return tuple(
         values.AlarmView(code="vessel", level=levels[seen.alarm], text=seen.sentence())
-        for seen in step.state.watch if seen.alarm in levels)
+        for seen in step.state.traffic.watch if seen.alarm in levels)
 
 
 def heard_vessel(traffic: TrafficStatus | None, age_s: float | None) -> tuple[values.VesselView, ...]:
@@ -106,10 +106,10 @@ def state_of(step: Step, since_s: float) -> values.StateView:
     """Return what she does and why."""
     state, autopilot = step.state, step.snapshot.autopilot
     return values.StateView(
-        phase=state.phase.value, why=state.why, task=state.task, age_s=rounded(step.snapshot.t_s - since_s, 1),
+        phase=state.phase.value, why=state.why, task=state.progress.task, age_s=rounded(step.snapshot.t_s - since_s, 1),
         mode=None if autopilot is None or autopilot.mode is None else autopilot.mode.name,
-        is_armed=None if autopilot is None else autopilot.is_armed, is_sailing=state.sailing,
-        is_over=bool(state.over), has_arrived=state.arrived, is_planning=state.pending_plan is not None,
+        is_armed=None if autopilot is None else autopilot.is_armed, is_sailing=state.voyage.sailing,
+        is_over=bool(state.voyage.over), has_arrived=state.voyage.arrived, is_planning=state.pending.plan is not None,
         wants=state.wants)
 
 
@@ -119,7 +119,7 @@ def alarms(step: Step, status: CompanionStatus, said: Mapping[str, str]) -> tupl
     out = [values.AlarmView(
         code=raised.name, level=level_of(BY_NAME[raised.name].severity),
         text=said.get(raised.name, BY_NAME[raised.name].watches), age_s=rounded(t_s - raised.since_s, 1),
-    ) for raised in step.state.raised]
+    ) for raised in step.state.alarms.raised]
     out += alarms_of(step)
     if status.alert_code in {DISK, GONE}:
         out.append(values.AlarmView(code=status.alert_code, level="warning", text=status.alert_text))
@@ -128,8 +128,8 @@ def alarms(step: Step, status: CompanionStatus, said: Mapping[str, str]) -> tupl
 
 def next_goal(step: Step, voyage: Voyage) -> int:
     """Return the index, over all laps, of the goal that is sailed to; behind the last one when all are reached."""
-    gates = gates_of(voyage, step.state.approaches)
-    return gates[step.state.gate].goal if step.state.gate < len(gates) else len(voyage.legs)
+    gates = gates_of(voyage, step.state.progress.approaches)
+    return gates[step.state.progress.gate].goal if step.state.progress.gate < len(gates) else len(voyage.legs)
 
 
 def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatView:
@@ -181,7 +181,7 @@ def goals_of(step: Step, voyage: Voyage) -> tuple[values.GoalView, ...]:
             radius_m=metres(goal.radius_m), side="" if goal.side is Side.NONE else goal.side.value,
             line_en_m=None if goal.line is None else (
                 place(goal.line.port_en_m), place(goal.line.starboard_en_m)),
-            is_next=begin + number == following, is_reached=begin + number in step.state.reached,
+            is_next=begin + number == following, is_reached=begin + number in step.state.progress.reached,
             distance_m=None if here is None else metres(math.dist(here, goal.en_m)),
             bearing_deg=None if here is None else compass(heading_of(goal.en_m[0] - here[0], goal.en_m[1] - here[1]))))
     return tuple(out)
@@ -205,7 +205,7 @@ def refuges_of(voyage: Voyage) -> tuple[values.PlaceView, ...]:
 def orders_of(step: Step) -> values.Orders:
     """Return the order that stands, the last answer, and what is permitted on board."""
     state, t_s = step.state, step.snapshot.t_s
-    standing, last = state.standing, max(state.answered, key=lambda a: a.t_s, default=None)
+    standing, last = state.orders.standing, max(state.orders.answered, key=lambda a: a.t_s, default=None)
     return values.Orders(
         standing=None if standing is None else values.StandingView(
             verb=standing.verb.value, words=standing.words, by=standing.by, age_s=rounded(standing.age_s(t_s), 0),
@@ -223,7 +223,7 @@ def figures_of(step: Step, figures: VoyageFigures, voyage: Voyage) -> values.Fig
         replans=figures.replans, contacts=figures.contacts, no_go_entries=figures.no_go_entries,
         min_clearance_m=rounded(figures.min_clearance_m, 1),
         promised_clearance_m=rounded(figures.promised_clearance_m, 1),
-        goals_reached=min(len(step.state.reached), len(voyage.legs)), goals=len(voyage.legs))
+        goals_reached=min(len(step.state.progress.reached), len(voyage.legs)), goals=len(voyage.legs))
 
 
 def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
@@ -244,12 +244,12 @@ def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
                     text="" if autopilot is None or ekf else "the autopilot does not believe its position"),
         values.Part(name="wind", grade=wind_grade, age_s=rounded(wind_age, 1), text=wind.verdict or wind.health.value),
         values.Part(name="planner", grade="good" if snapshot.planner_alive else "bad",
-                    text="at work" if state.pending_plan is not None else
+                    text="at work" if state.pending.plan is not None else
                     "ready" if snapshot.planner_alive else "its process has died"),
         values.Part(name="mission on board", grade="unknown" if mission.items is None else
-                    "bad" if state.foreign else "good",
+                    "bad" if state.mission.foreign else "good",
                     age_s=None if mission.read_t_s is None else rounded(snapshot.t_s - mission.read_t_s, 0),
-                    text=state.foreign or ("not read yet" if mission.items is None else "ours, as read back")),
+                    text=state.mission.foreign or ("not read yet" if mission.items is None else "ours, as read back")),
         values.Part(name="records", grade="bad" if status.alert_code == DISK else "good",
                     text=status.alert_text if status.alert_code == DISK else "written"),
     ]
@@ -268,7 +268,7 @@ def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
     if autopilot is not None and autopilot.battery_v is not None:
         share = "" if autopilot.battery_remaining is None else f", {100.0 * autopilot.battery_remaining:.0f} %"
         parts.append(values.Part(
-            name="battery", grade="bad" if state.battery_critical or autopilot.battery_failed else "good",
+            name="battery", grade="bad" if state.alarms.battery_critical or autopilot.battery_failed else "good",
             age_s=rounded(snapshot.autopilot_age_s, 1), text=f"{autopilot.battery_v:.1f} V{share}"))
     return tuple(parts)
 
@@ -359,7 +359,7 @@ def apparent(
 
 def no_go_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.NoGo | None:
     """Return the no-go zone now and later, widened as a plan that keeps the promise in force would have it."""
-    forecast, route = step.snapshot.wind.forecast, step.state.route
+    forecast, route = step.snapshot.wind.forecast, step.state.mission.route
     if forecast is None:
         return None
     delta_s = config.delta_s if route is None else route.delta_s
@@ -470,10 +470,10 @@ def plan_of(
     step: Step, voyage: Voyage, ahead: Ahead, chosen: Chosen | None, legs: tuple[Leg, ...],
 ) -> values.PlanView | None:
     """Return the plan that is sailed; ``legs`` are those of the plans that it was spliced from, the newest first."""
-    route, state = step.state.route, step.state
+    route, state = step.state.mission.route, step.state
     if route is None:
         return None
-    begin, count = min(state.index, len(route.items)), len(route.items)
+    begin, count = min(state.mission.index, len(route.items)), len(route.items)
     left = tuple(_leg(route, n, legs) for n in range(begin, count))
     return values.PlanView(
         number=route.plan_id, age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),
@@ -486,7 +486,7 @@ def plan_of(
         median_s=rounded(route.median_s, 0), late_s=rounded(route.late_s, 0),
         there_s=rounded(ahead.there_s, 0), there_late_s=rounded(ahead.there_late_s, 0),
         expected_clearance_m=rounded(route.expected_clearance_m, 1),
-        bound_s=None if chosen is None else rounded(chosen.plan.lower_bound_s, 1), replans=state.replans,
+        bound_s=None if chosen is None else rounded(chosen.plan.lower_bound_s, 1), replans=state.plans.replans,
         next_tack_s=rounded(next_tack_s(step, voyage.boat.polar), 0),
         leg=min(begin + 1, count) if count else None, count=count,
         legs=left)

@@ -106,9 +106,9 @@ class _Trial:
         self.looked.set()
         self.seen |= {word for action in step.actions if (word := _ordered(action))}
         self.seen |= set(_false(step, self.autopilot))
-        if step.state.custody:
+        if step.state.vehicle.doubt:
             self.seen.add("orders stop")
-        if step.state.phase is Phase.OPERATOR and not step.state.custody:
+        if step.state.phase is Phase.OPERATOR and not step.state.vehicle.doubt:
             self.seen.add("stands by as for an operator")
 
 
@@ -143,7 +143,7 @@ def _false(step: Step, autopilot: Autopilot) -> list[str]:
         out += ["false leak"] * bool(status.leaks)
         out += ["false time"] * (status.utc_at_boot_s is not None and status.utc_at_boot_s < EPOCH_S - 3600.0)
         out += ["false fence state"] * bool(status.fence_breached)
-        out += ["a person at the sticks"] * (snapshot.t_s - step.state.signs.rc_moved_s <= TOLD_S)
+        out += ["a person at the sticks"] * (snapshot.t_s - step.state.operator.signs.rc_moved_s <= TOLD_S)
         core = autopilot.core
         if status.home is not None and core.home_en is not None:
             out += ["false home"] * (_apart_m(status.home, core.chart.point(core.home_en)) > FALSE_PLACE_M)
@@ -192,7 +192,7 @@ async def _measure(
 
 
 async def _forge_all(trial: _Trial, bursts: Sequence[Sequence[Forgery]]) -> list[tuple[str, ...]]:
-    await trial.until(lambda step: step.state.sailing)
+    await trial.until(lambda step: step.state.voyage.sailing)
     await asyncio.sleep(SETTLED_S)
     without = {in_a_read: await _window(trial, (), in_a_read=in_a_read) for in_a_read in (False, True)}
     out = []
@@ -210,7 +210,7 @@ async def _window(trial: _Trial, burst: Sequence[Forgery], *, in_a_read: bool) -
     trial.seen = set()
     if in_a_read:
         trial.autopilot.core.voice.announce(6, "Flight plan received")
-        await trial.until(lambda step: step.state.pending_read is not None)
+        await trial.until(lambda step: step.state.pending.read is not None)
     for _ in range(round(BURST_S * trial.rate_hz)):
         for forgery in burst:
             trial.air.say(trial.forger.frame(now_s(), forgery))
@@ -223,8 +223,9 @@ async def _window(trial: _Trial, burst: Sequence[Forgery], *, in_a_read: bool) -
 
 def _is_quiet(step: Step, autopilot: Autopilot) -> bool:
     state = step.state
-    return not (_false(step, autopilot) or state.custody or state.raised or state.foreign or state.pending_plan
-                or state.pending_upload or state.pending_read)
+    return not (
+        _false(step, autopilot) or state.vehicle.doubt or state.alarms.raised or state.mission.foreign
+        or state.pending.plan or state.pending.upload or state.pending.read)
 
 
 def _store(folder: Path) -> SigningStore:

@@ -38,7 +38,7 @@ def test_what_is_drawn_on_the_autopilot_is_read_while_a_fence_is_in_force_and_no
     """Its content was never looked at: a fence that a person drew under way was not known of."""
     one, other = (MissionItem(command=5003, params=(100.0, 0, 0, 0)),), (MissionItem(command=5003),)
     shown = SimpleNamespace(fence_breached=None, fence_breaches=None)
-    state = SimpleNamespace(is_ours=True, pending_upload=None)
+    state = SimpleNamespace(vehicle=SimpleNamespace(is_ours=True), pending=SimpleNamespace(upload=None))
     fold = SimpleNamespace(state=state, permissions=SimpleNamespace(may_upload_fence=False))
     read_s, ended, taken, answers = [], [], [], []
 
@@ -72,7 +72,7 @@ def test_what_is_drawn_on_the_autopilot_is_read_while_a_fence_is_in_force_and_no
         shown.fence_breaches = 1
         await asyncio.sleep(1.5)                             # it is being read, to no end ...
         assert len(ended) == 1
-        state.pending_upload = object()                      # ... and gives way
+        state.pending.upload = object()                      # ... and gives way
         await asyncio.sleep(0.2)
         assert len(ended) == 2
         before = len(read_s)

@@ -7,12 +7,12 @@ import pytest
 from companion.frozen import changed
 from companion.messages import AutopilotStatus, GeoPoint, Mode
 from companion.skipper import SkipperState
-from companion.skipper.step.state import Phase
+from companion.skipper.step.state import LoadedMission, Phase
 
 
 @pytest.mark.parametrize(("value", "changes"), [
     (AutopilotStatus(t_s=1.0), {"mode": Mode.AUTO, "t_s": 2.0}),
-    (SkipperState(), {"phase": Phase.STANDARD, "why": "away", "index": 3}),
+    (SkipperState(), {"phase": Phase.STANDARD, "why": "away", "wants": ("wind",)}),
     (GeoPoint(lat_deg=1.0, lon_deg=2.0), {"lat_deg": 3.0}),
 ])
 def test_it_is_what_replace_makes(value, changes):
@@ -23,15 +23,15 @@ def test_it_is_what_replace_makes(value, changes):
 
 
 def test_what_holds_already_is_no_new_value():
-    state = SkipperState()
-    assert changed(state, index=0, route=None) is state
-    assert changed(state, index=1) is not state
+    mission = LoadedMission()
+    assert changed(mission, index=0, route=None) is mission
+    assert changed(mission, index=1) is not mission
 
 
 def test_a_copy_is_frozen_and_leaves_the_first_as_it_was():
-    state = SkipperState()
-    new = changed(state, index=5)
-    assert (state.index, new.index) == (0, 5)
+    mission = LoadedMission()
+    new = changed(mission, index=5)
+    assert (mission.index, new.index) == (0, 5)
     with pytest.raises(AttributeError):
         new.index = 6
 

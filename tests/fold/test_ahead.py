@@ -12,6 +12,7 @@ from companion.messages import Mode
 from companion.skipper.step import Announce
 from sitl.run.embedded import run_embedded
 from sitl.scene import load_scenario
+from tests.skipper.world import with_parts
 
 DEMO = Path("sitl/scenarios/demo.toml")
 
@@ -22,7 +23,7 @@ def demo(tmp_path_factory):
     steps = []
     run_virtual(run_embedded(load_scenario(DEMO), DEMO, 0, tmp_path_factory.mktemp("demo") / "voyage",
                              on_status=lambda _, step: steps.append(step)))
-    return steps, next(step.snapshot.t_s for step in steps if step.state.reached)
+    return steps, next(step.snapshot.t_s for step in steps if step.state.progress.reached)
 
 
 def told(demo):
@@ -54,9 +55,9 @@ def test_a_plan_that_is_kept_has_its_own_time_and_the_new_clock(demo):
         for said in step.actions:
             if isinstance(said, Announce) and "the old plan stays" in said.text:
                 kept += 1
-                assert f"({step.state.route.cost_s:.0f} s;" in said.text
-                assert step.state.route.median_s is None or (
-                    0.5 < step.state.route.median_s / step.state.route.cost_s < 2.0)
+                assert f"({step.state.mission.route.cost_s:.0f} s;" in said.text
+                assert step.state.mission.route.median_s is None or (
+                    0.5 < step.state.mission.route.median_s / step.state.mission.route.cost_s < 2.0)
     assert kept > 0
 
 
@@ -65,7 +66,7 @@ def test_a_boat_that_is_not_sailing_the_plan_is_told_nothing(demo):
     assert ahead.points
     for changed in (
         replace(step, snapshot=replace(step.snapshot, autopilot=replace(step.snapshot.autopilot, mode=Mode.LOITER))),
-        replace(step, state=replace(step.state, route=None)),
+        replace(step, state=with_parts(step.state, mission={"route": None})),
         replace(step, snapshot=replace(step.snapshot, position_en_m=None)),
     ):
         assert changed.ahead().there_s is None

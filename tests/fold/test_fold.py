@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import math
 import socket
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -31,6 +30,7 @@ from companion.wind.parameters import VaneParameters
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, serve
 from sitl.world.wind import Constant
+from tests.skipper.world import with_parts
 
 DEMO = "missions/archipelago.toml"
 
@@ -164,7 +164,7 @@ def test_one_that_was_not_known_is_said_when_it_is_set_under_way_and_not_when_a_
     fold = fresh()
     told(fold, "COMPASS_ORIENT", 6.0)
     assert not changed(fold), "before she sails somebody reads it"
-    fold.state = replace(fold.state, sailing=True)
+    fold.state = with_parts(fold.state, voyage={"sailing": True})
     told(fold, "SERVO3_REVERSED", 1.0, index=311)
     assert "SERVO3_REVERSED" not in fold.unread
     told(fold, "AHRS_ORIENTATION", 8.0)

@@ -18,7 +18,7 @@ from companion.skipper.way import Composed, Until
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from companion.traffic import Targets
-from tests.skipper.world import FRAME, World, restarted, skipper, voyage
+from tests.skipper.world import FRAME, World, restarted, skipper, voyage, with_parts
 from tests.traffic.conftest import report
 
 RING = Round(at_en=(80.0, 0.0), radius_m=50.0)
@@ -56,7 +56,7 @@ def test_a_circle_is_sailed_for_its_time_and_a_mark_by_plan_behind_it():
     world = make(goal(field("ring", Until.TIME, 200.0, ring=RING)), MARK)
     assert world.run(60, lambda w: w.mode is Mode.GUIDED)
     began = world.t
-    assert world.run(400, lambda w: bool(w.state.reached))
+    assert world.run(400, lambda w: bool(w.state.progress.reached))
     assert world.t - began == pytest.approx(200.0, abs=5.0)
     assert "for 200 s" in next(text for code, text in said(world) if code == "field")
     assert "the ring: her time is over" in next(text for code, text in said(world) if code == "goal")
@@ -66,7 +66,7 @@ def test_a_circle_is_sailed_for_its_time_and_a_mark_by_plan_behind_it():
     assert {round(b) for b in bearings} >= {-3, -2, -1, 0, 1, 2, 3}          # all round it
     assert all(abs(difference_rad(a.heading_rad, 0.0)) >= world.no_go - 1e-9 for _, a in steered(world))
     assert world.run(300, lambda w: w.state.phase is Phase.DONE)
-    assert world.state.reached == (0, 1)
+    assert world.state.progress.reached == (0, 1)
     assert world.mode is Mode.AUTO
     assert "no progress" not in codes(world)
     assert "off the corridor" not in codes(world)
@@ -76,7 +76,7 @@ def test_a_circle_is_sailed_for_its_time_and_a_mark_by_plan_behind_it():
 def test_from_the_field_to_a_plan_she_is_steered_until_it_is_on_board():
     """The mission on board leads across a rock from where the field has brought her: AUTO waits for another."""
     world = make(goal(field("ring", Until.TIME, 120.0, ring=RING)), MARK)
-    assert world.run(400, lambda w: bool(w.state.reached))
+    assert world.run(400, lambda w: bool(w.state.progress.reached))
     left, uploads = world.t, world.uploads
     assert world.run(60, lambda w: w.mode is Mode.AUTO)
     assert world.uploads > uploads
@@ -97,10 +97,10 @@ def test_a_station_is_kept_until_told_to_go_on():
     assert world.run(120, lambda w: distance_m(w.position, (60.0, 0.0)) < 8.0)
     world.run(150)
     assert max(distance_m(p, (60.0, 0.0)) for p in world.track[-600:]) < 20.0
-    assert not world.state.reached
+    assert not world.state.progress.reached
     assert "until told to go on" in world.state.why
     world.order("go_on")
-    assert world.run(10, lambda w: bool(w.state.reached))
+    assert world.run(10, lambda w: bool(w.state.progress.reached))
     assert world.run(300, lambda w: w.state.phase is Phase.DONE)
 
 
@@ -122,7 +122,7 @@ def test_a_field_that_leads_nowhere_is_given_up_by_name_and_she_loiters_at_its_p
     assert world.mode is Mode.AUTO
     assert distance_m(world.position, (60.0, 0.0)) < 30.0
     assert "has no value here" in world.state.why
-    assert not world.state.reached
+    assert not world.state.progress.reached
     assert codes(world).count("no field") == 1
 
 
@@ -135,7 +135,7 @@ def test_a_field_that_has_a_value_again_steers_again():
     world.run(60)
     assert world.mode is Mode.AUTO
     world.position = (20.0, 240.0)
-    world.state = replace(world.state, last_seen=None)
+    world.state = with_parts(world.state, position={"last_seen": None})
     assert world.run(60, lambda w: "its field leads on again" in " ".join(text for _, text in said(w)))
     assert world.run(20, lambda w: w.mode is Mode.GUIDED)
 
@@ -185,7 +185,7 @@ def test_stay_until_a_vessel_is_in_the_square_then_leave_it():
             left = world.t
         if world.state.phase is Phase.DONE:
             break
-    assert world.state.reached == (0, 1)
+    assert world.state.progress.reached == (0, 1)
     assert left - entered < 60.0
     assert least > 12.0
     assert "in its water" in " ".join(text for code, text in said(world) if code == "goal")
@@ -199,7 +199,7 @@ def test_killed_in_the_middle_of_it_she_sails_on_by_the_same_field_and_its_time_
     world.run(after_s)
     restarted(world)
     assert world.run(30, lambda w: w.state.by_field.composed)
-    assert world.run(200, lambda w: bool(w.state.reached))
+    assert world.run(200, lambda w: bool(w.state.progress.reached))
     assert world.t - began == pytest.approx(150.0, abs=8.0)
 
 
@@ -230,4 +230,4 @@ def test_a_person_may_take_her_and_auto_gives_her_back_to_the_field():
 def test_a_mission_that_is_sailed_by_field_throughout_has_fields_of_its_own_too():
     world = make(goal(field("ring", Until.TIME, 120.0, ring=RING)), MARK, config={"guidance": Guidance.FIELD})
     assert world.run(600, lambda w: w.state.phase is Phase.DONE)
-    assert world.state.reached == (0, 1)
+    assert world.state.progress.reached == (0, 1)

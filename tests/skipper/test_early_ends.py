@@ -19,7 +19,7 @@ def under_way(ends=None, *, has_refuge=True, **config):
     world = make(FAR, obstacles=(), voyage={"refuges": (REFUGE,)} if has_refuge else {},
                  config={"ends": ends or Ends(), **config})
     world.shown["home"] = FRAME.geo_from_en(*HOME)
-    assert world.run(60, lambda w: w.state.sailing)
+    assert world.run(60, lambda w: w.state.voyage.sailing)
     world.run(30)
     return world
 
@@ -51,7 +51,7 @@ def test_each_cause_leads_where_the_mission_says_and_on_when_it_is_over(cause, e
     CAUSES[cause](world)
     if end is End.SAY:
         assert world.run(600, is_done)
-        assert world.state.arrived
+        assert world.state.voyage.arrived
         return
     assert world.run(400, lambda w: "; waiting until" in w.state.why)
     assert distance_m(world.position, where or here) < (30.0 if where else 150.0)   # darkness takes half a minute
@@ -61,7 +61,7 @@ def test_each_cause_leads_where_the_mission_says_and_on_when_it_is_over(cause, e
     CAUSES[cause](world, **{"leak": {"is_wet": False}, "dark": {"is_dark": False}, "shore_lost": {"is_silent": False},
                             "battery": {"is_low": False}}[cause])
     assert world.run(900, is_done)
-    assert world.state.arrived
+    assert world.state.voyage.arrived
 
 
 def test_without_a_place_to_go_to_a_leaking_boat_stays_and_one_with_an_empty_battery_sails_on():
@@ -71,13 +71,13 @@ def test_without_a_place_to_go_to_a_leaking_boat_stays_and_one_with_an_empty_bat
     empty = under_way(Ends(battery_v=10.5), has_refuge=False)
     volts(empty)
     assert empty.run(600, is_done)
-    assert empty.state.arrived
+    assert empty.state.voyage.arrived
 
 
 def test_out_of_time_she_may_only_say_so_and_sails_on():
     world = under_way(Ends(out_of_time=End.SAY), voyage_timeout_s=60.0)
     assert world.run(600, is_done)
-    assert world.state.arrived
+    assert world.state.voyage.arrived
     assert [entry[2].partition(": ")[2] for entry in said(world, "out of time")] == ["say so"]
 
 

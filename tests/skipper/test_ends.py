@@ -1,7 +1,6 @@
 """Where it ends: home, refuges, the voyage's time, the loiter that is watched, a voyage finished before."""
 
 import math
-from dataclasses import replace
 
 import pytest
 from shapely.geometry import box
@@ -15,7 +14,7 @@ from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from tests.skipper.deeds.test_failsafe import text
 from tests.skipper.test_voyage import is_done, make, said
-from tests.skipper.world import FRAME, restarted
+from tests.skipper.world import FRAME, restarted, with_parts
 
 ISLAND = box(-60, 80, 60, 120)
 BEHIND = Goal(en_m=(0.0, 220.0), radius_m=8.0)
@@ -37,7 +36,7 @@ def charged(world, share):
 def test_the_way_home_is_planned_round_the_island_and_ends_in_a_loiter():
     world = homeward()
     assert world.run(900, is_done)
-    assert world.state.arrived
+    assert world.state.voyage.arrived
     assert "; home" in world.state.why
     assert distance_m(world.position, (0.0, 0.0)) < 30.0
     assert world.clearance() > 5.0
@@ -56,7 +55,7 @@ def test_a_home_that_cannot_be_sailed_to_is_told_at_the_start_and_at_the_end(hom
     assert world.run(900, is_done)
     assert any(words in entry[2] for entry in said(world, "home"))
     assert words in world.state.why
-    assert not world.state.arrived
+    assert not world.state.voyage.arrived
     assert distance_m(world.position, BEHIND.en_m) < 40.0
 
 
@@ -64,31 +63,31 @@ def test_without_a_plan_home_she_holds_at_the_last_goal_and_says_what_she_waits_
     world = homeward()
     assert world.run(300, lambda w: w.position[1] > 100.0)
     world.planner = lambda problem, seed: None
-    assert world.run(300, lambda w: w.state.gate == 1)
+    assert world.run(300, lambda w: w.state.progress.gate == 1)
     world.run(60)
     assert world.state.phase in {Phase.HOLDING, Phase.NEW_CALCULATION}
     world.planner = None
     assert world.run(900, is_done)
-    assert world.state.arrived
+    assert world.state.voyage.arrived
 
 
 def test_killed_on_the_way_home_she_goes_on_and_knows_the_end():
     world = homeward()
-    assert world.run(600, lambda w: w.state.gate == 1)
+    assert world.run(600, lambda w: w.state.progress.gate == 1)
     world.run(20)
     restarted(world)
     assert world.run(600, is_done)
-    assert world.state.arrived
+    assert world.state.voyage.arrived
     restarted(world)
     world.run(10)
     assert world.state.phase is Phase.DONE
-    assert world.state.home_reached
+    assert world.state.voyage.home_reached
 
 
 # ---------------------------------------------------------------------------------------------------- refuges
 def test_the_nearest_refuge_and_on_when_the_battery_is_charged():
     world = make(Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(), voyage={"refuges": ((60.0, 90.0), (300.0, 60.0))})
-    assert world.run(60, lambda w: w.state.sailing)
+    assert world.run(60, lambda w: w.state.voyage.sailing)
     world.run(30)
     charged(world, 0.08)
     assert world.run(300, lambda w: "at the refuge 1" in w.state.why)
@@ -100,14 +99,14 @@ def test_the_nearest_refuge_and_on_when_the_battery_is_charged():
     assert not said(world, "mission ended")
     charged(world, 0.16)
     assert world.run(600, is_done)
-    assert world.state.arrived
+    assert world.state.voyage.arrived
 
 
 def test_a_refuge_without_a_way_is_passed_over_for_the_next():
     ring = box(40, 70, 80, 110).difference(box(45, 75, 75, 105))
     world = make(Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(ring,),
                  voyage={"refuges": ((60.0, 90.0), (250.0, 60.0))})
-    assert world.run(60, lambda w: w.state.sailing)
+    assert world.run(60, lambda w: w.state.voyage.sailing)
     world.run(10)
     charged(world, 0.08)
     assert world.run(900, lambda w: "at the refuge 2" in w.state.why)
@@ -115,7 +114,7 @@ def test_a_refuge_without_a_way_is_passed_over_for_the_next():
 
 def test_a_critical_battery_without_a_refuge_sails_home_where_the_mission_ends_there_else_on():
     home = homeward(goals=(Goal(en_m=(500.0, 0.0), radius_m=8.0),), obstacles=())
-    assert home.run(60, lambda w: w.state.sailing)
+    assert home.run(60, lambda w: w.state.voyage.sailing)
     home.run(60)
     charged(home, 0.08)
     assert home.run(300, lambda w: "at home: the battery is critical" in w.state.why)
@@ -135,11 +134,11 @@ def test_out_of_time_the_goals_are_given_up(more, where):
     world = make(Goal(en_m=(900.0, 0.0), radius_m=8.0), obstacles=(), config=config, **more)
     world.shown["home"] = FRAME.geo_from_en(0.0, 0.0)
     assert world.run(200, lambda w: bool(said(w, "out of time")))
-    under_way_s = world.state.under_way_s
+    under_way_s = world.state.voyage.under_way_s
     assert under_way_s == pytest.approx(60.0, abs=2.0)
     here = world.position
     assert world.run(300, is_done)
-    assert not world.state.arrived
+    assert not world.state.voyage.arrived
     assert "out of time: 0 of 1 goals reached" in world.state.why
     assert distance_m(world.position, where or here) < 40.0
     world.run(60)
@@ -148,9 +147,9 @@ def test_out_of_time_the_goals_are_given_up(more, where):
 
 def test_the_time_under_way_survives_a_kill_to_the_minute():
     world = make(Goal(en_m=(900.0, 0.0), radius_m=8.0), obstacles=(), config={"voyage_timeout_s": 200.0})
-    assert world.run(300, lambda w: w.state.under_way_s > 130.0)
+    assert world.run(300, lambda w: w.state.voyage.under_way_s > 130.0)
     restarted(world)
-    assert world.state.under_way_s == 120.0
+    assert world.state.voyage.under_way_s == 120.0
     assert world.run(100, lambda w: bool(said(w, "out of time")))
 
 
@@ -178,7 +177,7 @@ def test_dragged_off_over_clear_water_the_autopilots_loiter_goes_back_alone():
     world.position = (180.0, 240.0)
     world.run(40)
     assert said(world, "dragged off")
-    assert world.run(200, lambda w: not w.state.raised)
+    assert world.run(200, lambda w: not w.state.alarms.raised)
     assert world.count(act.RequestPlan) == plans
     assert world.state.phase is Phase.DONE
 
@@ -194,7 +193,7 @@ def test_a_battery_that_is_critical_at_rest_leads_to_the_refuge():
     world = arrived(BEHIND, obstacles=(), voyage={"refuges": ((120.0, 160.0),)})
     charged(world, 0.05)
     assert world.run(300, lambda w: "at the refuge" in w.state.why)
-    assert world.state.arrived
+    assert world.state.voyage.arrived
 
 
 def test_a_person_takes_her_at_rest_and_gives_her_back():
@@ -230,7 +229,8 @@ def test_a_plan_that_went_stale_says_why_it_is_renewed_and_is_not_sailed():
     world = make(Goal(en_m=(0.0, 220.0), radius_m=8.0), obstacles=(ISLAND,), **ASIDE)
     world.permissions = type(world.permissions)(may_upload=True)
     assert world.run(120, lambda w: bool(w.mission) and "waiting for the operator" in w.state.why)
-    world.position, world.track, world.state = (0.0, 130.0), [], replace(world.state, last_seen=None)   # it drifted
+    # it drifted
+    world.position, world.track, world.state = (0.0, 130.0), [], with_parts(world.state, position={"last_seen": None})
     world.planner = lambda problem, seed: None
     world.permissions = type(world.permissions)(may_upload=True, may_set_mode=True, may_arm=True)
     assert world.run(60, lambda w: "next try in" in w.state.why and "o0" in w.state.why)
@@ -252,7 +252,7 @@ def test_a_wind_that_turned_before_sailing_is_named():
 
 def test_a_monitor_that_knows_no_charge_tells_by_the_autopilots_limits():
     world = make(Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(), voyage={"refuges": ((60.0, 90.0),)})
-    assert world.run(60, lambda w: w.state.sailing)
+    assert world.run(60, lambda w: w.state.voyage.sailing)
     world.shown["battery_failed"] = True
     text(world, "Battery 1 is low 10.40V used 0 mAh")
     world.run(15)

@@ -56,7 +56,7 @@ def relief(world):
     world.armed = True
     if world.mode is not Mode.AUTO and world.mission:
         world.set_mode(Mode.AUTO)
-    if world.state.phase is Phase.HOLDING or world.state.standing is not None:
+    if world.state.phase is Phase.HOLDING or world.state.orders.standing is not None:
         world.order("go_on")
 
 
@@ -82,7 +82,7 @@ def check(seed):
     assert world.clearance() > 0.0, what
     assert arrived, what
     assert ends_safely(world.mission), what
-    assert is_same_mission(world.mission, world.state.route.items), what
+    assert is_same_mission(world.mission, world.state.mission.route.items), what
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -41,7 +41,7 @@ def test_marks_by_plan_without_a_wind_straight_and_round_a_rock():
     world = make(Goal(en_m=(0.0, 200.0), radius_m=6.0), Goal(en_m=(200.0, 200.0), radius_m=6.0),
                  obstacles=(box(-20.0, 80.0, 20.0, 110.0),))
     assert world.run(400, lambda w: w.state.phase is Phase.DONE)
-    assert world.state.reached == (0, 1)
+    assert world.state.progress.reached == (0, 1)
     assert world.clearance() > 6.0
     sailed = sum(math.dist(a, b) for a, b in zip(world.track, world.track[1:], strict=False))
     assert sailed < 470.0                       # nothing is beaten
@@ -50,7 +50,7 @@ def test_marks_by_plan_without_a_wind_straight_and_round_a_rock():
 
 def test_it_is_under_way_at_once():
     world = make(Goal(en_m=(0.0, 200.0), radius_m=6.0))
-    assert world.run(15, lambda w: w.state.sailing)
+    assert world.run(15, lambda w: w.state.voyage.sailing)
 
 
 @pytest.mark.parametrize("guidance", ["ring", "throughout"])

@@ -39,37 +39,37 @@ def crossed_s(w):
 
 def test_a_gate_is_passed_where_the_track_crosses_it():
     w = world(line(), END)
-    assert w.run(300.0, lambda w: bool(w.state.reached))
+    assert w.run(300.0, lambda w: bool(w.state.progress.reached))
     assert w.position[1] == pytest.approx(83.0, abs=5.0)
     assert said(w, "goal")[0].startswith("line crossed")
     assert w.run(300.0, lambda w: w.state.phase is Phase.DONE)
-    assert w.state.reached == (0, 1)
+    assert w.state.progress.reached == (0, 1)
 
 
 def test_near_its_middle_is_not_across_it():
     w = world(line(), END, position=(0.0, 70.0))
     w.run(5.0)
-    assert w.state.reached == ()
+    assert w.state.progress.reached == ()
 
 
 def test_from_beyond_the_line_she_comes_round_and_crosses_it_the_right_way():
     w = world(line(), END, position=(0.0, 130.0), heading=math.pi)
-    assert w.run(400.0, lambda w: bool(w.state.reached))
+    assert w.run(400.0, lambda w: bool(w.state.progress.reached))
     assert min(p[1] for p in w.track) < 70.0
     assert said(w, "goal")[0].startswith("line crossed")
 
 
 def test_crossed_the_wrong_way_it_does_not_count_and_that_is_said():
     w = world(line(), END)
-    w.run(30.0, lambda w: w.state.sailing)
+    w.run(30.0, lambda w: w.state.voyage.sailing)
     way = [(28.0, 0.0), (28.0, 88.0), (18.0, 88.0), (18.0, 70.0)]   # round the starboard mark, and back through
     for a, b in itertools.pairwise(way):
         for share in np.arange(0.0, 1.0, 2.0 / math.dist(a, b)):
             w.position = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
             w.run(1.0)
     assert said(w, "wrong way") == ["line was crossed the wrong way: it does not count"]
-    assert w.state.reached == ()
-    assert w.run(300.0, lambda w: bool(w.state.reached))
+    assert w.state.progress.reached == ()
+    assert w.run(300.0, lambda w: bool(w.state.progress.reached))
 
 
 def test_a_gate_that_was_passed_by_outside_is_sailed_again():
@@ -79,7 +79,7 @@ def test_a_gate_that_was_passed_by_outside_is_sailed_again():
     w.current = lambda t: (-6.0, 0.0)
     w.run(15.0, lambda w: w.position[0] < -45.0)
     w.current = lambda t: (0.0, 2.5) if w.position[1] < 110.0 and not said(w, "gate missed") else (0.0, 0.0)
-    assert w.run(500.0, lambda w: bool(w.state.reached))
+    assert w.run(500.0, lambda w: bool(w.state.progress.reached))
     assert abs(w.track[-1][0]) < 27.0
 
 
@@ -90,7 +90,7 @@ def test_a_gate_that_was_passed_by_outside_is_sailed_again():
 ])
 def test_she_waits_before_the_line_and_crosses_after_the_gun(when, shown):
     w = world(line(**when), END, shown=shown)
-    assert w.run(300.0, lambda w: bool(w.state.reached))
+    assert w.run(300.0, lambda w: bool(w.state.progress.reached))
     set_sail_s = next(t for t, code, *_ in w.log if code == "under way")
     gun_s = 95.0 if "not_before_s" in when else set_sail_s + 90.0
     assert gun_s - 1.0 <= crossed_s(w) <= gun_s + 40.0
@@ -102,10 +102,10 @@ def test_she_waits_before_the_line_and_crosses_after_the_gun(when, shown):
 def test_without_the_time_of_day_she_waits_for_it_and_says_so():
     w = world(line(not_before_s=UTC_AT_BOOT + 160.0), END)
     w.run(200.0)
-    assert w.state.reached == ()
+    assert w.state.progress.reached == ()
     assert "does not know the time" in w.state.why
     w.shown = {"utc_at_boot_s": UTC_AT_BOOT}
-    assert w.run(200.0, lambda w: bool(w.state.reached))
+    assert w.run(200.0, lambda w: bool(w.state.progress.reached))
 
 
 def test_too_early_she_comes_back_and_starts_again():
@@ -114,19 +114,19 @@ def test_too_early_she_comes_back_and_starts_again():
     w.current = lambda t: (0.0, 4.0) if not said(w, "early start") else (0.0, 0.0)
     assert w.run(60.0, lambda w: bool(said(w, "early start")))
     w.current = lambda t: (0.0, 0.0)
-    assert w.state.reached == ()
-    assert w.run(300.0, lambda w: bool(w.state.reached))
+    assert w.state.progress.reached == ()
+    assert w.run(300.0, lambda w: bool(w.state.progress.reached))
     assert "after the gun" in said(w, "goal")[0]
 
 
 def test_the_gun_is_kept_over_a_restart_to_the_second():
     w = world(line(after_s=150.0), END, shown={"utc_at_boot_s": UTC_AT_BOOT})
     w.run(70.0)
-    gun = w.state.set_sail_utc_s
+    gun = w.state.voyage.set_sail_utc_s
     restarted(w)
     w.run(5.0)
-    assert w.state.set_sail_utc_s == gun
-    assert w.run(300.0, lambda w: bool(w.state.reached))
+    assert w.state.voyage.set_sail_utc_s == gun
+    assert w.run(300.0, lambda w: bool(w.state.progress.reached))
     set_sail_s = next(t for t, code, *_ in w.log if code == "under way")
     assert set_sail_s + 149.0 <= crossed_s(w) <= set_sail_s + 190.0
 
@@ -140,13 +140,13 @@ def test_a_line_crossed_while_nobody_looked_counts():
         w.t += 0.2
     w.state = w.skipper.initial(saved)
     w.pending = []
-    assert w.run(10.0, lambda w: bool(w.state.reached))
+    assert w.run(10.0, lambda w: bool(w.state.progress.reached))
     assert "while nobody looked" in said(w, "goal")[0]
 
 
 def test_a_gate_is_given_up_by_order_and_a_hold_before_it_ends():
     w = world(line(), END)
-    w.run(20.0, lambda w: w.state.sailing)
+    w.run(20.0, lambda w: w.state.voyage.sailing)
     w.order("hold")
     w.run(60.0)
     assert w.state.phase is Phase.HOLDING
@@ -154,7 +154,7 @@ def test_a_gate_is_given_up_by_order_and_a_hold_before_it_ends():
     w.run(3.0)
     w.order("skip_goal")
     assert w.run(400.0, lambda w: w.state.phase is Phase.DONE)
-    assert w.state.reached == (1,)
+    assert w.state.progress.reached == (1,)
 
 
 SQUARE = shapely.box(-25.0, 75.0, 25.0, 125.0)
@@ -173,7 +173,7 @@ def test_she_stays_in_a_box_for_its_time_and_goes_on():
     w = world(box(for_s=200.0), END)
     assert w.run(200.0, lambda w: bool(said(w, "box")))
     entered = w.t
-    assert w.run(300.0, lambda w: bool(w.state.reached))
+    assert w.run(300.0, lambda w: bool(w.state.progress.reached))
     assert w.t - entered == pytest.approx(200.0, abs=2.0)
     assert out_of_it(w, entered + 1.0) == 0
     assert any("to stay in it; waiting" in entry[2] for entry in w.log)
@@ -183,16 +183,16 @@ def test_she_stays_in_a_box_for_its_time_and_goes_on():
 def test_in_a_box_without_a_time_she_stays_until_told():
     w = world(box(), END)
     w.run(400.0)
-    assert w.state.reached == ()
+    assert w.state.progress.reached == ()
     assert "until told to go on" in w.state.why
     w.order("hold")
     w.run(5.0)
     w.order("go_on")   # the end of the hold, not of the stay
     w.run(20.0)
-    assert w.state.reached == ()
+    assert w.state.progress.reached == ()
     w.order("go_on")
     w.run(3.0)
-    assert w.state.reached == (0,)
+    assert w.state.progress.reached == (0,)
     assert w.run(300.0, lambda w: w.state.phase is Phase.DONE)
 
 
@@ -202,7 +202,7 @@ def test_the_time_in_a_box_is_counted_on_over_a_restart():
     entered = w.t
     w.run(100.0)
     restarted(w)
-    assert w.run(150.0, lambda w: bool(w.state.reached))
+    assert w.run(150.0, lambda w: bool(w.state.progress.reached))
     assert w.t - entered == pytest.approx(200.0, abs=3.0)
 
 
@@ -211,10 +211,10 @@ def test_a_box_is_given_up_by_order():
     w.run(150.0)
     w.order("skip_goal")
     assert w.run(300.0, lambda w: w.state.phase is Phase.DONE)
-    assert w.state.reached == (1,)
+    assert w.state.progress.reached == (1,)
 
 
 def test_a_voyage_that_ends_with_a_box_is_done_when_its_time_is_over():
     w = world(box(for_s=60.0))
     assert w.run(300.0, lambda w: w.state.phase is Phase.DONE)
-    assert w.state.arrived
+    assert w.state.voyage.arrived

@@ -24,7 +24,7 @@ from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.manoeuvre import is_tack
 from companion.skipper.way.voyage import Goal, Side
-from tests.skipper.world import World, restarted, skipper, voyage
+from tests.skipper.world import World, restarted, skipper, voyage, with_parts
 
 ISLANDS = (box(-40, 120, 30, 160), box(60, 220, 120, 260), box(-120, 230, -20, 270))
 GOAL = Goal(en_m=(0.0, 400.0), radius_m=6.0, name="the goal")
@@ -51,7 +51,7 @@ def is_done(world):
 
 
 def is_sailing(world):
-    return world.state.sailing and world.state.phase is Phase.STANDARD
+    return world.state.voyage.sailing and world.state.phase is Phase.STANDARD
 
 
 def make(*goals, config=None, obstacles=ISLANDS, **world):
@@ -74,7 +74,7 @@ def test_beats_through_islands_to_a_goal_upwind(seed, beats):
     assert distance_m(world.position, GOAL.en_m) < 10.0
     assert world.clearance() > world.skipper.config.margin_floor_m
     assert ends_safely(world.mission)
-    assert world.state.reached == (0,)
+    assert world.state.progress.reached == (0,)
 
 
 def test_runs_to_a_goal_downwind():
@@ -171,7 +171,7 @@ def test_a_board_of_short_legs_is_watched_as_one(step_m):
     """A zone that grows makes a chain of a board: each waypoint of it is near, the end of it is not."""
     world = make(Goal(en_m=(300.0, 330.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0))
     assert world.run(40, is_sailing)
-    here, route = world.position, world.state.route
+    here, route = world.position, world.state.mission.route
     bends = [math.radians(50.0 + 1.5 * n) for n in range(round(120.0 / step_m))]
     points = list(accumulate(bends, lambda at, course: moved(at, course, step_m), initial=here))
     points.append(moved(points[-1], math.radians(-50.0), 60.0))     # she tacks there
@@ -179,7 +179,7 @@ def test_a_board_of_short_legs_is_watched_as_one(step_m):
     chain = replace(
         route, items=(item,) * len(points), points_en_m=(*points[1:], route.points_en_m[-1]),
         leg_from_en_m=tuple(points), gate_of=(-1,) * len(points))
-    state = replace(world.state, route=chain, index=0)
+    state = with_parts(world.state, mission={"route": chain, "index": 0})
     turn = Turn(world.skipper.voyage, world.skipper.config, state, world.snapshot())
     assert board_end(turn, (points[0], points[1])) == points[-2]
 
@@ -192,7 +192,7 @@ def test_speed_is_not_lost_by_replanning():
     def look(w):
         nonlocal slow
         turning = abs(difference_rad(w.heading, bearing_rad(w.track[-6], w.track[-1]))) > 0.3
-        if not turning and w.state.pending_upload is not None:
+        if not turning and w.state.pending.upload is not None:
             slow = min(slow, w.speed)
         return is_done(w)
 
@@ -215,7 +215,7 @@ def test_five_laps_of_the_regatta_course_without_missing_a_buoy(side):
         return is_done(w)
 
     assert world.run(3000, look)
-    assert len(world.state.reached) == 15
+    assert len(world.state.progress.reached) == 15
     assert Phase.BUOY_APPROACH in seen
     for number, place in enumerate(places[:2]):
         turned = sum(
@@ -239,9 +239,9 @@ def turned(world, buoy):
 def test_the_first_buoy_is_rounded_from_wherever_the_voyage_begins(start):
     """Buoy course, seed 0: the first leg had no beginning, so its buoy was passed with one gate on either hand."""
     world = regatta(position=start)
-    assert world.run(900, lambda w: len(w.state.reached) == 1)
+    assert world.run(900, lambda w: len(w.state.progress.reached) == 1)
     first = turned(world, (0.0, 150.0))
-    assert world.state.missed == 0
+    assert world.state.progress.missed == 0
     assert math.radians(-420.0) < first < math.radians(-20.0)
 
 
@@ -256,7 +256,7 @@ def carry_round(world, buoy, until):
 
 @pytest.mark.parametrize("killed", [False, True])
 @pytest.mark.parametrize(("under_way", "slow"), [
-    ("pending_plan", {"plan_s": 6.0}), ("pending_upload", {"upload_s": 8.0})], ids=["planned", "uploaded"])
+    ("plan", {"plan_s": 6.0}), ("upload", {"upload_s": 8.0})], ids=["planned", "uploaded"])
 def test_a_buoy_left_on_the_wrong_side_is_not_reached_before_it_is_rounded(killed, under_way, slow):
     """Buoy course, seeds 0 and 3: missed, and reached a second later, from where the boat had missed it.
 
@@ -268,27 +268,27 @@ def test_a_buoy_left_on_the_wrong_side_is_not_reached_before_it_is_rounded(kille
     assert world.run(600, lambda w: distance_m(w.position, buoy) < 60.0)
     carry_round(world, buoy, lambda w: turned(w, buoy) > math.radians(150.0))
     world.order("replan")
-    carry_round(world, buoy, lambda w: getattr(w.state, under_way) is not None)
+    carry_round(world, buoy, lambda w: getattr(w.state.pending, under_way) is not None)
     if killed:
         restarted(world)
     carry_round(world, buoy, lambda w: said(w, "buoy missed"))
-    missed, since = len(world.actions), world.state.next_id - 1
+    missed, since = len(world.actions), world.state.pending.next_id - 1
     world.run(12)
     asked = [a for _, a in world.actions[missed - 1:]]
     assert any(isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.MISSED_BUOY for a in asked)
     assert all(a.plan_id >= since for a in asked if isinstance(a, act.UploadMission))
-    assert world.state.reached == ()
-    assert world.run(1500, lambda w: w.state.reached)
+    assert world.state.progress.reached == ()
+    assert world.run(1500, lambda w: w.state.progress.reached)
     assert turned(world, buoy) == pytest.approx(math.radians(-200.0), abs=math.radians(80.0))
     assert world.run(1500, is_done)
-    assert world.state.reached == (0, 1, 2)
+    assert world.state.progress.reached == (0, 1, 2)
 
 
 def test_several_goals_without_a_stop_between():
     goals = [Goal(en_m=p, radius_m=6.0) for p in ((150.0, 0.0), (150.0, 150.0), (0.0, 150.0))]
     world = make(*goals, obstacles=(), wind=lambda t: (math.radians(-45), 5.0))
     assert world.run(900, is_done)
-    assert world.state.reached == (0, 1, 2)
+    assert world.state.progress.reached == (0, 1, 2)
     assert all(min(distance_m(p, g.en_m) for p in world.track) <= 6.0 for g in goals)
     assert not any("loitering" in entry[2] for entry in world.log if entry[1] == "holding")
 
@@ -305,7 +305,7 @@ def test_a_long_voyage_starts_its_numbering_again():
     world = make(*(Goal(en_m=p, radius_m=6.0) for p in places), obstacles=(), voyage={"laps": 6},
                  config={"max_items": 14}, wind=lambda t: (math.radians(45), 5.0), expansions=300)
     assert world.run(3000, is_done)
-    assert len(world.state.reached) == 24
+    assert len(world.state.progress.reached) == 24
     assert max(len(a.items) for _, a in world.actions if isinstance(a, act.UploadMission)) <= 24
 
 
@@ -418,7 +418,7 @@ def test_a_mission_changed_under_way_is_noticed_and_left_alone():
     world.events.append(StatusText(t_s=world.t, severity=6, text="Flight plan received"))
     uploads = world.count(act.UploadMission)
     world.run(60)
-    assert world.state.foreign
+    assert world.state.mission.foreign
     assert world.count(act.UploadMission) == uploads
     assert said(world, "foreign mission")
 
@@ -455,7 +455,7 @@ def test_killed_at_any_moment_it_goes_on_without_an_upload(when):
     restarted(world)
     if mission:
         world.run(8)
-        assert world.state.route is not None
+        assert world.state.mission.route is not None
         assert world.count(act.UploadMission) == uploads
         assert is_same_mission(world.mission, mission)
         assert said(world, "adopted")
@@ -484,7 +484,7 @@ def test_failed_uploads_are_looked_at_and_made_good(result):
     world = make(uploads_fail=lambda n: result if n in {2, 3, 5} else UploadResult.OK)
     assert world.run(1800, is_done)
     assert said(world, "upload failed")
-    route = world.state.route
+    route = world.state.mission.route
     assert route is not None
     assert is_same_mission(world.mission, route.items)
 
@@ -581,11 +581,11 @@ def test_the_boat_in_irons_bears_away_and_sails_on():
 def test_after_two_failed_tacks_it_gybes_round():
     world = make(obstacles=(), wind=lambda t: (0.0, 5.0), config={"no_go_patience_s": 1e9})
     assert world.run(60, is_sailing)
-    world.state = replace(world.state, irons_s=(world.t - 60.0, world.t - 5.0))
+    world.state = with_parts(world.state, steering={"irons_s": (world.t - 60.0, world.t - 5.0)})
     world.order("replan")
     assert world.run(30, lambda w: said(w, "gybing round"))
     world.run(3)
-    points = world.state.route.points_en_m[world.state.index:-1]
+    points = world.state.mission.route.points_en_m[world.state.mission.index:-1]
     courses = [bearing_rad(a, b) for a, b in pairwise([world.position, *points])]
     assert len(points) >= 5
     assert not any(is_tack(a, b, 0.0) for a, b in pairwise(courses[1:]))
@@ -597,7 +597,7 @@ def test_after_two_failed_tacks_it_gybes_round():
 def test_becalmed_it_waits_without_plans_and_sails_on():
     world = make(wind=lambda t: (0.0, 5.0 if t < 60.0 or t > 600.0 else 0.2))
     world.run(200)
-    assert any(r.name == "becalmed" for r in world.state.raised)
+    assert any(r.name == "becalmed" for r in world.state.alarms.raised)
     asked = world.count(act.RequestPlan)
     world.run(300)
     assert world.count(act.RequestPlan) == asked
@@ -610,7 +610,7 @@ def test_a_position_jump_into_an_island_moves_no_plan():
     asked = world.count(act.RequestPlan)
     world.position_offset = (-world.position[0], 140.0 - world.position[1])
     world.step()
-    assert any(r.name == "position jump" for r in world.state.raised)
+    assert any(r.name == "position jump" for r in world.state.alarms.raised)
     world.position_offset = (0.0, 0.0)
     world.step()
     world.run(3)
@@ -625,11 +625,11 @@ def test_a_position_that_jumped_is_planned_from_when_the_way_from_there_is_shut(
     world.run(60)
     asked = world.count(act.RequestPlan)
     middle = (-5.0, 140.0)
-    away = bearing_rad(world.state.route.points_en_m[world.state.index], middle)
+    away = bearing_rad(world.state.mission.route.points_en_m[world.state.mission.index], middle)
     world.position = moved(middle, away, 55.0)      # moved, and truly so: behind an island, seen from the waypoint
     moved_at = len(world.track)
     world.run(3)
-    assert any(r.name == "position jump" for r in world.state.raised)
+    assert any(r.name == "position jump" for r in world.state.alarms.raised)
     assert world.count(act.RequestPlan) > asked
     assert world.run(1500, is_done)
     assert world.skipper.voyage.area.path_clearance_m(world.track[moved_at:]) > 0.0
@@ -640,7 +640,7 @@ def test_a_boat_that_drifted_behind_something_before_it_sails_is_planned_for_aga
     assert world.run(30, lambda w: bool(w.mission) and w.mode is Mode.AUTO)
     world.run(20)
     middle = (-5.0, 140.0)
-    away = bearing_rad(world.state.route.points_en_m[0], middle)
+    away = bearing_rad(world.state.mission.route.points_en_m[0], middle)
     there = moved(middle, away, 75.0)
     steps = math.ceil(distance_m(world.position, there) / 4.0)
     for n in range(steps):                          # she drifts: a boat that leapt would not be believed
@@ -650,7 +650,7 @@ def test_a_boat_that_drifted_behind_something_before_it_sails_is_planned_for_aga
     asked = world.t - steps
     assert world.run(28, lambda w: any(t >= asked for t, a in w.actions if isinstance(a, act.RequestPlan)))
     world.run(5)
-    ahead = [world.position, *world.state.route.points_en_m[:-1]]
+    ahead = [world.position, *world.state.mission.route.points_en_m[:-1]]
     assert world.skipper.voyage.area.path_clearance_m(ahead) > 0.0
 
 
@@ -730,7 +730,7 @@ def test_a_mission_held_back_by_an_upload_cut_short_is_ours_and_planned_on_from(
     world.install((*world.mission[:action.keep_first], action.stopgap, *action.items[action.keep_first + 1:]))
     assert world.run(10, lambda w: said(w, "held back"))
     assert not said(world, "foreign mission")
-    assert is_same_mission(world.state.route.items, world.mission)
+    assert is_same_mission(world.state.mission.route.items, world.mission)
     world.uploads_fail = lambda n: UploadResult.OK
     assert world.run(1500, is_done)
     assert world.clearance() > 0.0
@@ -795,7 +795,7 @@ def test_by_headings_under_guided_it_arrives_and_hands_back():
                  config={"guidance": Guidance.HEADING}, wind=lambda t: (0.0, 5.0))
     assert world.run(40, lambda w: w.mode is Mode.GUIDED)
     assert world.run(1500, is_done)
-    assert world.state.reached == (0, 1)
+    assert world.state.progress.reached == (0, 1)
     assert world.count(act.SteerHeading) > 100
     world.run(20)
     assert world.mode is Mode.AUTO
@@ -823,7 +823,7 @@ def test_by_headings_it_rounds_buoys(side):
     world = make(*(Goal(en_m=p, side=side) for p in places), obstacles=(), config={"guidance": Guidance.HEADING},
                  voyage={"laps": 2, "home": (20.0 * hand, -40.0)}, position=(20.0 * hand, -40.0), expansions=600)
     assert world.run(3000, is_done)
-    assert len(world.state.reached) == 6
+    assert len(world.state.progress.reached) == 6
     assert min(distance_m(places[0], p) for p in world.track) > 3.0
 
 
@@ -838,7 +838,7 @@ def test_by_headings_nothing_is_steered_to_the_buoys_side_of_what_is_wanted(side
 
     def look(w):
         place, seen = before[0]
-        if w.state.gate == 0 and 10.0 < distance_m(place, buoy) < 25.0:
+        if w.state.progress.gate == 0 and 10.0 < distance_m(place, buoy) < 25.0:
             near.extend(hand * difference_rad(a.heading_rad, bearing_rad(place, buoy))
                         for _, a in w.actions[seen:] if isinstance(a, act.SteerHeading))
         before[0] = (w.position, len(w.actions))
@@ -847,7 +847,7 @@ def test_by_headings_nothing_is_steered_to_the_buoys_side_of_what_is_wanted(side
     assert world.run(1500, look)
     assert near
     assert min(near) > math.radians(19.0), np.degrees(near)
-    assert world.state.missed == 0
+    assert world.state.progress.missed == 0
 
 
 @pytest.mark.parametrize(("place", "words"), [

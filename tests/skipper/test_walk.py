@@ -36,7 +36,7 @@ from companion.skipper.way.geometry import bearing_rad, moved
 from companion.skipper.way.voyage import Goal, Side
 from companion.traffic import TrafficPicture
 from tests.skipper.test_voyage import ISLANDS, make
-from tests.skipper.world import check_invariants, order
+from tests.skipper.world import check_invariants, order, with_parts
 from tests.traffic.conftest import vessel
 
 ORDERS = ("hold", "go_on", "skip_goal", "refuge", "refuge 3", "refuge Nowhere", "home", "goal 51.1020 -1.3000",
@@ -61,14 +61,14 @@ def states():
     keep("waiting", fresh)
     fresh.run(300, lambda w: w.state.phase is Phase.NEW_CALCULATION)
     keep("new calculation", fresh)
-    fresh.run(300, lambda w: w.state.pending_upload is not None)
+    fresh.run(300, lambda w: w.state.pending.upload is not None)
     keep("first upload", fresh)
-    fresh.run(300, lambda w: w.state.sailing and w.state.phase is Phase.STANDARD)
+    fresh.run(300, lambda w: w.state.voyage.sailing and w.state.phase is Phase.STANDARD)
     fresh.run(20)
     keep("standard", fresh)
-    fresh.run(900, lambda w: w.state.sailing and w.state.pending_plan is not None)
+    fresh.run(900, lambda w: w.state.voyage.sailing and w.state.pending.plan is not None)
     keep("planning under way", fresh)
-    fresh.run(900, lambda w: w.state.sailing and w.state.pending_upload is not None)
+    fresh.run(900, lambda w: w.state.voyage.sailing and w.state.pending.upload is not None)
     keep("uploading under way", fresh)
     taken = make()
     taken.run(60)
@@ -105,7 +105,7 @@ def states():
     buoys.run(900, lambda w: w.state.phase is Phase.BUOY_APPROACH)
     keep("buoy approach", buoys)
     broken = make(uploads_fail=lambda n: UploadResult.TIMEOUT if n > 1 else UploadResult.OK)
-    broken.run(900, lambda w: w.state.unsure_route is not None)
+    broken.run(900, lambda w: w.state.mission.unsure_route is not None)
     keep("after a failed upload", broken)
     return out
 
@@ -141,10 +141,10 @@ def event(*events):
 
 def ids(state):
     return [n for n in (
-        state.pending_plan.request_id if state.pending_plan else None,
-        state.pending_upload.upload_id if state.pending_upload else None,
-        state.pending_read[0] if state.pending_read else None,
-        state.pending_command[0] if state.pending_command else None,
+        state.pending.plan.request_id if state.pending.plan else None,
+        state.pending.upload.upload_id if state.pending.upload else None,
+        state.pending.read[0] if state.pending.read else None,
+        state.pending.command[0] if state.pending.command else None,
     ) if n is not None] or [99_999]
 
 
@@ -155,8 +155,9 @@ def outcomes(make_outcome):
 def beside(snapshot, state):
     """Return a place 22 m to the right of the boat's leg: off it, and not far enough for a jump."""
     heading = snapshot.vehicle.heading_rad
-    if state.route is not None:
-        heading = bearing_rad(state.route.leg_from_en_m[state.index], state.route.points_en_m[state.index])
+    route, index = state.mission.route, state.mission.index
+    if route is not None:
+        heading = bearing_rad(route.leg_from_en_m[index], route.points_en_m[index])
     return moved(snapshot.position_en_m, heading + math.pi / 2, 22.0)
 
 
@@ -314,8 +315,8 @@ def test_any_mode_that_we_did_not_ask_for_is_the_operator(name, mode):
 
 def test_a_plan_that_comes_with_the_takeover_is_not_uploaded():
     skipper, state, snapshot = states()["planning under way"]
-    problem = state.pending_plan.problem
-    outcome = PlanOutcome(request_id=state.pending_plan.request_id, plan=plan(problem, expansions=800))
+    problem = state.pending.plan.problem
+    outcome = PlanOutcome(request_id=state.pending.plan.request_id, plan=plan(problem, expansions=800))
     _, actions = skipper.step(state, replace(status(mode=Mode.HOLD)(snapshot), outcomes=(outcome,)))
     assert not any(isinstance(a, act.UploadMission) for a in actions)
 
@@ -338,21 +339,22 @@ def test_each_watchdog_enters_and_leaves_and_says_so(dog):
             step = replace(seen, t_s=t0 + n, **({} if n == 0 else {"events": (), "outcomes": ()}))
             state, actions = skipper.step(state, step)
             texts.extend(a.code for a in actions if isinstance(a, act.Announce))
-            if any(r.name == dog.name for r in state.raised):
+            if any(r.name == dog.name for r in state.alarms.raised):
                 return state, True
         return state, False
 
     if dog.name == "off the corridor":
-        state = replace(state, last_seen=None)   # the event puts her there at once, and no jump is meant
+        # the event puts her there at once, and no jump is meant
+        state = with_parts(state, position={"last_seen": None})
     if dog.name == "foreign mission":
         state, _ = skipper.step(state, change(snapshot))
         from companion.messages import MissionItem
 
         theirs = (MissionItem(command=16, lat_e7=1, lon_e7=1), MissionItem(command=20))
         for n in (1, 3):   # read twice before it is believed
-            read = state.pending_read
+            read = state.pending.read
             assert read is not None
-            assert not state.foreign
+            assert not state.mission.foreign
             state, _ = skipper.step(state, replace(
                 snapshot, t_s=snapshot.t_s + n, outcomes=(ReadOutcome(read_id=read[0], items=theirs),)))
             state, _ = skipper.step(state, replace(snapshot, t_s=snapshot.t_s + n + 1, outcomes=()))
@@ -362,15 +364,15 @@ def test_each_watchdog_enters_and_leaves_and_says_so(dog):
     state, raised = run(state, seen_after(change, snapshot, state), int(dog.enter_s) + 4, snapshot.t_s)
     assert raised, dog.name
     assert dog.name in texts
-    assert sum(r.name == dog.name for r in state.raised) == 1
+    assert sum(r.name == dog.name for r in state.alarms.raised) == 1
     t = snapshot.t_s + dog.enter_s + 10
     for n in range(int(dog.exit_s) + 4):
         state, _ = skipper.step(state, replace(snapshot, t_s=t + n))
-    assert all(r.name != dog.name for r in state.raised), dog.name
+    assert all(r.name != dog.name for r in state.alarms.raised), dog.name
 
 
 def raised_in(world, name, seconds):
-    return world.run(seconds, lambda w: any(r.name == name for r in w.state.raised))
+    return world.run(seconds, lambda w: any(r.name == name for r in w.state.alarms.raised))
 
 
 def test_no_progress_is_noticed_and_answered_with_a_plan():
@@ -382,13 +384,13 @@ def test_no_progress_is_noticed_and_answered_with_a_plan():
     assert world.run(60, lambda w: any(
         isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.NO_PROGRESS for _, a in w.actions))
     del world.sail
-    assert world.run(300, lambda w: not any(r.name == "no progress" for r in w.state.raised))
+    assert world.run(300, lambda w: not any(r.name == "no progress" for r in w.state.alarms.raised))
 
 
 def test_a_stuck_waypoint_is_pushed_on():
     world = make(Goal(en_m=(150.0, 0.0), radius_m=6.0), Goal(en_m=(150.0, 200.0), radius_m=6.0), obstacles=(),
                  wind=lambda t: (math.radians(-45), 5.0))
-    assert world.run(60, lambda w: w.state.index >= 0 and len(w.mission) > 2 and w.seq == 1)
+    assert world.run(60, lambda w: w.state.mission.index >= 0 and len(w.mission) > 2 and w.seq == 1)
     world.run(300, lambda w: w.position[0] > 152.0 or w.seq > 1)
     # The autopilot goes on counting the waypoint that lies behind.
     seq, world.seq = world.seq, 1
@@ -411,11 +413,11 @@ def test_a_jump_is_raised_at_once_and_forgotten_after_quiet_fixes():
     world.run(60)
     world.position_offset = (300.0, 0.0)
     world.step()
-    assert any(r.name == "position jump" for r in world.state.raised)
+    assert any(r.name == "position jump" for r in world.state.alarms.raised)
     world.run(10)
-    assert any(r.name == "position jump" for r in world.state.raised)
+    assert any(r.name == "position jump" for r in world.state.alarms.raised)
     world.run(20)
-    assert not any(r.name == "position jump" for r in world.state.raised)
+    assert not any(r.name == "position jump" for r in world.state.alarms.raised)
 
 
 def test_a_reboot_is_raised_and_the_mission_read_again():

@@ -19,12 +19,12 @@ from companion.skipper.step.water import in_water
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.integrity import PositionDoubt
 from companion.traffic.vessel import Vessel
-from tests.skipper.world import World, voyage
+from tests.skipper.world import World, voyage, with_parts
 
 # Pairs of numbers that are no places: said here, so that a new one is thought about.
 NO_PLACES = {
-    ("SkipperState", "history"),          # carried over by hand
-    ("SkipperState", "announced"), ("SkipperState", "entering"), ("SkipperState", "covered"),
+    ("GoalProgress", "history"),         # carried over by hand
+    ("Announced", "codes"), ("Alarms", "entering"), ("GoalProgress", "covered"),
     ("Signs", "seen_s"), ("Persisted", "inside"), ("Persisted", "covered"),
     ("AutopilotStatus", "servo_us"),
 }
@@ -76,29 +76,35 @@ def shifted(world, east_m=4000.0, north_m=-2500.0):
 def test_everything_that_is_remembered_is_where_it_was():
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
     world.run(120)
-    state = replace(
-        world.state, rest_en_m=(10.0, 20.0), searched=((1.0, 2.0), (3.0, 4.0)),
-        doubt=PositionDoubt(since_s=1.0, t_s=1.0, settled_s=1.0, reckoned_en_m=(30.0, 40.0), why="it jumped"),
+    state = with_parts(
+        world.state, voyage={"rest_en_m": (10.0, 20.0)},
+        progress={
+            "searched": ((1.0, 2.0), (3.0, 4.0)),
+            "approaches": (Approach(goal=0, en_m=(7.0, 8.0), sweeps=(((0.0, 0.0), (9.0, 9.0)),)),)},
+        position={"doubt": PositionDoubt(
+            since_s=1.0, t_s=1.0, settled_s=1.0, reckoned_en_m=(30.0, 40.0), why="it jumped")},
         adrift=Adrift(places=(Fix(t_s=0.0, en_m=(5.0, 6.0)),), ground_en_mps=(0.5, 0.0)),
-        approaches=(Approach(goal=0, en_m=(7.0, 8.0), sweeps=(((0.0, 0.0), (9.0, 9.0)),)),),
-        standing=Standing(verb=Verb.GOAL, by="crew", name="there", en_m=(100.0, 200.0)))
+        orders={"standing": Standing(verb=Verb.GOAL, by="crew", name="there", en_m=(100.0, 200.0))})
     shift = shifted(world)
     out = in_water(state, shift)
-    assert state.route is not None
-    assert len(state.history) > 2
+    assert state.mission.route is not None
+    assert len(state.progress.history) > 2
     for old, new in [
-        (state.rest_en_m, out.rest_en_m), (state.last_seen.en_m, out.last_seen.en_m),
-        (state.standing.en_m, out.standing.en_m), (state.approaches[0].en_m, out.approaches[0].en_m),
-        (state.approaches[0].sweeps[0][1], out.approaches[0].sweeps[0][1]), (state.searched[1], out.searched[1]),
-        (state.doubt.reckoned_en_m, out.doubt.reckoned_en_m),
-        (state.adrift.places[0].en_m, out.adrift.places[0].en_m), (state.history[1][1:3], out.history[1][1:3]),
-        *zip(state.route.points_en_m, out.route.points_en_m, strict=True),
-        *zip(state.route.leg_from_en_m, out.route.leg_from_en_m, strict=True),
+        (state.voyage.rest_en_m, out.voyage.rest_en_m), (state.position.last_seen.en_m, out.position.last_seen.en_m),
+        (state.orders.standing.en_m, out.orders.standing.en_m),
+        (state.progress.approaches[0].en_m, out.progress.approaches[0].en_m),
+        (state.progress.approaches[0].sweeps[0][1], out.progress.approaches[0].sweeps[0][1]),
+        (state.progress.searched[1], out.progress.searched[1]),
+        (state.position.doubt.reckoned_en_m, out.position.doubt.reckoned_en_m),
+        (state.adrift.places[0].en_m, out.adrift.places[0].en_m),
+        (state.progress.history[1][1:3], out.progress.history[1][1:3]),
+        *zip(state.mission.route.points_en_m, out.mission.route.points_en_m, strict=True),
+        *zip(state.mission.route.leg_from_en_m, out.mission.route.leg_from_en_m, strict=True),
     ]:
         assert math.dist(shift.point(old), new) < 1e-9
     assert math.hypot(*out.adrift.ground_en_mps) == pytest.approx(0.5)
-    assert [h[0::3] for h in out.history] == [h[0::3] for h in state.history]
-    assert out.route.items == state.route.items
+    assert [h[0::3] for h in out.progress.history] == [h[0::3] for h in state.progress.history]
+    assert out.mission.route.items == state.mission.route.items
 
 
 def passage(world, recentre_m=500.0):
@@ -112,15 +118,15 @@ def test_the_water_is_left_when_she_is_far_from_its_origin_and_nothing_is_under_
     assert not world.skipper.leaves_water(world.state, far)       # no passage
     assert skipper.leaves_water(world.state, far)
     assert not skipper.leaves_water(world.state, frame.geo_from_en(400.0, 299.0))
-    world.run(3, lambda w: w.state.pending_plan is not None)
+    world.run(3, lambda w: w.state.pending.plan is not None)
     asked = world.state
-    assert asked.pending_plan is not None
+    assert asked.pending.plan is not None
     assert not skipper.leaves_water(asked, far)                   # its answer would come in the metres of this water
-    seen = replace(world.state, pending_plan=None, last_seen=Fix(t_s=0.0, en_m=(400.0, 290.0)))
+    seen = with_parts(world.state, pending={"plan": None}, position={"last_seen": Fix(t_s=0.0, en_m=(400.0, 290.0))})
     assert skipper.leaves_water(seen, far)
-    jumped = replace(seen, doubt=Fix(t_s=0.0, en_m=(300.0, 0.0)))
+    jumped = with_parts(seen, position={"doubt": Fix(t_s=0.0, en_m=(300.0, 0.0))})
     assert not skipper.leaves_water(jumped, far)                  # a position that may be false
-    assert not skipper.leaves_water(replace(seen, last_seen=Fix(t_s=0.0, en_m=(-200.0, 0.0))), far)
+    assert not skipper.leaves_water(with_parts(seen, position={"last_seen": Fix(t_s=0.0, en_m=(-200.0, 0.0))}), far)
 
 
 def test_a_saved_state_knows_its_water_and_is_read_in_it():
@@ -144,7 +150,7 @@ def test_a_saved_state_knows_its_water_and_is_read_in_it():
     plain, brought = begun(world.skipper, saved, None)
     assert plain.voyage.frame == home.frame
     assert brought.water is None
-    for place, was in zip(brought.route.points_en_m, world.state.route.points_en_m, strict=True):
+    for place, was in zip(brought.route.points_en_m, world.state.mission.route.points_en_m, strict=True):
         assert math.dist(place, was) < 1e-3
 
 

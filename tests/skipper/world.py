@@ -90,6 +90,12 @@ def forecast(t_s: float, twd_rad: float, tws_mps: float = 5.0, sigma_rad: float 
         half_width_rad=np.outer(np.full(n, sigma_rad), z), correlation_time_s=30.0)
 
 
+def with_parts(state, **parts):
+    """A state with other parts: ``{field: value}`` changes a part, anything else takes its place."""
+    return replace(state, **{
+        name: replace(getattr(state, name), **new) if isinstance(new, dict) else new for name, new in parts.items()})
+
+
 @dataclass
 class World:
     """Boat, wind, autopilot and the application's hands in one; ``run`` folds the skipper over it."""
@@ -373,11 +379,11 @@ def check_invariants(before, after, snapshot, actions) -> None:
     for action in actions:
         assert permitted(action, snapshot.permissions), action
         if isinstance(action, (act.UploadMission, act.SetMode, act.Arm, act.SetCurrent, act.SteerHeading)):
-            assert after.is_ours, action
+            assert after.vehicle.is_ours, action
         if isinstance(action, act.UploadMission):
             assert ends_safely(action.items)
-            if before.route is not None and after.pending_upload is not None:
-                assert action.items[: action.keep_first] == before.route.items[: action.keep_first]
+            if before.mission.route is not None and after.pending.upload is not None:
+                assert action.items[: action.keep_first] == before.mission.route.items[: action.keep_first]
         if after.phase is Phase.OPERATOR:
             assert isinstance(action, (
                 act.Announce, act.Acknowledge, act.CancelPlan, act.ReadMission, act.StopOrders)), action

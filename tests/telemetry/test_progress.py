@@ -15,7 +15,7 @@ from companion.skipper import Skipper
 from companion.skipper.step.actions import Announce, Severity
 from companion.skipper.step.config import SkipperConfig
 from companion.telemetry.console import ProgressLine, left_behind, progress_text
-from tests.skipper.world import World, voyage
+from tests.skipper.world import World, voyage, with_parts
 
 STATUS = CompanionStatus(t_s=0.0, state="waiting")
 LONG = "waiting for permission to upload the plan that is ready, which [operator] upload = true would give, or a person"
@@ -60,18 +60,18 @@ def steps():
 
 def test_the_line_tells_the_clearance_and_when_she_is_there():
     world = World(Skipper(voyage=voyage(obstacles=[shapely.box(40.0, 100.0, 60.0, 120.0)]), config=SkipperConfig()))
-    assert world.run(120, lambda w: w.state.sailing)
+    assert world.run(120, lambda w: w.state.voyage.sailing)
     world.run(5)
     step = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
-    route = world.state.route
+    route = world.state.mission.route
     assert f"clear {route.expected_clearance_m:.1f} m" in progress_text(step, None)
     left = re.search(r"there in (\d+) s \(90 %: (\d+) s\)", progress_text(step, None))
     assert (float(left[1]), float(left[2])) == pytest.approx((step.ahead().there_s, step.ahead().there_late_s), abs=0.6)
-    assert "there in" not in progress_text(replace(step, state=replace(step.state, route=None)), None)
+    assert "there in" not in progress_text(replace(step, state=with_parts(step.state, mission={"route": None})), None)
 
 
 def _with(state, **changes):
-    return replace(state, sailing=False, **changes)
+    return with_parts(state, voyage={"sailing": False}, **changes)
 
 
 def test_at_80_columns_the_sentence_is_whole_and_what_was_said_stays(steps, monkeypatch):
@@ -107,7 +107,7 @@ def test_what_is_left_behind_is_said_with_where_she_will_end():
     world.run(60)
     step = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=made)
     assert step.snapshot.autopilot.mode is Mode.AUTO
-    end = world.state.route.items[-1].point
+    end = world.state.mission.route.items[-1].point
     assert re.fullmatch(
         rf"the boat sails on in AUTO: \d+ items to go, the last a loiter at {end.lat_deg:.5f}, {end.lon_deg:.5f}",
         left_behind(step))

@@ -172,7 +172,7 @@ def test_killed_under_way_she_sails_on_by_the_drawing_that_was_kept(tmp_path):
     async def work():
         await bay.draw()
         reached = asyncio.Event()
-        life = asyncio.create_task(bay.sail(on_step=lambda s: s.state.reached and reached.set()))
+        life = asyncio.create_task(bay.sail(on_step=lambda s: s.state.progress.reached and reached.set()))
         await reached.wait()
         life.cancel()
         with contextlib.suppress(asyncio.CancelledError):

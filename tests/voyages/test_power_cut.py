@@ -127,7 +127,8 @@ def durable(monkeypatch):
 def whose(skipper, saved, aboard):
     """Return what a companion that starts with this state says of the mission that it finds, the boat under way."""
     state = skipper.initial(saved)
-    ours = Identity(system=1, uid=state.uid or "5a", is_confirmed=True, vehicle_type=11, frame_class=2, sails=True)
+    uid = state.vehicle.uid or "5a"
+    ours = Identity(system=1, uid=uid, is_confirmed=True, vehicle_type=11, frame_class=2, sails=True)
     status = AutopilotStatus(t_s=0.0, mode=Mode.AUTO, is_armed=True, ekf_ok=True, mission_seq=1,
                              mission_total=len(aboard), mission_state=MissionState.ACTIVE)
     seen = Snapshot(t_s=0.0, autopilot=status, autopilot_age_s=0.0, heartbeat_age_s=0.0, permissions=ALL_PERMITTED,
@@ -165,7 +166,7 @@ def test_after_a_power_cut_at_any_write_the_mission_on_board_is_known(durable, m
         for left, there in ((now.honest, plain), (now.kept, plain), (now.torn, aboard), (older.honest, aboard),
                             (older.torn, aboard), (None, aboard)):
             state, said = whose(skipper, believed(left), there)
-            assert not state.foreign
+            assert not state.mission.foreign
             assert said & {"adopted", "held back", "mixture"}
             met |= said
     assert met >= {"adopted", "held back", "mixture"}

@@ -160,7 +160,7 @@ def test_another_board_under_way_stops_all_orders_until_ours_is_back(tmp_path):
     ours, changed_s, back_s = boat.core.config, [], []
 
     def exchange(step):
-        if step.state.sailing and not changed_s and step.snapshot.t_s - world.steps[0].snapshot.t_s > 50.0:
+        if step.state.voyage.sailing and not changed_s and step.snapshot.t_s - world.steps[0].snapshot.t_s > 50.0:
             boat.core.config = replace(ours, uid=b"another")
             boat.reboot()
             changed_s.append(step.snapshot.t_s)
@@ -186,10 +186,10 @@ def test_the_board_is_asked_for_after_a_gap(tmp_path):
     seen = []
 
     def cut(step):
-        if step.state.sailing and not seen:
+        if step.state.voyage.sailing and not seen:
             line.cut()
             asyncio.get_running_loop().call_later(8.0, line.mend)
-        if step.state.sailing:
+        if step.state.voyage.sailing:
             seen.append((step.snapshot.t_s, step.snapshot.identity.is_confirmed))
 
     world.run(on_step=cut, limit_s=80.0)
@@ -279,7 +279,7 @@ def test_a_companion_of_another_kind_under_way_is_said_and_sailed_on(tmp_path):
     stranger = Codec(1, 191)
 
     def speak(step):
-        if step.state.sailing:
+        if step.state.voyage.sailing:
             world.air.say(stranger.pack(wire.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)))
 
     world.run(on_step=speak, limit_s=80.0)
@@ -295,10 +295,10 @@ def test_a_change_of_mode_is_noticed_within_two_seconds_and_a_forged_one_not_at_
     boat, forged, changed_s, noticed_s = world.boats["ours"], Codec(1, 1), [], []
 
     def look(step):
-        if not step.state.sailing:
+        if not step.state.voyage.sailing:
             return
         world.air.say(forged.pack(wire.MAVLink_heartbeat_message(11, 3, 0x80, 4, 4, 3)))
-        if not changed_s and len([s for s in world.steps if s.state.sailing]) == 20:
+        if not changed_s and len([s for s in world.steps if s.state.voyage.sailing]) == 20:
             boat.set_mode(Mode.HOLD)
             changed_s.append(now_s())
         if step.snapshot.autopilot.mode is Mode.HOLD:

@@ -6,6 +6,7 @@ for. What a stranger's autopilot has on board sails on; ours is told nothing eit
 
 from __future__ import annotations
 
+from companion.frozen import changed
 from companion.mavlink.trust import ROVERS, Identity, type_words
 from companion.skipper.step.actions import CancelPlan, Severity, StopOrders
 from companion.skipper.step.state import Phase
@@ -27,29 +28,31 @@ def judge(turn: Turn) -> None:
         turn.say(Severity.ERROR, "not ours", f"no orders: {wrong}", every_s=SAY_EVERY_S)
     asking = _unknown(turn, identity)
     if not wrong and not asking:
-        if turn.state.custody:
-            turn.update(custody="", checked_mission=False, read_since_s=turn.t_s)
+        if turn.state.vehicle.doubt:
+            turn.set(
+                vehicle=changed(turn.state.vehicle, doubt=""),
+                mission=changed(turn.state.mission, checked=False, read_since_s=turn.t_s))
             turn.say(Severity.NOTICE, "ours", "the autopilot is known to be ours", every_s=0.0)
-        if turn.state.uid is None:
-            turn.update(uid=identity.uid, system=identity.system)
-        turn.update(is_ours=True)
+        if turn.state.vehicle.uid is None:
+            turn.set(vehicle=changed(turn.state.vehicle, uid=identity.uid, system=identity.system))
+        turn.set(vehicle=changed(turn.state.vehicle, is_ours=True))
         return
-    if turn.state.is_ours:
+    if turn.state.vehicle.is_ours:
         turn.act(StopOrders(text=wrong or asking))
-        if turn.state.pending_plan is not None:
-            turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
-        turn.update(pending_plan=None, steering_until_s=None)
-    turn.update(is_ours=False, custody=wrong or turn.state.custody)
+        if turn.state.pending.plan is not None:
+            turn.act(CancelPlan(request_id=turn.state.pending.plan.request_id))
+        turn.set(pending=changed(turn.state.pending, plan=None), steering=changed(turn.state.steering, until_s=None))
+    turn.set(vehicle=changed(turn.state.vehicle, is_ours=False, doubt=wrong or turn.state.vehicle.doubt))
 
 
 def stand_by(turn: Turn) -> bool:
     """Say why nothing is asked of the autopilot; False when it is ours."""
     state = turn.state
-    if state.is_ours:
+    if state.vehicle.is_ours:
         return False
     wrong = _wrong(turn, turn.snapshot.identity)
     phase = state.phase
-    if phase is not Phase.DONE and not state.sailing:
+    if phase is not Phase.DONE and not state.voyage.sailing:
         phase = Phase.WAITING
     elif phase is not Phase.DONE and wrong:
         phase = Phase.OPERATOR
@@ -59,12 +62,12 @@ def stand_by(turn: Turn) -> bool:
 
 def _wrong(turn: Turn, identity: Identity) -> str:
     """Return why the autopilot is none of ours, "" when it may be."""
-    return _stranger(turn, identity) or ("" if turn.state.sailing else _unfit(turn, identity))
+    return _stranger(turn, identity) or ("" if turn.state.voyage.sailing else _unfit(turn, identity))
 
 
 def _stranger(turn: Turn, identity: Identity) -> str:
     """Return why the autopilot is another than the one that this voyage began with, "" when it is not."""
-    kind, known, told = identity.vehicle_type, turn.state.uid, identity.uid
+    kind, known, told = identity.vehicle_type, turn.state.vehicle.uid, identity.uid
     if identity.is_contested:
         return ("two autopilots speak with one system id: give one of them another SYSID_THISMAV and name ours in "
                 "[autopilot] system, or sign the link")
@@ -73,7 +76,7 @@ def _stranger(turn: Turn, identity: Identity) -> str:
     if known is not None and identity.is_confirmed and told != known:
         return (f"the autopilot is another one than this voyage began with (UID {told or 'none'}, not "
                 f"{known or 'none'}): connect ours again, or begin anew without the saved state")
-    if turn.snapshot.neighbours and not turn.state.sailing:
+    if turn.snapshot.neighbours and not turn.state.voyage.sailing:
         return (f"other autopilots are heard ({'; '.join(turn.snapshot.neighbours)}): say which is yours, with "
                 "--system N or [autopilot] system in the mission")
     return ""
@@ -94,6 +97,6 @@ def _unknown(turn: Turn, identity: Identity) -> str:
     """Return what of it is still to be told, in words, "" when all is."""
     if not identity.is_confirmed:
         return "waiting for the autopilot to tell who it is (AUTOPILOT_VERSION)"
-    if not turn.state.sailing and (identity.frame_class is None or identity.sails is None):
+    if not turn.state.voyage.sailing and (identity.frame_class is None or identity.sails is None):
         return "waiting for the autopilot to tell its frame (FRAME_CLASS, SAIL_ENABLE)"
     return ""

@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from companion.frozen import changed
 from companion.geo.angles import difference_rad, heading_of
 from companion.messages import Mode
 from companion.skipper.deeds.helm import is_busy, run_motor, set_mode
@@ -48,7 +49,7 @@ def follow_ground(turn: Turn) -> None:
     """Keep the mean velocity over ground, and the places of the last minute of a boat that hardly moves."""
     vehicle, boat, memory = turn.snapshot.vehicle, turn.reckoned_en, turn.state.adrift
     if vehicle is None or boat is None:
-        turn.update(adrift=replace(memory, ground_en_mps=None, places=()))
+        turn.set(adrift=replace(memory, ground_en_mps=None, places=()))
         return
     before = memory.ground_en_mps
     share = 1.0 if before is None else -math.expm1(-max(0.0, turn.t_s - memory.ground_t_s) / TAU_S)
@@ -59,7 +60,7 @@ def follow_ground(turn: Turn) -> None:
         places = ()
     elif not places or turn.t_s - places[-1].t_s >= PLACE_S:
         places = (*places[-SLOW_PLACES:], Fix(t_s=turn.t_s, en_m=boat))
-    turn.update(adrift=replace(memory, ground_en_mps=after, ground_t_s=turn.t_s, places=places))
+    turn.set(adrift=replace(memory, ground_en_mps=after, ground_t_s=turn.t_s, places=places))
 
 
 def over_ground(turn: Turn) -> tuple[float, float] | None:
@@ -181,7 +182,7 @@ MEANS: tuple[Means, ...] = (
 def stops_drift(turn: Turn) -> bool:
     """Hold a boat that is becalmed or drifts onto something; True while LOITER is ours and to be kept."""
     state, status = turn.state, turn.autopilot
-    if status is None or state.steering_until_s is not None or state.by_field.resort.engaged:
+    if status is None or state.steering.until_s is not None or state.by_field.resort.engaged:
         return False
     is_calm, is_danger = turn.is_raised("becalmed"), turn.is_raised("drifting")
     # What has been stopped stays so until there is a wind to sail by again.
@@ -203,14 +204,14 @@ def _let_go(turn: Turn) -> None:
     if memory.motor:
         run_motor(turn, on=False, text="the boat sails again")
     if memory.since_s is not None or memory.loitered:
-        turn.update(adrift=replace(turn.state.adrift, since_s=None, loitered=False, loiter_en_m=None))
+        turn.set(adrift=replace(turn.state.adrift, since_s=None, loitered=False, loiter_en_m=None))
 
 
 def _stop(turn: Turn, ahead: DriftAhead) -> None:
     """Use the first means that will do; call for the anchor where it has not done, or there is no time."""
     memory = turn.state.adrift
     since_s = memory.since_s if memory.since_s is not None else turn.t_s
-    turn.update(adrift=replace(memory, since_s=since_s))
+    turn.set(adrift=replace(memory, since_s=since_s))
     means = next(m for m in MEANS if m.will_do(turn, ahead))
     means.use(turn)
     left_s = ahead.contact_s if ahead.contact_s is not None else ahead.floor_s
@@ -227,7 +228,7 @@ def lies_in_loiter(turn: Turn) -> bool:
 
     Its place was chosen for its room; a loiter begun where she lies would have what room there is.
     """
-    route, boat = turn.state.route, turn.boat_en
+    route, boat = turn.state.mission.route, turn.boat_en
     if route is None or boat is None or turn.ahead():
         return False
     place = route.points_en_m[-1]
@@ -255,9 +256,9 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
         return False
     what = "becalmed" if turn.is_raised("becalmed") else "adrift"
     how = "lying still" if ahead is None else ahead.sentence()
-    if status.mode is Mode.LOITER and state.own_mode is Mode.LOITER:
+    if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
         place = memory.loiter_en_m if memory.loiter_en_m is not None else turn.reckoned_en
-        turn.update(adrift=replace(memory, loitered=True, loiter_en_m=place))
+        turn.set(adrift=replace(memory, loitered=True, loiter_en_m=place))
         turn.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until she can sail")
         return True
     if status.mode not in {Mode.AUTO, turn.sails_in} or memory.loitered or ahead is None:
@@ -267,6 +268,6 @@ def _loiters(turn: Turn, ahead: DriftAhead | None) -> bool:
     if is_cramped(turn):
         return False
     if not is_busy(turn, Mode.LOITER.name) and set_mode(turn, Mode.LOITER, f"{what}, {how}"):
-        turn.update(after_operator=True)
+        turn.set(operator=changed(turn.state.operator, is_back=True))
     turn.phase(state.phase, f"{what}, {how}: waiting for the autopilot to take LOITER")
     return True

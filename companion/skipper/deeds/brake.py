@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from companion.frozen import changed
 from companion.messages import Mode
 from companion.skipper.deeds.headings import course_rad
 from companion.skipper.deeds.helm import is_busy, set_mode
@@ -52,9 +53,9 @@ def ahead_of(turn: Turn) -> DriftAhead | None:
 def brakes(turn: Turn) -> bool:
     """Ask for LOITER where the leg is shut too near to plan; True in the step in which it is asked for."""
     state = turn.state
-    if state.steering_until_s is not None or state.by_field.resort.engaged:
+    if state.steering.until_s is not None or state.by_field.resort.engaged:
         return False
-    if state.pending_upload is not None or not turn.snapshot.permissions.may_set_mode:
+    if state.pending.upload is not None or not turn.snapshot.permissions.may_set_mode:
         return False
     met = ahead_of(turn)
     if met is None or is_busy(turn, Mode.LOITER.name):
@@ -62,7 +63,7 @@ def brakes(turn: Turn) -> bool:
     text = f"{met.name} is {met.floor_s or 0.0:.0f} s ahead, too near to plan round: waiting in a loiter for a plan"
     if not set_mode(turn, Mode.LOITER, text):
         return False
-    turn.update(after_operator=True)
+    turn.set(operator=changed(turn.state.operator, is_back=True))
     turn.say(Severity.WARNING, "too near", text, every_s=0.0)
     turn.phase(Phase.HOLDING, text)
     return True

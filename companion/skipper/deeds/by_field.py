@@ -19,6 +19,7 @@ from companion.field.leave import way_out_rad
 from companion.field.station import RETURNED_M, Phase, Station, StationState, keep
 from companion.field.tree import LEAST, Conditions, field_of, lengths, zone_of
 from companion.field.values import Habits, Intent, Obstacle, Setpoint, Situation
+from companion.frozen import changed
 from companion.geo.angles import wrap_pi
 from companion.messages import Mode
 from companion.skipper.deeds.helm import hand_back, is_busy, set_mode
@@ -152,7 +153,7 @@ def heading(turn: Turn) -> Setpoint | None:
     else:
         guidance, setpoint = step(
             turn.state.by_field.guidance, seen, intent(turn, seen), habits(turn, seen.tws_mps))
-        turn.update(by_field=replace(turn.state.by_field, guidance=guidance))
+        turn.set(by_field=replace(turn.state.by_field, guidance=guidance))
     return setpoint if turn.config.sails else _slowed(setpoint, seen)
 
 
@@ -180,7 +181,7 @@ def _composed(turn: Turn, seen: Situation, field: Composed) -> Setpoint:
     station = _station(turn, seen, field, conditions)
     if station is not None:
         after, setpoint = keep(memory.station, seen, station, can)
-        turn.update(by_field=replace(memory, station=after))
+        turn.set(by_field=replace(memory, station=after))
         return setpoint
     made, last = field_of(tree, conditions), memory.guidance.wanted_rad
     value = made(seen.en_m)[0]
@@ -189,7 +190,7 @@ def _composed(turn: Turn, seen: Situation, field: Composed) -> Setpoint:
     if is_weak:   # for a moment: over a point that is sailed to
         wanted = replace(hold_heading(seen.heading_rad if last is None else last), clearance=wanted.clearance)
     guidance, setpoint = step(memory.guidance, seen, wanted, can)
-    turn.update(by_field=replace(memory, guidance=guidance, station=StationState(), way_out_rad=way_out))
+    turn.set(by_field=replace(memory, guidance=guidance, station=StationState(), way_out_rad=way_out))
     place = tree.station_en
     lies = not turn.config.sails and place is not None and distance_m(seen.en_m, place) < STOP_M
     return replace(setpoint, thrust=0.0) if lies else setpoint
@@ -234,25 +235,28 @@ def last_resort(turn: Turn) -> bool:
         if situation(turn) is None:
             return False
     elif memory.seen_guided and status.mode is Mode.AUTO and not is_busy(turn, Mode.GUIDED.name):
-        turn.update(own_mode=None, by_field=ByField(not_before_s=turn.t_s + LEFT_ALONE_S))
+        turn.set(
+            steering=changed(turn.state.steering, own_mode=None),
+            by_field=ByField(not_before_s=turn.t_s + LEFT_ALONE_S))
         turn.say(Severity.NOTICE, "last resort over", "somebody set AUTO: the field lets go", every_s=0.0)
         return False
     resort = memory.resort.step(turn.t_s, too_near=raised, can_plan=_is_planned(turn), clear_s=0.0)
     if memory.resort.engaged and not resort.engaged:
-        turn.update(by_field=ByField())
+        turn.set(by_field=ByField())
         turn.say(Severity.NOTICE, "last resort over", f"the way is clear again after "
                  f"{turn.t_s - memory.resort.since_s:.0f} s: back to AUTO and the plan", every_s=0.0)
         return False
     if not memory.resort.engaged:
         met = meets_in(turn)
         whose = f"{met[1]}, met in {met[0]:.0f} s" if met is not None and met[1] else "a vessel"
-        turn.update(steering_until_s=None, steering_heading_rad=None)   # the guidance gets out of irons by itself
+        turn.set(   # the guidance gets out of irons by itself
+            steering=changed(turn.state.steering, until_s=None, heading_rad=None))
         turn.say(Severity.WARNING, "last resort", f"too near to plan for: {whose}; steering by field", every_s=0.0)
     clear_s = None if raised else (memory.clear_s if memory.clear_s is not None else turn.t_s)
     guided = status.mode is Mode.GUIDED
-    turn.update(by_field=replace(memory, resort=resort, clear_s=clear_s, seen_guided=memory.seen_guided or guided))
+    turn.set(by_field=replace(memory, resort=resort, clear_s=clear_s, seen_guided=memory.seen_guided or guided))
     if guided:
-        turn.update(own_mode=Mode.GUIDED)
+        turn.set(steering=changed(turn.state.steering, own_mode=Mode.GUIDED))
     else:
         set_mode(turn, Mode.GUIDED, "too near to plan for: steering by field")
     _plan(turn)
@@ -271,19 +275,19 @@ def _is_planned(turn: Turn) -> bool:
     """Return whether a plan asked for since the water was clear has been answered and is on board."""
     state, clear_s = turn.state, turn.state.by_field.clear_s
     return (
-        clear_s is not None and state.last_plan_s >= clear_s and state.pending_plan is None
-        and state.pending_upload is None and not state.repair
+        clear_s is not None and state.plans.last_s >= clear_s and state.pending.plan is None
+        and state.pending.upload is None and not state.mission.repair
     )
 
 
 def _plan(turn: Turn) -> None:
     """Ask for a plan from where the field has brought the boat: now and then, and at once when the water is clear."""
     state = turn.state
-    if state.pending_plan is not None or state.pending_upload is not None or turn.is_raised("becalmed"):
+    if state.pending.plan is not None or state.pending.upload is not None or turn.is_raised("becalmed"):
         return
     clear_s = state.by_field.clear_s
-    due = clear_s is not None and state.last_plan_s < clear_s
-    if due or turn.t_s - state.last_plan_s >= PLAN_EVERY_S:
+    due = clear_s is not None and state.plans.last_s < clear_s
+    if due or turn.t_s - state.plans.last_s >= PLAN_EVERY_S:
         request(turn, ReplanReason.OBSTACLE, text="from where the field has brought the boat")
 
 
@@ -294,11 +298,11 @@ def keeps_station(turn: Turn) -> bool:
     By field where that is the guidance; else the mission's safe end does it.
     """
     length_s, boat = turn.config.station_s, turn.boat_en
-    if length_s <= 0.0 or turn.state.route is None:
+    if length_s <= 0.0 or turn.state.mission.route is None:
         return False
     memory = turn.state.by_field
     since = memory.station_since_s if memory.station_since_s is not None else turn.t_s
-    turn.update(by_field=replace(memory, station_since_s=since))
+    turn.set(by_field=replace(memory, station_since_s=since))
     left_s = length_s - (turn.t_s - since)
     if left_s <= 0.0:
         return False
@@ -312,9 +316,9 @@ def keeps_station(turn: Turn) -> bool:
     if status is not None and status.mode is not Mode.GUIDED:
         set_mode(turn, Mode.GUIDED, "keeping station by field")
     elif seen is not None:
-        turn.update(own_mode=Mode.GUIDED)
+        turn.set(steering=changed(turn.state.steering, own_mode=Mode.GUIDED))
         after, setpoint = keep(memory.station, seen, _station_at(turn, place), habits(turn, seen.tws_mps))
-        turn.update(by_field=replace(turn.state.by_field, station=after))
+        turn.set(by_field=replace(turn.state.by_field, station=after))
         turn.act(SteerHeading(
             heading_rad=setpoint.heading_rad, thrust=setpoint.thrust, text=f"station: {setpoint.reason}"))
     return True

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from companion.frozen import changed
 from companion.messages import Mode
 from companion.skipper.deeds.adrift import stops_drift
 from companion.skipper.deeds.helm import is_busy, set_mode
@@ -61,27 +62,31 @@ def follow(turn: Turn) -> None:
         return
     _follow_filter(turn)
     seen = _evidence(turn, here, turn.t_s - age)
-    doubt = _begun(turn, seen) if state.doubt is None else state.doubt.after(seen)
-    turn.update(restored=None if doubt is not None or utc_s(turn) is not None else turn.state.restored)
+    doubt = _begun(turn, seen) if state.position.doubt is None else state.position.doubt.after(seen)
+    turn.set(position=changed(
+        turn.state.position,
+        restored=None if doubt is not None or utc_s(turn) is not None else turn.state.position.restored))
     if doubt is None:
         _remember(turn, here, None)
         return
-    if seen.is_jump and state.own_mode is Mode.LOITER and turn.autopilot is not None and (
+    if seen.is_jump and state.steering.own_mode is Mode.LOITER and turn.autopilot is not None and (
         turn.autopilot.mode is Mode.LOITER
     ):
-        turn.update(anew=Mode.HOLD)
-    why = "" if state.doubt is None else doubt.believed_for(seen)
+        turn.set(position=changed(turn.state.position, anew=Mode.HOLD))
+    why = "" if state.position.doubt is None else doubt.believed_for(seen)
     if why:
-        turn.update(doubt=None, back_s=turn.t_s,
-                    raised=tuple(r for r in state.raised if r.name != "position jump"))
+        turn.set(
+            position=changed(turn.state.position, doubt=None, back_s=turn.t_s),
+            alarms=changed(
+                turn.state.alarms, raised=tuple(r for r in state.alarms.raised if r.name != "position jump")))
         code = "position back" if doubt.is_back(here) else "position believed"
         turn.say(Severity.NOTICE, code, f"the position is believed again: {why}", every_s=0.0)
         _remember(turn, here, None)
         return
-    if state.doubt is None and not seen.is_jump:   # of a jump the watchdog speaks
+    if state.position.doubt is None and not seen.is_jump:   # of a jump the watchdog speaks
         turn.say(Severity.WARNING, CODE, f"the position is doubted: {doubt.why}; reckoned on from where she was",
                  every_s=0.0)
-    turn.update(doubt=doubt)
+    turn.set(position=changed(turn.state.position, doubt=doubt))
     _remember(turn, here, doubt)
 
 
@@ -92,38 +97,39 @@ def _evidence(turn: Turn, here: PointEn, at_s: float) -> Evidence:
     velocity = (0.0, 0.0) if vehicle is None else vehicle.velocity_en_mps
     told = status.gps2 if status is not None else None
     second = None if told is None else turn.voyage.frame.en_from_geo(told)
-    if state.doubt is None:   # nothing of the rest matters
+    if state.position.doubt is None:   # nothing of the rest matters
         return Evidence(t_s=at_s, en_m=here, velocity_en_mps=velocity, is_jump=jumped, second_en_m=second)
-    place = state.doubt.reckoned_en_m
+    place = state.position.doubt.reckoned_en_m
     room_m, other_m = (float(room) for room in solid.clearance_m([here, place]))
     return Evidence(
         t_s=at_s, en_m=here, velocity_en_mps=velocity, is_jump=jumped, is_possible=room_m > -ERROR_M,
         is_well=status is None or (status.ekf_ok and status.system_status != CRITICAL),
-        is_other_possible=other_m > -(ERROR_M + state.doubt.error_m), room_m=min(room_m, other_m), second_en_m=second,
-        is_given=state.given_back_s >= state.doubt.since_s)
+        is_other_possible=other_m > -(ERROR_M + state.position.doubt.error_m), room_m=min(room_m, other_m),
+        second_en_m=second,
+        is_given=state.operator.given_back_s >= state.position.doubt.since_s)
 
 
 def _begun(turn: Turn, seen: Evidence) -> PositionDoubt | None:
     """Return the doubt that this step begins, None: the position is believed."""
-    state, last = turn.state, turn.state.last_seen
-    lost_s = 0.0 if state.lost_s is None else turn.t_s - state.lost_s
+    state, last = turn.state, turn.state.position.last_seen
+    lost_s = 0.0 if state.position.lost_s is None else turn.t_s - state.position.lost_s
     lost_m = ERROR_M + LOST_ERRS_MPS * lost_s if lost_s >= LOST_S else 0.0
     if seen.is_jump and last is not None:
         begun = PositionDoubt(since_s=turn.t_s, t_s=last.t_s, settled_s=seen.t_s, reckoned_en_m=last.en_m,
                               lost_m=lost_m, why=f"it jumped {turn.jump_m:.0f} m")
         return begun.after(seen)
     if seen.is_contradicted and seen.second_en_m is not None:
-        disputed_s = state.disputed_s if state.disputed_s is not None else turn.t_s
-        turn.update(disputed_s=disputed_s)
+        disputed_s = state.position.disputed_s if state.position.disputed_s is not None else turn.t_s
+        turn.set(position=changed(turn.state.position, disputed_s=disputed_s))
         if turn.t_s - disputed_s >= DISPUTED_S:
             off_m = math.dist(seen.second_en_m, seen.en_m)
             return PositionDoubt(since_s=turn.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=seen.second_en_m,
                                  farthest_m=off_m, is_dispute=True,
                                  why=f"a second receiver is {off_m:.0f} m away from it")
-    elif state.disputed_s is not None:
-        turn.update(disputed_s=None)
-    if state.restored is not None:
-        begun_anew = _since_the_last_start(turn, state.restored, seen)
+    elif state.position.disputed_s is not None:
+        turn.set(position=changed(turn.state.position, disputed_s=None))
+    if state.position.restored is not None:
+        begun_anew = _since_the_last_start(turn, state.position.restored, seen)
         if begun_anew is not None:
             return begun_anew
     if is_impossible(turn.voyage.area, seen.en_m, margin_m=turn.config.margin_m):
@@ -136,7 +142,7 @@ def _begun(turn: Turn, seen: Evidence) -> PositionDoubt | None:
 
 def _since_the_last_start(turn: Turn, before: SavedPlace, seen: Evidence) -> PositionDoubt | None:
     """Return the doubt of a fix that is not where the boat can have come to since it was saved, or was in doubt."""
-    now_s, saved = utc_s(turn), turn.state.adoptable
+    now_s, saved = utc_s(turn), turn.state.mission.adoptable
     passed_s = UNKNOWN_S if now_s is None else max(0.0, now_s - before.utc_s)
     is_held = saved is not None and saved.own_mode in {Mode.LOITER, Mode.HOLD}
     fastest_mps = turn.voyage.boat.polar.max_speed_mps(BEATEN_MPS) + turn.snapshot.current.drift_mps + SLOW_MPS
@@ -157,31 +163,32 @@ def _follow_filter(turn: Turn) -> None:
     """Notice since when the filter has had no position; that is forgotten when a fix has come without a jump."""
     status = turn.autopilot
     if status is None or status.ekf_ok:
-        if turn.jump_m < JUMP_M and turn.state.lost_s is not None and turn.state.doubt is None:
-            turn.update(lost_s=None)
-    elif turn.state.lost_s is None:
-        turn.update(lost_s=turn.t_s)
+        if turn.jump_m < JUMP_M and turn.state.position.lost_s is not None and turn.state.position.doubt is None:
+            turn.set(position=changed(turn.state.position, lost_s=None))
+    elif turn.state.position.lost_s is None:
+        turn.set(position=changed(turn.state.position, lost_s=turn.t_s))
 
 
 def _remember(turn: Turn, here: PointEn, doubt: PositionDoubt | None) -> None:
     """Keep for who comes after a kill where the boat is, every ``SAVE_S`` and when a doubt begins or ends."""
-    now_s, before = utc_s(turn), turn.state.place
-    if now_s is None or not turn.state.sailing:
+    now_s, before = utc_s(turn), turn.state.position.place
+    if now_s is None or not turn.state.voyage.sailing:
         return
     is_same = before is not None and (before.farthest_m > 0.0) == (doubt is not None)
     if is_same and before is not None and before.utc_s // SAVE_S == now_s // SAVE_S:
         return
     en_m = here if doubt is None else doubt.reckoned_en_m
-    turn.update(place=SavedPlace(
+    turn.set(position=changed(turn.state.position, place=SavedPlace(
         utc_s=round(now_s, 1), en_m=(round(en_m[0], 1), round(en_m[1], 1)),
         error_m=0.0 if doubt is None else round(doubt.error_m, 1),
-        farthest_m=0.0 if doubt is None else max(JUMP_M, round(doubt.farthest_m, 1))))
+        farthest_m=0.0 if doubt is None else max(JUMP_M, round(doubt.farthest_m, 1)))))
 
 
 # --------------------------------------------------------------------------------------------- held
 def is_other_shut(turn: Turn) -> bool:
     """Return whether, from the reckoned place, the boat would soon come too near to something as it is steered now."""
-    doubt, here, leg, vehicle = turn.state.doubt, turn.snapshot.position_en_m, turn.leg(), turn.snapshot.vehicle
+    doubt, here = turn.state.position.doubt, turn.snapshot.position_en_m
+    leg, vehicle = turn.leg(), turn.snapshot.vehicle
     if doubt is None or here is None or vehicle is None:
         return False
     place = doubt.reckoned_en_m
@@ -197,7 +204,7 @@ def is_other_shut(turn: Turn) -> bool:
 
 def _is_steered_falsely(turn: Turn) -> bool:
     """Return whether the autopilot has steered for a while by a place where no boat can be: inside something."""
-    here, doubt = turn.snapshot.position_en_m, turn.state.doubt
+    here, doubt = turn.snapshot.position_en_m, turn.state.position.doubt
     if here is None or doubt is None or turn.t_s - doubt.since_s < GLITCH_S:
         return False
     return float(turn.voyage.area.unfenced.clearance_m([here])[0]) < -ERROR_M
@@ -210,28 +217,30 @@ def stands_off(turn: Turn) -> bool:
         return False
     if not status.ekf_ok or status.system_status == CRITICAL:
         return False   # nor would it loiter then
-    if state.anew is not None:
+    if state.position.anew is not None:
         _begin_anew(turn)
-        if turn.state.anew is not None:
+        if turn.state.position.anew is not None:
             turn.phase(Phase.HOLDING, "the position jumped, and the loiter's point with it: waiting to loiter anew")
             return True
-    if state.doubt is None:
+    if state.position.doubt is None:
         return False
-    is_held = status.mode is state.own_mode and state.own_mode is Mode.LOITER
+    is_held = status.mode is state.steering.own_mode and state.steering.own_mode is Mode.LOITER
     if is_held:
         stops_drift(turn)   # which the reckoned track tells, too
-        turn.phase(Phase.HOLDING, f"the position is doubted, {state.doubt.why}: waiting in a loiter until it can be "
-                   "believed")
+        turn.phase(
+            Phase.HOLDING,
+            f"the position is doubted, {state.position.doubt.why}: waiting in a loiter until it can be believed")
         return True
-    is_stopped = status.mode is state.own_mode and state.own_mode in {Mode.HOLD, *HOMEWARD}
+    is_stopped = status.mode is state.steering.own_mode and state.steering.own_mode in {Mode.HOLD, *HOMEWARD}
     if not (is_stopped or turn.steers or _is_steered_falsely(turn) or is_other_shut(turn)):
         return False
     if is_busy(turn, Mode.LOITER.name):
         return is_stopped
     if set_mode(turn, Mode.LOITER, "the position is doubted and the reckoned place is not clear ahead"):
-        turn.update(after_operator=True)
+        turn.set(operator=changed(turn.state.operator, is_back=True))
         turn.say(Severity.WARNING, "standing off",
-                 f"the position is doubted ({state.doubt.why}) and the reckoned place is not clear ahead: loitering",
+                 f"the position is doubted ({state.position.doubt.why}) and the reckoned place is not clear ahead: "
+                  "loitering",
                  every_s=0.0)
     return True
 
@@ -243,16 +252,16 @@ def _begin_anew(turn: Turn) -> None:
     """
     status, state = turn.autopilot, turn.state
     shown = None if status is None else status.mode
-    if shown not in {Mode.LOITER, Mode.HOLD} or state.own_mode not in {Mode.LOITER, Mode.HOLD}:
-        turn.update(anew=None)
-    elif state.anew is Mode.HOLD and shown is Mode.LOITER:
+    if shown not in {Mode.LOITER, Mode.HOLD} or state.steering.own_mode not in {Mode.LOITER, Mode.HOLD}:
+        turn.set(position=changed(turn.state.position, anew=None))
+    elif state.position.anew is Mode.HOLD and shown is Mode.LOITER:
         set_mode(turn, Mode.HOLD, "the position jumped, and the loiter's point with it: loitering anew")
     elif shown is Mode.LOITER or (
-        state.doubt is None and (state.pending_plan is not None or state.pending_upload is not None)
+        state.position.doubt is None and (state.pending.plan is not None or state.pending.upload is not None)
     ):
-        turn.update(anew=None)
+        turn.set(position=changed(turn.state.position, anew=None))
     elif set_mode(turn, Mode.LOITER, "loitering anew where she is"):
-        turn.update(anew=Mode.LOITER)
+        turn.set(position=changed(turn.state.position, anew=Mode.LOITER))
 
 
 def holds(turn: Turn) -> bool:
@@ -260,24 +269,24 @@ def holds(turn: Turn) -> bool:
     status, state, why = turn.autopilot, turn.state, turn.snapshot.unsure
     memory = state.adrift
     if not why and memory.loiter_en_m is not None and not memory.loitered:
-        turn.update(adrift=replace(memory, loiter_en_m=None))
+        turn.set(adrift=replace(memory, loiter_en_m=None))
     if not why or status is None:
         return False
-    if state.pending_plan is not None:
-        turn.act(CancelPlan(request_id=state.pending_plan.request_id))
-        turn.update(pending_plan=None)
-    turn.update(rung=0, ladder_reason=None)
+    if state.pending.plan is not None:
+        turn.act(CancelPlan(request_id=state.pending.plan.request_id))
+        turn.set(pending=changed(turn.state.pending, plan=None))
+    turn.set(plans=changed(turn.state.plans, rung=0, ladder_reason=None))
     turn.say(Severity.ERROR, "held", f"{why}: no plan is made until it is known again", every_s=SAID_S)
     if state.by_field.resort.engaged or not turn.snapshot.permissions.may_set_mode or not status.ekf_ok:
         return False
-    if status.mode is Mode.LOITER and state.own_mode is Mode.LOITER:
+    if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
         if memory.loiter_en_m is None:   # by a wrong wind she may be carried off it, which is a drift
-            turn.update(adrift=replace(memory, loiter_en_m=turn.boat_en))
+            turn.set(adrift=replace(memory, loiter_en_m=turn.boat_en))
         turn.phase(Phase.HOLDING, f"{why}: waiting in a loiter until the wind is known")
         return True
-    if state.steering_until_s is not None:      # out of irons, it was believed
-        turn.update(steering_until_s=None, steering_heading_rad=None)
+    if state.steering.until_s is not None:      # out of irons, it was believed
+        turn.set(steering=changed(turn.state.steering, until_s=None, heading_rad=None))
     if not is_busy(turn, Mode.LOITER.name) and set_mode(turn, Mode.LOITER, why):
-        turn.update(after_operator=True)
+        turn.set(operator=changed(turn.state.operator, is_back=True))
     turn.phase(Phase.HOLDING, f"{why}: waiting for the autopilot to take LOITER")
     return True

@@ -12,6 +12,7 @@ import math
 from dataclasses import replace
 
 from companion.boat import AutopilotLimits
+from companion.frozen import changed
 from companion.messages import AutopilotStatus, Command, Mode, StatusText
 from companion.skipper.deeds.helm import set_mode
 from companion.skipper.step.actions import Severity
@@ -51,9 +52,9 @@ def note(turn: Turn, text: StatusText) -> None:
     """Remember a text that is a sign."""
     cause = told_by(text)
     if cause:
-        turn.update(signs=_seen(turn.state.signs, cause, turn.t_s))
+        turn.set(operator=changed(turn.state.operator, signs=_seen(turn.state.operator.signs, cause, turn.t_s)))
     if cause == "battery" and EMPTY in text.text:
-        turn.update(battery_critical=True)
+        turn.set(alarms=changed(turn.state.alarms, battery_critical=True))
 
 
 def _seen(signs: Signs, cause: str, t_s: float) -> Signs:
@@ -65,7 +66,7 @@ def follow_stops(turn: Turn) -> None:
     status = turn.autopilot
     if status is None:
         return
-    before = turn.state.signs
+    before = turn.state.operator.signs
     signs = _sticks(before, status, turn.snapshot.limits or AutopilotLimits(), turn.t_s)
     up = standing(status)
     for cause in up:
@@ -76,25 +77,29 @@ def follow_stops(turn: Turn) -> None:
         signs = _seen(signs, "fence", turn.t_s)   # outside already, and the autopilot acts again
     helm = (status.mode, status.is_armed)
     if status.battery_failed is False and "battery" in before.standing:
-        turn.update(battery_critical=False)
-    turn.update(signs=replace(signs, standing=up, breaches=status.fence_breaches, helm=helm, helm_s=turn.t_s))
-    stop = turn.state.stop
+        turn.set(alarms=changed(turn.state.alarms, battery_critical=False))
+    turn.set(operator=changed(
+        turn.state.operator,
+        signs=replace(signs, standing=up, breaches=status.fence_breaches, helm=helm, helm_s=turn.t_s)))
+    stop = turn.state.operator.stop
     if status.is_armed and status.mode not in STOPPING:
-        turn.update(stop=None)
+        turn.set(operator=changed(turn.state.operator, stop=None))
     elif stop is not None and _is_ours(turn):
-        turn.update(stop=replace(stop, mode=status.mode, is_armed=True))   # a loiter that we asked for in it
+        # a loiter that we asked for in it
+        turn.set(operator=changed(turn.state.operator, stop=replace(stop, mode=status.mode, is_armed=True)))
     elif (stop is not None and (stop.mode, stop.is_armed) != helm) or (stop is None and _was_sailed(turn, before)):
-        turn.update(stop=Stop(
-            t_s=turn.t_s, before_s=before.helm_s, mode=status.mode, is_armed=status.is_armed, cause=PERSON))
-    stop = turn.state.stop
+        turn.set(operator=changed(turn.state.operator, stop=Stop(
+            t_s=turn.t_s, before_s=before.helm_s, mode=status.mode, is_armed=status.is_armed, cause=PERSON)))
+    stop = turn.state.operator.stop
     if stop is not None and turn.t_s - stop.t_s <= TOLD_S:
-        turn.update(stop=replace(stop, cause=_cause(stop, turn.state.signs)))
+        turn.set(operator=changed(
+            turn.state.operator, stop=replace(stop, cause=_cause(stop, turn.state.operator.signs))))
 
 
 def _was_sailed(turn: Turn, before: Signs) -> bool:
     """Return whether somebody's mission or course was being sailed; at the first look, whether the state says so."""
     if before.helm is None:
-        saved = turn.state.adoptable
+        saved = turn.state.mission.adoptable
         return saved is not None and saved.sailing
     return before.helm[1] and before.helm[0] in SAILED and not _is_ours(turn)
 
@@ -129,15 +134,17 @@ def _cause(stop: Stop, signs: Signs) -> str:
 
 def take_over(turn: Turn) -> bool:
     """Make a failsafe's stop ours to end, where the table and the operator allow it; False: somebody else's."""
-    stop, may = turn.state.stop, turn.snapshot.permissions
+    stop, may = turn.state.operator.stop, turn.snapshot.permissions
     if stop is None or not stop.is_armed or stop.cause == PERSON or not (may.may_set_mode and may.may_upload):
         return False
     answer = turn.config.ends.answer(stop.cause)
     if answer is None or answer is Answer.LEAVE or stop.mode is None:
         return False
-    turn.update(
-        own_mode=stop.mode, operator_since_s=None, after_operator=True, plan_retry=PATIENT, answering=stop.cause,
-        sent_home=stop.mode in HOMEWARD)
+    turn.set(
+        steering=changed(turn.state.steering, own_mode=stop.mode),
+        operator=changed(
+            turn.state.operator, since_s=None, is_back=True, answering=stop.cause, sent_home=stop.mode in HOMEWARD),
+        plans=changed(turn.state.plans, retry=PATIENT))
     turn.phase(Phase.HOLDING, waits_for(turn) or "stopped: waiting for a plan from where she is")
     turn.say(Severity.WARNING, f"{stop.cause} failsafe",
              f"put into {stop.mode.name} by the autopilot's {stop.cause} failsafe: {answer.value}", every_s=0.0)
@@ -168,11 +175,12 @@ def keeps_off(turn: Turn) -> bool:
 
 def _others_way(turn: Turn) -> tuple[str, list[PointEn]]:
     """Return whose way is sailed that is not ours to plan, and its points ahead; none where it is ours, or no way."""
-    state, stop, status = turn.state, turn.state.stop, turn.autopilot
-    if status is None or not status.is_armed or not (state.foreign or not turn.snapshot.permissions.may_upload):
+    state, stop, status = turn.state, turn.state.operator.stop, turn.autopilot
+    if status is None or not status.is_armed or not (state.mission.foreign or not turn.snapshot.permissions.may_upload):
         return "", []
-    if status.mode is Mode.AUTO and state.foreign and state.read_items is not None and status.mission_seq:
-        items = [item for item in state.read_items[status.mission_seq - 1:] if item.command in _SAILED_TO]
+    aboard = state.mission.read_items
+    if status.mode is Mode.AUTO and state.mission.foreign and aboard is not None and status.mission_seq:
+        items = [item for item in aboard[status.mission_seq - 1:] if item.command in _SAILED_TO]
         return "the mission on the autopilot, which is not ours,", [
             turn.voyage.frame.en_from_geo(item.point) for item in items]
     far_m, course, boat = status.waypoint_distance_m, status.target_bearing_rad, turn.boat_en
@@ -197,19 +205,20 @@ def _begin(way: list[PointEn], far_m: float) -> list[PointEn]:
 def is_answered(turn: Turn) -> bool:
     """Return whether she lies in a stop that is ours to end."""
     status = turn.autopilot
-    held = status is not None and turn.state.stop is not None and (
-        status.mode is turn.state.own_mode or turn.is_leaving)
-    return bool(turn.state.answering) and held
+    held = status is not None and turn.state.operator.stop is not None and (
+        status.mode is turn.state.steering.own_mode or turn.is_leaving)
+    return bool(turn.state.operator.answering) and held
 
 
 def waits_for(turn: Turn) -> str:
     """Return what is missing before the boat can be planned for; empty: nothing."""
     status = turn.autopilot
-    stop = turn.state.stop
+    stop = turn.state.operator.stop
     ill = status is None or not status.ekf_ok
-    if not ill and status is not None and stop is not None and turn.state.answering == "position":
+    if not ill and status is not None and stop is not None and turn.state.operator.answering == "position":
         # The filter takes a jump before its failsafe is over.
-        ill = status.system_status == CRITICAL and dict(turn.state.signs.seen_s).get(SHORE, -math.inf) < stop.before_s
+        shore_s = dict(turn.state.operator.signs.seen_s).get(SHORE, -math.inf)
+        ill = status.system_status == CRITICAL and shore_s < stop.before_s
     if ill:
         return "stopped: waiting until the autopilot's position filter is well"
     if turn.boat_en is None:
@@ -219,31 +228,34 @@ def waits_for(turn: Turn) -> str:
 
 def follow_answer(turn: Turn) -> None:
     """Let go of an answer whose cause is over, or that a person has taken out of our hands."""
-    state, stop = turn.state, turn.state.stop
-    if not state.answering or turn.autopilot is None:
+    state, stop = turn.state, turn.state.operator.stop
+    if not state.operator.answering or turn.autopilot is None:
         return
     if is_answered(turn):
         if stop is not None and (stop.cause == PERSON or (
-                state.signs.rc_moved_s > stop.t_s and RECEIVER not in state.signs.standing)):
-            turn.update(answering="", own_mode=None, stop=replace(stop, cause=PERSON))
+                state.operator.signs.rc_moved_s > stop.t_s and RECEIVER not in state.operator.signs.standing)):
+            turn.set(
+                operator=changed(turn.state.operator, answering="", stop=replace(stop, cause=PERSON)),
+                steering=changed(turn.state.steering, own_mode=None))
         elif stop is not None and turn.config.ends.answer(stop.cause) is not Answer.LEAVE:
-            turn.update(answering=stop.cause)   # a better sign came late
+            turn.set(operator=changed(turn.state.operator, answering=stop.cause))   # a better sign came late
         return
     if turn.autopilot.mode is Mode.AUTO and not _has_asked_for_auto(turn):
         turn.say(Severity.NOTICE, "answered", "a person has set AUTO: sailing on", every_s=0.0)
-        turn.update(answering="")
+        turn.set(operator=changed(turn.state.operator, answering=""))
         return
-    is_over = state.answering == SHORE and SHORE not in state.signs.standing   # of the others a person says so
-    if is_over or turn.config.ends.answer(state.answering) is Answer.SAIL_ON:
-        turn.update(answering="")
+    # of the others a person says so
+    is_over = state.operator.answering == SHORE and SHORE not in state.operator.signs.standing
+    if is_over or turn.config.ends.answer(state.operator.answering) is Answer.SAIL_ON:
+        turn.set(operator=changed(turn.state.operator, answering=""))
 
 
 def _has_asked_for_auto(turn: Turn) -> bool:
     """Return whether AUTO shows by our own order: at the change of mode, the only moment when it matters."""
     state = turn.state
-    if state.own_mode is None:
+    if state.steering.own_mode is None:
         return True   # seen before
-    pending = state.pending_command is not None and state.pending_command[2] == Mode.AUTO.name
-    accepted = state.accepted is not None and state.accepted[0] == Mode.AUTO.name and (
-        turn.t_s - state.accepted[1] <= ASKED_S)
+    pending = state.pending.command is not None and state.pending.command[2] == Mode.AUTO.name
+    accepted = state.pending.accepted is not None and state.pending.accepted[0] == Mode.AUTO.name and (
+        turn.t_s - state.pending.accepted[1] <= ASKED_S)
     return pending or accepted

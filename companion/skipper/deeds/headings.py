@@ -100,7 +100,7 @@ def desired_heading_rad(turn: Turn) -> float | None:
         return sailable_rad(wrap_pi(wanted + drift), vehicle.heading_rad, twd, half, gate.side)
     along = wrap_pi(bearing_rad(*leg) + drift)
     off_wind = difference_rad(along, twd)
-    is_last = turn.state.index == turn.last_waypoint() and distance_m(boat, leg[1]) < turn.config.grid_size_m
+    is_last = turn.state.mission.index == turn.last_waypoint() and distance_m(boat, leg[1]) < turn.config.grid_size_m
     if is_last or distance_m(*leg) < 1.0 or abs(off_wind) < half:
         # On a leg that the wind has closed she goes about where the other tack is nearer to its end.
         return sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), vehicle.heading_rad, twd, half)

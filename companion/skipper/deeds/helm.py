@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from companion.frozen import changed
 from companion.messages import MissionState, Mode
 from companion.skipper.planning.uploads import upload
 from companion.skipper.step.actions import Action, Arm, RunMotor, SetCurrent, SetMode, Severity, Tack
@@ -19,27 +20,30 @@ CHECK_S = 3.0   # MISSION_CURRENT comes once a second: by then it shows what was
 def is_busy(turn: Turn, what: str) -> bool:
     """Return whether a command is unanswered, the last refusal too fresh, or this one just accepted."""
     state = turn.state
-    if state.pending_command is not None or turn.t_s < state.command_retry.not_before_s:
+    if state.pending.command is not None or turn.t_s < state.pending.command_retry.not_before_s:
         return True
-    return state.accepted is not None and state.accepted[0] == what and turn.t_s < state.accepted[1] + SHOWS_S
+    name, accepted_s = state.pending.accepted or ("", 0.0)
+    return name == what and turn.t_s < accepted_s + SHOWS_S
 
 
-def _ask(turn: Turn, what: str, order: Callable[[int], Action], **changes: object) -> bool:
-    """Give an order, and note ``changes`` with it; False when not permitted or not now."""
+def _ask(turn: Turn, what: str, order: Callable[[int], Action]) -> bool:
+    """Give an order; False when not permitted or not now."""
     if is_busy(turn, what):
         return False
     number = turn.new_id()
     if not turn.act(order(number)):
         return False
-    turn.update(pending_command=(number, turn.t_s, what), **changes)
+    turn.set(pending=changed(turn.state.pending, command=(number, turn.t_s, what)))
     return True
 
 
 def set_mode(turn: Turn, mode: Mode, text: str) -> bool:
     """Ask for a mode; False when not permitted or not now."""
-    return turn.snapshot.permissions.may_set_mode and _ask(
-        turn, mode.name, lambda number: SetMode(command_id=number, mode=mode, text=text),
-        own_mode=None if mode is Mode.AUTO else mode)
+    if not turn.snapshot.permissions.may_set_mode or not _ask(
+            turn, mode.name, lambda number: SetMode(command_id=number, mode=mode, text=text)):
+        return False
+    turn.set(steering=changed(turn.state.steering, own_mode=None if mode is Mode.AUTO else mode))
+    return True
 
 
 def arm(turn: Turn) -> bool:
@@ -49,8 +53,9 @@ def arm(turn: Turn) -> bool:
 
 def tack(turn: Turn, code: str, text: str) -> bool:
     """Ask for a tack, announced by ``code``; False when not permitted or not now."""
-    if not _ask(turn, TACK, lambda number: Tack(command_id=number, text=text), tacked_s=turn.t_s):
+    if not _ask(turn, TACK, lambda number: Tack(command_id=number, text=text)):
         return False
+    turn.set(steering=changed(turn.state.steering, tacked_s=turn.t_s))
     turn.say(Severity.NOTICE, code, text)
     return True
 
@@ -63,19 +68,20 @@ def run_motor(turn: Turn, *, on: bool, text: str) -> bool:
 
 def make_current(turn: Turn, seq: int) -> bool:
     """Make an item current and the mission run (p2 = 1); False when not permitted or not now."""
-    return _ask(
-        turn, CURRENT, lambda number: SetCurrent(command_id=number, seq=seq, reset=True),
-        current_asked_s=turn.t_s, asked_seq=seq, index=seq - 1)
+    if not _ask(turn, CURRENT, lambda number: SetCurrent(command_id=number, seq=seq, reset=True)):
+        return False
+    turn.set(mission=changed(turn.state.mission, asked_s=turn.t_s, asked_seq=seq, index=seq - 1))
+    return True
 
 
 def check_current(turn: Turn) -> None:
     """See that the item made current is sailed for; ask again when it is not."""
-    status, asked = turn.autopilot, turn.state.asked_seq
-    if asked is None or status is None or turn.t_s - turn.state.current_asked_s < CHECK_S:
+    status, asked = turn.autopilot, turn.state.mission.asked_seq
+    if asked is None or status is None or turn.t_s - turn.state.mission.asked_s < CHECK_S:
         return
     stopped = status.mission_state in {MissionState.NOT_STARTED, MissionState.COMPLETE}
     if status.mission_seq is not None and status.mission_seq >= asked and not stopped:
-        turn.update(asked_seq=None)
+        turn.set(mission=changed(turn.state.mission, asked_seq=None))
         return
     make_current(turn, asked)
 
@@ -85,45 +91,47 @@ def leave_passed(turn: Turn) -> None:
 
     The list was made for a boat that had not come so far; sent back it would turn round in whatever water there is.
     """
-    state, route, boat = turn.state, turn.state.route, turn.boat_en
-    if route is None or boat is None or state.pending_upload is not None or turn.t_s - state.uploaded_s > CHECK_S:
+    state, route, boat = turn.state, turn.state.mission.route, turn.boat_en
+    if route is None or boat is None or state.pending.upload is not None or (
+            turn.t_s - state.mission.uploaded_s > CHECK_S):
         return
-    area, floor_m, index = turn.voyage.area, turn.config.margin_floor_m, state.index
+    area, floor_m, index = turn.voyage.area, turn.config.margin_floor_m, state.mission.index
     while index < turn.last_waypoint() and route.gate_of[index] < 0 and is_past(
             boat, route.leg_from_en_m[index], route.points_en_m[index]):
         back_m, on_m = (area.path_clearance_m([boat, route.points_en_m[n]]) for n in (index, index + 1))
         if on_m < min(floor_m, back_m):
             break
         index += 1
-    if index > state.index and make_current(turn, index + 1):
-        turn.say(Severity.NOTICE, "passed", f"item {state.index + 1} was passed while it was on its way: "
+    if index > state.mission.index and make_current(turn, index + 1):
+        turn.say(Severity.NOTICE, "passed", f"item {state.mission.index + 1} was passed while it was on its way: "
                  f"sailing for item {index + 1}", every_s=0.0)
 
 
 def repair(turn: Turn) -> bool:
     """Put right a mission that an interrupted upload left as a mixture; True while that is going on."""
     state = turn.state
-    if not state.repair:
+    if not state.mission.repair:
         return False
-    route = state.unsure_route or state.route
+    route = state.mission.unsure_route or state.mission.route
     if route is None:
-        turn.update(repair=False)
+        turn.set(mission=changed(turn.state.mission, repair=False))
         return False
     turn.phase(state.phase, "waiting for the mission on board, a mixture of two of ours, to be uploaded whole")
-    if state.pending_upload is None and turn.t_s >= state.upload_retry.not_before_s:
-        index = min(state.index, len(route.items) - 1)
-        turn.update(repair=False)
+    if state.pending.upload is None and turn.t_s >= state.pending.upload_retry.not_before_s:
+        index = min(state.mission.index, len(route.items) - 1)
+        turn.set(mission=changed(turn.state.mission, repair=False))
         upload(turn, route, index + 1, "an upload was cut short: the whole mission again", whole=True)
     return True
 
 
 def hand_back(turn: Turn) -> None:
     """Give the helm back to AUTO at the item that the boat has come to."""
-    status, route = turn.autopilot, turn.state.route
-    if status is None or route is None or turn.state.own_mode is None or status.mode is not turn.state.own_mode:
+    status, route = turn.autopilot, turn.state.mission.route
+    own = turn.state.steering.own_mode
+    if status is None or route is None or own is None or status.mode is not own:
         return
-    own, seq = turn.state.own_mode, min(turn.state.index + 1, len(route.items))
+    seq = min(turn.state.mission.index + 1, len(route.items))
     if status.mission_seq != seq:
         make_current(turn, seq)
     elif set_mode(turn, Mode.AUTO, "back to the mission"):
-        turn.update(own_mode=own)
+        turn.set(steering=changed(turn.state.steering, own_mode=own))

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from companion.boat import required_margin
+from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode
 from companion.skipper.deeds.helm import arm, make_current, repair, set_mode
@@ -30,25 +31,26 @@ STALE_S = 60.0           # a plan that waits for permission is renewed no more o
 def start(turn: Turn) -> None:
     """Get a first plan on board."""
     state, snapshot = turn.state, turn.snapshot
-    if state.pending_upload is not None:
+    if state.pending.upload is not None:
         turn.phase(Phase.WAITING, "waiting for the first plan's upload")
         return
-    if state.pending_plan is not None:
+    if state.pending.plan is not None:
         turn.phase(Phase.NEW_CALCULATION, "making the first plan")
         return
-    if state.ready_route is not None and turn.t_s - state.ready_route.plan_t_s < 60.0:
+    if state.plans.ready_route is not None and turn.t_s - state.plans.ready_route.plan_t_s < 60.0:
         turn.phase(Phase.WAITING, f"a plan is ready; waiting for permission to upload it: {MAY_UPLOAD}")
         if snapshot.permissions.may_upload:
-            upload(turn, state.ready_route, 1, "the first plan")
+            upload(turn, state.plans.ready_route, 1, "the first plan")
         return
-    shut = next(filter(None, (fenced_off(turn, gate) for gate in turn.gates[turn.state.gate:])), "")
+    shut = next(filter(None, (fenced_off(turn, gate) for gate in turn.gates[turn.state.progress.gate:])), "")
     if shut:
         turn.phase(Phase.WAITING, f"waiting: {shut}")
         turn.say(Severity.ERROR, "fenced off", f"not setting sail: {shut}")
         return
     wants = []
     if turn.boat_en is None:
-        wants.append("a position" + (f" that can be believed: {state.doubt.why}" if state.doubt is not None else ""))
+        wants.append("a position" + (
+            f" that can be believed: {state.position.doubt.why}" if state.position.doubt is not None else ""))
     if turn.autopilot is not None and not turn.autopilot.ekf_ok:
         wants.append("the autopilot's position filter (EKF)")
     wind = snapshot.wind
@@ -59,11 +61,11 @@ def start(turn: Turn) -> None:
     elif wind.record_s < turn.config.wind_settle_s:
         wants.append(f"{turn.config.wind_settle_s - wind.record_s:.0f} s more of wind")
     wants += winds_wanted(turn)
-    wait_s = max(state.plan_retry.not_before_s, state.upload_retry.not_before_s) - turn.t_s
+    wait_s = max(state.plans.retry.not_before_s, state.pending.upload_retry.not_before_s) - turn.t_s
     if wait_s > 0.0:
         wrong = _misplaced(turn)
         wants.append(f"the next try in {wait_s:.0f} s" + (f": {wrong}" if wrong else ""))
-    turn.update(wants=tuple(wants))
+    turn.set(wants=tuple(wants))
     if wants:
         turn.phase(Phase.WAITING, "waiting for " + ", ".join(wants))
         return
@@ -92,15 +94,17 @@ def _misplaced(turn: Turn) -> str:
 def finished(turn: Turn) -> None:
     """Nothing is left to sail: all goals were reached before this start. Watch her if she is under way."""
     status = turn.autopilot
-    if status is not None and status.is_armed and status.mode is Mode.AUTO and turn.state.route is not None:
-        turn.update(sailing=True, own_index=turn.state.index)
+    if status is not None and status.is_armed and status.mode is Mode.AUTO and turn.state.mission.route is not None:
+        turn.set(
+            voyage=changed(turn.state.voyage, sailing=True),
+            mission=changed(turn.state.mission, own_index=turn.state.mission.index))
         return
     turn.phase(Phase.DONE, ARRIVED_BEFORE)
 
 
 def _request_start(turn: Turn, text: str = "") -> bool:
     """Ask for a plan from where the boat lies: until a gate is passed, the way to the first goal begins here."""
-    if turn.state.gate == 0 and turn.boat_en is not None:
+    if turn.state.progress.gate == 0 and turn.boat_en is not None:
         turn.approach(Approach(goal=0, en_m=turn.boat_en))
     return request(turn, ReplanReason.START, text=text)
 
@@ -108,34 +112,37 @@ def _request_start(turn: Turn, text: str = "") -> bool:
 def launch(turn: Turn) -> None:
     """Set AUTO and arm, as far as the operator allows; otherwise wait and say for what."""
     status, state = turn.autopilot, turn.state
-    if status is None or state.route is None:
+    if status is None or state.mission.route is None:
         return
     if repair(turn):
         return
     turn.say(Severity.INFO, "safe ends", announcement(turn.config, turn.voyage.boat), every_s=math.inf)
     wanted = winds_wanted(turn)
     if wanted and not (status.mode is Mode.AUTO and status.is_armed):
-        turn.update(sailing=False)
+        turn.set(voyage=changed(turn.state.voyage, sailing=False))
         turn.phase(Phase.WAITING, f"not setting sail: waiting for {' and '.join(wanted)}")
         return
     stale = _stale(turn)
-    if state.pending_upload is not None or state.pending_plan is not None:
-        what = "a new plan" if state.pending_plan is not None else "a new plan's upload"
+    if state.pending.upload is not None or state.pending.plan is not None:
+        what = "a new plan" if state.pending.plan is not None else "a new plan's upload"
         turn.phase(Phase.WAITING, f"waiting for {what} before setting sail" + (f": {stale}" if stale else ""))
         return
     if status.mode is Mode.AUTO and status.is_armed:
-        turn.update(sailing=True, history=(), own_index=state.index)
+        turn.set(
+            voyage=changed(turn.state.voyage, sailing=True),
+            progress=changed(turn.state.progress, history=()),
+            mission=changed(turn.state.mission, own_index=state.mission.index))
         turn.phase(Phase.STANDARD, "under way")
         turn.say(Severity.NOTICE, "under way", "AUTO and armed: under way", every_s=0.0)
         _look_at_margin(turn)
         _look_at_home(turn)
         if status.mission_state in {MissionState.COMPLETE, MissionState.NOT_STARTED, MissionState.PAUSED}:
-            make_current(turn, state.index + 1)
+            make_current(turn, state.mission.index + 1)
         return
-    turn.update(sailing=False)
+    turn.set(voyage=changed(turn.state.voyage, sailing=False))
     if stale:
-        earliest_s = state.last_plan_s + turn.config.no_go_replan_interval_s
-        wait_s = max(state.plan_retry.not_before_s, state.upload_retry.not_before_s, earliest_s) - turn.t_s
+        earliest_s = state.plans.last_s + turn.config.no_go_replan_interval_s
+        wait_s = max(state.plans.retry.not_before_s, state.pending.upload_retry.not_before_s, earliest_s) - turn.t_s
         if wait_s > 0.0:
             why = f"the next try in {wait_s:.0f} s to plan anew"
         elif _request_start(turn, f"{stale}, before setting sail"):
@@ -186,13 +193,13 @@ def _look_at_home(turn: Turn) -> None:
 
 def _stale(turn: Turn) -> str:
     """Return why the plan no longer fits, in words; empty: it does, or what has changed may wait."""
-    boat, leg, wind, route = turn.boat_en, turn.leg(), turn.wind_mean, turn.state.route
+    boat, leg, wind, route = turn.boat_en, turn.leg(), turn.wind_mean, turn.state.mission.route
     if boat is None or leg is None or wind is None or route is None or turn.snapshot.wind.forecast is None:
         return ""
     wrong = _misplaced(turn)
     if wrong:
         return wrong
-    age_s, config = turn.t_s - turn.state.last_plan_s, turn.config
+    age_s, config = turn.t_s - turn.state.plans.last_s, turn.config
     clear_m = turn.voyage.area.path_clearance_m([boat, leg[1]])
     if clear_m < min(config.margin_floor_m, config.margin_m):
         where = f"{max(0.0, clear_m):.0f} m from {turn.voyage.area.nearest_name(boat)} on the way to the first waypoint"

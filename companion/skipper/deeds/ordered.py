@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from companion.frozen import changed
 from companion.messages import Mode
 from companion.orders import FAR, LOCAL, MAVLINK, Answer, Order, Result, Verb, lead_in, permitted
 from companion.skipper.board.adoption import adopt
@@ -35,9 +36,9 @@ _PERMITTED_BY = {MAVLINK: "orders", LOCAL: "local_orders", FAR: "far_orders"}
 
 def take_orders(turn: Turn) -> None:
     """Answer the orders of this step, each once and in the order in which they came; see what stands through."""
-    standing = turn.state.standing
+    standing = turn.state.orders.standing
     if standing is not None and standing.since_s is None:
-        turn.update(standing=replace(standing, since_s=turn.t_s))
+        turn.set(orders=changed(turn.state.orders, standing=replace(standing, since_s=turn.t_s)))
         turn.say(Severity.NOTICE, CODE, f"since before this start she is under an order: {standing.words}, "
                  f"{standing.why}", every_s=0.0)
     for event in turn.snapshot.events:
@@ -47,14 +48,15 @@ def take_orders(turn: Turn) -> None:
 
 
 def _answer(turn: Turn, order: Order) -> None:
-    lately = tuple(a for a in turn.state.answered if turn.t_s - a.t_s <= REMEMBERED_S)
+    lately = tuple(a for a in turn.state.orders.answered if turn.t_s - a.t_s <= REMEMBERED_S)
     before = next((a for a in lately if a.order.key == order.key), None)
     if before is not None and order.wanted.verb is not Verb.WHY:
         answer = before.answer
     else:
         answer = _judged(turn, order)
         others = tuple(a for a in lately if a.order.source != order.source)
-        turn.update(answered=(*others, Answered(order=order, answer=answer, t_s=turn.t_s))[-STATIONS:])
+        turn.set(orders=changed(
+            turn.state.orders, answered=(*others, Answered(order=order, answer=answer, t_s=turn.t_s))[-STATIONS:]))
     source = order.source
     turn.act(Acknowledge(way=source.kind, system=source.system, component=source.component, command=order.command,
                          result=answer.result, text=answer.text))
@@ -88,16 +90,19 @@ def _done(text: str) -> Answer:
 
 
 def _why(turn: Turn) -> str:
-    return turn.state.standing.why if turn.state.standing is not None else ""
+    return turn.state.orders.standing.why if turn.state.orders.standing is not None else ""
 
 
 def _stand(turn: Turn, order: Order, text: str, *, place: tuple[str, tuple[float, float]] | None = None) -> Answer:
     """Let an order stand, in place of the one that stood."""
     assert order.wanted.verb is not None
-    before, by = turn.state.standing, order.source.words
+    before, by = turn.state.orders.standing, order.source.words
     name, en_m = place if place is not None else ("", None)
-    turn.update(standing=Standing(verb=order.wanted.verb, by=by, name=name, en_m=en_m, since_s=turn.t_s),
-                plan_retry=PATIENT)
+    turn.set(
+        orders=changed(
+            turn.state.orders,
+            standing=Standing(verb=order.wanted.verb, by=by, name=name, en_m=en_m, since_s=turn.t_s)),
+        plans=changed(turn.state.plans, retry=PATIENT))
     instead = f"; in place of {before.words}, {before.why}" if before is not None and before.by != by else ""
     return _done(text + instead)
 
@@ -105,15 +110,15 @@ def _stand(turn: Turn, order: Order, text: str, *, place: tuple[str, tuple[float
 def _hindrance(turn: Turn, *, ashore: bool = False) -> str:
     """Return why she cannot be sent anywhere now; empty: she can. ``ashore``: nor need she be under way."""
     state = turn.state
-    if not state.is_ours:
+    if not state.vehicle.is_ours:
         return f"no orders: {state.why}"
     if not turn.snapshot.permissions.may_upload:
         return "uploading is not permitted: the mission's [operator] set_auto"
-    if state.foreign:
-        return f"{state.foreign}: {Verb.REPLACE} or take it away first"
+    if state.mission.foreign:
+        return f"{state.mission.foreign}: {Verb.REPLACE} or take it away first"
     if state.phase is Phase.OPERATOR or turn.is_taken:
         return f"a person has her: {state.why}"
-    if not state.sailing and not ashore:
+    if not state.voyage.sailing and not ashore:
         return f"she is not under way: {state.why}"
     first = pressing(turn)
     return "" if first is None else f"this comes first: {first.sentence}"
@@ -124,13 +129,13 @@ def _hold(turn: Turn, order: Order) -> Answer:
     trouble = _hindrance(turn, ashore=True)
     if trouble:
         return _not_now(trouble)
-    turn.update(asked="")
-    if not turn.state.sailing:
+    turn.set(plans=changed(turn.state.plans, asked=""))
+    if not turn.state.voyage.sailing:
         return _stand(turn, order, f"she stays where she is, and is not set sailing until {Verb.GO_ON}")
     answer = _stand(turn, order, f"loitering here, where there is room, until {Verb.GO_ON}")
     _let_go_of_plan(turn)
-    route, boat = turn.state.route, turn.boat_en
-    if route is not None and boat is not None and turn.state.pending_upload is None and not turn.ahead() and (
+    route, boat = turn.state.mission.route, turn.boat_en
+    if route is not None and boat is not None and turn.state.pending.upload is None and not turn.ahead() and (
         distance_m(boat, route.points_en_m[-1]) > HERE_M
     ):
         hold(turn, _why(turn), anew=True)   # on her way to the loiter that ends the mission: that is not here
@@ -138,43 +143,52 @@ def _hold(turn: Turn, order: Order) -> Answer:
 
 
 def _go_on(turn: Turn, _: Order) -> Answer:
-    was = turn.state.standing
+    was = turn.state.orders.standing
     if was is None:
-        turn.update(plan_retry=PATIENT)
+        turn.set(plans=changed(turn.state.plans, retry=PATIENT))
         gate = turn.gate
-        if gate is not None and (gate.box or gate.field) is not None and turn.state.inside is not None:
-            turn.update(released=gate.goal)
-            following = turn.gates[turn.state.gate + 1] if turn.state.gate + 1 < len(turn.gates) else None
+        if gate is not None and (gate.box or gate.field) is not None and turn.state.progress.inside is not None:
+            turn.set(progress=changed(turn.state.progress, released=gate.goal))
+            after = turn.state.progress.gate + 1
+            following = turn.gates[after] if after < len(turn.gates) else None
             what = "her stay in" if gate.box is not None else "the field of"
             return _done(f"the end of {what} {gate.name}" + (f": on to {following.name}" if following else ""))
         return _done(f"no order stands: {_next(turn)}")
-    turn.update(standing=None, plan_retry=PATIENT, history=())
-    if was.verb is Verb.STOP and turn.state.sailing:
+    turn.set(
+        orders=changed(turn.state.orders, standing=None),
+        plans=changed(turn.state.plans, retry=PATIENT),
+        progress=changed(turn.state.progress, history=()))
+    if was.verb is Verb.STOP and turn.state.voyage.sailing:
         # As when a person gives her back: what is on board is compared, and planned from where she is.
-        turn.update(checked_mission=False, read_since_s=turn.t_s, after_operator=True)
+        turn.set(
+            mission=changed(turn.state.mission, checked=False, read_since_s=turn.t_s),
+            operator=changed(turn.state.operator, is_back=True))
         turn.phase(Phase.WAITING, "to go on: waiting for the mission on board to be compared")
     return _done(f"the end of {was.words}: {_next(turn)}")
 
 
 def _next(turn: Turn) -> str:
-    if turn.state.over or turn.gate is None:
+    if turn.state.voyage.over or turn.gate is None:
         return "no goal is left"
-    return f"on to {turn.gate.name}" if turn.state.sailing else f"to {turn.gate.name} when she sails"
+    return f"on to {turn.gate.name}" if turn.state.voyage.sailing else f"to {turn.gate.name} when she sails"
 
 
 def _skip_goal(turn: Turn, _: Order) -> Answer:
     gate, boat = turn.gate, turn.boat_en
-    if gate is None or turn.state.over:
+    if gate is None or turn.state.voyage.over:
         return _not_now("no goal is left")
     following = gate.goal + 1
     if following >= len(turn.voyage.legs):
         return _not_now(f"{gate.name} is the last goal: {Verb.HOLD} to stay here, {Verb.HOME} or {Verb.REFUGE}")
-    if boat is None or turn.state.adoptable is not None:
+    if boat is None or turn.state.mission.adoptable is not None:
         return _not_now("her position is not known" if boat is None else "the mission on board is being compared")
     _let_go_of_plan(turn)
     turn.approach(Approach(goal=following, en_m=boat))
     text = f"{gate.name} is given up"
-    turn.update(skipped=turn.state.skipped + 1, missed_s=None, plan_retry=PATIENT, asked=text)
+    turn.set(
+        orders=changed(turn.state.orders, skipped=turn.state.orders.skipped + 1),
+        progress=changed(turn.state.progress, missed_s=None),
+        plans=changed(turn.state.plans, retry=PATIENT, asked=text))
     return _done(f"{text}: {_next(turn)}")
 
 
@@ -184,7 +198,7 @@ def _sail_to(turn: Turn, order: Order, found: tuple[str, tuple[float, float]] | 
     trouble = _hindrance(turn)
     if trouble:
         return _not_now(trouble)
-    turn.update(asked="")
+    turn.set(plans=changed(turn.state.plans, asked=""))
     answer = _stand(turn, order, "", place=found)
     bound = errand(turn)
     return replace(answer, text=f"to {bound.name if bound is not None else found[0]}, {then}{answer.text}")
@@ -205,11 +219,11 @@ def _goal(turn: Turn, order: Order) -> Answer:
 def _replan(turn: Turn, order: Order) -> Answer:
     bound = errand(turn)
     trouble = _hindrance(turn)
-    if not trouble and (turn.state.over if bound is None else not bound.has_place or is_at_rest(turn)):
+    if not trouble and (turn.state.voyage.over if bound is None else not bound.has_place or is_at_rest(turn)):
         trouble = f"there is nothing to plan: {turn.state.why}"
     if trouble:
         return _not_now(trouble)
-    turn.update(asked=f"asked for by {order.source.words}", plan_retry=PATIENT)
+    turn.set(plans=changed(turn.state.plans, asked=f"asked for by {order.source.words}", retry=PATIENT))
     return _done("a new plan from here is asked for")
 
 
@@ -217,11 +231,14 @@ def _stop(turn: Turn, order: Order) -> Answer:
     if turn.is_given_up:
         return _stand(turn, order, "she is given up already")
     _let_go_of_plan(turn)
-    status, is_busy = turn.autopilot, turn.state.pending_upload is not None
+    status, is_busy = turn.autopilot, turn.state.pending.upload is not None
     if not is_busy:
         turn.act(StopOrders(text="she is given up"))
-    turn.update(pending_read=None, pending_command=None, steering_until_s=None, by_field=ByField(), asked="",
-                ready_route=None)
+    turn.set(
+        pending=changed(turn.state.pending, read=None, command=None),
+        steering=changed(turn.state.steering, until_s=None),
+        by_field=ByField(),
+        plans=changed(turn.state.plans, asked="", ready_route=None))
     mode = "an unknown mode" if status is None or status.mode is None else status.mode.name
     upload = ", but for the end of an upload that is under way" if is_busy else ""
     return _stand(turn, order, f"nothing more is asked of her until {Verb.GO_ON}{upload}; she is in {mode}")
@@ -233,12 +250,12 @@ def _adopt(turn: Turn, _: Order) -> Answer:
 
 
 def _replace(turn: Turn, _: Order) -> Answer:
-    if not turn.state.foreign:
+    if not turn.state.mission.foreign:
         return _not_now("the mission on board is not a stranger's, or is not known yet")
     if not turn.snapshot.permissions.may_upload:
         return Answer(result=Result.REFUSED, text="uploading is not permitted: the mission's [operator] set_auto")
-    text = turn.state.foreign
-    turn.update(foreign="", adoptable=None, replace_foreign=True)
+    text = turn.state.mission.foreign
+    turn.set(mission=changed(turn.state.mission, foreign="", adoptable=None, replace_foreign=True))
     return _done(f"it is replaced: {text}")
 
 
@@ -246,7 +263,7 @@ def _say_why(turn: Turn, _: Order) -> Answer:
     state = turn.state
     tack_s = next_tack_s(turn, turn.voyage.boat.polar) if turn.config.sails else None
     tack = "" if tack_s is None else f"; next tack in {tack_s:.0f} s"
-    order = state.standing
+    order = state.orders.standing
     under = "" if order is None else f"; {order.words} for {order.age_s(turn.t_s) / 60.0:.0f} min, {order.why}"
     return _done(f"{state.phase.value}: {state.why}{tack}{under}")
 
@@ -259,29 +276,30 @@ _DEEDS: dict[Verb, Callable[[Turn, Order], Answer]] = {
 
 
 def _let_go_of_plan(turn: Turn) -> None:
-    if turn.state.pending_plan is not None:
-        turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
-        turn.update(pending_plan=None)
+    if turn.state.pending.plan is not None:
+        turn.act(CancelPlan(request_id=turn.state.pending.plan.request_id))
+        turn.set(pending=changed(turn.state.pending, plan=None))
 
 
 # --------------------------------------------------------------------------------------------- standing
 def _see_through(turn: Turn) -> None:
     """End an order to sail to a place once she is there: the goals that are left are next."""
-    standing, bound, boat = turn.state.standing, errand(turn), turn.boat_en
-    if standing is None or bound is None or bound.kind is not Kind.GOAL or boat is None or not turn.state.sailing:
+    standing, bound, boat = turn.state.orders.standing, errand(turn), turn.boat_en
+    if standing is None or bound is None or bound.kind is not Kind.GOAL or boat is None or (
+            not turn.state.voyage.sailing):
         return
     off_m = distance_m(boat, bound.en_m)
     if off_m > bound.radius_m and not is_at_rest(turn):
         return
-    turn.update(standing=None, plan_retry=PATIENT)
+    turn.set(orders=changed(turn.state.orders, standing=None), plans=changed(turn.state.plans, retry=PATIENT))
     turn.say(Severity.NOTICE, CODE, f"{standing.words} reached, {off_m:.1f} m from it: {_next(turn)}", every_s=0.0)
 
 
 def holds_ashore(turn: Turn) -> bool:
     """Say that an order keeps her from being set sailing, while it does."""
-    status, standing = turn.autopilot, turn.state.standing
-    is_under_way = turn.state.sailing or (
-        turn.state.route is not None and status is not None and status.is_armed and status.mode is Mode.AUTO)
+    status, standing = turn.autopilot, turn.state.orders.standing
+    is_under_way = turn.state.voyage.sailing or (
+        turn.state.mission.route is not None and status is not None and status.is_armed and status.mode is Mode.AUTO)
     if standing is None or standing.verb is not Verb.HOLD or is_under_way:
         return False
     turn.phase(Phase.WAITING, f"held, {standing.why}: waiting {UNTIL_TOLD}")
@@ -292,6 +310,6 @@ def leaves_alone(turn: Turn) -> bool:
     """Say that she is given up, while she is; True: nothing is asked of her."""
     if not turn.is_given_up:
         return False
-    turn.phase(Phase.OPERATOR if turn.state.sailing else Phase.WAITING,
+    turn.phase(Phase.OPERATOR if turn.state.voyage.sailing else Phase.WAITING,
                f"given up, {_why(turn)}: nothing is asked of her, waiting {UNTIL_TOLD}")
     return True

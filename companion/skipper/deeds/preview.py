@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from companion.frozen import changed
 from companion.orders import Verb, Wanted
 from companion.skipper.deeds.ordered_places import goal_place, home_place, refuge_place
 from companion.skipper.planning.asking import lacks, request
@@ -23,8 +24,10 @@ def preview(turn: Turn, wanted: Wanted) -> RequestPlan | str:
     if isinstance(found, str):
         return found
     name, en_m = found
-    turn.update(pending_plan=None, standing=Standing(
-        verb=wanted.verb, by="a preview", name=name, en_m=en_m, since_s=turn.t_s))
+    turn.set(
+        pending=changed(turn.state.pending, plan=None),
+        orders=changed(turn.state.orders, standing=Standing(
+            verb=wanted.verb, by="a preview", name=name, en_m=en_m, since_s=turn.t_s)))
     missing = lacks(turn)
     if missing:
         return f"for a plan there is no {missing}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.deeds.adrift import stops_drift
@@ -47,18 +48,18 @@ ROUTINE = frozenset({
 def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
     """Act for one step under way."""
     bound = errand(turn)
-    if bound is None and (turn.gate is None or turn.state.over):
-        if not (stands_off(turn) or (turn.state.over and stops_drift(turn))):
+    if bound is None and (turn.gate is None or turn.state.voyage.over):
+        if not (stands_off(turn) or (turn.state.voyage.over and stops_drift(turn))):
             rest(turn)
         return
     if stands_off(turn):
-        if turn.state.doubt is None and turn.state.pending_upload is None:
+        if turn.state.position.doubt is None and turn.state.pending.upload is None:
             _consider(turn, fresh)   # from where she is known to be, while her loiter is begun anew
         return
     if stops_drift(turn) or holds(turn) or brakes(turn):
         return
-    stopped = turn.state.own_mode in STOPPING
-    if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.own_mode:
+    stopped = turn.state.steering.own_mode in STOPPING
+    if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.steering.own_mode:
         _sail_on(turn, fresh)
         return
     if last_resort(turn):
@@ -67,7 +68,7 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         return
     if _steer(turn, fresh):
         return
-    own = turn.state.own_mode
+    own = turn.state.steering.own_mode
     if own is not None and turn.autopilot is not None and turn.autopilot.mode is own and not turn.steers:
         hand_back(turn)
         turn.phase(turn.state.phase, "waiting for AUTO after steering")
@@ -85,12 +86,12 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         check_current(turn)
         short_tack(turn)
         shift_tack(turn)
-    if turn.is_raised("stuck waypoint") and turn.state.own_index > turn.state.index:
-        make_current(turn, turn.state.own_index + 1)
+    if turn.is_raised("stuck waypoint") and turn.state.mission.own_index > turn.state.mission.index:
+        make_current(turn, turn.state.mission.own_index + 1)
     if bound is not None and not bound.has_place:
         _stay(turn, bound)
         return
-    if turn.state.pending_upload is None:
+    if turn.state.pending.upload is None:
         _consider(turn, fresh)
     _name(turn)
 
@@ -109,12 +110,12 @@ def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
     stays = bound is not None and not bound.has_place
     if bound is not None and stays and not (is_at_rest(turn) and (_is_outside(turn) or _is_way_clear(turn))):
         _stay(turn, bound, anew=True)
-    elif turn.state.pending_upload is None:
+    elif turn.state.pending.upload is None:
         _consider(turn, fresh)
-    if turn.state.pending_plan is not None or turn.state.pending_upload is not None:
+    if turn.state.pending.plan is not None or turn.state.pending.upload is not None:
         turn.phase(Phase.HOLDING, "waiting for the plan from where the boat has drifted to, and for its upload")
-    elif turn.state.after_operator and not stays and (turn.is_way_shut or _is_outside(turn)):
-        wait_s = turn.state.plan_retry.not_before_s - turn.t_s
+    elif turn.state.operator.is_back and not stays and (turn.is_way_shut or _is_outside(turn)):
+        wait_s = turn.state.plans.retry.not_before_s - turn.t_s
         again = f"; trying again in {wait_s:.0f} s" if wait_s > 0.0 else ""
         turn.phase(Phase.HOLDING, f"no plan yet from where the boat has drifted to: waiting for one{again}")
     else:
@@ -129,7 +130,7 @@ def _goes_on_at_once(turn: Turn) -> bool:
     that a plan and its upload take; AUTO takes one, and a plan made under way begins where she will be.
     """
     state = turn.state
-    return state.own_mode in HOMEWARD and state.pending_upload is None and bool(turn.ahead()) and (
+    return state.steering.own_mode in HOMEWARD and state.pending.upload is None and bool(turn.ahead()) and (
         not _is_outside(turn) and _is_way_clear(turn))
 
 
@@ -153,7 +154,7 @@ def _is_outside(turn: Turn) -> bool:
 
 def _stay(turn: Turn, bound: Errand, *, anew: bool = False) -> None:
     """Loiter where there is room near by; ``anew``: the loiter on board cannot be sailed to from here."""
-    if turn.state.pending_upload is None and turn.t_s >= turn.state.upload_retry.not_before_s:
+    if turn.state.pending.upload is None and turn.t_s >= turn.state.pending.upload_retry.not_before_s:
         hold(turn, bound.sentence, anew=anew)
     turn.phase(Phase.HOLDING, f"{bound.sentence}; waiting for the loiter's upload")
 
@@ -163,14 +164,14 @@ def _send_heading(turn: Turn) -> None:
     status = turn.autopilot
     if status is None:
         return
-    own = turn.state.own_mode
+    own = turn.state.steering.own_mode
     is_stopping = own in STOPPING and is_busy(turn, own.name)   # asked for, and not shown yet
     if status.mode is not Mode.GUIDED:
         if not is_stopping:
             set_mode(turn, Mode.GUIDED, f"steering by {'field' if turn.guidance is Guidance.FIELD else 'headings'}")
         return
     if not is_stopping:
-        turn.update(own_mode=Mode.GUIDED)
+        turn.set(steering=changed(turn.state.steering, own_mode=Mode.GUIDED))
     if turn.guidance is Guidance.FIELD:
         told = by_field_heading(turn)
         if told is not None:
@@ -179,8 +180,8 @@ def _send_heading(turn: Turn) -> None:
         wanted = desired_heading_rad(turn)
         if wanted is not None:
             turn.act(SteerHeading(heading_rad=wanted, text="leg"))
-    if status.mission_seq is not None and status.mission_seq < turn.state.index + 1:
-        make_current(turn, turn.state.index + 1)
+    if status.mission_seq is not None and status.mission_seq < turn.state.mission.index + 1:
+        make_current(turn, turn.state.mission.index + 1)
 
 
 def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
@@ -188,41 +189,41 @@ def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
     if trigger is None:
         return
     state = turn.state
-    if state.pending_plan is not None and not (trigger.urgent and state.pending_plan.reason is not trigger.reason):
+    if state.pending.plan is not None and not (trigger.urgent and state.pending.plan.reason is not trigger.reason):
         return
-    if turn.t_s < state.plan_retry.not_before_s and not trigger.urgent:
+    if turn.t_s < state.plans.retry.not_before_s and not trigger.urgent:
         return
     interval_s = trigger.interval_s
     if trigger.reason in ROUTINE and near(turn):
         interval_s = max(interval_s, MIN_INTERVAL_S)
     if trigger.reason in ROUTINE - {ReplanReason.OFF_LEG} and stands_on(turn):
         return   # rule 17 a i: course and speed are kept
-    if turn.t_s - state.last_plan_s < interval_s:
+    if turn.t_s - state.plans.last_s < interval_s:
         return
     if request(turn, trigger.reason, from_index=trigger.from_index, text=trigger.text):
-        changes: dict[str, object] = {"after_operator": False, "asked": ""}
-        if trigger.from_index is not None:
-            changes["replanned_index"] = trigger.from_index
-        turn.update(**changes)
+        at = turn.state.plans.replanned_index if trigger.from_index is None else trigger.from_index
+        turn.set(
+            operator=changed(turn.state.operator, is_back=False),
+            plans=changed(turn.state.plans, asked="", replanned_index=at))
 
 
 def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
     """Bear away out of irons under GUIDED; True while the helm is ours."""
     state, status, vehicle, boat, wind = (
         turn.state, turn.autopilot, turn.snapshot.vehicle, turn.boat_en, turn.wind_now)
-    if state.steering_until_s is None:
+    if state.steering.until_s is None:
         if "in irons" not in fresh or boat is None or vehicle is None or wind is None:
             return False
-        recent = tuple(t for t in state.irons_s if turn.t_s - t < IRONS_MEMORY_S)
-        turn.update(irons_s=(*recent, turn.t_s))
+        recent = tuple(t for t in state.steering.irons_s if turn.t_s - t < IRONS_MEMORY_S)
+        turn.set(steering=changed(turn.state.steering, irons_s=(*recent, turn.t_s)))
         if turn.snapshot.permissions.may_steer and set_mode(turn, Mode.GUIDED, "in irons: bearing away"):
             heading = bear_away_rad(boat, vehicle.heading_rad, wind[0], turn.voyage.area)
-            turn.update(steering_until_s=turn.t_s + STEER_S, steering_heading_rad=heading)
+            turn.set(steering=changed(turn.state.steering, until_s=turn.t_s + STEER_S, heading_rad=heading))
         else:
-            turn.update(asked=IN_IRONS)
+            turn.set(plans=changed(turn.state.plans, asked=IN_IRONS))
             return False
-    heading_rad = turn.state.steering_heading_rad or 0.0
-    until = turn.state.steering_until_s
+    heading_rad = turn.state.steering.heading_rad or 0.0
+    until = turn.state.steering.until_s
     out = vehicle is not None and wind is not None and vehicle.speed_mps > SAILS_MPS and (
         abs(difference_rad(wind[0], vehicle.heading_rad)) > SAILS_TWA_RAD)
     refused = status is not None and status.mode is Mode.AUTO and not is_busy(turn, Mode.GUIDED.name)
@@ -230,9 +231,10 @@ def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
     if over and (refused or turn.steers or set_mode(
             turn, Mode.AUTO, "sailing again" if out else "bearing away took too long")):
         # The mode we asked for ourselves stays ours until AUTO shows.
-        turn.update(
-            steering_until_s=None, steering_heading_rad=None, asked=IN_IRONS,
-            own_mode=None if refused else Mode.GUIDED)
+        turn.set(
+            steering=changed(
+                turn.state.steering, until_s=None, heading_rad=None, own_mode=None if refused else Mode.GUIDED),
+            plans=changed(turn.state.plans, asked=IN_IRONS))
         return False
     turn.act(SteerHeading(heading_rad=heading_rad, text="out of irons"))
     turn.phase(turn.state.phase, f"in irons: waiting for her to bear away to {math.degrees(heading_rad) % 360.0:.0f}°")
@@ -241,32 +243,32 @@ def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
 
 def _name(turn: Turn) -> None:
     """Name what the boat is doing, with the sentence why."""
-    state, route = turn.state, turn.state.route
+    state, route = turn.state, turn.state.mission.route
     if route is None:
         return
     step = f" ({route.rung})" if route.rung else ""
-    if state.pending_plan is not None:
-        turn.phase(Phase.NEW_CALCULATION, f"planning: {state.pending_plan.reason.value}")
+    if state.pending.plan is not None:
+        turn.phase(Phase.NEW_CALCULATION, f"planning: {state.pending.plan.reason.value}")
         return
-    raised = ", ".join(r.name for r in state.raised)
-    tail = (f"; {state.task}" if state.task else "") + (f"; {raised}" if raised else "")
+    raised = ", ".join(r.name for r in state.alarms.raised)
+    tail = (f"; {state.progress.task}" if state.progress.task else "") + (f"; {raised}" if raised else "")
     gate, bound = turn.gate, errand(turn)
     if is_composed(turn) and gate is not None and gate.field is not None:
         left_s = stay_left_s(turn, gate)
         field, time = gate.field, "" if math.isinf(left_s) else f"; {left_s:.0f} s left"
         turn.phase(Phase.STANDARD, f"{gate.name}: by field {field.tree.text}, {field.until_words}{time}{tail}")
     elif not turn.ahead():
-        wait = state.plan_retry.not_before_s - turn.t_s
+        wait = state.plans.retry.not_before_s - turn.t_s
         again = f", trying again in {wait:.0f} s" if wait > 0.0 else ""
         turn.phase(Phase.HOLDING, f"loitering in the mission's safe end: waiting for a plan{again}{tail}")
     elif bound is not None:
-        turn.phase(Phase.STANDARD, f"item {state.index + 1} of {len(route.items)} {bound.sentence}{step}{tail}")
+        turn.phase(Phase.STANDARD, f"item {state.mission.index + 1} of {len(route.items)} {bound.sentence}{step}{tail}")
     elif gate is not None and is_buoy(gate) and gate.buoy_en_m is not None and turn.boat_en is not None and (
         distance_m(turn.boat_en, gate.buoy_en_m) < 4.0 * distance_m(gate.en_m, gate.buoy_en_m)
     ):
         turn.phase(Phase.BUOY_APPROACH, f"{gate.name} to {gate.side.value}{step}{tail}")
-    elif state.index == turn.last_waypoint() and route.gate_of[state.index] == len(turn.gates) - 1:
+    elif state.mission.index == turn.last_waypoint() and route.gate_of[state.mission.index] == len(turn.gates) - 1:
         turn.phase(Phase.DESTINATION_APPROACH, f"last waypoint before {gate.name if gate else 'the end'}{step}{tail}")
     else:
-        where = f"item {state.index + 1} of {len(route.items)}"
+        where = f"item {state.mission.index + 1} of {len(route.items)}"
         turn.phase(Phase.STANDARD, f"{where} to {gate.name if gate else 'the end'}{step}{tail}")

@@ -29,8 +29,8 @@ def shift_tack(turn: Turn) -> None:
     if not turn.ahead() or status.mode is not Mode.AUTO or turn.speed_mps < LEAST_MPS or tacks_fail(turn) or (
             not turn.voyage.boat.can_tack):
         return
-    is_too_soon = turn.t_s - turn.state.tacked_s < turn.config.shift_tacks_apart_s
-    if is_too_soon or is_busy(turn, TACK) or turn.state.pending_upload is not None:
+    is_too_soon = turn.t_s - turn.state.steering.tacked_s < turn.config.shift_tacks_apart_s
+    if is_too_soon or is_busy(turn, TACK) or turn.state.pending.upload is not None:
         return
     half_rad = turn.no_go_half_rad
     off_rad = difference_rad(wind[0], vehicle.heading_rad)

@@ -37,7 +37,8 @@ def short_tack(turn: Turn) -> None:
         return
     if status.mode is not Mode.AUTO or turn.speed_mps < LEAST_MPS or not turn.voyage.boat.can_tack:
         return
-    if turn.t_s - turn.state.tacked_s < APART_S or is_busy(turn, TACK) or turn.state.pending_upload is not None:
+    is_uploading = turn.state.pending.upload is not None
+    if turn.t_s - turn.state.steering.tacked_s < APART_S or is_busy(turn, TACK) or is_uploading:
         return
     if not turn.is_closed(boat, leg[1], wind):
         return   # the leg is open: the autopilot follows it

@@ -43,13 +43,14 @@ def refusal(turn: Turn, route: Route, set_current: int | None, pending: PendingP
     ``set_current`` is the item number (1: the first) that is made current with it, None: the present one stays.
     """
     boat, vehicle = turn.boat_en, turn.snapshot.vehicle
-    if boat is None or vehicle is None or not turn.state.sailing:
+    if boat is None or vehicle is None or not turn.state.voyage.sailing:
         return ""
     problem: Problem = pending.problem
     here_m = float(turn.voyage.area.clearance_m([boat])[0]) - turn.voyage.boat.hull.reach_m
     # Below the floor, and where it has to be gybed round, a way of short legs is better than none.
     has_loops = not tacks_fail(turn) and (problem.tracking is None or here_m >= problem.tracking.floor_m)
-    first, heading_rad, begins = turn.state.index if set_current is None else set_current - 1, vehicle.heading_rad, boat
+    first = turn.state.mission.index if set_current is None else set_current - 1
+    heading_rad, begins = vehicle.heading_rad, boat
     if set_current is not None and pending.from_index is None and not pending.lead_in:
         # where she is by the time that it is on board
         begins, heading_rad = pending.start_en_m, problem.start_heading_rad
@@ -85,10 +86,12 @@ def is_open(turn: Turn, pending: PendingPlan, seen: Expected) -> bool:
 
 def leads_there(turn: Turn, pending: PendingPlan) -> bool:
     """Return whether the mission on board is ours and leads where a plan was asked for."""
-    route = turn.state.route
-    if route is None or turn.state.foreign or route.bound_for != pending.facts.bound_for:
+    route = turn.state.mission.route
+    if route is None or turn.state.mission.foreign or route.bound_for != pending.facts.bound_for:
         return False
-    return pending.gate in route.gate_of[turn.state.index:-1] if pending.gate >= 0 else bool(pending.facts.bound_for)
+    if pending.gate < 0:
+        return bool(pending.facts.bound_for)
+    return pending.gate in route.gate_of[turn.state.mission.index:-1]
 
 
 def is_on_board_sound(turn: Turn) -> bool:
@@ -114,7 +117,7 @@ def is_sound(turn: Turn, way: Sequence[PointEn]) -> bool:
 
 def _less(turn: Turn, pending: PendingPlan, new: list[PointEn], old: list[PointEn], *, heading_rad: float) -> str:
     """Return what a new way promises less of than the open one on board, in words; empty: nothing."""
-    route, facts = turn.state.route, pending.facts
+    route, facts = turn.state.mission.route, pending.facts
     assert route is not None
     if facts.margin_m < route.margin_m - MARGIN_M:
         return f"its margin is {facts.margin_m:.1f} m, that of the way on board, which is open, {route.margin_m:.1f} m"

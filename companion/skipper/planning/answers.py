@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from companion.boat.tracking import SHORT_S
+from companion.frozen import changed
 from companion.planner import Plan, PlanStatus
 from companion.planner.plan import Arrival
 from companion.planner.problem import evaluate, resolved
@@ -40,13 +41,13 @@ GYBE_RADIUS_M = 8.0      # a loop that a boat of a few metres turns in, with WP_
 
 def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
     """Take the planner's answer: splice and upload it, keep the old plan, or climb down the ladder."""
-    pending = turn.state.pending_plan
+    pending = turn.state.pending.plan
     if pending is None or pending.request_id != outcome.request_id:
         return
-    turn.update(pending_plan=None)
+    turn.set(pending=changed(turn.state.pending, plan=None))
     if turn.state.phase is Phase.OPERATOR or turn.is_taken:
         return   # the operator may have taken the boat in this very step
-    if turn.state.sailing and not turn.state.checked_mission:
+    if turn.state.voyage.sailing and not turn.state.mission.checked:
         return
     plan = outcome.plan
     if plan is None or not plan.has_path:
@@ -55,9 +56,9 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
             return
         not_found(turn, pending, reason)
         return
-    turn.update(
-        unanswered=0, effort=min(1.0, MORE * turn.state.effort),
-        rung=0, ladder_reason=None, plan_retry=turn.failed(turn.state.plan_retry) if pending.rung > 0 else Retry())
+    turn.set(plans=changed(
+        turn.state.plans, unanswered=0, effort=min(1.0, MORE * turn.state.plans.effort), rung=0, ladder_reason=None,
+        retry=turn.failed(turn.state.plans.retry) if pending.rung > 0 else Retry()))
     keep, set_current = _place(turn, pending)
     if keep is None:
         turn.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
@@ -83,29 +84,30 @@ def _may_still_turn_before(turn: Turn, waypoint_en: PointEn) -> bool:
 def _place(turn: Turn, pending: PendingPlan) -> tuple[int | None, int | None]:
     """Return how many items stay and which seq must be made current (None: none; keep None: too late)."""
     state, k = turn.state, pending.from_index
-    if state.route is None or state.foreign:
+    if state.mission.route is None or state.mission.foreign:
         return 0, 1
     if k is None:
-        return state.index, state.index + 1
+        return state.mission.index, state.mission.index + 1
     boat = turn.boat_en
-    if state.index <= k:
+    if state.mission.index <= k:
         if pending.reason in AT_WAYPOINT and boat is not None and (
-                distance_m(boat, state.route.points_en_m[state.index]) < SHORT_S * turn.speed_mps):
+                distance_m(boat, state.mission.route.points_en_m[state.mission.index]) < SHORT_S * turn.speed_mps):
             return None, None   # an upload begins the leg anew, and what is left of it is too short to be followed
         return k + 1, None
-    if state.index == k + 1 and boat is not None and distance_m(boat, pending.start_en_m) < turn.config.grid_size_m:
+    if state.mission.index == k + 1 and boat is not None and (
+            distance_m(boat, pending.start_en_m) < turn.config.grid_size_m):
         return k + 1, k + 2
     return None, None
 
 
 def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     """Keep the old plan when it is sound under the new forecast and the new one is not clearly better."""
-    route = turn.state.route
+    route = turn.state.mission.route
     if tacks_fail(turn):
         return False
     if route is None or pending.reason in {ReplanReason.START, ReplanReason.OPERATOR_BACK, ReplanReason.RETRY}:
         return False
-    first = turn.state.index if pending.from_index is None else pending.from_index + 1
+    first = turn.state.mission.index if pending.from_index is None else pending.from_index + 1
     points = route.points_en_m[first:-1]
     ends = [n for n in range(first, len(route.items) - 1) if route.gate_of[n] == pending.gate]
     if not points or not ends or pending.lead_in or route.bound_for != pending.facts.bound_for:
@@ -129,7 +131,7 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
         return False
     if problem.targets:
         tail = [(float(e), float(n)) for e, n in plan.waypoints_en]
-        way = [*route.points_en_m[turn.state.index:first], *tail]
+        way = [*route.points_en_m[turn.state.mission.index:first], *tail]
         verdict = decide(meetings(turn), since_replan_s=0.0, active_cost_s=old.time_s, new_cost_s=plan.cost_s,
                          apart_m=apart_m(turn, way))
         if verdict is not Decision.KEEP:
@@ -137,11 +139,11 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     elif gain > max(turn.config.keep_gain_s, turn.config.keep_gain * old.time_s):
         return False
     facts, when, told = pending.facts, arrival(problem, old.legs), path_risk(problem, old.legs)
-    turn.update(route=replace(
+    turn.set(mission=changed(turn.state.mission, route=replace(
         route, plan_t_s=facts.plan_t_s, plan_twd_from_rad=facts.plan_twd_from_rad, plan_tws_mps=facts.plan_tws_mps,
         plan_half_width_rad=facts.plan_half_width_rad, risk=told.total, vessel_risk=told.vessels.total,
         cost_s=old.time_s, median_s=_time(when, "median_s"), late_s=_time(when, "late_s"),
-    ))
+    )))
     turn.say(
         Severity.INFO, "plan kept",
         f"{pending.reason.value}: the old plan stays ({old.time_s:.0f} s; a new one gains {max(0.0, gain):.1f} s)",
@@ -176,24 +178,28 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
         median_s=_time(plan.arrival, "median_s"), late_s=_time(plan.arrival, "late_s"),
         expected_clearance_m=expected_m, why=plan.why.text or plan.reason)
-    old = turn.state.route
+    old = turn.state.mission.route
     if keep + len(tail.points_en) + 1 > turn.config.max_items and old is not None:
         # Start the numbering again with what is still ahead of the boat.
-        ahead = slice(turn.state.index, keep)
+        ahead = slice(turn.state.mission.index, keep)
         old = replace(old, items=old.items[ahead], points_en_m=old.points_en_m[ahead],
                       leg_from_en_m=old.leg_from_en_m[ahead], gate_of=old.gate_of[ahead])
         keep, set_current = len(old.items), 1
     route = splice(
         turn.voyage, turn.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts)
-    if turn.state.route is not None and _is_same(turn.state.route, route):
-        turn.update(
-            missed_s=None, route=replace(route, items=turn.state.route.items, points_en_m=turn.state.route.points_en_m))
+    if turn.state.mission.route is not None and _is_same(turn.state.mission.route, route):
+        turn.set(
+            progress=changed(turn.state.progress, missed_s=None),
+            mission=changed(
+                turn.state.mission,
+                route=replace(
+                    route, items=turn.state.mission.route.items, points_en_m=turn.state.mission.route.points_en_m)))
         turn.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
         return ""
-    way = route.points_en_m[turn.state.index if set_current is None else set_current - 1:-1]
+    way = route.points_en_m[turn.state.mission.index if set_current is None else set_current - 1:-1]
     met = meetings(turn)
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
-    change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.route is not None else Change()
+    change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.mission.route is not None else Change()
     _look_at_time(turn, route)
     clear = said(expected_m, turn.config.margin_floor_m)
     return upload(
@@ -216,7 +222,7 @@ def _look_at_time(turn: Turn, route: Route) -> None:
     limit_s = turn.config.voyage_timeout_s
     if limit_s is None or errand(turn) is not None or route.cost_s is None:
         return
-    left_s = limit_s - turn.state.under_way_s
+    left_s = limit_s - turn.state.voyage.under_way_s
     if route.late_s is None or route.late_s > left_s:
         late = "not told" if route.late_s is None else f"{route.late_s:.0f} s"
         turn.say(Severity.WARNING, "may be late",

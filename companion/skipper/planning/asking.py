@@ -9,6 +9,7 @@ from typing import Any
 from companion.boat.failed_tack import IRONS_S
 from companion.current import over_ground
 from companion.errors import InputError
+from companion.frozen import changed
 from companion.messages import Mode
 from companion.planner import Problem
 from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
@@ -70,7 +71,7 @@ def request(
         ))
     except (ValueError, InputError) as error:
         turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
-        turn.update(plan_retry=turn.failed(turn.state.plan_retry))
+        turn.set(plans=changed(turn.state.plans, retry=turn.failed(turn.state.plans.retry)))
         return False
     problem = replace(problem, delta_s=shared.delta_s, targets=shared.targets, vessels_part=shared.part)
     facts = replace(
@@ -80,18 +81,20 @@ def request(
         plan_half_width_rad=half_width_rad(forecast, start.after_s + WIDTH_AHEAD_S, turn.config.wind_change_level),
         vessels_part=shared.part or 0.0, bound_for=bound.name if bound is not None and not step.nearer_goal else "",
     )
-    if turn.state.pending_plan is not None:
-        turn.act(CancelPlan(request_id=turn.state.pending_plan.request_id))
+    if turn.state.pending.plan is not None:
+        turn.act(CancelPlan(request_id=turn.state.pending.plan.request_id))
     pending = PendingPlan(
         request_id=number, t_s=turn.t_s, reason=reason, from_index=from_index, rung=rung, gate=aim.gate,
         lead_in=start.lead_in, start_en_m=start.en_m, facts=facts, problem=problem,
     )
-    turn.update(
-        pending_plan=pending, last_plan_s=turn.t_s, rung=rung, ladder_reason=reason, replans=turn.state.replans + 1)
+    turn.set(
+        pending=changed(turn.state.pending, plan=pending),
+        plans=changed(
+            turn.state.plans, last_s=turn.t_s, rung=rung, ladder_reason=reason, replans=turn.state.plans.replans + 1))
     budget = turn.config.first_plan_budget_s if reason is ReplanReason.START else turn.config.plan_budget_s
     why = "; ".join(part for part in (text, start.text, f"step: {name}" if name else "") if part)
     turn.act(RequestPlan(
-        request_id=number, problem=problem, reason=reason, budget_s=turn.state.effort * budget, seed=number,
+        request_id=number, problem=problem, reason=reason, budget_s=turn.state.plans.effort * budget, seed=number,
         from_seq=None if from_index is None else from_index + 1,
         planner=step.planner.about(turn.voyage.frame.origin), rung=name, text=why,
     ))
@@ -109,13 +112,13 @@ def _failing(turn: Turn) -> dict[str, Any]:
 
 
 def _start(turn: Turn, from_index: int | None) -> Start | None:
-    boat, vehicle, route = turn.boat_en, turn.snapshot.vehicle, turn.state.route
+    boat, vehicle, route = turn.boat_en, turn.snapshot.vehicle, turn.state.mission.route
     if boat is None or vehicle is None or is_impossible(turn.voyage.area, boat, margin_m=turn.config.margin_m):
         return None
     if from_index is None:
         # Stopped, or turning in circles, she is where she is.
-        stopped = turn.state.own_mode in {Mode.HOLD, Mode.LOITER}
-        sailing = turn.state.sailing and vehicle.speed_mps > SLOW_MPS and not stopped
+        stopped = turn.state.steering.own_mode in {Mode.HOLD, Mode.LOITER}
+        sailing = turn.state.voyage.sailing and vehicle.speed_mps > SLOW_MPS and not stopped
         ahead = turn.config.plan_budget_s + UPLOAD_LATENCY_S if sailing else 0.0
         heading = math.atan2(*vehicle.velocity_en_mps) if sailing else vehicle.heading_rad
         place = moved(boat, heading, vehicle.speed_mps * ahead)
@@ -125,9 +128,9 @@ def _start(turn: Turn, from_index: int | None) -> Start | None:
         if tacking.is_counted:
             bow = tacking.settled_rad   # she lies in irons, and falls off to her old tack
         return Start(en_m=place, heading_rad=bow, after_s=ahead)
-    if route is None or not turn.state.index <= from_index < len(route.items):
+    if route is None or not turn.state.mission.index <= from_index < len(route.items):
         return None
-    way = [boat, *route.points_en_m[turn.state.index:from_index + 1]]
+    way = [boat, *route.points_en_m[turn.state.mission.index:from_index + 1]]
     speed = max(vehicle.speed_mps, SLOW_MPS)
     return Start(
         en_m=route.points_en_m[from_index],
@@ -141,7 +144,7 @@ def lacks(turn: Turn, from_index: int | None = None) -> str:
     if turn.snapshot.wind.forecast is None:
         return "a wind forecast"
     if _start(turn, from_index) is None:
-        doubt = turn.state.doubt
+        doubt = turn.state.position.doubt
         return "a position to plan from" + (f": {doubt.why}" if doubt is not None else "")
     if _target(turn, from_index) is None:
         return "a goal: none is left"
@@ -161,9 +164,9 @@ def _target(turn: Turn, from_index: int | None) -> tuple[Gate, int, Errand | Non
 
 def _gate_after(turn: Turn, from_index: int | None) -> int | None:
     """Return the gate that a plan from there is for: the first not completed before or at that item."""
-    gate, route = turn.state.gate, turn.state.route
+    gate, route = turn.state.progress.gate, turn.state.mission.route
     if from_index is not None and route is not None:
-        done = [g for g in route.gate_of[turn.state.index:from_index + 1] if g >= 0]
+        done = [g for g in route.gate_of[turn.state.mission.index:from_index + 1] if g >= 0]
         gate = max([gate, *(g + 1 for g in done)])
     return gate if gate < len(turn.gates) else None
 

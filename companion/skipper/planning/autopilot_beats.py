@@ -26,7 +26,7 @@ FOLLOWS_RAD = math.radians(10.0)   # this far outside its no-go zone the autopil
 
 def tacks_fail(turn: Turn) -> bool:
     """Return whether tacks failed, or she was in irons, so often of late that they are not tried."""
-    recent = [t for t in turn.state.irons_s if turn.t_s - t < IRONS_MEMORY_S]
+    recent = [t for t in turn.state.steering.irons_s if turn.t_s - t < IRONS_MEMORY_S]
     tacking, given = turn.state.tacking, turn.voyage.boat.tack_fails
     in_a_row = tacking.in_a_row if given > 0.0 and turn.t_s - tacking.failed_s < IRONS_MEMORY_S else 0
     return max(len(recent), in_a_row) >= TACKS_FAIL_AFTER

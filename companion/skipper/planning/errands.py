@@ -92,7 +92,7 @@ def is_composed(turn: Turn) -> bool:
 def _off_field(turn: Turn) -> Errand | None:
     """Return where she waits while the field of the goal that is next cannot be sailed, None: it can."""
     gate, may = turn.gate, turn.snapshot.permissions
-    if gate is None or gate.field is None or turn.state.over:
+    if gate is None or gate.field is None or turn.state.voyage.over:
         return None
     why = turn.state.by_field.lost or (
         "" if may.may_steer and may.may_set_mode else "its field is not sailed, for steering is not permitted")
@@ -107,7 +107,7 @@ def _off_field(turn: Turn) -> Errand | None:
 def _in_box(turn: Turn) -> Errand | None:
     """Return where she stays in the box that is next."""
     gate = turn.gate
-    if gate is None or gate.box is None or turn.state.over:
+    if gate is None or gate.box is None or turn.state.voyage.over:
         return None
     left_s = stay_left_s(turn, gate)
     until = "until told to go on" if gate.box.for_s is None else f"{left_s:.0f} s more"
@@ -118,13 +118,13 @@ def _in_box(turn: Turn) -> Errand | None:
 def _before_start(turn: Turn) -> Errand | None:
     """Return where she waits for the gun of the start line that is next."""
     gate = turn.gate
-    if gate is None or gate.line is None or turn.state.over or not waits_for_gun(turn, gate):
+    if gate is None or gate.line is None or turn.state.voyage.over or not waits_for_gun(turn, gate):
         return None
     left_s = gun_in_s(turn, gate.line)
     why = "the autopilot does not know the time of day yet" if left_s is None else "waiting for the gun"
     until = "" if left_s is None else f"{left_s:.0f} s"
     name = f"the water before {gate.name}"
-    route = turn.state.route
+    route = turn.state.mission.route
     is_bound = route is not None and route.bound_for == name and route.points_en_m
     place = route.points_en_m[turn.last_waypoint()] if route is not None and is_bound else waiting_en(turn, gate)
     return Errand(kind=Kind.START, name=name, why=why, en_m=place, until=until)
@@ -133,11 +133,11 @@ def _before_start(turn: Turn) -> Errand | None:
 def pressing(turn: Turn) -> Errand | None:
     """Return the errand that comes before every order: battery, leak, or a failsafe that is answered."""
     state, ends = turn.state, turn.config.ends
-    answer = ends.answer(state.answering)
-    why = "the autopilot has lost its link to the shore" if state.answering == SHORE else (
-        f"the autopilot's {state.answering} failsafe")
+    answer = ends.answer(state.operator.answering)
+    why = "the autopilot has lost its link to the shore" if state.operator.answering == SHORE else (
+        f"the autopilot's {state.operator.answering} failsafe")
     if answer is Answer.SHELTER:
-        is_battery = state.answering == "battery"
+        is_battery = state.operator.answering == "battery"
         # she is stopped: something must be done
         end = End.REFUGE if not is_battery or ends.battery is End.SAY else ends.battery
         why = WHY[BATTERY] if is_battery and turn.is_raised(BATTERY) else why
@@ -149,13 +149,13 @@ def pressing(turn: Turn) -> Errand | None:
     if turn.is_raised(LEAK) and ends.leak is not End.SAY:
         return _found(turn, ends.leak, WHY[LEAK]) or _stay(turn, WHY[LEAK])
     if answer is Answer.STAY:
-        return (_home(turn, why) if state.sent_home else None) or _stay(turn, why)
+        return (_home(turn, why) if state.operator.sent_home else None) or _stay(turn, why)
     return None
 
 
 def _ordered(turn: Turn) -> Errand | None:
     """Return the errand of the order that stands, None: there is none, or she is given up."""
-    order = turn.state.standing
+    order = turn.state.orders.standing
     if order is None or order.verb is Verb.STOP:
         return None
     if order.verb is Verb.HOLD or order.en_m is None:
@@ -175,9 +175,9 @@ def _at_the_end(turn: Turn) -> Errand | None:
     state = turn.state
     for name in (OUT_OF_TIME, STRONG_WIND, SHORE_LOST, DARK, LIGHT_WIND):
         end = end_of(turn.config, name)
-        if turn.is_raised(name) and end is not End.SAY and not state.over:
+        if turn.is_raised(name) and end is not End.SAY and not state.voyage.over:
             return _found(turn, end, WHY[name]) or _stay(turn, WHY[name])
-    if state.over:
+    if state.voyage.over:
         return _back(turn)
     return homeward(turn) if turn.gate is None else None
 
@@ -191,7 +191,7 @@ def _kept_in(turn: Turn) -> Errand | None:
     # From the edge a loiter strays across it: she goes so far in, and is there when she has come there.
     room_m = min(turn.config.margin_m + 2.0 * turn.config.loiter_radius_m, fence.most_room_m)
     name = f"a place inside {fence.words}"
-    route = turn.state.route
+    route = turn.state.mission.route
     is_bound = route is not None and route.bound_for == name
     if here is None or (fence.inside_m(here) >= room_m and not is_bound):
         staying = _stay(turn, trouble)
@@ -209,7 +209,7 @@ def fenced_off(turn: Turn, gate: Gate | None) -> str:
 
 def _fence_before(turn: Turn, gate: Gate | None) -> tuple[Circle | Drawn | None, str]:
     """Return the autopilot's own fence that a goal cannot be sailed to for, and why; None: there is none."""
-    if gate is not None and not turn.state.over:
+    if gate is not None and not turn.state.voyage.over:
         floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
         for fence in turn.fences:
             trouble = fence.trouble(gate.name or "the goal", gate.en_m, floor_m)
@@ -227,7 +227,7 @@ def speak_of_fence(turn: Turn) -> None:
 
 def _found(turn: Turn, end: End, why: str) -> Errand | None:
     """Return the errand that ends a voyage so, None: there is no such place, or words are all that is asked."""
-    ends_home = end is End.HOME or turn.state.sent_home or turn.config.safe_end is SafeEnd.RETURN
+    ends_home = end is End.HOME or turn.state.operator.sent_home or turn.config.safe_end is SafeEnd.RETURN
     home = _home(turn, why) if end in {End.HOME, End.REFUGE} and ends_home else None
     if end is End.STAY:
         return _stay(turn, why)
@@ -238,7 +238,7 @@ def _found(turn: Turn, end: End, why: str) -> Errand | None:
 
 def homeward(turn: Turn) -> Errand | None:
     """Return the way home behind the last goal, None where the mission does not end there or has come there."""
-    if turn.config.safe_end is not SafeEnd.RETURN or turn.state.home_reached or turn.state.over:
+    if turn.config.safe_end is not SafeEnd.RETURN or turn.state.voyage.home_reached or turn.state.voyage.over:
         return None
     return _home(turn, "all goals are reached")
 
@@ -256,12 +256,12 @@ def _refuge(turn: Turn, why: str) -> Errand | None:
     refuges = turn.voyage.refuges
     if not refuges:
         return None
-    route, here = turn.state.route, turn.boat_en or turn.snapshot.position_en_m
+    route, here = turn.state.mission.route, turn.boat_en or turn.snapshot.position_en_m
     bound = route.bound_for if route is not None else ""
     chosen = next((r for r in refuges if refuge_name(r) == bound), None)
     if chosen is None:
         by_distance = sorted(refuges, key=lambda r: distance_m(here, r.en_m) if here is not None else 0.0)
-        chosen = by_distance[turn.state.plan_retry.failures % len(by_distance)]
+        chosen = by_distance[turn.state.plans.retry.failures % len(by_distance)]
     return Errand(kind=Kind.REFUGE, name=refuge_name(chosen), why=why, en_m=chosen.en_m, radius_m=chosen.radius_m)
 
 
@@ -304,8 +304,8 @@ def _home(turn: Turn, why: str) -> Errand | None:
 
 def _back(turn: Turn) -> Errand | None:
     """Return the way back to where she is to rest, when she is off it and the straight way is not clear."""
-    rest, boat = turn.state.rest_en_m, turn.boat_en
-    off = turn.is_raised(DRAGGED) or bool(turn.state.answering)
+    rest, boat = turn.state.voyage.rest_en_m, turn.boat_en
+    off = turn.is_raised(DRAGGED) or bool(turn.state.operator.answering)
     if rest is None or boat is None or not (off or _is_bound(turn, REST)):
         return None
     if not _is_bound(turn, REST) and turn.voyage.area.path_clearance_m([boat, rest]) >= turn.config.margin_floor_m:
@@ -314,7 +314,7 @@ def _back(turn: Turn) -> Errand | None:
 
 
 def _is_bound(turn: Turn, name: str) -> bool:
-    route = turn.state.route
+    route = turn.state.mission.route
     return route is not None and route.bound_for == name and bool(turn.ahead())
 
 
@@ -328,7 +328,7 @@ def gate_for(turn: Turn, bound: Errand) -> Gate:
 
 def is_at_rest(turn: Turn) -> bool:
     """Return whether she is in the loiter at the end of the errand that she is on."""
-    bound, route = errand(turn), turn.state.route
+    bound, route = errand(turn), turn.state.mission.route
     if bound is None or route is None or turn.ahead():
         return False
     return bound.kind is Kind.STAY or route.bound_for == bound.name

@@ -40,7 +40,7 @@ PORT_RAD = (math.radians(-45.0), math.radians(-95.0))
 def held_of(turn: Turn, vessel: Vessel) -> Held | None:
     """Return the encounter with a vessel."""
     key = (vessel.mmsi, vessel.branch)
-    return next((h for h in turn.state.encounters if (h.mmsi, h.branch) == key), None)
+    return next((h for h in turn.state.traffic.encounters if (h.mmsi, h.branch) == key), None)
 
 
 def is_stood_on_to(turn: Turn, vessel: Vessel) -> bool:
@@ -52,14 +52,14 @@ def is_stood_on_to(turn: Turn, vessel: Vessel) -> bool:
         return held.stands_on
     # A boat that hardly moves meets nobody: she has no course to keep.
     return turn.speed_mps >= LEAST_MPS and any(
-        a.encounter.role is Role.STAND_ON for a in turn.state.watch
+        a.encounter.role is Role.STAND_ON for a in turn.state.traffic.watch
         if (a.vessel.mmsi, a.vessel.branch) == (vessel.mmsi, vessel.branch))
 
 
 def stands_on(turn: Turn) -> bool:
     """Return whether course and speed are to be kept: there is an encounter in which we stand on."""
     return any(h.stands_on and h.apart_s is None and h.cpa_m < PASSES_CLEAR * turn.config.traffic_clearance_m
-               for h in turn.state.encounters)
+               for h in turn.state.traffic.encounters)
 
 
 def bow_discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, share: float = 1.0) -> tuple[Disc, ...]:

@@ -43,7 +43,7 @@ def next_tack_s(seen: Seen, polar: Polar) -> float | None:
     The end of a mission, a loiter, is no course. Legs ahead are sailed at the polar's speed, this one at the boat's
     own, once she has way on.
     """
-    route, snapshot = seen.state.route, seen.snapshot
+    route, snapshot = seen.state.mission.route, seen.snapshot
     vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
     wind_rad = wind.mean_twd_from_rad if wind.present_twd_from_rad is None else wind.present_twd_from_rad
     tws_mps = wind.mean_tws_mps if wind.present_tws_mps is None else wind.present_tws_mps
@@ -51,7 +51,7 @@ def next_tack_s(seen: Seen, polar: Polar) -> float | None:
             vehicle.speed_mps < MIN_SPEED_MPS):
         return None
     limits = snapshot.limits or AutopilotLimits()
-    no_go_rad, begin = limits.sail_no_go_angle_rad, seen.state.index
+    no_go_rad, begin = limits.sail_no_go_angle_rad, seen.state.mission.index
     legs = [
         (start, end) for item, start, end in zip(
             route.items[begin:], route.leg_from_en_m[begin:], route.points_en_m[begin:], strict=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from companion.frozen import changed
 from companion.messages import Command, waypoint
 from companion.planner.settings import AUTO
 from companion.skipper.planning.admission import is_on_board_sound, is_sound, leads_there
@@ -34,19 +35,21 @@ def asks_again(turn: Turn, pending: PendingPlan, reason: str) -> bool:
     problem may be what the planner dies of; and for its first step where that is another planner.
     """
     state = turn.state
-    turn.update(unanswered=state.unanswered + 1, effort=max(LEAST_EFFORT, LESS * state.effort))
-    if turn.state.unanswered < TRIES and request(
+    turn.set(plans=changed(
+        turn.state.plans, unanswered=state.plans.unanswered + 1,
+        effort=max(LEAST_EFFORT, LESS * state.plans.effort)))
+    if turn.state.plans.unanswered < TRIES and request(
             turn, pending.reason, from_index=pending.from_index, rung=pending.rung, text=reason):
         turn.say(Severity.WARNING, "no answer", f"{reason}: asked again, with less effort", every_s=0.0)
         return True
-    turn.update(unanswered=0)
-    sails = state.sailing and state.route is not None
+    turn.set(plans=changed(turn.state.plans, unanswered=0))
+    sails = state.voyage.sailing and state.mission.route is not None
     if pending.rung == 0 and turn.config.planner.algorithm != AUTO.algorithm:
         return False
     if sails and (meetings(turn) or not is_on_board_sound(turn)):
         return False
-    turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
-    wait_s = turn.state.plan_retry.not_before_s - turn.t_s
+    turn.set(plans=changed(turn.state.plans, retry=turn.failed(state.plans.retry), rung=0))
+    wait_s = turn.state.plans.retry.not_before_s - turn.t_s
     stays = "what is on board is sound and stays; " if sails else ""
     turn.say(Severity.WARNING, "no answer", f"{reason}: {stays}asked again in {wait_s:.0f} s, with less effort",
              every_s=0.0)
@@ -75,12 +78,12 @@ def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
     ladder = steps(turn)
     state = turn.state
     where = ladder[min(pending.rung, len(ladder) - 1)].name or "as configured"
-    met = meetings(turn) if state.route is not None else ()
+    met = meetings(turn) if state.mission.route is not None else ()
     if (
-        (pending.rung == 0 or leads_there(turn, pending)) and state.route is not None and not met
+        (pending.rung == 0 or leads_there(turn, pending)) and state.mission.route is not None and not met
         and is_on_board_sound(turn) and _keeps_floor(turn, pending) and not _risk_of_old(turn, pending)
     ):
-        turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
+        turn.set(plans=changed(turn.state.plans, retry=turn.failed(state.plans.retry), rung=0))
         turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
         return
     foul = _foul(turn, pending)
@@ -88,16 +91,17 @@ def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
         _wait_against(turn, pending, foul, count=len(ladder))
         return
     # Only the boat's own place helps when the way from a waypoint ahead is closed: the rungs start at the boat.
-    from_index = pending.from_index if pending.rung == 0 and state.route is not None and _tail_only(turn) else None
+    keeps = pending.rung == 0 and state.mission.route is not None and _tail_only(turn)
+    from_index = pending.from_index if keeps else None
     if pending.rung + 1 < len(ladder):
         following = ladder[pending.rung + 1].name
         text = f"no plan {where} ({reason}): trying {following}"
         turn.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
         if request(turn, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
             return
-    turn.update(plan_retry=turn.failed(state.plan_retry), rung=0)
+    turn.set(plans=changed(turn.state.plans, retry=turn.failed(state.plans.retry), rung=0))
     risk = _risk_of_old(turn, pending)
-    if risk and state.route is not None and not met and is_on_board_sound(turn) and _keeps_floor(turn, pending):
+    if risk and state.mission.route is not None and not met and is_on_board_sound(turn) and _keeps_floor(turn, pending):
         turn.say(Severity.WARNING, "no plan",
                  f"no plan on any step of the ladder ({reason}): the old one stays; {risk}", every_s=0.0)
         return
@@ -107,7 +111,7 @@ def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
             Severity.CRITICAL, "no way clear",
             f"no plan keeps clear of {met[0].name}, met in {met[0].time_s:.0f} s: the old plan stays", every_s=0.0)
         return
-    wait = turn.state.plan_retry.not_before_s - turn.t_s
+    wait = turn.state.plans.retry.not_before_s - turn.t_s
     turn.say(
         Severity.CRITICAL, "no plan at all",
         f"no plan on any step of the ladder ({reason}): holding, trying again in {wait:.0f} s", every_s=0.0)
@@ -136,7 +140,7 @@ def _wait_against(turn: Turn, pending: PendingPlan, foul: str, *, count: int) ->
     if not is_here and pending.rung + 1 < count and request(
             turn, pending.reason, rung=count - 1, text=foul):
         return
-    turn.update(plan_retry=turn.failed(turn.state.plan_retry), rung=0)
+    turn.set(plans=changed(turn.state.plans, retry=turn.failed(turn.state.plans.retry), rung=0))
     hold(turn, foul)
 
 
@@ -149,19 +153,21 @@ def _tail_only(turn: Turn) -> bool:
 def hold(turn: Turn, why: str, *, anew: bool = False) -> None:
     """Loiter in the roomiest place near by, in a mission that ends there at once; ``anew``: out of another loiter."""
     boat, wind, state = turn.boat_en, turn.wind_mean, turn.state
-    turn.phase(Phase.HOLDING if state.sailing else Phase.WAITING, f"waiting for a plan: {why}")
-    if boat is None or not state.sailing or state.route is None:
+    turn.phase(Phase.HOLDING if state.voyage.sailing else Phase.WAITING, f"waiting for a plan: {why}")
+    if boat is None or not state.voyage.sailing or state.mission.route is None:
         return   # not under way
-    if state.index >= len(state.route.items) - 1 and not anew:
+    if state.mission.index >= len(state.mission.route.items) - 1 and not anew:
         return   # already in the safe end of the mission
     config = turn.known_config
     place, room = loiter_place(
         turn.voyage, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m)
-    keep = state.index
+    keep = state.mission.index
     end = waypoint(turn.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
     route = replace(
-        state.route, items=(*state.route.items[:keep], end), points_en_m=(*state.route.points_en_m[:keep], place),
-        leg_from_en_m=(*state.route.leg_from_en_m[:keep], boat), gate_of=(*state.route.gate_of[:keep], -1),
+        state.mission.route, items=(*state.mission.route.items[:keep], end),
+        points_en_m=(*state.mission.route.points_en_m[:keep], place),
+        leg_from_en_m=(*state.mission.route.leg_from_en_m[:keep], boat),
+        gate_of=(*state.mission.route.gate_of[:keep], -1),
         rung="hold", risk=None, cost_s=None, median_s=None, late_s=None,
         bound_for="", why=f"{why}; loitering with {room:.0f} m of room",
     )

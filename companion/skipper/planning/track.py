@@ -26,7 +26,7 @@ def problem_tracking(
     turn: Turn, start: Start, from_index: int | None, *, floor_m: float, forecast: WindForecast,
 ) -> dict[str, Any]:
     """Return the ``tracking`` of a problem: the autopilot's parameters, the hull, and what is solid as it is."""
-    limits, area, route = turn.snapshot.limits, turn.voyage.area, turn.state.route
+    limits, area, route = turn.snapshot.limits, turn.voyage.area, turn.state.mission.route
     helm = Helm.of(limits or AutopilotLimits(sail_xtrack_max_m=turn.tack_corridor_m))
     before = None
     if from_index is not None and route is not None:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from companion.boat.tracking import SHORT_S
+from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
@@ -56,11 +57,12 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return None
     if turn.snapshot.unsure:
         return None
-    bound, route = errand(turn), turn.state.route
-    if state.over if bound is None else not bound.has_place:
+    bound, route = errand(turn), turn.state.mission.route
+    if state.voyage.over if bound is None else not bound.has_place:
         return None
-    if state.after_operator:
-        text = f"stopped by the {state.answering} failsafe" if state.answering else "the operator gave the boat back"
+    if state.operator.is_back:
+        cause = state.operator.answering
+        text = f"stopped by the {cause} failsafe" if cause else "the operator gave the boat back"
         return Trigger(reason=ReplanReason.OPERATOR_BACK, text=text)
     if route is not None and route.plan_id == NO_PLAN:
         # It need not lead to our goals: nothing is planned but another way, and that as soon as the wind is known.
@@ -71,9 +73,9 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
     changed = _errand(turn, bound)
     if changed is not None:
         return changed
-    if state.asked:
-        return Trigger(reason=ReplanReason.ORDER, text=state.asked)
-    if state.missed_s is not None and bound is None:
+    if state.plans.asked:
+        return Trigger(reason=ReplanReason.ORDER, text=state.plans.asked)
+    if state.progress.missed_s is not None and bound is None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     boat = turn.boat_en
     if turn.drawn is not None and turn.drawn.cuts([boat, *turn.ahead()]):
@@ -82,7 +84,7 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
     if turn.guidance is Guidance.FIELD and turn.steers:
-        if is_composed(turn) and route is not None and turn.state.gate in route.gate_of:
+        if is_composed(turn) and route is not None and turn.state.progress.gate in route.gate_of:
             return None   # what is on board leads to the goal's place: that is where she goes when she is not steered
         return _at_end(turn) or _extension(turn, bound)   # the mission on board need not be the way that is sailed
     trigger = _traffic(turn)
@@ -100,13 +102,14 @@ REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.
 
 def _errand(turn: Turn, bound: Errand | None) -> Trigger | None:
     """She is bound for somewhere else than her route leads to: an errand that begins, or one that is over."""
-    route = turn.state.route
+    route = turn.state.mission.route
     leads_to = route.bound_for if route is not None else ""
-    is_first = turn.state.plan_retry.failures == 0   # then the wait between two tries counts
+    is_first = turn.state.plans.retry.failures == 0   # then the wait between two tries counts
     interval_s = 0.0 if is_first else turn.config.min_replan_interval_s
     if bound is not None and leads_to != bound.name:
         return Trigger(reason=REASONS[bound.kind], text=bound.sentence, urgent=is_first, interval_s=interval_s)
-    if bound is None and leads_to and not (leads_to == HOME and homeward(turn) is not None) and not turn.state.over:
+    is_home = leads_to == HOME and homeward(turn) is not None
+    if bound is None and leads_to and not is_home and not turn.state.voyage.over:
         return Trigger(reason=ReplanReason.NEXT_GOAL, text=f"no longer bound for {leads_to}: sailing on",
                        urgent=is_first, interval_s=interval_s)
     return None
@@ -120,7 +123,7 @@ def _traffic(turn: Turn) -> Trigger | None:
     first = met[0]
     text = f"{first.name}: in {first.time_s:.0f} s {first.depth_m:.0f} m inside the distance to keep"
     turn.say(Severity.WARNING, "traffic", text)
-    since_s = turn.t_s - turn.state.last_plan_s
+    since_s = turn.t_s - turn.state.plans.last_s
     interval_s = max(MIN_INTERVAL_S, turn.config.min_replan_interval_s)
     if since_s < interval_s or decide(met, since_replan_s=since_s, urgent_s=0.0) is not Decision.REPLAN:
         return None
@@ -141,16 +144,16 @@ def _no_go(turn: Turn) -> Trigger | None:
     """The present wind has closed the leg: the autopilot will beat in its corridor. How far, and is that clear?"""
     boat, leg, wind, vehicle = turn.boat_en, turn.leg(), turn.wind_now, turn.snapshot.vehicle
     if boat is None or leg is None or wind is None or vehicle is None or not turn.ahead():
-        turn.update(no_go_since_s=None)
+        turn.set(plans=changed(turn.state.plans, no_go_since_s=None))
         return None
     target = board_end(turn, leg)
     twa = abs(difference_rad(wind[0], bearing_rad(boat, target)))
     is_near = distance_m(boat, target) < turn.config.announce_m + turn.speed_mps
     if twa >= turn.no_go_half_rad or is_near or is_left_to_beat(turn, *leg):
-        turn.update(no_go_since_s=None)
+        turn.set(plans=changed(turn.state.plans, no_go_since_s=None))
         return None
-    since = turn.state.no_go_since_s if turn.state.no_go_since_s is not None else turn.t_s
-    turn.update(no_go_since_s=since)
+    since = turn.state.plans.no_go_since_s if turn.state.plans.no_go_since_s is not None else turn.t_s
+    turn.set(plans=changed(turn.state.plans, no_go_since_s=since))
     drift = predicted_beat(
         boat, vehicle.heading_rad, leg[0], target, twd_from_rad=wind[0], no_go_half_rad=turn.no_go_half_rad,
         corridor_m=turn.tack_corridor_m, area=turn.voyage.area, current_en_mps=turn.current_en_mps,
@@ -169,7 +172,7 @@ def _no_go(turn: Turn) -> Trigger | None:
 
 def _position(turn: Turn) -> Trigger | None:
     """The boat is not where the plan has it, or is nowhere on it."""
-    if turn.state.doubt is not None:   # with a position all the same: see Turn.plans_in_doubt
+    if turn.state.position.doubt is not None:   # with a position all the same: see Turn.plans_in_doubt
         return Trigger(reason=ReplanReason.OFF_LEG, text="the position jumped, and the way from there is not clear",
                        interval_s=turn.config.no_go_replan_interval_s, urgent=True)
     if turn.is_raised("off the corridor"):
@@ -181,7 +184,7 @@ def _position(turn: Turn) -> Trigger | None:
 
 def _at_end(turn: Turn) -> Trigger | None:
     """The mission on board is at its end and goals remain."""
-    if errand(turn) is not None or turn.state.over:
+    if errand(turn) is not None or turn.state.voyage.over:
         return None
     if turn.is_raised("mission ended") or not turn.ahead():
         reason = ReplanReason.RETRY if turn.state.phase is Phase.HOLDING else ReplanReason.NEXT_GOAL
@@ -201,7 +204,7 @@ def _patience_off_leg_s(turn: Turn) -> float:
 
 def _wind(turn: Turn) -> Trigger | None:
     """Büsser's 20° against the wind that the plan used, outside the interval that it allowed for; and 60 minutes."""
-    route, mean, config = turn.state.route, turn.wind_mean, turn.config
+    route, mean, config = turn.state.mission.route, turn.wind_mean, turn.config
     if route is None or mean is None or turn.is_raised("wind untrusted"):
         return None
     turned = abs(difference_rad(mean[0], route.plan_twd_from_rad))
@@ -223,7 +226,7 @@ def _wind(turn: Turn) -> Trigger | None:
 
 def _unsure(turn: Turn) -> Trigger | None:
     """The wind has become less certain than the plan allowed for; that it became more so can wait for a waypoint."""
-    route, config = turn.state.route, turn.config
+    route, config = turn.state.mission.route, turn.config
     if route is None or config.replan_policy is not ReplanPolicy.FORECAST or turn.is_raised("wind untrusted"):
         return None
     width_rad = _width_rad(turn)
@@ -246,8 +249,8 @@ def _is_wider(now_rad: float, then_rad: float) -> bool:
 
 def _extension(turn: Turn, bound: Errand | None) -> Trigger | None:
     """The mission ends soon and goals remain, or the rest of an errand's way: plan on from its last waypoint."""
-    route, boat, last = turn.state.route, turn.boat_en, turn.last_waypoint()
-    if route is None or boat is None or last < turn.state.index:
+    route, boat, last = turn.state.mission.route, turn.boat_en, turn.last_waypoint()
+    if route is None or boat is None or last < turn.state.mission.index:
         return None
     ends = route.gate_of[last]
     if bound is not None or route.bound_for == HOME:
@@ -269,25 +272,26 @@ def _extension(turn: Turn, bound: Errand | None) -> Trigger | None:
 
 def _waypoint(turn: Turn) -> Trigger | None:
     """Wolsieffer's rule: near a waypoint, plan again from it with the wind measured since."""
-    state, route, boat, leg = turn.state, turn.state.route, turn.boat_en, turn.leg()
-    if route is None or boat is None or leg is None or state.replanned_index >= state.index:
+    state, route, boat, leg = turn.state, turn.state.mission.route, turn.boat_en, turn.leg()
+    if route is None or boat is None or leg is None or state.plans.replanned_index >= state.mission.index:
         return None
     last = turn.last_waypoint()
-    if state.index >= last or any(g >= 0 for g in route.gate_of[state.index:last]) or is_buoy(turn.gate):
+    passes = any(g >= 0 for g in route.gate_of[state.mission.index:last])
+    if state.mission.index >= last or passes or is_buoy(turn.gate):
         return None   # the tail to the next goal is there already: see _extension
     left_s = distance_m(boat, leg[1]) / max(turn.speed_mps, 0.3)
     if not TOO_LATE_S < left_s <= turn.config.lead_s or turn.is_raised("wind untrusted"):
         return None
     if not may_restart_leg(turn):
         return None
-    if _is_bend(route, state.index) and turn.t_s - state.last_plan_s < BEND_PLAN_AGE_S:
+    if _is_bend(route, state.mission.index) and turn.t_s - state.plans.last_s < BEND_PLAN_AGE_S:
         return None
     if turn.config.replan_policy is ReplanPolicy.FORECAST and not forecast_matters(turn):
-        turn.update(replanned_index=state.index)
+        turn.set(plans=changed(turn.state.plans, replanned_index=state.mission.index))
         return None
     reason = (ReplanReason.WAYPOINT if turn.config.replan_policy is ReplanPolicy.WAYPOINT else ReplanReason.FORECAST)
     return Trigger(
-        reason=reason, text=f"waypoint {state.index + 1} in {left_s:.0f} s", from_index=state.index,
+        reason=reason, text=f"waypoint {state.mission.index + 1} in {left_s:.0f} s", from_index=state.mission.index,
         interval_s=turn.config.min_replan_interval_s)
 
 
@@ -302,7 +306,7 @@ def _is_bend(route: Route, index: int) -> bool:
 
 def forecast_matters(turn: Turn) -> bool:
     """Return whether the wind, or its uncertainty, has changed enough against the plan's to be worth an upload."""
-    route, mean = turn.state.route, turn.wind_mean
+    route, mean = turn.state.mission.route, turn.wind_mean
     if route is None or mean is None:
         return False
     turned = abs(difference_rad(mean[0], route.plan_twd_from_rad))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from companion.frozen import changed
 from companion.skipper.board.mark import marked
 from companion.skipper.planning.admission import refusal
 from companion.skipper.step.actions import Change, Severity, UploadMission
@@ -27,13 +28,13 @@ def upload(
     if refused:
         return refused
     route = replace(route, items=marked(route.items))
-    old = turn.state.route
-    known = old is not None and not turn.state.foreign and turn.state.checked_mission and not whole
+    old = turn.state.mission.route
+    known = old is not None and not turn.state.mission.foreign and turn.state.mission.checked and not whole
     on_board = old.items if old is not None and known else ()
     number = turn.new_id()
     keep = common_prefix(on_board, route.items)
     if old is not None and known:
-        closing = stopgap(old, keep, turn.state.index)
+        closing = stopgap(old, keep, turn.state.mission.index)
     else:
         # A list that is not ours to keep a part of: whoever gives an armed boat AUTO meanwhile must not sail a mixture.
         closing = stopgap(route, 0, 0) if turn.autopilot is not None and turn.autopilot.is_armed else None
@@ -42,39 +43,42 @@ def upload(
         text=text, stopgap=None if closing is None else marked([closing])[0], change=change or Change(),
     )
     if not turn.act(action):
-        turn.update(ready_route=route)
+        turn.set(plans=changed(turn.state.plans, ready_route=route))
         turn.say(Severity.WARNING, "upload not permitted", "a plan is ready; uploading is not permitted")
         return ""
     # A read that is still under way will tell of the mission before this upload: its answer is not wanted.
-    turn.update(pending_read=None, ready_route=None, pending_upload=PendingUpload(
-        upload_id=number, t_s=turn.t_s, route=route, set_current=set_current, keep_first=action.keep_first))
+    turn.set(
+        pending=changed(turn.state.pending, read=None, upload=PendingUpload(
+            upload_id=number, t_s=turn.t_s, route=route, set_current=set_current, keep_first=action.keep_first)),
+        plans=changed(turn.state.plans, ready_route=None))
     return ""
 
 
 def take_upload(turn: Turn, outcome: UploadOutcome) -> None:
     """Take the end of an upload: the new route sails, or the mission on board must be looked at."""
-    pending = turn.state.pending_upload
+    pending = turn.state.pending.upload
     if pending is None or pending.upload_id != outcome.upload_id:
         return
     if outcome.result is UploadResult.OK:
-        index, missed_s = turn.state.index, turn.state.missed_s
+        index, missed_s = turn.state.mission.index, turn.state.progress.missed_s
         if pending.set_current is not None:
             index = pending.set_current - 1
-        turn.update(
-            pending_upload=None, route=pending.route, index=index, own_index=max(index, 0), upload_retry=Retry(),
-            checked_mission=True, foreign="", unsure_route=None, replace_foreign=False,
-            # An upload that was on its way at the miss does not lead back.
-            missed_s=missed_s if missed_s is not None and pending.t_s <= missed_s else None,
-            no_go_since_s=None, uploaded_s=turn.t_s,
-            current_asked_s=turn.t_s if pending.set_current is not None else turn.state.current_asked_s,
-            asked_seq=pending.set_current if turn.state.sailing else None,
-            replanned_index=turn.state.replanned_index if pending.set_current != 1 else -1,
-        )
+        turn.set(
+            pending=changed(turn.state.pending, upload=None, upload_retry=Retry()),
+            mission=changed(
+                turn.state.mission, route=pending.route, index=index, own_index=max(index, 0), checked=True,
+                foreign="", unsure_route=None, replace_foreign=False, uploaded_s=turn.t_s,
+                asked_s=turn.t_s if pending.set_current is not None else turn.state.mission.asked_s,
+                asked_seq=pending.set_current if turn.state.voyage.sailing else None),
+            progress=changed(   # an upload that was on its way at the miss does not lead back
+                turn.state.progress, missed_s=missed_s if missed_s is not None and pending.t_s <= missed_s else None),
+            plans=changed(
+                turn.state.plans, no_go_since_s=None,
+                replanned_index=turn.state.plans.replanned_index if pending.set_current != 1 else -1))
         return
-    turn.update(
-        pending_upload=None, unsure_route=pending.route, checked_mission=False,
-        upload_retry=turn.failed(turn.state.upload_retry), read_since_s=turn.t_s,
-    )
+    turn.set(
+        pending=changed(turn.state.pending, upload=None, upload_retry=turn.failed(turn.state.pending.upload_retry)),
+        mission=changed(turn.state.mission, unsure_route=pending.route, checked=False, read_since_s=turn.t_s))
     turn.say(
         Severity.ERROR, "upload failed",
         f"upload {outcome.result.value}: {outcome.text or 'no words'}; reading what is on board", every_s=0.0)

@@ -71,7 +71,7 @@ def near(turn: Turn) -> tuple[Vessel, ...]:
     if len(soon) > NEAREST:
         own = turn.snapshot.vehicle
         velocities = ((0.0, 0.0), own.velocity_en_mps if own is not None else (0.0, 0.0))
-        held = {(h.mmsi, h.branch) for h in turn.state.encounters}
+        held = {(h.mmsi, h.branch) for h in turn.state.traffic.encounters}
         by_peril = sorted(soon, key=lambda s: (
             s[1:3] not in held, min(peril_m(boat, velocity, s[3], turn.t_s) for velocity in velocities), s[1:3]))
         kept = {s[1:3] for s in by_peril[:NEAREST // 2]}
@@ -90,7 +90,7 @@ def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> t
     )
     known = [v for v in vessels if v.is_moving_known]
     unknown = [v for v in vessels if not v.is_moving_known]
-    met = {(h.mmsi, h.branch) for h in turn.state.encounters}
+    met = {(h.mmsi, h.branch) for h in turn.state.traffic.encounters}
     holding = [v for v in known if (v.mmsi, v.branch) in met]
     known = [v for v in known if (v.mmsi, v.branch) not in met]
     return (*(d for v in holding for d in planning_discs([v], t_s, keep, motion=expected(v))),
@@ -119,7 +119,7 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
     clear of all. One that we give way to adds regions on the first rung.
     """
     vessels = near(turn)
-    is_met = bool(turn.state.encounters) and bool(meetings(turn))
+    is_met = bool(turn.state.traffic.encounters) and bool(meetings(turn))
     if not is_met:
         vessels = tuple(v for v in vessels if not ((held := held_of(turn, v)) is not None and held.stands_on))
     found = discs(turn, vessels, turn.t_s + after_s, 0.0)
@@ -147,7 +147,7 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
             out.append(replace(target, radius_m=radius_m))
     if not out:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
-    if rung == 0 and turn.state.encounters:
+    if rung == 0 and turn.state.traffic.encounters:
         out += regions(turn, vessels, start_en, after_s, is_met=is_met)
     least = max(LEAST_DELTA_S, 1.0 - of_wind - part)   # a half and not the last digit below it
     return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)

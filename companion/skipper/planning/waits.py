@@ -42,15 +42,15 @@ def gun_in_s(turn: Turn, line: Line) -> float | None:
         return None if now_s is None else line.not_before_s - now_s
     if line.after_s is None:
         return -math.inf
-    if state.set_sail_utc_s is not None and now_s is not None:
-        return state.set_sail_utc_s + line.after_s - now_s
-    return line.after_s - state.under_way_s
+    if state.voyage.set_sail_utc_s is not None and now_s is not None:
+        return state.voyage.set_sail_utc_s + line.after_s - now_s
+    return line.after_s - state.voyage.under_way_s
 
 
 def waits_for_gun(turn: Turn, gate: Gate) -> bool:
     """Return whether it is too early to sail for a gate's line: from where she is she would be there before the gun."""
     line = gate.line
-    if line is None or not line.is_start or turn.state.released == gate.goal:
+    if line is None or not line.is_start or turn.state.progress.released == gate.goal:
         return False
     left_s = gun_in_s(turn, line)
     return left_s is None or left_s > _to_line_s(turn, gate) - RESERVE_S
@@ -100,7 +100,7 @@ def waiting_en(turn: Turn, gate: Gate) -> PointEn:
 
 def stay_left_s(turn: Turn, gate: Gate) -> float:
     """Return how long she still stays in a gate's box, or sails by its field [s]; inf: until told, or not yet."""
-    inside, box = turn.state.inside, gate.box or gate.field
+    inside, box = turn.state.progress.inside, gate.box or gate.field
     if box is None or box.for_s is None or inside is None or inside.goal != gate.goal:
         return math.inf
     return box.for_s - inside.age_s(turn.t_s, utc_s(turn))

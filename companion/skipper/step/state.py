@@ -188,145 +188,239 @@ class Charge:
     is_short: bool = False
 
 
+# The parts have no slots: one of them changes a dozen times a step, and ``companion.frozen`` copies it in one piece.
 @dataclass(frozen=True, kw_only=True)
-class SkipperState:
-    """Everything that ``step`` needs from before. ``Skipper.initial`` makes the first.
+class VehicleIdentity:
+    """Whose the autopilot is (``companion.skipper.board.custody``), and whether it has started anew."""
 
-    Without slots: it changes a dozen times a step, and ``companion.frozen`` copies it in one piece.
-    """
-
-    phase: Phase = Phase.IDLE
-    why: str = "just started"
-    next_id: int = 1
-    gate: int = 0                      # index of the gate being sailed to
-    route: Route | None = None         # what is on the autopilot, as far as we know
-    adoptable: Persisted | None = None  # from before a restart or a foreign mission, until one of ours is found
-    known: tuple[str, ...] = ()        # hashes of lists that earlier voyages of ours may have left on board
     uid: str | None = None             # of the autopilot that this voyage began with, and ...
     system: int | None = None          # ... its system id
     is_ours: bool = False              # in this step: it is that one, and a boat of ours
-    custody: str = ""                  # why it was not, until it is
-    checked_mission: bool = False      # the mission on board has been compared with ours since link, reboot, operator
+    doubt: str = ""                    # why it was not, until it is
+    boot_s: float | None = None        # its time since boot, as last heard [s]
+    rebooted: bool = False             # in this very step
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadedMission:
+    """The mission on the autopilot: which it is, as far as we know, and how far the boat is on it."""
+
+    route: Route | None = None
+    adoptable: Persisted | None = None  # from before a restart or a foreign mission, until one of ours is found
+    known: tuple[str, ...] = ()        # hashes of lists that earlier voyages of ours may have left on board
+    checked: bool = False              # compared with ours since link, reboot, operator
     read_twice: bool = False           # the last mission read was not ours: the next one decides
-    foreign: str = ""                  # why the mission on board is not ours; empty: it is, or there is none
-    sailing: bool = False              # has been in AUTO and armed with our route
+    foreign: str = ""                  # why it is not ours; empty: it is, or there is none
+    unsure_route: Route | None = None  # of an upload that failed: the mission on board may be it or a mixture
+    read_since_s: float = float("-inf")   # a mission read before this does not count
+    read_items: tuple[MissionItem, ...] | None = None      # as last read
+    read_t_s: float = float("-inf")
+    replace_foreign: bool = False      # permission was given to overwrite what is on board
+    repair: bool = False               # it is a mixture of ours
+    uploaded_s: float = float("-inf")  # when the last upload ended well
     index: int = 0                     # target by the autopilot
     own_index: int = 0                 # target by Büsser's double conditions
-    pending_plan: PendingPlan | None = None
-    pending_upload: PendingUpload | None = None
-    pending_read: tuple[int, float] | None = None          # id, since
-    pending_command: tuple[int, float, str] | None = None  # id, since, what
-    unsure_route: Route | None = None  # of an upload that failed: the mission on board may be it or a mixture
-    accepted: tuple[str, float] | None = None  # the last command that was accepted, and when
-    ready_route: Route | None = None   # planned, not allowed or not yet possible to upload
-    own_mode: Mode | None = None       # a mode other than AUTO that we asked for ourselves
-    rung: int = 0                      # step of the ladder being tried
-    unanswered: int = 0                # requests in a row that the planner did not answer
-    effort: float = 1.0                # share of the planning budget that is asked for: less on a slow processor
-    ladder_reason: ReplanReason | None = None
-    plan_retry: Retry = PATIENT
-    upload_retry: Retry = PATIENT
-    read_retry: Retry = PATIENT
-    command_retry: Retry = PATIENT
-    read_since_s: float = float("-inf")   # a mission read before this does not count
-    asked_seq: int | None = None   # the item we made current, until the autopilot shows it
-    current_asked_s: float = float("-inf")  # when an item was last made current by us
-    last_plan_s: float = float("-inf")  # when a plan was last asked for
-    replanned_index: int = -1           # the target for which Wolsieffer's replan was asked
-    replans: int = 0
-    closest_m: float = float("inf")     # smallest distance to the present gate so far
-    uploaded_s: float = float("-inf")   # when the last upload ended well
-    good_wind_since_s: float | None = None
-    no_go_since_s: float | None = None
-    tacked_s: float = float("-inf")     # when a tack was last asked for
-    standing: Standing | None = None    # the order that stands until she is told to go on
-    answered: tuple[Answered, ...] = ()  # the last order of each who gave one lately
-    asked: str = ""                     # why a new plan is wanted at once, until it is asked for; empty: it is not
-    skipped: int = 0                    # goals given up by order
-    read_items: tuple[MissionItem, ...] | None = None      # the mission as last read
-    read_t_s: float = float("-inf")
+    passed_since_s: float | None = None   # the target was passed by our own geometry, the autopilot still steers for it
+    asked_seq: int | None = None       # the item we made current, until the autopilot shows it
+    asked_s: float = float("-inf")     # when an item was last made current by us
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalProgress:
+    """How far the boat is with the voyage's goals."""
+
+    gate: int = 0                      # index of the gate being sailed to
     approaches: tuple[Approach, ...] = ()   # where the way to a goal began, see companion.skipper.way.gates
-    bearing_rad: float = 0.0            # how far the boat has come round the buoy that is next, see gates.bearing_on
-    is_blind: bool = False              # the voyage was taken up again: what she passed meanwhile was not seen
-    released: int = -1                  # the goal at whose line she no longer waits for the gun, or in whose box
+    bearing_rad: float = 0.0           # how far the boat has come round the buoy that is next, see gates.bearing_on
+    closest_m: float = float("inf")    # smallest distance to the present gate so far
+    is_blind: bool = False             # the voyage was taken up again: what she passed meanwhile was not seen
+    released: int = -1                 # the goal at whose line she no longer waits for the gun, or in whose box
+    inside: Inside | None = None       # the box that she stays in
     searched: tuple[PointEn, ...] = ()  # the track of the search that is next
     covered: tuple[tuple[int, float], ...] = ()   # goals searched, and the share that was seen
-    task: str = ""                      # how far she is with it, in words
-    inside: Inside | None = None        # the box that she stays in
-    set_sail_utc_s: float | None = None  # Unix time of setting sail, by the autopilot's clock
-    missed_s: float | None = None       # when a gate was missed to which no upload since leads
-    history_plan: int = -1
+    task: str = ""                     # how far she is with it, in words
+    reached: tuple[int, ...] = ()      # goals reached, in order
+    missed: int = 0                    # buoys passed on the wrong side and sailed again
+    missed_s: float | None = None      # when a gate was missed to which no upload since leads
     history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
-    last_seen: Fix | None = None        # the last position
-    boot_s: float | None = None
-    doubt: PositionDoubt | None = None  # the position is not believed (``deeds.doubt``)
-    back_s: float = float("-inf")      # when it was believed again: this step's jump is none
-    lost_s: float | None = None        # since when the autopilot's filter has had no position
-    given_back_s: float = float("-inf")  # when a person last gave her back
-    disputed_s: float | None = None    # since when two receivers have said different things
-    anew: Mode | None = None           # a LOITER whose point jumped with the position is begun anew: what shows next
-    place: SavedPlace | None = None    # where she is believed or reckoned to be, for who comes after a kill
-    restored: SavedPlace | None = None  # where she was before this start, until the first fix is held against it
-    signs: Signs = Signs()
-    battery_critical: bool = False     # by the autopilot's own limit (BATT_CRT_VOLT, BATT_CRT_MAH)
-    charge: Charge | None = None
-    stop: Stop | None = None           # she is not being sailed though she was
-    answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
-    sent_home: bool = False            # ... which put her into RTL
-    after_operator: bool = False       # AUTO has come back: plan from where the boat is now
+    history_plan: int = -1             # the plan that its distances are of
+
+
+@dataclass(frozen=True, kw_only=True)
+class VoyageState:
+    """The voyage from setting sail to its end."""
+
+    sailing: bool = False              # has been in AUTO and armed with our route
     under_way_s: float = 0.0           # how long the voyage has been under way ...
     last_step_s: float = float("-inf")  # ... counted from step to step
+    set_sail_utc_s: float | None = None  # Unix time of setting sail, by the autopilot's clock
     home_reached: bool = False         # the way home that follows the last goal is sailed
     over: str = ""                     # why the voyage is over: what is left is to watch her loiter; empty: it is not
     arrived: bool = False              # ... with all goals reached, and home where the mission ends there
     rest_en_m: PointEn | None = None   # where she loiters since
-    replace_foreign: bool = False      # permission was given to overwrite what is on board
-    repair: bool = False               # the mission on board is a mixture of ours
-    rebooted: bool = False             # in this very step
-    operator_since_s: float | None = None
-    passed_since_s: float | None = None   # the target was passed by our own geometry, the autopilot still steers for it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planning:
+    """When and how plans are asked for."""
+
+    ready_route: Route | None = None   # planned, not allowed or not yet possible to upload
+    asked: str = ""                    # why a new plan is wanted at once, until it is asked for; empty: it is not
+    last_s: float = float("-inf")      # when a plan was last asked for
+    retry: Retry = PATIENT
+    rung: int = 0                      # step of the ladder being tried
+    ladder_reason: ReplanReason | None = None
+    unanswered: int = 0                # requests in a row that the planner did not answer
+    effort: float = 1.0                # share of the planning budget that is asked for: less on a slow processor
+    replans: int = 0
+    replanned_index: int = -1          # the target for which Wolsieffer's replan was asked
+    good_wind_since_s: float | None = None
+    no_go_since_s: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pending:
+    """What was asked of planner and autopilot and is not answered yet, and the patience with each."""
+
+    next_id: int = 1
+    plan: PendingPlan | None = None
+    upload: PendingUpload | None = None
+    upload_retry: Retry = PATIENT
+    read: tuple[int, float] | None = None          # id, since
+    read_retry: Retry = PATIENT
+    command: tuple[int, float, str] | None = None  # id, since, what
+    command_retry: Retry = PATIENT
+    accepted: tuple[str, float] | None = None      # the last command that was accepted, and when
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatorState:
+    """Who has the boat when we have not: a person, or one of the autopilot's failsafes."""
+
+    since_s: float | None = None       # since when a person has her
+    given_back_s: float = float("-inf")  # when a person last gave her back
+    is_back: bool = False              # AUTO has come back: plan from where the boat is now
+    signs: Signs = Signs()
+    stop: Stop | None = None           # she is not being sailed though she was
+    answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
+    sent_home: bool = False            # ... which put her into RTL
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteeringState:
+    """The modes and headings that are asked for beside the mission."""
+
+    own_mode: Mode | None = None       # a mode other than AUTO that we asked for ourselves
+    until_s: float | None = None       # bearing away in GUIDED until
+    heading_rad: float | None = None
+    irons_s: tuple[float, ...] = ()    # when the boat was in irons
+    tacked_s: float = float("-inf")    # when a tack was last asked for
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionState:
+    """Whether the reported position is believed (``deeds.doubt``), and where the boat was last."""
+
+    last_seen: Fix | None = None       # the last position
+    doubt: PositionDoubt | None = None  # it is not believed
+    back_s: float = float("-inf")      # when it was believed again: this step's jump is none
+    lost_s: float | None = None        # since when the autopilot's filter has had no position
+    disputed_s: float | None = None    # since when two receivers have said different things
+    anew: Mode | None = None           # a LOITER whose point jumped with the position is begun anew: what shows next
+    place: SavedPlace | None = None    # where she is believed or reckoned to be, for who comes after a kill
+    restored: SavedPlace | None = None  # where she was before this start, until the first fix is held against it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orders:
+    """What was ordered from ashore or aboard (``companion.orders``)."""
+
+    standing: Standing | None = None   # the order that stands until she is told to go on
+    answered: tuple[Answered, ...] = ()  # the last order of each who gave one lately
+    skipped: int = 0                   # goals given up by order
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alarms:
+    """Watchdogs, and what is known of the battery."""
+
     raised: tuple[Raised, ...] = ()
     entering: tuple[tuple[str, float], ...] = ()   # watchdogs whose entry condition holds, since when
-    steering_until_s: float | None = None          # bearing away in GUIDED until
-    steering_heading_rad: float | None = None
+    battery_critical: bool = False     # by the autopilot's own limit (BATT_CRT_VOLT, BATT_CRT_MAH)
+    charge: Charge | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficState:
+    """The vessels about, as they are watched."""
+
+    watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
+    encounters: tuple[Held, ...] = ()              # with vessels, under the policy "rules"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Announced:
+    """What was said lately, so that it is not said again at once."""
+
+    codes: tuple[tuple[str, float], ...] = ()      # code, last said
+    watch: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of vessels said lately, when
+    encounters: tuple[tuple[int, int, str, float], ...] = ()   # MMSI, branch, what, when
+    water_en_mps: tuple[float, float] | None = None  # the current that was said last; None: still water
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkipperState:
+    """Everything that ``step`` needs from before, in parts that are replaced whole.
+
+    ``Skipper.initial`` makes the first; ``Turn.set`` replaces a part.
+    """
+
+    phase: Phase = Phase.IDLE
+    why: str = "just started"
+    wants: tuple[str, ...] = ()        # what is missing, in words
+    vehicle: VehicleIdentity = VehicleIdentity()
+    mission: LoadedMission = LoadedMission()
+    progress: GoalProgress = GoalProgress()
+    voyage: VoyageState = VoyageState()
+    plans: Planning = Planning()
+    pending: Pending = Pending()
+    operator: OperatorState = OperatorState()
+    steering: SteeringState = SteeringState()
     by_field: ByField = ByField()
     adrift: Adrift = Adrift()
-    water_told_en_mps: tuple[float, float] | None = None  # the current that was said last; None: still water
-    irons_s: tuple[float, ...] = ()                # when the boat was in irons
-    tacking: Tacking = NO_TACKS                    # what her tacks have told
-    watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
-    watch_told: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of those said lately, when
-    encounters: tuple[Held, ...] = ()              # with vessels, under the policy "rules"
-    encounters_told: tuple[tuple[int, int, str, float], ...] = ()   # MMSI, branch, what, when
-    announced: tuple[tuple[str, float], ...] = ()  # code, last said
-    reached: tuple[int, ...] = ()                  # goals reached, in order
-    missed: int = 0                                # buoys passed on the wrong side and sailed again
-    wants: tuple[str, ...] = ()                    # what is missing, in words
+    tacking: Tacking = NO_TACKS        # what her tacks have told
+    position: PositionState = PositionState()
+    orders: Orders = Orders()
+    alarms: Alarms = Alarms()
+    traffic: TrafficState = TrafficState()
+    announced: Announced = Announced()
 
 
 def is_given_up(state: SkipperState) -> bool:
     """Return whether the boat was given up by order: nothing is asked of her."""
-    return state.standing is not None and state.standing.verb is Verb.STOP
+    return state.orders.standing is not None and state.orders.standing.verb is Verb.STOP
 
 
 def standing_saved(state: SkipperState) -> Standing | None:
     """Return the order that stands as it is saved: its age in whole minutes."""
-    order = state.standing
+    order = state.orders.standing
     if order is None:
         return None
-    return replace(order, since_s=None, before_s=60.0 * (order.age_s(state.last_step_s) // 60.0))
+    return replace(order, since_s=None, before_s=60.0 * (order.age_s(state.voyage.last_step_s) // 60.0))
 
 
 def saved_of(state: SkipperState, voyage: str) -> Persisted:
     """Return what of a state survives a kill."""
     return Persisted(
-        voyage=voyage, gate=state.gate, sailing=state.sailing, route=state.route,
-        pending=state.pending_upload.route if state.pending_upload is not None else None,
-        unsure=state.unsure_route, own_mode=state.own_mode, motor=state.adrift.motor,
-        under_way_s=60.0 * (state.under_way_s // 60.0), arrived=state.arrived, uid=state.uid, system=state.system,
-        approaches=state.approaches, quarters=round(state.bearing_rad / (0.5 * math.pi)),
-        standing=standing_saved(state), skipped=state.skipped, set_sail_utc_s=state.set_sail_utc_s,
-        inside=None if state.inside is None or state.inside.utc_s is None else (state.inside.goal, state.inside.utc_s),
-        searched=state.searched[:-1], covered=state.covered,   # the last point moves with her
-        tacks=(state.tacking.tried, state.tacking.failed), place=state.place,
+        voyage=voyage, gate=state.progress.gate, sailing=state.voyage.sailing, route=state.mission.route,
+        pending=state.pending.upload.route if state.pending.upload is not None else None,
+        unsure=state.mission.unsure_route, own_mode=state.steering.own_mode, motor=state.adrift.motor,
+        under_way_s=60.0 * (state.voyage.under_way_s // 60.0), arrived=state.voyage.arrived, uid=state.vehicle.uid,
+        system=state.vehicle.system,
+        approaches=state.progress.approaches, quarters=round(state.progress.bearing_rad / (0.5 * math.pi)),
+        standing=standing_saved(state), skipped=state.orders.skipped, set_sail_utc_s=state.voyage.set_sail_utc_s,
+        inside=None if state.progress.inside is None or state.progress.inside.utc_s is None
+        else (state.progress.inside.goal, state.progress.inside.utc_s),
+        searched=state.progress.searched[:-1], covered=state.progress.covered,   # the last point moves with her
+        tacks=(state.tacking.tried, state.tacking.failed), place=state.position.place,
     )

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
@@ -32,8 +31,29 @@ from companion.skipper.step.config import Guidance, Permissions, SkipperConfig
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import Snapshot, wind_mean, wind_now
-from companion.skipper.step.state import Phase, Retry, SkipperState, is_given_up
+from companion.skipper.step.state import (
+    Adrift,
+    Alarms,
+    Announced,
+    ByField,
+    GoalProgress,
+    LoadedMission,
+    OperatorState,
+    Orders,
+    Pending,
+    Phase,
+    Planning,
+    PositionState,
+    Retry,
+    SkipperState,
+    SteeringState,
+    TrafficState,
+    VehicleIdentity,
+    VoyageState,
+    is_given_up,
+)
 from companion.skipper.step.still_air import still_air
+from companion.skipper.step.tacking import Tacking
 from companion.skipper.way.circle import Circle, Drawn, circle_of, drawn_of
 from companion.skipper.way.gates import Approach, Gate, gates_of
 from companion.skipper.way.geometry import bearing_rad
@@ -77,8 +97,8 @@ def _kept_in(voyage: Voyage, drawn: Drawn | None, circle: Circle | None) -> Voya
 
 def _is_fence_off(state: SkipperState, snapshot: Snapshot) -> bool:
     """Return whether the autopilot keeps a fence no more: under way not for a moment's silence, but by the watchdog."""
-    if state.sailing:
-        return "fence off" in [raised.name for raised in state.raised]
+    if state.voyage.sailing:
+        return "fence off" in [raised.name for raised in state.alarms.raised]
     return snapshot.autopilot is not None and snapshot.autopilot.fence_on is False
 
 
@@ -98,21 +118,64 @@ class Turn:
         self._gates: tuple[tuple[Approach, ...], tuple[Gate, ...]] | None = None
 
     # ------------------------------------------------------------------------------------- changing
-    def update(self, **changes: Any) -> None:
-        """Change the state."""
-        self.state = changed(self.state, **changes)
+    def set(
+        self, *,
+        wants: tuple[str, ...] | None = None, vehicle: VehicleIdentity | None = None,
+        mission: LoadedMission | None = None, progress: GoalProgress | None = None, voyage: VoyageState | None = None,
+        plans: Planning | None = None, pending: Pending | None = None, operator: OperatorState | None = None,
+        steering: SteeringState | None = None, by_field: ByField | None = None, adrift: Adrift | None = None,
+        tacking: Tacking | None = None, position: PositionState | None = None, orders: Orders | None = None,
+        alarms: Alarms | None = None, traffic: TrafficState | None = None, announced: Announced | None = None,
+    ) -> None:
+        """Replace parts of the state whole; a part that is None stays."""
+        state = self.state
+        if wants is not None:
+            state = changed(state, wants=wants)
+        if vehicle is not None:
+            state = changed(state, vehicle=vehicle)
+        if mission is not None:
+            state = changed(state, mission=mission)
+        if progress is not None:
+            state = changed(state, progress=progress)
+        if voyage is not None:
+            state = changed(state, voyage=voyage)
+        if plans is not None:
+            state = changed(state, plans=plans)
+        if pending is not None:
+            state = changed(state, pending=pending)
+        if operator is not None:
+            state = changed(state, operator=operator)
+        if steering is not None:
+            state = changed(state, steering=steering)
+        if by_field is not None:
+            state = changed(state, by_field=by_field)
+        if adrift is not None:
+            state = changed(state, adrift=adrift)
+        if tacking is not None:
+            state = changed(state, tacking=tacking)
+        if position is not None:
+            state = changed(state, position=position)
+        if orders is not None:
+            state = changed(state, orders=orders)
+        if alarms is not None:
+            state = changed(state, alarms=alarms)
+        if traffic is not None:
+            state = changed(state, traffic=traffic)
+        if announced is not None:
+            state = changed(state, announced=announced)
+        self.state = state
 
     def new_id(self) -> int:
         """Return a number not used before in this voyage."""
-        number = self.state.next_id
-        self.update(next_id=number + 1)
+        number = self.state.pending.next_id
+        self.set(pending=changed(self.state.pending, next_id=number + 1))
         return number
 
     def act(self, action: Action) -> bool:
         """Ask for an action; False (nothing is asked) when it is not permitted, the autopilot not ours, or given up."""
         is_order = isinstance(
             action, UploadMission | UploadFence | SetMode | Arm | SetCurrent | SteerHeading | Tack | RunMotor)
-        if is_order and (self.is_given_up or not self.state.is_ours):
+        if is_order and (self.is_given_up or not self.state.vehicle.is_ours):
             return False
         if not permitted(action, self.snapshot.permissions):
             return False
@@ -123,19 +186,19 @@ class Turn:
         """Announce something; the same code not more often than every ``every_s`` (default: the configured)."""
         if self.is_said(code, self.config.announce_interval_s if every_s is None else every_s):
             return
-        said = dict(self.state.announced)
+        said = dict(self.state.announced.codes)
         said[code] = self.t_s
         recent = sorted(said.items(), key=lambda item: item[1])[-64:]
-        self.update(announced=tuple(recent))
+        self.set(announced=changed(self.state.announced, codes=tuple(recent)))
         self.actions.append(Announce(severity=severity, code=code, text=text))
 
     def is_said(self, code: str, within_s: float) -> bool:
         """Return whether it was announced within that time: then it need not be worked out."""
-        return self.t_s - dict(self.state.announced).get(code, -math.inf) < within_s
+        return self.t_s - dict(self.state.announced.codes).get(code, -math.inf) < within_s
 
     def phase(self, phase: Phase, why: str) -> None:
         """Set the phase and the sentence that says why."""
-        self.update(phase=phase, why=why)
+        self.state = changed(self.state, phase=phase, why=why)
 
     def failed(self, retry: Retry) -> Retry:
         """Return the patience after another failure: the wait doubles up to the longest."""
@@ -148,28 +211,29 @@ class Turn:
 
         The gates are others from here on: what the mission on board, or on its way there, counted for is void.
         """
-        others = tuple(a for a in self.state.approaches if a.goal != approach.goal)
-        self.update(
-            approaches=(*others, approach), bearing_rad=0.0, closest_m=math.inf,
-            gate=next(n for n, gate in enumerate(self.gates) if gate.goal == approach.goal))
+        others = tuple(a for a in self.state.progress.approaches if a.goal != approach.goal)
+        self.set(
+            progress=changed(
+                self.state.progress, approaches=(*others, approach), bearing_rad=0.0, closest_m=math.inf,
+                gate=next(n for n, gate in enumerate(self.gates) if gate.goal == approach.goal)))
         self.void_route()
 
     def void_route(self) -> None:
         """Let no item of the mission on board, or on its way there, count for the gate that is next or a later one."""
         def void(route: Route) -> Route:
-            return replace(route, gate_of=tuple(-1 if g >= self.state.gate else g for g in route.gate_of))
+            return replace(route, gate_of=tuple(-1 if g >= self.state.progress.gate else g for g in route.gate_of))
 
-        if self.state.route is not None:
-            self.update(route=void(self.state.route))
-        if self.state.pending_upload is not None:
-            pending = self.state.pending_upload
-            self.update(pending_upload=replace(pending, route=void(pending.route)))
+        if self.state.mission.route is not None:
+            self.set(mission=changed(self.state.mission, route=void(self.state.mission.route)))
+        if self.state.pending.upload is not None:
+            pending = self.state.pending.upload
+            self.set(pending=changed(self.state.pending, upload=replace(pending, route=void(pending.route))))
 
     # -------------------------------------------------------------------------------------- reading
     @property
     def gates(self) -> tuple[Gate, ...]:
         """The voyage's gates, in order."""
-        approaches = self.state.approaches
+        approaches = self.state.progress.approaches
         if self._gates is None or self._gates[0] is not approaches:
             self._gates = (approaches, gates_of(self.voyage, approaches))   # which hashes the whole voyage
         return self._gates[1]
@@ -191,13 +255,13 @@ class Turn:
         age = self.snapshot.vehicle_age_s
         if self.snapshot.vehicle is None or age is None or age > FRESH_S:
             return None
-        is_doubted = self.state.doubt is not None or self.jump_m >= JUMP_M
+        is_doubted = self.state.position.doubt is not None or self.jump_m >= JUMP_M
         return None if is_doubted and not self.plans_in_doubt else self.snapshot.position_en_m
 
     @property
     def reckoned_en(self) -> PointEn | None:
         """Where the boat is, reckoned on from the last place that was believed while the position is not."""
-        doubt = self.state.doubt
+        doubt = self.state.position.doubt
         return self.boat_en if doubt is None else doubt.reckoned_en_m
 
     @property
@@ -206,7 +270,7 @@ class Turn:
 
         Sailed by the autopilot, on a way that is shut, a plan that is clear from where it believes to be is better.
         """
-        is_held = self.state.own_mode in STOPPING and self.snapshot.permissions.may_set_mode
+        is_held = self.state.steering.own_mode in STOPPING and self.snapshot.permissions.may_set_mode
         return not is_held and self.is_way_shut
 
     @property
@@ -217,10 +281,10 @@ class Turn:
         from there is better than a leg that is not.
         """
         here, leg, vehicle = self.snapshot.position_en_m, self.leg(), self.snapshot.vehicle
-        if here is None or leg is None or vehicle is None or not self.state.sailing:
+        if here is None or leg is None or vehicle is None or not self.state.voyage.sailing:
             return False
         goes_to = leg[1]
-        if self.state.own_mode in STOPPING:   # drifting, turning, or on a way that is not ours
+        if self.state.steering.own_mode in STOPPING:   # drifting, turning, or on a way that is not ours
             east, north = vehicle.velocity_en_mps
             goes_to = (here[0] + DRIFT_LOOK_S * east, here[1] + DRIFT_LOOK_S * north)
         area, floor_m = self.voyage.area, min(self.config.margin_floor_m, self.config.margin_m)
@@ -232,9 +296,9 @@ class Turn:
 
         At a leap's 8 m/s a second would hide what a margin is: she is held against her own speed.
         """
-        here, last, vehicle = self.snapshot.position_en_m, self.state.last_seen, self.snapshot.vehicle
+        here, last, vehicle = self.snapshot.position_en_m, self.state.position.last_seen, self.snapshot.vehicle
         age = self.snapshot.vehicle_age_s
-        if here is None or last is None or vehicle is None or age is None or self.state.back_s == self.t_s:
+        if here is None or last is None or vehicle is None or age is None or self.state.position.back_s == self.t_s:
             return 0.0
         elapsed_s = max(0.0, self.t_s - age - last.t_s)
         if elapsed_s > MEMORY_S:
@@ -319,17 +383,17 @@ class Turn:
     @property
     def gate(self) -> Gate | None:
         """The gate being sailed to, None when all are passed."""
-        return self.gates[self.state.gate] if self.state.gate < len(self.gates) else None
+        return self.gates[self.state.progress.gate] if self.state.progress.gate < len(self.gates) else None
 
     def is_raised(self, name: str) -> bool:
         """Return whether a watchdog is raised."""
-        return name in [raised.name for raised in self.state.raised]
+        return name in [raised.name for raised in self.state.alarms.raised]
 
     @property
     def is_taken(self) -> bool:
         """Whether somebody else has the boat: under way, and disarmed or in a mode that we did not ask for."""
         status = self.autopilot
-        if status is None or not self.state.sailing:
+        if status is None or not self.state.voyage.sailing:
             return False
         if status.is_armed and self.is_leaving:
             return False
@@ -339,8 +403,8 @@ class Turn:
 
     def is_own(self, mode: Mode | None) -> bool:
         """Return whether a mode is one that we asked for; a LOITER that is begun anew passes through HOLD."""
-        own = self.state.own_mode
-        return mode is own or (self.state.anew is not None and {mode, own} <= {Mode.LOITER, Mode.HOLD})
+        own = self.state.steering.own_mode
+        return mode is own or (self.state.position.anew is not None and {mode, own} <= {Mode.LOITER, Mode.HOLD})
 
     @property
     def is_given_up(self) -> bool:
@@ -350,17 +414,17 @@ class Turn:
     @property
     def is_leaving(self) -> bool:
         """Whether she shows a stop still, or GUIDED, that an order of ours, on its way or just accepted, ends."""
-        status, state, own = self.autopilot, self.state, self.state.own_mode
+        status, state, own = self.autopilot, self.state, self.state.steering.own_mode
         if status is None or own is None or own is status.mode:
             return False
         since_s = -math.inf
         if status.mode is not Mode.GUIDED:
-            if state.stop is None or status.mode is not state.stop.mode:
+            if state.operator.stop is None or status.mode is not state.operator.stop.mode:
                 return False
-            since_s = state.stop.t_s
-        if state.pending_command is not None:
-            return state.pending_command[2] == own.name and since_s < state.pending_command[1]
-        name, accepted_s = state.accepted or ("", 0.0)
+            since_s = state.operator.stop.t_s
+        if state.pending.command is not None:
+            return state.pending.command[2] == own.name and since_s < state.pending.command[1]
+        name, accepted_s = state.pending.accepted or ("", 0.0)
         return name == own.name and since_s < accepted_s and self.t_s < accepted_s + SHOWS_S
 
     @property
@@ -399,19 +463,19 @@ class Turn:
 
     def leg(self) -> tuple[PointEn, PointEn] | None:
         """Return the planned leg being sailed (from, to), None without a route."""
-        route, i = self.state.route, self.state.index
+        route, i = self.state.mission.route, self.state.mission.index
         if route is None or not 0 <= i < len(route.items):
             return None
         return route.leg_from_en_m[i], route.points_en_m[i]
 
     def ahead(self) -> tuple[PointEn, ...]:
         """Return the waypoints still to be sailed, without the safe end; empty when loitering at it."""
-        route = self.state.route
-        return route.points_en_m[self.state.index:-1] if route is not None else ()
+        route = self.state.mission.route
+        return route.points_en_m[self.state.mission.index:-1] if route is not None else ()
 
     def last_waypoint(self) -> int:
         """Return the index of the last waypoint before the safe end, -1 without one."""
-        route = self.state.route
+        route = self.state.mission.route
         return len(route.items) - 2 if route is not None else -1
 
     def blank_facts(self, plan_id: int, margin_m: float, delta_s: float, rung: str) -> Route:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
+from companion.frozen import changed
 from companion.geo.shift import Shift, carried
 from companion.skipper.step.state import SkipperState
 
@@ -13,6 +12,6 @@ def in_water(state: SkipperState, shift: Shift) -> SkipperState:
 
     The places of ``history`` stand between a time and a distance.
     """
-    return replace(
-        carried(state, shift),
-        history=tuple((t_s, *shift.point((east, north)), to_go_m) for t_s, east, north, to_go_m in state.history))
+    new = carried(state, shift)
+    history = tuple((t_s, *shift.point((east, north)), to_go_m) for t_s, east, north, to_go_m in state.progress.history)
+    return changed(new, progress=changed(new.progress, history=history))

@@ -81,11 +81,11 @@ def _strength(turn: Turn) -> Strength | None:
 
 def _until_s(turn: Turn) -> float:
     """Return how far ahead is looked: the rest of the plan."""
-    route = turn.state.route
+    route = turn.state.mission.route
     whole_s = None if route is None else route.late_s or route.cost_s
     if route is None or whole_s is None:
         return AHEAD_S
-    began_s = route.plan_t_s if turn.state.sailing else turn.t_s
+    began_s = route.plan_t_s if turn.state.voyage.sailing else turn.t_s
     return max(LEAST_S, began_s + whole_s - turn.t_s)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from companion.frozen import changed
 from companion.skipper.planning.errands import home_trouble
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.state import Charge
@@ -24,30 +25,30 @@ LEAST_MPS = 0.5
 
 def follow_charge(turn: Turn) -> None:
     """Remember where the fall of the charge began, and whether it still covers the way; say it when it does not."""
-    status, before = turn.autopilot, turn.state.charge
+    status, before = turn.autopilot, turn.state.alarms.charge
     share = status.battery_remaining if status is not None else None
     if share is None:
         return
     if before is None or share > before.last + RISE:
-        turn.update(charge=Charge(since_s=turn.t_s, first=share, last=share))
+        turn.set(alarms=changed(turn.state.alarms, charge=Charge(since_s=turn.t_s, first=share, last=share)))
         return
     now = replace(before, last=min(share, before.last))
     if now != before:
-        turn.update(charge=now)
+        turn.set(alarms=changed(turn.state.alarms, charge=now))
     left_s = lasts_s(turn)
     if now.is_short or left_s is None:
         return
     needed_s = way_s(turn)
     if needed_s is None or left_s >= turn.config.ends.battery_reserve * needed_s:
         return
-    turn.update(charge=replace(now, is_short=True))
+    turn.set(alarms=changed(turn.state.alarms, charge=replace(now, is_short=True)))
     turn.say(Severity.WARNING, "charge", f"the charge lasts {math.floor(left_s / 60.0)} min at its rate, the way to "
              f"where she can wait takes {math.ceil(needed_s / 60.0)} min", every_s=0.0)
 
 
 def lasts_s(turn: Turn) -> float | None:
     """Return how long the charge lasts [s], None while the rate is not known."""
-    charge = turn.state.charge
+    charge = turn.state.alarms.charge
     if charge is None or turn.t_s - charge.since_s < LOOK_S or charge.first - charge.last < FALL:
         return None
     return charge.last * (turn.t_s - charge.since_s) / (charge.first - charge.last)

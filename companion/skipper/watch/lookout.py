@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from companion.frozen import changed
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.turn import Turn
@@ -35,8 +36,8 @@ def look_out(turn: Turn) -> None:
     """Judge the vessels in view and announce alarms that are new or go on."""
     picture, vehicle, boat = turn.snapshot.traffic, turn.snapshot.vehicle, turn.boat_en
     if picture is None or vehicle is None or boat is None or not picture.vessels:
-        if turn.state.watch:
-            turn.update(watch=())
+        if turn.state.traffic.watch:
+            turn.set(traffic=changed(turn.state.traffic, watch=()))
         return
     hull, wind, adrift = turn.voyage.boat.hull, turn.wind_now, turn.state.adrift
     own = OwnShip(
@@ -46,18 +47,18 @@ def look_out(turn: Turn) -> None:
     found = assess(own, picture, limits(turn.config), None if wind is None else wind[0])
     if turn.config.traffic_policy is Policy.RULES:
         found = _meet(turn, own, found)
-    turn.update(watch=found[:SHOWN])
+    turn.set(traffic=changed(turn.state.traffic, watch=found[:SHOWN]))
     _say(turn, found[:SHOWN])
 
 
 def _meet(turn: Turn, own: OwnShip, found: Sequence[Assessment]) -> tuple[Assessment, ...]:
     """Follow the encounters, say which have changed, and return the vessels with what the rules gave each of them."""
     state, mean = turn.state, turn.wind_mean
-    before = {(h.mmsi, h.branch): h for h in state.encounters}
-    held = follow(state.encounters, own, found, t_s=turn.t_s, clearance_m=turn.config.traffic_clearance_m,
+    before = {(h.mmsi, h.branch): h for h in state.traffic.encounters}
+    held = follow(state.traffic.encounters, own, found, t_s=turn.t_s, clearance_m=turn.config.traffic_clearance_m,
                   twd_from_rad=None if mean is None else mean[0])
     now = {(h.mmsi, h.branch): h for h in held}
-    told = {t[:2]: t for t in state.encounters_told}
+    told = {t[:2]: t for t in state.announced.encounters}
     for one in found:
         key = one.vessel.mmsi, one.vessel.branch
         after, last = now.get(key), told.get(key)
@@ -73,17 +74,19 @@ def _meet(turn: Turn, own: OwnShip, found: Sequence[Assessment]) -> tuple[Assess
         if key not in now:
             turn.say(Severity.INFO, "encounter", f"{gone.label}: past and clear", every_s=0.0)
             told.pop(key, None)
-    turn.update(encounters=held, encounters_told=tuple(told.values()))
+    turn.set(
+        traffic=changed(turn.state.traffic, encounters=held),
+        announced=changed(turn.state.announced, encounters=tuple(told.values())))
     return tuple(replace(one, encounter=now[key].encounter) if (
         key := (one.vessel.mmsi, one.vessel.branch)) in now else one for one in found)
 
 
 def _say(turn: Turn, found: Sequence[Assessment]) -> None:
     """Say the worst of the alarms that were not said lately."""
-    lately = tuple(told for told in turn.state.watch_told if turn.t_s - told[2] < EVERY_S)
+    lately = tuple(told for told in turn.state.announced.watch if turn.t_s - told[2] < EVERY_S)
     known = {told[:2] for told in lately}
     news = next((a for a in found if a.alarm is not Alarm.NONE and (a.vessel.mmsi, a.vessel.branch) not in known), None)
     if news is not None:
         turn.say(SEVERITY[news.alarm], "vessel near", news.sentence(), every_s=0.0)
         lately = (*lately, (news.vessel.mmsi, news.vessel.branch, turn.t_s))
-    turn.update(watch_told=lately)
+    turn.set(announced=changed(turn.state.announced, watch=lately))

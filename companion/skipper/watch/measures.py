@@ -44,12 +44,13 @@ def _position_lost(turn: Turn) -> float | None:
 def _jump(turn: Turn) -> float | None:
     if turn.snapshot.position_en_m is None:
         return None
-    return turn.jump_m if turn.state.doubt is None else max(turn.jump_m, JUMP_M)   # it lasts as long as the doubt
+    # it lasts as long as the doubt
+    return turn.jump_m if turn.state.position.doubt is None else max(turn.jump_m, JUMP_M)
 
 
 def _wind(turn: Turn) -> float | None:
     health = turn.snapshot.wind.health
-    return float(health is WindHealth.UNTRUSTED or (health is WindHealth.NONE and turn.state.sailing))
+    return float(health is WindHealth.UNTRUSTED or (health is WindHealth.NONE and turn.state.voyage.sailing))
 
 
 def _contradicted(turn: Turn) -> float | None:
@@ -80,14 +81,14 @@ def _too_near(turn: Turn) -> float | None:
 
 def _progress(turn: Turn) -> float | None:
     """Way made good in the window; None before the window is full or while there is a reason to stand still."""
-    if turn.is_raised("becalmed") or not turn.ahead() or not turn.state.history:
+    if turn.is_raised("becalmed") or not turn.ahead() or not turn.state.progress.history:
         return None
-    if turn.state.route is None or turn.state.history_plan != turn.state.route.plan_id:
+    if turn.state.mission.route is None or turn.state.progress.history_plan != turn.state.mission.route.plan_id:
         return None   # the history is of the plan before
-    old = turn.state.history[0]
+    old = turn.state.progress.history[0]
     if turn.t_s - old[0] < PROGRESS_WINDOW_S:
         return None
-    return old[3] - turn.state.history[-1][3]
+    return old[3] - turn.state.progress.history[-1][3]
 
 
 def _heading(turn: Turn) -> float | None:
@@ -102,7 +103,7 @@ def _heading(turn: Turn) -> float | None:
 
 def corridor_m(turn: Turn) -> float:
     """Return how far off its leg the boat may be before the margin's floor is in question [m]."""
-    route = turn.state.route
+    route = turn.state.mission.route
     margin = route.margin_m if route is not None else turn.config.margin_m
     return max(margin - turn.config.margin_floor_m, turn.config.manoeuvre_m)
 
@@ -110,7 +111,7 @@ def corridor_m(turn: Turn) -> float:
 def _corridor(turn: Turn) -> float | None:
     """Share of the corridor used; in open water the grid size bounds it, not the margin, and a beat its own boards."""
     boat, leg = turn.boat_en, turn.leg()
-    if boat is None or leg is None or not turn.ahead() or turn.state.own_mode in STOPPING or is_composed(turn):
+    if boat is None or leg is None or not turn.ahead() or turn.state.steering.own_mode in STOPPING or is_composed(turn):
         return None      # stopped, or by a field of her own, she follows no leg
     if distance_m(*leg) < 1.0:
         return 0.0
@@ -127,16 +128,16 @@ def _corridor(turn: Turn) -> float | None:
 
 
 def _stuck(turn: Turn) -> float | None:
-    passed = turn.state.passed_since_s
+    passed = turn.state.mission.passed_since_s
     return None if passed is None else turn.t_s - passed
 
 
 def _ended(turn: Turn) -> float | None:
-    route = turn.state.route
+    route = turn.state.mission.route
     if route is None or turn.gate is None or turn.autopilot is None or errand(turn) is not None or (
         is_composed(turn)):
         return None
-    return float(turn.state.index >= len(route.items) - 1 or turn.autopilot.mission_state.name == "COMPLETE")
+    return float(turn.state.mission.index >= len(route.items) - 1 or turn.autopilot.mission_state.name == "COMPLETE")
 
 
 def _breach(turn: Turn) -> float | None:
@@ -144,11 +145,11 @@ def _breach(turn: Turn) -> float | None:
 
 
 def _foreign(turn: Turn) -> float | None:
-    return float(bool(turn.state.foreign))
+    return float(bool(turn.state.mission.foreign))
 
 
 def _reboot(turn: Turn) -> float | None:
-    return float(turn.state.rebooted)
+    return float(turn.state.vehicle.rebooted)
 
 
 def _battery(turn: Turn, name: str, *, is_below: bool) -> float | None:
@@ -169,8 +170,8 @@ def _battery_critical(turn: Turn) -> float | None:
     status, least_v = turn.autopilot, turn.config.ends.battery_v
     volts = status.battery_v if status is not None else None
     is_empty = least_v is not None and volts is not None and volts <= least_v
-    is_short = turn.state.charge is not None and turn.state.charge.is_short
-    is_below = turn.state.battery_critical or is_empty or is_short
+    is_short = turn.state.alarms.charge is not None and turn.state.alarms.charge.is_short
+    is_below = turn.state.alarms.battery_critical or is_empty or is_short
     return _battery(turn, "battery critical", is_below=is_below)
 
 
@@ -195,11 +196,11 @@ def _shore(turn: Turn) -> float | None:
 
 def _time(turn: Turn) -> float | None:
     limit_s = turn.config.voyage_timeout_s
-    return None if limit_s is None else turn.state.under_way_s / limit_s
+    return None if limit_s is None else turn.state.voyage.under_way_s / limit_s
 
 
 def _dragged(turn: Turn) -> float | None:
-    rest, boat = turn.state.rest_en_m, turn.boat_en
+    rest, boat = turn.state.voyage.rest_en_m, turn.boat_en
     if rest is None or boat is None:
         return None
     bound = errand(turn)

@@ -26,7 +26,7 @@ PATIENCE_S = 30.0     # an answer that is on its way is given this long before i
 
 def speak_of_stop(turn: Turn) -> None:
     """Say how she drifts while a stop lasts."""
-    stop = turn.state.stop
+    stop = turn.state.operator.stop
     if stop is None or turn.autopilot is None or turn.t_s - stop.t_s <= (
         PATIENCE_S if is_answered(turn) else TOLD_S
     ) or turn.is_said("adrift", EVERY_S):
@@ -80,7 +80,7 @@ def _where(turn: Turn, here: PointEn, ahead: DriftAhead) -> str:
 
 def _remedy(turn: Turn) -> str:
     """Return what to press, and what would let the companion do it."""
-    stop, may = turn.state.stop, turn.snapshot.permissions
+    stop, may = turn.state.operator.stop, turn.snapshot.permissions
     if is_answered(turn):
         return turn.state.why
     if stop is not None and not stop.is_armed:

@@ -13,6 +13,7 @@ import math
 from dataclasses import replace
 
 from companion.boat.failed_tack import SHOOT_S
+from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.planning.autopilot_beats import TACKS_FAIL_AFTER
@@ -38,11 +39,11 @@ TACK_FAILED = "a tack failed"
 def watch_tacks(turn: Turn) -> None:
     """Follow her tacks for one step."""
     now, vehicle, wind, status = turn.state.tacking, turn.snapshot.vehicle, turn.wind_now, turn.autopilot
-    sails = turn.state.sailing and turn.config.sails and status is not None and (
+    sails = turn.state.voyage.sailing and turn.config.sails and status is not None and (
         status.is_armed and status.mode in {Mode.AUTO, Mode.GUIDED})
     if not sails or vehicle is None or wind is None or wind[1] < LEAST_TWS_MPS:
         if now.side or now.began_s is not None:
-            turn.update(tacking=replace(now, side=0, began_s=None, is_counted=False))
+            turn.set(tacking=replace(now, side=0, began_s=None, is_counted=False))
         return
     through_mps = math.dist(vehicle.velocity_en_mps, turn.snapshot.current.en_mps)   # as it is believed to move
     then = followed(now, turn.t_s, vehicle.heading_rad, wind[0], through_mps)
@@ -51,7 +52,7 @@ def watch_tacks(turn: Turn) -> None:
     elif now.began_s is not None and then.began_s is None and (now.is_counted or then.failed > now.failed):
         then = lain(now, then, turn.t_s, turn.boat_en, wind[0], turn.snapshot.current.en_mps)
     if then != now:
-        turn.update(tacking=then)
+        turn.set(tacking=then)
     if then.failed > now.failed:
         _failed(turn, then)
 
@@ -129,4 +130,4 @@ def _failed(turn: Turn, tacking: Tacking) -> None:
         return
     is_near = float(turn.voyage.area.clearance_m([boat])[0]) < NEAR_SOLID_M
     if tacking.in_a_row >= TACKS_FAIL_AFTER or is_near:
-        turn.update(asked=TACK_FAILED)
+        turn.set(plans=changed(turn.state.plans, asked=TACK_FAILED))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from companion.frozen import changed
 from companion.messages import Mode
 from companion.skipper.deeds.adrift import STEERAGE_MPS
 from companion.skipper.planning.ends import words
@@ -16,8 +17,8 @@ from companion.skipper.watch.watchdogs import BY_NAME, TABLE, Response, Watchdog
 
 def watch(turn: Turn) -> tuple[str, ...]:
     """Raise and clear watchdogs; return the names raised in this very step."""
-    raised = {r.name: r for r in turn.state.raised}
-    entering = dict(turn.state.entering)
+    raised = {r.name: r for r in turn.state.alarms.raised}
+    entering = dict(turn.state.alarms.entering)
     fresh: list[str] = []
     for dog in TABLE:
         value = measure(turn, dog.name) if _is_watched(turn, dog) else None
@@ -47,10 +48,9 @@ def watch(turn: Turn) -> tuple[str, ...]:
         else:
             raised[dog.name] = replace(now, clear_since_s=clear)
     order = {dog.name: n for n, dog in enumerate(TABLE)}
-    turn.update(
-        raised=tuple(sorted(raised.values(), key=lambda r: order[r.name])),
-        entering=tuple(sorted(entering.items(), key=lambda e: order[e[0]])),
-    )
+    turn.set(alarms=changed(
+        turn.state.alarms, raised=tuple(sorted(raised.values(), key=lambda r: order[r.name])),
+        entering=tuple(sorted(entering.items(), key=lambda e: order[e[0]]))))
     for name in fresh:
         dog = BY_NAME[name]
         value = measure(turn, name)
@@ -73,14 +73,14 @@ def _done_about(turn: Turn, dog: Watchdog) -> str:
 def _is_watched(turn: Turn, dog: Watchdog) -> bool:
     if dog.at_rest:
         return True
-    if turn.state.over and not turn.ahead():
+    if turn.state.voyage.over and not turn.ahead():
         return dog.loitering and _is_under_way(turn)
     return _is_under_way(turn)
 
 
 def _is_under_way(turn: Turn) -> bool:
     status = turn.autopilot
-    own = turn.state.own_mode
+    own = turn.state.steering.own_mode
     return (
-        turn.state.sailing and status is not None and status.is_armed and status.mode in {Mode.AUTO, own}
+        turn.state.voyage.sailing and status is not None and status.is_armed and status.mode in {Mode.AUTO, own}
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from companion.frozen import changed
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.turn import Turn
 
@@ -16,17 +17,17 @@ REMIND_S = 1800.0
 
 def watch_water(turn: Turn) -> None:
     """Say what is new of the current."""
-    current, told = turn.snapshot.current, turn.state.water_told_en_mps
-    if not turn.state.sailing:
+    current, told = turn.snapshot.current, turn.state.announced.water_en_mps
+    if not turn.state.voyage.sailing:
         return
     if current.verdict:
         turn.say(Severity.WARNING, "tide table", current.verdict, every_s=REMIND_S)
     if not current.is_significant:
         if told is not None:
-            turn.update(water_told_en_mps=None)
+            turn.set(announced=changed(turn.state.announced, water_en_mps=None))
             turn.say(Severity.INFO, "current", "the current is no longer told from still water: plans leave it out",
                      every_s=0.0)
         return
     if told is None or math.dist(told, current.en_mps) >= ANOTHER_MPS:
-        turn.update(water_told_en_mps=current.en_mps)
+        turn.set(announced=changed(turn.state.announced, water_en_mps=current.en_mps))
         turn.say(Severity.INFO, "current", f"{current.sentence()}: plans reckon with it", every_s=0.0)

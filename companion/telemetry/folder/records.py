@@ -140,7 +140,7 @@ def water_record(step: Step, shift: Shift) -> dict[str, Any]:
     ``drift_m`` is how far the route's points, which have been carried over at each change, are at most from the items
     on the autopilot, which are degrees.
     """
-    origin, route = shift.after.origin, step.state.route
+    origin, route = shift.after.origin, step.state.mission.route
     apart = [] if route is None else [
         math.dist(shift.after.en_from_geo(item.point), en_m)
         for item, en_m in zip(route.items, route.points_en_m, strict=True) if item.command == Command.NAV_WAYPOINT]
@@ -312,7 +312,7 @@ class VoyageFigures:
         self.current = snapshot.current
         if snapshot.traffic is not None:
             self.traffic = snapshot.traffic.counts
-        route = step.state.route
+        route = step.state.mission.route
         if route is not None:
             self.promised_risk = max(self.promised_risk or 0.0, 1.0 - route.delta_s)
             self.promised_risk_vessels = max(self.promised_risk_vessels, route.vessels_part)
@@ -327,7 +327,7 @@ class VoyageFigures:
                 self.path_risk = max(self.path_risk or 0.0, route.risk)
         autopilot = snapshot.autopilot
         sails = autopilot is not None and autopilot.is_armed and autopilot.mode in {Mode.AUTO, Mode.GUIDED}
-        if sails and self.first_s is None and not step.state.over:
+        if sails and self.first_s is None and not step.state.voyage.over:
             self.first_s = snapshot.t_s
         if self.first_s is None:
             return
@@ -335,7 +335,7 @@ class VoyageFigures:
             self.min_clearance_m = min(self.min_clearance_m, clearance_m)
             self.contacts += clearance_m <= 0.0 and not self._touching
             self._touching = clearance_m <= 0.0
-        if step.state.over:
+        if step.state.voyage.over:
             return   # what follows is a loiter
         self.last_s = snapshot.t_s
         if autopilot is not None:

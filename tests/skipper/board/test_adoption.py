@@ -8,7 +8,7 @@ from companion.skipper.board.adoption import adopt
 from companion.skipper.step import AdoptDrawing, SkipperConfig
 from companion.skipper.step.turn import Turn
 from companion.skipper.way import Goal
-from tests.skipper.world import World, voyage
+from tests.skipper.world import World, voyage, with_parts
 
 DRAWN = (waypoint(GeoPoint(lat_deg=50.81, lon_deg=-1.31)),)
 
@@ -16,7 +16,7 @@ DRAWN = (waypoint(GeoPoint(lat_deg=50.81, lon_deg=-1.31)),)
 def asked(*, adopts=True, **changes):
     skipper = Skipper(voyage=voyage(Goal(en_m=(0.0, 100.0))), config=SkipperConfig(adopts=adopts))
     world = World(skipper=skipper)
-    turn = Turn(skipper.voyage, skipper.config, replace(skipper.initial(), **changes), world.snapshot())
+    turn = Turn(skipper.voyage, skipper.config, with_parts(skipper.initial(), mission=changes), world.snapshot())
     return adopt(turn), turn.actions
 
 

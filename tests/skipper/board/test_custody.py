@@ -13,6 +13,7 @@ from companion.skipper.step import actions as act
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
 from tests.skipper.test_voyage import is_done, is_sailing, make, said
+from tests.skipper.world import with_parts
 
 ORDERS = (act.UploadMission, act.SetMode, act.Arm, act.SetCurrent, act.SteerHeading)
 THEIRS = (MissionItem(command=16, lat_e7=511_010_000, lon_e7=-13_000_000), MissionItem(command=20))
@@ -52,7 +53,7 @@ def test_a_motor_boat_is_sailed_where_the_mission_asks_for_one():
 
 def test_another_autopilot_under_way_stops_all_orders_and_ours_takes_them_up_again():
     world = make(upload_s=4.0)
-    assert world.run(300, lambda w: w.state.sailing and w.pending and w.pending[-1][1] == "upload")
+    assert world.run(300, lambda w: w.state.voyage.sailing and w.pending and w.pending[-1][1] == "upload")
     ours = world.identity
     world.identity = replace(ours, uid="77")
     before, on_board = orders(world), world.mission
@@ -104,12 +105,13 @@ def test_a_forged_read_is_read_again_and_costs_nothing():
     world.run(200, is_sailing)
     world.run(20)
     world.forged_reads = [THEIRS]
-    world.state = replace(world.state, checked_mission=False, read_since_s=world.t)   # somebody finished an upload
-    replans = world.state.replans
+    # somebody finished an upload
+    world.state = with_parts(world.state, mission={"checked": False, "read_since_s": world.t})
+    replans = world.state.plans.replans
     world.run(15)
     assert not world.forged_reads
     assert not said(world, "foreign mission")
-    assert world.state.replans == replans
+    assert world.state.plans.replans == replans
     assert is_sailing(world)
 
 
@@ -118,15 +120,15 @@ def test_a_mission_that_is_ours_again_is_taken_up_without_a_restart():
     world.run(200, is_sailing)
     ours, seq = world.mission, world.seq
     world.forged_reads = [THEIRS, THEIRS]
-    world.state = replace(world.state, checked_mission=False, read_since_s=world.t)
+    world.state = with_parts(world.state, mission={"checked": False, "read_since_s": world.t})
     world.run(10)
-    assert world.state.foreign
+    assert world.state.mission.foreign
     saved = world.skipper.persisted(world.state)
     assert saved.route is not None
     assert saved.route.items == ours, "what was ours is still known after a kill"
     assert (world.mission, world.seq) == (ours, seq)
-    world.run(60, lambda w: not w.state.foreign)
-    assert not world.state.foreign
+    world.run(60, lambda w: not w.state.mission.foreign)
+    assert not world.state.mission.foreign
     assert len(said(world, "foreign mission")) == 2, "found, and the watchdog"
     assert world.run(1500, is_done)
 
@@ -135,10 +137,10 @@ def test_a_strangers_mission_stays_a_strangers():
     world = make()
     world.run(200, is_sailing)
     world.install(THEIRS)
-    world.state = replace(world.state, checked_mission=False, read_since_s=world.t)
+    world.state = with_parts(world.state, mission={"checked": False, "read_since_s": world.t})
     before = orders(world)
     world.run(200)
-    assert world.state.foreign
+    assert world.state.mission.foreign
     assert world.mission == THEIRS
     assert orders(world) == before
     assert len(said(world, "foreign mission")) == 2, "found, and the watchdog"
@@ -148,7 +150,7 @@ def test_what_was_ours_is_given_up_when_the_strangers_mission_is_replaced():
     world = make()
     world.run(200, is_sailing)
     world.install(THEIRS)
-    world.state = replace(world.state, checked_mission=False, read_since_s=world.t)
+    world.state = with_parts(world.state, mission={"checked": False, "read_since_s": world.t})
     world.run(20)
     old = world.skipper.persisted(world.state).route
     world.order("replace")

@@ -93,7 +93,7 @@ def test_the_permission_to_replace_does_not_hold_for_what_somebody_brings_under_
     world.events.append(StatusText(t_s=world.t, severity=6, text="Flight plan received"))
     world.run(60)
     assert world.mission == theirs
-    assert world.state.foreign
+    assert world.state.mission.foreign
 
 
 def test_a_mission_that_has_arrived_is_not_sailed_again_by_itself():
@@ -112,13 +112,13 @@ def test_a_mission_that_has_arrived_is_not_sailed_again_by_itself():
     # told to, it sails from the beginning; the list of the first time is known by its name
     world.state, world.position = world.skipper.initial(None, saved.names), (0.0, 0.0)
     assert world.run(1500, is_done)
-    assert world.state.reached
+    assert world.state.progress.reached
 
 
 def test_a_failed_upload_is_remembered_beside_the_next():
     """A kill then left a mixture that the saved state could not explain (issue 12, point 14)."""
     world = make(uploads_fail=lambda n: UploadResult.TIMEOUT if n == 2 else UploadResult.OK)
-    world.run(400, lambda w: w.state.unsure_route is not None and w.state.pending_upload is not None)
+    world.run(400, lambda w: w.state.mission.unsure_route is not None and w.state.pending.upload is not None)
     saved = world.skipper.persisted(world.state)
     assert saved.unsure is not None
     assert saved.pending is not None

@@ -17,7 +17,7 @@ from companion.skipper.step.turn import Turn
 from companion.skipper.way.drift import drift_ahead
 from companion.skipper.way.voyage import Goal
 from tests.skipper.test_voyage import is_done, make, said
-from tests.skipper.world import restarted
+from tests.skipper.world import restarted, with_parts
 
 CALM_S = 60.0
 ROCK = shapely.box(150.0, -100.0, 190.0, 400.0)     # to leeward of the way, across the whole set of the current
@@ -181,9 +181,9 @@ def test_the_mission_s_own_loiter_is_kept_where_she_is_in_it_or_has_a_clear_way_
     there = (here[0] + place[0], here[1] + place[1])
     moved = tuple(shapely.affinity.translate(o, *here) for o in obstacles)
     voyage = replace(w.skipper.voyage, area=world(obstacles=moved).skipper.voyage.area) if moved else w.skipper.voyage
-    route = w.state.route
+    route = w.state.mission.route
     end = replace(route, items=route.items[-1:], points_en_m=(there,), leg_from_en_m=(here,), gate_of=(-1,))
-    turn = Turn(voyage, w.skipper.config, replace(w.state, route=end, index=0), w.snapshot())
+    turn = Turn(voyage, w.skipper.config, with_parts(w.state, mission={"route": end, "index": 0}), w.snapshot())
     assert lies_in_loiter(turn) is stays
 
 

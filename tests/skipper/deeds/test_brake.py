@@ -135,32 +135,32 @@ def test_a_planner_that_hangs_before_the_start_costs_no_margin():
     assert said(world, "no answer")
     world.planner = None
     assert world.run(120, is_sailing)
-    assert world.state.route.margin_m == world.skipper.config.margin_m
+    assert world.state.mission.route.margin_m == world.skipper.config.margin_m
 
 
 def test_want_of_a_processor_costs_effort_and_neither_margin_nor_mission():
     """Under way nothing is answered: less is asked of the planner each time, and what is on board stays."""
     world = make(Goal(en_m=(200.0, 200.0), radius_m=8.0), obstacles=(), wind=lambda t: (-math.pi / 4.0, 5.0))
     assert world.run(120, is_sailing)
-    sound, world.planner = world.state.route, lambda problem, seed: None
+    sound, world.planner = world.state.mission.route, lambda problem, seed: None
     budgets = []
     for _ in range(3):
         turn = turn_of(world)
         assert request(turn, ReplanReason.ORDER)
-        while turn.state.pending_plan is not None:
+        while turn.state.pending.plan is not None:
             budgets += [a.budget_s for a in turn.actions if isinstance(a, act.RequestPlan)]
             turn.actions.clear()
-            take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id, text="no answer"))
-        assert turn.state.route == sound
+            take_plan(turn, PlanOutcome(request_id=turn.state.pending.plan.request_id, text="no answer"))
+        assert turn.state.mission.route == sound
         assert not any(isinstance(a, act.UploadMission | act.SetMode) for a in turn.actions)
         world.state = turn.state
     assert budgets == sorted(budgets, reverse=True)
     assert budgets[-1] < 0.1 * budgets[0]
     turn = turn_of(world)
     assert request(turn, ReplanReason.ORDER)
-    pending = turn.state.pending_plan
+    pending = turn.state.pending.plan
     take_plan(turn, PlanOutcome(request_id=pending.request_id, plan=plan(pending.problem, expansions=500)))
-    assert turn.state.effort > world.state.effort     # what is answered gives it back
+    assert turn.state.plans.effort > world.state.plans.effort     # what is answered gives it back
 
 
 def test_an_old_plan_that_the_present_wind_has_closed_is_not_sound():

@@ -213,7 +213,7 @@ BY_FIELD = {"guidance": Guidance.FIELD}
 def test_a_voyage_by_field_alone(goals):
     world = make(goals=goals, config=BY_FIELD)
     assert world.run(900, lambda w: w.state.phase is Phase.DONE)
-    assert world.state.reached == tuple(range(len(goals)))
+    assert world.state.progress.reached == tuple(range(len(goals)))
     headings = steered(world)
     assert len(headings) > 60
     assert all(abs(difference_rad(a.heading_rad, 0.0)) >= world.no_go - 1e-9 for _, a in headings)
@@ -242,7 +242,7 @@ def test_a_voyage_by_field_without_permission_sails_by_plan():
 def test_station_keeping_lasts_as_long_as_asked(guidance):
     goal = Goal(en_m=(150.0, 0.0), radius_m=8.0)
     world = make(goals=(goal,), config={"guidance": guidance, "station_s": 120.0})
-    assert world.run(600, lambda w: bool(w.state.reached))
+    assert world.run(600, lambda w: bool(w.state.progress.reached))
     arrived = world.t
     far = 0.0
     while world.state.phase is not Phase.DONE:

@@ -15,7 +15,7 @@ from tests.skipper.world import FRAME, restarted
 
 
 def raised(world):
-    return any(r.name == "position jump" for r in world.state.raised)
+    return any(r.name == "position jump" for r in world.state.alarms.raised)
 
 
 def false_place(world):
@@ -24,7 +24,7 @@ def false_place(world):
     rock = min(area.polygons, key=lambda p: p.distance(shapely.Point(world.position)))
     near = shapely.ops.nearest_points(rock, shapely.Point(world.position))[0]
     way = bearing_rad(world.position, (near.x, near.y))
-    return moved(world.state.route.points_en_m[world.state.index], way, -150.0)
+    return moved(world.state.mission.route.points_en_m[world.state.mission.index], way, -150.0)
 
 
 def lie(world):
@@ -211,10 +211,10 @@ def test_a_position_that_jumped_while_the_companion_was_dead_is_doubted_by_who_c
     assert world.run(600, is_near_an_island)
     restarted(world)
     world.position_offset = (400.0, -300.0)
-    assert world.run(10, lambda w: w.state.doubt is not None)
-    assert "s ago" in world.state.doubt.why
+    assert world.run(10, lambda w: w.state.position.doubt is not None)
+    assert "s ago" in world.state.position.doubt.why
     world.position_offset = (0.0, 0.0)
-    assert world.run(3, lambda w: w.state.doubt is None)
+    assert world.run(3, lambda w: w.state.position.doubt is None)
 
 
 def test_an_ordinary_restart_doubts_nothing():
@@ -236,8 +236,8 @@ def test_of_two_receivers_that_differ_the_other_one_may_be_right():
         world.shown = {"gps2": geo(world.position)}
         world.position_offset = (3.0 * n, 0.0)
         world.step()
-    assert world.state.doubt is not None
-    assert "second receiver" in world.state.doubt.why
+    assert world.state.position.doubt is not None
+    assert "second receiver" in world.state.position.doubt.why
     world.shown = {}       # a forger's, or it has fallen silent: nothing has jumped
     world.run(3)
-    assert world.state.doubt is None
+    assert world.state.position.doubt is None

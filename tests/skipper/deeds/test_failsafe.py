@@ -15,7 +15,7 @@ from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from tests.skipper.test_voyage import make, said
-from tests.skipper.world import FRAME, restarted
+from tests.skipper.world import FRAME, restarted, with_parts
 
 ISLAND = box(-60, 80, 60, 120)
 EAST = (Goal(en_m=(400.0, 0.0), radius_m=8.0),)
@@ -30,7 +30,7 @@ def text(world, words):
 def under_way(goals=EAST, **made):
     world = make(*goals, obstacles=made.pop("obstacles", ()), **made)
     world.shown = {"rc_us": RESTING, "home": FRAME.geo_from_en(0.0, 0.0), **world.shown}
-    assert world.run(60, lambda w: w.state.sailing)
+    assert world.run(60, lambda w: w.state.voyage.sailing)
     world.run(20)
     return world
 
@@ -67,9 +67,9 @@ def test_each_cause_is_known_by_its_sign_before_or_after_the_change_of_mode(what
     if words:
         text(world, words)
     world.run(2)
-    assert world.state.stop.cause == cause
+    assert world.state.operator.stop.cause == cause
     expected = {c.name: c.answer is not Answer.LEAVE for c in TABLE}.get(cause, False)
-    assert bool(world.state.answering) is expected
+    assert bool(world.state.operator.answering) is expected
     assert (world.state.phase is Phase.OPERATOR) is not expected
 
 
@@ -81,7 +81,7 @@ def test_a_sign_long_before_or_after_belongs_to_nothing():
     world.run(10)
     text(world, "Radio Failsafe")
     world.run(5)
-    assert world.state.stop.cause == "a person"
+    assert world.state.operator.stop.cause == "a person"
     assert world.state.phase is Phase.OPERATOR
 
 
@@ -95,7 +95,7 @@ def test_another_breach_while_she_is_outside_is_a_sign_too():
     assert world.state.phase is Phase.OPERATOR
     world.shown["fence_breaches"] = 2
     world.run(2)
-    assert world.state.stop.cause == "fence"
+    assert world.state.operator.stop.cause == "fence"
     assert world.run(20, lambda w: w.mode is Mode.AUTO)
 
 
@@ -104,12 +104,12 @@ def test_a_critical_heartbeat_tells_when_the_text_was_lost():
     stop(world)
     world.system_status = 5
     world.run(2)
-    assert world.state.stop.cause == "shore link"
+    assert world.state.operator.stop.cause == "shore link"
     filtered = under_way()
     stop(filtered)
     filtered.system_status, filtered.ekf_ok = 5, False
     filtered.run(2)
-    assert filtered.state.stop.cause == "position"
+    assert filtered.state.operator.stop.cause == "position"
 
 
 @pytest.mark.parametrize("channel", [0, 2, 7])
@@ -144,7 +144,7 @@ def test_a_person_who_takes_the_sticks_while_she_lies_in_the_failsafes_hold_has_
     world.system_status, world.ekf_ok = 5, False      # nothing is planned before the filter is well
     text(world, "EKF failsafe")
     world.run(10)
-    assert world.state.answering == "position"
+    assert world.state.operator.answering == "position"
     world.shown["rc_us"] = SWITCHED
     world.run(3)
     assert world.state.phase is Phase.OPERATOR
@@ -205,7 +205,7 @@ def test_auto_that_a_person_sets_before_we_ask_for_it_is_his_answer():
     world.system_status, world.ekf_ok = 4, True
     world.set_mode(Mode.AUTO)
     world.run(2)
-    assert world.state.answering == ""
+    assert world.state.operator.answering == ""
     assert said(world, "answered")
 
 
@@ -226,7 +226,7 @@ def test_what_is_answered_survives_a_kill_of_the_companion():
     world = under_way()
     stop(world, fence_breached=True)
     world.run(2)
-    assert world.state.answering == "fence"
+    assert world.state.operator.answering == "fence"
     restarted(world)
     asked = world.count(act.RequestPlan)
     assert world.run(20, lambda w: w.mode is Mode.AUTO)
@@ -315,7 +315,7 @@ def test_a_boat_that_was_never_sailed_is_no_stop():
     world = make(*EAST, obstacles=(), permissions=replace(make().permissions, may_arm=False, may_set_mode=False))
     world.armed, world.mode, world.drift_mps = True, Mode.HOLD, 0.5
     world.run(120)
-    assert world.state.stop is None
+    assert world.state.operator.stop is None
     assert drifts(world) == []
 
 
@@ -339,7 +339,7 @@ def test_sailed_home_straight_she_is_back_in_auto_before_any_plan(mode, shown):
 def test_sailed_home_where_the_way_on_board_is_shut_a_plan_comes_first():
     world = under_way(goals=(Goal(en_m=(0.0, 200.0), radius_m=8.0),), obstacles=(ISLAND,))
     world.position = (0.0, 70.0)   # swept to where the island stands before her
-    world.state = replace(world.state, last_seen=None)   # in time: no jump is meant
+    world.state = with_parts(world.state, position={"last_seen": None})   # in time: no jump is meant
     stop(world, Mode.RTL, fence_breached=True)
     before = len(world.actions)
     world.run(2)
@@ -352,7 +352,8 @@ def test_a_loiter_laid_where_she_lies_is_sailed_to_before_she_drifts_onto_what_i
     """It is the plan that she waits for; while another was waited for she drifted onto the rock."""
     world = under_way(obstacles=(box(130, -60, 170, 60),))
     world.position, world.heading, world.speed = (112.0, 0.0), math.pi / 2.0, 0.6
-    world.state = replace(world.state, last_seen=None)   # she has come there by sailing: no jump is meant
+    # she has come there by sailing: no jump is meant
+    world.state = with_parts(world.state, position={"last_seen": None})
     stop(world, battery_failed=True)
     text(world, "Battery 1 is low 10.20V used 0 mAh")
     assert world.run(8, lambda w: w.mode is Mode.AUTO)
@@ -367,7 +368,7 @@ def test_a_loiter_that_cannot_be_sailed_to_any_more_is_laid_anew():
     assert world.run(8, lambda w: w.mode is Mode.AUTO)
     world.position = (195.0, 0.0)   # set behind the island, and held there once more
     world.heading = math.pi / 2.0
-    world.state = replace(world.state, last_seen=None)   # a position that leapt would not be believed
+    world.state = with_parts(world.state, position={"last_seen": None})   # a position that leapt would not be believed
     before = len(world.actions)
     stop(world)
     text(world, "Battery 1 is critical 9.10V used 0 mAh")
@@ -423,7 +424,7 @@ def test_a_mission_of_somebody_else_s_that_leads_over_something_is_loitered_befo
     """Its legs led over an island, and she was let touch it: 40 s before the hull did that was known."""
     world = with_their_mission((0.0, 300.0))
     assert world.run(120, lambda w: w.mode is Mode.LOITER)
-    assert world.state.foreign
+    assert world.state.mission.foreign
     assert float(world.skipper.voyage.area.clearance_m([world.position])[0]) > 15.0
     assert "which is not ours, leads over" in said(world, "kept off")[0][2]
     uploads = world.count(act.UploadMission)
@@ -437,7 +438,7 @@ def test_a_mission_of_somebody_else_s_that_leads_over_something_is_loitered_befo
 def test_a_mission_of_somebody_else_s_that_is_clear_is_left_alone():
     world = with_their_mission((300.0, 100.0))
     world.run(60)
-    assert world.state.foreign
+    assert world.state.mission.foreign
     assert world.mode is Mode.AUTO
     assert not said(world, "kept off")
 
@@ -445,7 +446,7 @@ def test_a_mission_of_somebody_else_s_that_is_clear_is_left_alone():
 def test_a_failsafe_s_way_home_over_something_is_loitered_before_where_a_stranger_s_mission_is_on_board():
     world = with_their_mission((400.0, 0.0), obstacles=(box(60, -40, 100, 40),))
     world.skipper, behind = under_way(obstacles=()).skipper, world.skipper
-    assert world.run(120, lambda w: w.state.foreign and w.position[0] > 115.0)
+    assert world.run(120, lambda w: w.state.mission.foreign and w.position[0] > 115.0)
     world.skipper = behind
     stop(world, Mode.RTL, fence_breached=True, waypoint_distance_m=110.0, target_bearing_rad=-0.5 * math.pi)
     world.drift_mps = 0.0

@@ -41,12 +41,12 @@ def test_she_loiters_while_it_lasts_and_sails_on_by_a_plan_from_where_she_is():
 
 def test_a_plan_that_is_being_made_is_called_off_and_no_rung_follows_it():
     world = under_way(plan_s=5.0)
-    assert world.run(300, lambda w: w.state.pending_plan is not None)
-    number = world.state.pending_plan.request_id
+    assert world.run(300, lambda w: w.state.pending.plan is not None)
+    number = world.state.pending.plan.request_id
     world.extra["unsure"], begins = WHY, world.t
     world.run(20)
     assert [a.request_id for a in asked_since(world, begins, act.CancelPlan)] == [number]
-    assert world.state.pending_plan is None
+    assert world.state.pending.plan is None
     assert not asked_since(world, begins, act.RequestPlan)
 
 

@@ -71,20 +71,20 @@ def test_hold_is_here_and_lasts_until_told_to_go_on(guidance):
     assert world.count(act.UploadMission) == 2, "the first plan and the loiter"
     assert answer(world, "go_on").text == "the end of hold: on to A"
     assert world.run(1500, is_done)
-    assert world.state.reached == (0, 1)
+    assert world.state.progress.reached == (0, 1)
 
 
 def test_hold_on_the_way_to_the_loiter_that_ends_the_mission_is_here_too():
     world = sailing(A)
     world.run(600, is_done)
-    place = world.state.route.points_en_m[-1]
+    place = world.state.mission.route.points_en_m[-1]
     for off_m in range(0, 95, 5):      # carried off
         world.position = (place[0] + off_m, place[1])
         world.step()
     here = world.position
     assert answer(world, "hold").result is Result.DONE
     world.run(40)
-    assert distance_m(world.state.route.points_en_m[-1], here) < 50.0
+    assert distance_m(world.state.mission.route.points_en_m[-1], here) < 50.0
 
 
 @pytest.mark.parametrize("verb", ["hold", "stop", "home", "refuge"])
@@ -93,10 +93,10 @@ def test_what_stands_survives_a_restart_with_its_age(verb):
     assert answer(world, verb).result is Result.DONE
     world.run(130)
     uploads = world.count(act.UploadMission)
-    stood = world.state.standing
+    stood = world.state.orders.standing
     restarted(world)
     world.run(60)
-    after = world.state.standing
+    after = world.state.orders.standing
     assert (after.verb, after.by, after.name, after.en_m) == (stood.verb, stood.by, stood.name, stood.en_m)
     assert 120.0 <= after.age_s(world.t) <= 195.0
     assert any("since before this start she is under an order" in text for text in said(world))
@@ -147,7 +147,7 @@ def test_home_is_planned_and_stayed_at(guidance):
     assert world.run(400, lambda w: w.state.phase is Phase.HOLDING)
     world.run(120)
     assert distance_m(world.position, (0.0, 0.0)) < 40.0
-    assert not world.state.over
+    assert not world.state.voyage.over
     answer(world, "go_on")
     assert world.run(1500, is_done)
 
@@ -167,11 +167,11 @@ def test_a_goal_is_sailed_to_and_the_others_follow(guidance):
     given = answer(world, geo(-150.0, 150.0))
     assert given.result is Result.DONE
     assert given.text.endswith("then on to A")
-    assert world.run(600, lambda w: w.state.standing is None)
+    assert world.run(600, lambda w: w.state.orders.standing is None)
     assert distance_m(world.position, (-150.0, 150.0)) <= 12.0
     assert any("reached" in text and "on to A" in text for text in said(world))
     assert world.run(1500, is_done)
-    assert world.state.reached == (0, 1)
+    assert world.state.progress.reached == (0, 1)
 
 
 def test_a_second_place_takes_the_place_of_the_first():
@@ -181,7 +181,7 @@ def test_a_second_place_takes_the_place_of_the_first():
     given = answer(world, geo(150.0, 100.0), by=(254, 190))
     assert "in place of goal" in given.text
     assert "ordered by 255/190" in given.text
-    assert world.run(600, lambda w: w.state.standing is None)
+    assert world.run(600, lambda w: w.state.orders.standing is None)
     assert distance_m(world.position, (150.0, 100.0)) <= 12.0
 
 
@@ -198,11 +198,11 @@ def test_a_place_that_cannot_be_is_refused_before_anything_moves(words, reason):
     world = make(A, obstacles=(box(-20.0, 130.0, 20.0, 170.0),))
     assert world.run(120, is_sailing)
     world.run(10)
-    before, standing = moves(world), world.state.standing
+    before, standing = moves(world), world.state.orders.standing
     given = answer(world, words)
     assert given.result is Result.REFUSED
     assert reason in given.text
-    assert (moves(world), world.state.standing) == (before, standing)
+    assert (moves(world), world.state.orders.standing) == (before, standing)
 
 
 def test_a_place_outside_the_fence_is_refused():
@@ -229,8 +229,8 @@ def test_a_goal_is_skipped_and_the_last_is_not():
     assert given.result is Result.NOT_NOW
     assert "B is the last goal" in given.text
     assert world.run(1500, is_done)
-    assert world.state.reached == (1,)
-    assert "1 of 2 goals reached, 1 given up by order" in world.state.over
+    assert world.state.progress.reached == (1,)
+    assert "1 of 2 goals reached, 1 given up by order" in world.state.voyage.over
 
 
 def test_a_skipped_goal_stays_skipped_after_a_restart():
@@ -239,8 +239,8 @@ def test_a_skipped_goal_stays_skipped_after_a_restart():
     world.run(30)
     restarted(world)
     assert world.run(1500, is_done)
-    assert world.state.skipped == 1
-    assert world.state.reached == (1,)
+    assert world.state.orders.skipped == 1
+    assert world.state.progress.reached == (1,)
 
 
 def test_given_up_nothing_is_asked_of_her_until_told_to_go_on():
@@ -263,11 +263,11 @@ def test_given_up_during_an_upload_the_upload_ends_and_nothing_follows():
     world = sailing(upload_s=6.0)
     answer(world, "replan")
     answer(world, geo(-100.0, 120.0))
-    assert world.run(60, lambda w: w.state.pending_upload is not None)
+    assert world.run(60, lambda w: w.state.pending.upload is not None)
     assert "the end of an upload" in answer(world, "stop").text
     world.run(10)
-    assert world.state.pending_upload is None
-    assert world.mission == world.state.route.items, "whole, whatever it is"
+    assert world.state.pending.upload is None
+    assert world.mission == world.state.mission.route.items, "whole, whatever it is"
     before = moves(world)
     world.run(60)
     assert moves(world) == before
@@ -276,13 +276,13 @@ def test_given_up_during_an_upload_the_upload_ends_and_nothing_follows():
 def test_hold_during_an_upload_waits_for_its_end():
     world = sailing(upload_s=6.0)
     answer(world, geo(-100.0, 120.0))
-    assert world.run(60, lambda w: w.state.pending_upload is not None)
+    assert world.run(60, lambda w: w.state.pending.upload is not None)
     before = world.count(act.UploadMission)
     answer(world, "hold")
     assert world.count(act.UploadMission) == before
     world.run(60)
     assert world.state.phase is Phase.HOLDING
-    assert world.mission == world.state.route.items
+    assert world.mission == world.state.mission.route.items
 
 
 def test_a_new_plan_is_made_when_it_is_asked_for():
@@ -325,7 +325,7 @@ def test_what_is_not_permitted_is_refused_and_changes_nothing(verb, permissions)
     given = next(a for a in actions if isinstance(a, act.Acknowledge))
     assert given.result is Result.REFUSED
     assert "not permitted" in given.text
-    assert (state.standing, state.asked, state.gate) == (None, "", before.gate)
+    assert (state.orders.standing, state.plans.asked, state.progress.gate) == (None, "", before.progress.gate)
 
 
 _WORLD = []
@@ -352,7 +352,7 @@ def test_the_same_order_again_gets_the_same_answer_and_nothing_is_done_twice():
     first = answer(world, "skip_goal")
     world.run(3)
     assert answer(world, "skip_goal") == first
-    assert world.state.skipped == 1
+    assert world.state.orders.skipped == 1
     world.run(12)
     assert answer(world, "skip_goal").text == "B is given up: on to C"
 
@@ -361,7 +361,7 @@ def test_a_change_of_mind_is_no_repetition():
     world = sailing()
     for words in ("hold", "go_on", "hold"):
         assert answer(world, words).result is Result.DONE
-    assert world.state.standing.verb is Verb.HOLD
+    assert world.state.orders.standing.verb is Verb.HOLD
 
 
 def test_of_two_stations_in_one_step_the_later_one_stands_and_both_are_told():
@@ -372,7 +372,7 @@ def test_of_two_stations_in_one_step_the_later_one_stands_and_both_are_told():
     first, second = answers(world)[-2:]
     assert ((first.system, second.system), second.result) == ((255, 254), Result.DONE)
     assert "in place of hold, ordered by 255/190" in second.text
-    assert world.state.standing.verb is Verb.HOME
+    assert world.state.orders.standing.verb is Verb.HOME
     assert any("in place of hold, ordered by 255/190" in text for text in said(world))
 
 
@@ -384,7 +384,7 @@ def test_a_person_who_has_her_is_not_overruled():
         given = answer(world, words)
         assert given.result is Result.NOT_NOW
         assert "a person has her" in given.text
-    assert world.state.standing is None
+    assert world.state.orders.standing is None
 
 
 def test_she_cannot_be_sent_before_she_sails_nor_where_uploading_is_not_permitted():
@@ -411,6 +411,6 @@ def test_the_last_goals_end_does_not_end_an_order():
     world = sailing(A)
     assert world.run(1500, is_done)
     answer(world, geo(-100.0, 150.0))
-    assert world.run(600, lambda w: w.state.standing is None)
+    assert world.run(600, lambda w: w.state.orders.standing is None)
     world.run(120)
     assert world.state.phase is Phase.DONE

@@ -20,6 +20,7 @@ from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.way.voyage import Goal
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import make
+from tests.skipper.world import with_parts
 
 GOAL = (0.0, 220.0)
 ROCK = shapely.box(-30.0, 80.0, -10.0, 120.0)   # its eastern side is 10 m west of the straight way
@@ -30,20 +31,21 @@ def sailing(way=((0.0, 60.0), GOAL), *, rock=ROCK, **config):
     """Return a boat under way to the north on a beam reach, past a rock to port, on ``way``."""
     world = make(Goal(en_m=GOAL, radius_m=6.0, name="the goal"), obstacles=(rock,), wind=lambda t: (math.pi / 2, 5.0),
                  config={"margin_m": MARGIN_M, "margin_floor_m": FLOOR_M, **config})
-    assert world.run(150, lambda w: w.state.sailing and w.position[1] > 10.0)
-    route, boat = world.state.route, world.position
+    assert world.run(150, lambda w: w.state.voyage.sailing and w.position[1] > 10.0)
+    route, boat = world.state.mission.route, world.position
     end = route.points_en_m[-1]
     points = (*way, end)
-    world.state = replace(world.state, index=0, own_index=0, pending_plan=None, pending_upload=None, route=replace(
+    world.state = with_parts(world.state, mission={"index": 0, "own_index": 0, "route": replace(
         route, items=(*route.items[:1] * len(way), route.items[-1]), points_en_m=points,
-        leg_from_en_m=(boat, *points[:-1]), gate_of=(*(-1,) * (len(way) - 1), 0, -1), margin_m=MARGIN_M))
+        leg_from_en_m=(boat, *points[:-1]), gate_of=(*(-1,) * (len(way) - 1), 0, -1), margin_m=MARGIN_M)},
+        pending={"plan": None, "upload": None})
     return world
 
 
 def offered(turn, way, *, reason=ReplanReason.ORDER, rung=0):
     """Let the planner answer a request from the boat with the waypoints ``way``; return the actions that follow."""
     assert request(turn, reason, rung=rung)
-    pending = turn.state.pending_plan
+    pending = turn.state.pending.plan
     turn.actions.clear()
     found = plan(pending.problem, expansions=4000)
     answer = replace(found, waypoints_en=np.asarray([pending.problem.start_en, *way]), cost_s=1.0)
@@ -74,12 +76,12 @@ def test_nothing_below_the_floor_goes_on_board_from_a_place_that_is_not():
 def test_a_smaller_margin_goes_on_board_only_where_what_is_there_is_closed(way, is_open):
     turn = turn_of(sailing(way=way))
     assert request(turn, ReplanReason.ORDER, rung=1)
-    assert turn.state.pending_plan.facts.margin_m < MARGIN_M
+    assert turn.state.pending.plan.facts.margin_m < MARGIN_M
     actions = offered(turn, [(3.0, 100.0), GOAL], rung=1)
     assert bool(uploads(actions)) is not is_open
     if is_open:
         assert not any(isinstance(a, RequestPlan) for a in actions)   # it stays: no further step down the ladder
-        assert turn.state.route.points_en_m[:2] == way
+        assert turn.state.mission.route.points_en_m[:2] == way
 
 
 def test_a_way_that_lacks_less_than_the_predictions_error_stays_when_nothing_better_is_found():
@@ -88,7 +90,7 @@ def test_a_way_that_lacks_less_than_the_predictions_error_stays_when_nothing_bet
         turn = turn_of(sailing(way=((east, 100.0), GOAL)))
         assert request(turn, ReplanReason.ORDER)
         turn.actions.clear()
-        not_found(turn, turn.state.pending_plan, "none")
+        not_found(turn, turn.state.pending.plan, "none")
         asks_for_less = any(isinstance(a, RequestPlan) for a in turn.actions)
         assert asks_for_less is not stays
 
@@ -96,14 +98,15 @@ def test_a_way_that_lacks_less_than_the_predictions_error_stays_when_nothing_bet
 def test_from_below_the_floor_only_what_comes_no_nearer_goes_on_board():
     world = sailing()
     beside = (-7.0, 100.0)   # 3 m from the rock, on its eastern side, heading along it
-    world.position, world.state = beside, replace(world.state, last_seen=None)
+    world.position, world.state = beside, with_parts(world.state, position={"last_seen": None})
     turn = turn_of(world)
     assert request(turn, ReplanReason.OFF_LEG)
-    pending = turn.state.pending_plan
+    pending = turn.state.pending.plan
 
     def refused(*points):
-        ways = (*points, GOAL, turn.state.route.points_en_m[-1])
-        route = replace(turn.state.route, points_en_m=ways, items=turn.state.route.items[:1] * len(ways),
+        ways = (*points, GOAL, turn.state.mission.route.points_en_m[-1])
+        route = replace(turn.state.mission.route, points_en_m=ways,
+            items=turn.state.mission.route.items[:1] * len(ways),
                         leg_from_en_m=(beside, *ways[:-1]), gate_of=(*(-1,) * len(points), 0, -1))
         return refusal(turn, route, 1, replace(pending, start_en_m=beside))
 
@@ -115,10 +118,10 @@ def test_an_item_that_was_passed_during_its_upload_is_not_turned_back_for():
     """An upload of six seconds brought a list that begins behind the boat, and a rock lay where it turned round."""
     way = ((0.0, 20.0), (3.0, 26.0), (4.0, 60.0), GOAL)
     world = sailing(way=way)
-    world.position, world.state = (0.0, 34.0), replace(world.state, last_seen=None)
+    world.position, world.state = (0.0, 34.0), with_parts(world.state, position={"last_seen": None})
     for uploaded_s, wanted in ((world.t, [3]), (world.t - 30.0, [])):
         turn = turn_of(world)
-        turn.update(uploaded_s=uploaded_s)
+        turn.state = with_parts(turn.state, mission={"uploaded_s": uploaded_s})
         leave_passed(turn)
         assert [a.seq for a in turn.actions if isinstance(a, SetCurrent)] == wanted
 
@@ -126,8 +129,8 @@ def test_an_item_that_was_passed_during_its_upload_is_not_turned_back_for():
 def test_a_gate_is_never_left_out_as_passed():
     world = sailing(way=((0.0, 20.0), (4.0, 60.0), GOAL))
     world.position = (0.0, 34.0)
-    route = replace(world.state.route, gate_of=(0, -1, -1, -1))
-    world.state = replace(world.state, uploaded_s=world.t, last_seen=None, route=route)
+    route = replace(world.state.mission.route, gate_of=(0, -1, -1, -1))
+    world.state = with_parts(world.state, mission={"uploaded_s": world.t, "route": route}, position={"last_seen": None})
     turn = turn_of(world)
     leave_passed(turn)
     assert turn.actions == []

@@ -19,7 +19,7 @@ from companion.skipper.step.route import Route
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.voyage import Goal
-from tests.skipper.world import World, skipper, voyage
+from tests.skipper.world import World, skipper, voyage, with_parts
 
 GOAL = Goal(en_m=(0.0, 400.0), radius_m=6.0, name="the goal")
 NORTH = ((0.0, 0.0), (0.0, 300.0))
@@ -32,7 +32,7 @@ def turn(*obstacles, at=(0.0, 0.0), xtrack_m=10.0, irons=(), **config) -> Turn:
     route = Route(
         items=(), points_en_m=(), plan_id=1, plan_t_s=0.0, plan_twd_from_rad=0.0, plan_tws_mps=5.0,
         plan_half_width_rad=0.0, margin_m=15.0, delta_s=0.9)
-    state = replace(world.state, route=route, irons_s=irons)
+    state = with_parts(world.state, mission={"route": route}, steering={"irons_s": irons})
     out = Turn(world.skipper.voyage, world.skipper.config, state, world.snapshot())
     out.leg = lambda: NORTH  # type: ignore[method-assign]
     return out

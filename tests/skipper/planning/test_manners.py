@@ -19,6 +19,7 @@ from companion.skipper.way.geometry import distance_m
 from companion.traffic import Policy, Role, TrafficPicture
 from companion.traffic.encounters import APPARENT_RAD
 from tests.skipper.planning.test_traffic import Ship, asked, for_traffic, make, sail
+from tests.skipper.world import with_parts
 from tests.traffic.conftest import vessel
 
 POWER, FISHING = {"nav_status": 0, "ship_type": 70}, {"nav_status": 7, "ship_type": 30}
@@ -70,7 +71,7 @@ def said(turn):
 
 def test_a_motor_ship_that_has_time_is_stood_on_to():
     turn = turn_with(POWER)
-    [held] = turn.state.encounters
+    [held] = turn.state.traffic.encounters
     assert held.stands_on
     assert stands_on(turn)
     assert not meetings(turn)
@@ -88,16 +89,16 @@ def test_who_gives_way_to_one_keeps_clear_of_the_other_too():
     fisher = vessel((ship.antenna_en_m[0], 2.0 * here[1] - ship.antenna_en_m[1]), 180.0, 3.0, mmsi=7, t_s=turn.t_s,
                     heard_s=turn.t_s, size=(10.0, 10.0, 3.0, 3.0), **FISHING)
     both = replace(turn.snapshot, traffic=TrafficPicture(t_s=turn.t_s, vessels=(ship, fisher)))
-    turn = Turn(turn.voyage, turn.config, replace(turn.state, encounters=()), both)
+    turn = Turn(turn.voyage, turn.config, with_parts(turn.state, traffic={"encounters": ()}), both)
     look_out(turn)
-    assert [h.stands_on for h in turn.state.encounters] == [False, True]
+    assert [h.stands_on for h in turn.state.traffic.encounters] == [False, True]
     assert {t.name for t in shares(turn, here, 0.0, 0, 0.9).targets} >= {"7", "211000001", "ahead of 7"}
 
 
 def test_the_same_ship_is_kept_clear_of_by_default():
     turn = turn_with(POWER, policy=Policy.KEEP_CLEAR)
     assert SkipperConfig().traffic_policy is Policy.KEEP_CLEAR
-    assert not turn.state.encounters
+    assert not turn.state.traffic.encounters
     assert not said(turn)
     assert meetings(turn)
     assert {t.name for t in shares(turn, turn.boat_en, 0.0, 0, 0.9).targets} == {"211000001"}
@@ -105,7 +106,7 @@ def test_the_same_ship_is_kept_clear_of_by_default():
 
 def test_giving_way_closes_the_water_ahead_of_her_bow_and_our_old_course():
     turn = turn_with(FISHING)
-    [held] = turn.state.encounters
+    [held] = turn.state.traffic.encounters
     assert held.gives_way
     found = shares(turn, turn.boat_en, 0.0, 0, 0.9).targets
     bows = [t for t in found if t.name.startswith("ahead of")]
@@ -123,7 +124,8 @@ def test_giving_way_closes_the_water_ahead_of_her_bow_and_our_old_course():
 
 def test_when_the_change_of_course_has_shown_the_old_course_is_free_again():
     turn = turn_with(FISHING)
-    turn.update(encounters=tuple(replace(h, altered=True) for h in turn.state.encounters))
+    turn.state = with_parts(
+        turn.state, traffic={"encounters": tuple(replace(h, altered=True) for h in turn.state.traffic.encounters)})
     names = {t.name.partition(" ")[0] for t in regions(turn, near(turn), turn.boat_en, 0.0, is_met=True)}
     assert names == {"ahead"}
 
@@ -137,7 +139,9 @@ def test_a_region_that_the_boat_is_in_is_left_out():
 
 def test_a_vessel_that_comes_from_astern_has_no_closed_bow():
     turn = turn_with(FISHING)
-    turn.update(encounters=tuple(replace(h, course_rad=0.0) for h in turn.state.encounters))   # as if alike
+    turn.state = with_parts(
+        turn.state,   # as if alike
+        traffic={"encounters": tuple(replace(h, course_rad=0.0) for h in turn.state.traffic.encounters)})
     assert bow_discs(turn, near(turn), turn.t_s) == ()
 
 
@@ -151,7 +155,7 @@ def test_under_power_the_port_side_is_closed_end_on():
     config = replace(world.skipper.config, sails=False)
     turn = Turn(world.skipper.voyage, config, world.state, world.snapshot())
     look_out(turn)
-    [held] = turn.state.encounters
+    [held] = turn.state.traffic.encounters
     assert held.encounter.role is Role.BOTH_ALTER
     closed = [t for t in regions(turn, near(turn), turn.boat_en, 0.0, is_met=True) if t.name.startswith("apparent")]
     assert len(closed) == 3

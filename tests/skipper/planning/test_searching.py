@@ -31,23 +31,23 @@ def said(w, code):
 
 def test_an_area_is_searched_and_the_voyage_goes_on():
     w = world()
-    assert w.run(900.0, lambda w: bool(w.state.reached))
+    assert w.run(900.0, lambda w: bool(w.state.progress.reached))
     assert seen(w) >= 0.9
-    assert w.state.covered[0] == (0, pytest.approx(seen(w), abs=0.02))
+    assert w.state.progress.covered[0] == (0, pytest.approx(seen(w), abs=0.02))
     assert any("sweep 2 of 4" in entry[2] for entry in w.log)
     assert w.run(300.0, lambda w: w.state.phase is Phase.DONE)
 
 
 def test_a_wind_that_turns_has_the_rest_laid_anew():
     w = world(wind=lambda t: (0.0 if t < 150.0 else 1.1, 5.0))
-    assert w.run(1200.0, lambda w: bool(w.state.reached))
+    assert w.run(1200.0, lambda w: bool(w.state.progress.reached))
     assert any("the wind has turned" in text for text in said(w, "sweeps"))
     assert seen(w) >= 0.9
 
 
 def test_what_the_sweeps_left_is_sailed_again_and_not_for_ever():
     w = world(share=0.999)
-    assert w.run(2500.0, lambda w: bool(w.state.reached))
+    assert w.run(2500.0, lambda w: bool(w.state.progress.reached))
     laid = said(w, "sweeps")
     assert 1 <= len(laid) <= 4
 
@@ -59,9 +59,10 @@ def test_killed_in_the_middle_it_goes_on_where_it_was(at_s):
     before = w.state
     restarted(w)
     w.run(10.0)
-    assert (w.state.gate, w.state.approaches) == (before.gate, before.approaches) or w.state.gate == before.gate + 1
-    assert len(w.state.searched) >= len(before.searched) - 1
-    assert w.run(900.0, lambda w: bool(w.state.reached))
+    then, now = before.progress, w.state.progress
+    assert (now.gate, now.approaches) == (then.gate, then.approaches) or now.gate == then.gate + 1
+    assert len(w.state.progress.searched) >= len(before.progress.searched) - 1
+    assert w.run(900.0, lambda w: bool(w.state.progress.reached))
     assert seen(w) >= 0.9
     assert len(said(w, "sweeps")) == 1
 
@@ -89,5 +90,5 @@ def test_a_search_is_given_up_by_order_and_held():
     w.run(20.0)
     w.order("skip_goal")
     assert w.run(300.0, lambda w: w.state.phase is Phase.DONE)
-    assert w.state.reached == (1,)
-    assert w.state.task == ""
+    assert w.state.progress.reached == (1,)
+    assert w.state.progress.task == ""

@@ -15,6 +15,7 @@ from companion.skipper.step.tacking import Tacking
 from companion.skipper.step.turn import Turn
 from companion.skipper.watch.tacks import TACK_FAILED, watch_tacks
 from tests.skipper.test_voyage import make
+from tests.skipper.world import with_parts
 
 ROCK = shapely.box(25.0, 35.0, 60.0, 120.0)
 
@@ -23,13 +24,13 @@ def under_way(given=0.1, obstacles=(), **tacking):
     world = make(obstacles=obstacles)
     voyage = world.skipper.voyage
     world.skipper = replace(world.skipper, voyage=replace(voyage, boat=replace(voyage.boat, tack_fails=given)))
-    assert world.run(120, lambda w: w.state.sailing)
-    world.state = replace(world.state, tacking=Tacking(**tacking), asked="")
+    assert world.run(120, lambda w: w.state.voyage.sailing)
+    world.state = with_parts(world.state, tacking=Tacking(**tacking), plans={"asked": ""})
     return world
 
 
 def turn_of(world, **changes):
-    return Turn(world.skipper.voyage, world.skipper.config, replace(world.state, **changes), world.snapshot())
+    return Turn(world.skipper.voyage, world.skipper.config, with_parts(world.state, **changes), world.snapshot())
 
 
 def fallen_back(world, **seen):
@@ -50,18 +51,18 @@ def test_a_failure_is_said_with_what_it_taught_and_asks_for_a_plan_near_somethin
     [text] = [a.text for a in turn.actions if getattr(a, "code", "") == "tack failed"]
     assert "1 of 1" in text
     assert "25 %" in text                  # (0.1 * 5 + 1) / 6
-    assert turn.state.asked == TACK_FAILED
+    assert turn.state.plans.asked == TACK_FAILED
 
 
 def test_far_from_everything_only_the_second_in_a_row_asks():
-    assert fallen_back(under_way()).state.asked == ""
-    assert fallen_back(under_way(), tried=1, failed=1, in_a_row=1).state.asked == TACK_FAILED
+    assert fallen_back(under_way()).state.plans.asked == ""
+    assert fallen_back(under_way(), tried=1, failed=1, in_a_row=1).state.plans.asked == TACK_FAILED
 
 
 def test_a_mission_that_says_0_asks_for_nothing_and_goes_on_tacking():
     turn = fallen_back(under_way(0.0, [ROCK]), tried=1, failed=1, in_a_row=1)
     assert turn.state.tacking.failed == 2
-    assert turn.state.asked == ""
+    assert turn.state.plans.asked == ""
     assert not tacks_fail(turn)
 
 

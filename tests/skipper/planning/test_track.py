@@ -110,9 +110,9 @@ def test_no_upload_begins_a_leg_of_which_too_little_is_left_to_be_followed(left_
     world = sailing(obstacles=())
     boat, heading, speed = world.position, world.snapshot().vehicle.heading_rad, turn_of(world).speed_mps
     corner = moved(boat, heading, left_s * speed)
-    route = world.state.route
-    now = turn_of(world, route=replace(route, points_en_m=(corner, *route.points_en_m[1:])))
+    route = world.state.mission.route
+    now = turn_of(world, mission={"route": replace(route, points_en_m=(corner, *route.points_en_m[1:]))})
     problem = asked(now, ReplanReason.WAYPOINT, from_index=0)
-    take_plan(now, PlanOutcome(request_id=now.state.pending_plan.request_id, plan=plan(problem, expansions=2000)))
+    take_plan(now, PlanOutcome(request_id=now.state.pending.plan.request_id, plan=plan(problem, expansions=2000)))
     assert speed > 1.0
     assert any(isinstance(a, Announce) and a.code == "plan late" for a in now.actions) == is_late

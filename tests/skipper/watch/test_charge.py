@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from companion.skipper.planning.ends import BATTERY
 from companion.skipper.step.config import Ends
-from companion.skipper.step.state import Charge, SkipperState
+from companion.skipper.step.state import Alarms, Charge, SkipperState
 from companion.skipper.step.turn import Turn
 from companion.skipper.watch.charge import DETOUR, FALL, LOOK_S, lasts_s
 from companion.skipper.way.voyage import Goal
@@ -28,16 +28,16 @@ def falls(world, share_per_s, first=0.9, for_s=900):
     for _ in range(for_s // 10):
         world.shown["battery_remaining"] = round(first - share_per_s * (world.t - began), 2)
         world.run(10)
-        if any(r.name == BATTERY for r in world.state.raised):
+        if any(r.name == BATTERY for r in world.state.alarms.raised):
             return
 
 
 def test_it_is_critical_while_it_still_covers_the_way_to_the_refuge():
     world = sailing(voyage={"refuges": ((0.0, 0.0),)})
     falls(world, 0.9 / 1500.0)
-    assert world.state.charge.last > 0.2                    # long before the 10 % that are always critical
+    assert world.state.alarms.charge.last > 0.2                    # long before the 10 % that are always critical
     assert "the way to where she can wait" in said(world, "charge")[0][2]
-    assert world.run(60, lambda w: w.state.route.bound_for == "the refuge 1")
+    assert world.run(60, lambda w: w.state.mission.route.bound_for == "the refuge 1")
 
 
 @pytest.mark.parametrize("made", [
@@ -48,16 +48,16 @@ def test_it_is_not_where_it_is_not_asked_for_or_the_refuge_is_near(made):
     world = sailing(**made)
     falls(world, 0.5 / 1500.0, for_s=700)
     assert not said(world, "charge")
-    assert not world.state.battery_critical
+    assert not world.state.alarms.battery_critical
 
 
 def test_a_charge_that_rises_begins_anew():
     world = sailing()
     falls(world, 0.3 / 400.0, for_s=400)
-    assert world.state.charge.first == 0.9
+    assert world.state.alarms.charge.first == 0.9
     world.shown["battery_remaining"] = 0.8
     world.run(2)
-    assert world.state.charge.first == world.state.charge.last == 0.8
+    assert world.state.alarms.charge.first == world.state.alarms.charge.last == 0.8
 
 
 @given(st.floats(0.3, 1.0), st.floats(0.0, 0.3), st.floats(0.0, 20_000.0))
@@ -65,7 +65,7 @@ def test_what_is_left_at_the_mean_rate(first, fallen, after_s):
     charge = Charge(since_s=10.0, first=first, last=first - fallen)
     world = make(AWAY)
     world.t = 10.0 + after_s
-    left = lasts_s(Turn(voyage(), world.skipper.config, SkipperState(charge=charge), world.snapshot()))
+    left = lasts_s(Turn(voyage(), world.skipper.config, SkipperState(alarms=Alarms(charge=charge)), world.snapshot()))
     if after_s < LOOK_S or first - charge.last < FALL:
         assert left is None
     else:

@@ -58,7 +58,7 @@ def test_an_alarm_needs_both_limits_and_is_said_with_the_rule(away_m, alarm, sev
     turn = turn_among()
     turn = turn_among(coming(turn, away_m=away_m))
     look_out(turn)
-    assert turn.state.watch[0].alarm is alarm
+    assert turn.state.traffic.watch[0].alarm is alarm
     assert [a.severity for a in said(turn)] == ([] if severity is None else [severity])
     for announced in said(turn):
         assert announced.code == "vessel near"
@@ -70,9 +70,9 @@ def test_power_gives_way_to_sail_and_is_shown_so():
     turn = turn_among()
     turn = turn_among(coming(turn, away_m=300.0))
     look_out(turn)
-    encounter = turn.state.watch[0].encounter
+    encounter = turn.state.traffic.watch[0].encounter
     assert (encounter.rule, encounter.role) == (Rule.RESPONSIBILITIES, Role.STAND_ON)
-    assert encounter.must_act(turn.state.watch[0].alarm)           # and is kept clear of all the same
+    assert encounter.must_act(turn.state.traffic.watch[0].alarm)           # and is kept clear of all the same
 
 
 def test_a_vessel_has_one_line_in_half_a_minute_whatever_its_alarm_does():
@@ -114,12 +114,12 @@ def test_only_the_worst_are_kept_and_nobody_when_all_have_gone():
     crowd = [coming(turn, away_m=400.0 + 50.0 * i, mmsi=300 + i) for i in range(20)]
     turn = turn_among(*crowd)
     look_out(turn)
-    assert len(turn.state.watch) == SHOWN
-    assert turn.state.watch[0].vessel.mmsi == 300
+    assert len(turn.state.traffic.watch) == SHOWN
+    assert turn.state.traffic.watch[0].vessel.mmsi == 300
     gone = turn_among()
-    gone.update(watch=turn.state.watch)
+    gone.set(traffic=turn.state.traffic)
     look_out(gone)
-    assert gone.state.watch == ()
+    assert gone.state.traffic.watch == ()
 
 
 @pytest.mark.parametrize("meets_s", [220.0, 230.0])

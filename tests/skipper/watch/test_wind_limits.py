@@ -31,7 +31,7 @@ def test_she_does_not_set_sail_in_a_wind_that_is_not_hers_and_does_when_it_is(tw
     assert words in world.state.why
     assert world.count(Arm) == world.count(SetMode) == 0
     world.wind = lambda t: (0.0, 5.0)
-    assert world.run(300, lambda w: w.state.sailing)
+    assert world.run(300, lambda w: w.state.voyage.sailing)
 
 
 def test_a_limit_is_one_of_probability_and_not_of_the_mean():
@@ -39,7 +39,7 @@ def test_a_limit_is_one_of_probability_and_not_of_the_mean():
     for tws, may in ((7.3, True), (7.5, False)):
         world = limited(tws, max_tws_mps=8.0)
         world.skipper = replace(world.skipper, config=replace(world.skipper.config, delta_s=0.9))
-        assert world.run(90, lambda w: w.state.sailing) == may
+        assert world.run(90, lambda w: w.state.voyage.sailing) == may
 
 
 def test_what_is_not_believed_is_widened():
@@ -54,7 +54,7 @@ def test_what_is_not_believed_is_widened():
 @pytest.mark.parametrize(("end", "where"), [(End.REFUGE, REFUGE), (End.STAY, None), (End.SAY, None)])
 def test_under_way_too_much_wind_leads_where_the_mission_says_and_on_when_it_is_over(end, where):
     world = limited(5.0, Ends(strong_wind=end), max_tws_mps=8.0)
-    assert world.run(120, lambda w: w.state.sailing)
+    assert world.run(120, lambda w: w.state.voyage.sailing)
     world.run(20)
     here = world.position
     world.wind = lambda t: (0.0, 9.0)
@@ -66,12 +66,12 @@ def test_under_way_too_much_wind_leads_where_the_mission_says_and_on_when_it_is_
     assert distance_m(world.position, where or here) < (30.0 if where else 400.0)
     world.wind = lambda t: (0.0, 5.0)
     assert world.run(1200, is_done)
-    assert world.state.arrived
+    assert world.state.voyage.arrived
 
 
 def test_too_little_is_said_and_sailed_on_in():
     world = limited(5.0, min_tws_mps=3.0)
-    assert world.run(120, lambda w: w.state.sailing)
+    assert world.run(120, lambda w: w.state.voyage.sailing)
     world.wind = lambda t: (0.0, 2.6)
     assert world.run(900, is_done)
     assert [text.partition(": ")[2] for _, _, text in said(world, "light wind")] == ["say so"]
@@ -79,7 +79,7 @@ def test_too_little_is_said_and_sailed_on_in():
 
 def test_without_limits_nothing_is_watched():
     world = limited(5.0)
-    assert world.run(120, lambda w: w.state.sailing)
+    assert world.run(120, lambda w: w.state.voyage.sailing)
     world.wind = lambda t: (0.0, 14.0)
     world.run(120)
     assert not said(world, "strong wind")

@@ -89,23 +89,23 @@ def fenced(*goals, **made):
 def test_she_does_not_set_sail_for_a_goal_outside_of_it_and_does_once_it_is_gone():
     world = fenced(NEAR, FAR, circle_m=150.0)
     world.run(90)
-    assert not world.state.sailing
+    assert not world.state.voyage.sailing
     assert world.state.phase is Phase.WAITING
     assert "Far is 300 m from home, outside the autopilot's fence of 150 m" in world.state.why
     assert "FENCE_TYPE 4" in said(world, "fenced off")[0][2]
     world.circle_m = None
-    assert world.run(60, lambda w: w.state.sailing)
+    assert world.run(60, lambda w: w.state.voyage.sailing)
 
 
 def test_set_under_way_she_waits_inside_and_sails_on_when_it_is_widened():
     world = fenced(NEAR, FAR)
-    assert world.run(120, lambda w: w.state.reached == (0,))
+    assert world.run(120, lambda w: w.state.progress.reached == (0,))
     world.circle_m = 200.0
     assert world.run(200, lambda w: "Far is 300 m" in w.state.why and w.mission[-1].command is Command.NAV_LOITER_UNLIM)
     world.run(300)
     assert max(distance_m(p, (0.0, 0.0)) for p in world.track[-250:]) < 200.0
     world.circle_m = 1000.0
-    assert world.run(600, lambda w: w.state.reached == (0, 1))
+    assert world.run(600, lambda w: w.state.progress.reached == (0, 1))
 
 
 def test_outside_of_one_that_is_set_under_way_she_is_brought_back_in_and_kept_there():
@@ -115,7 +115,7 @@ def test_outside_of_one_that_is_set_under_way_she_is_brought_back_in_and_kept_th
     world.shown["fence_breached"] = True
     world.set_mode(Mode.RTL)
     world.run(3)
-    assert world.state.answering == "fence"
+    assert world.state.operator.answering == "fence"
     assert world.run(200, lambda w: distance_m(w.position, (0.0, 0.0)) < 110.0)
     world.shown["fence_breached"] = False
     before = world.uploads
@@ -185,31 +185,31 @@ def test_what_it_leaves_keeps_inside_of_it_and_all_else_as_it_was(limits):
 def test_she_does_not_set_sail_for_a_goal_outside_of_what_is_drawn():
     world = fenced(NEAR, FAR, extra={"fence": (square(IN, -300, -300, 300, 200),)})
     world.run(90)
-    assert not world.state.sailing
+    assert not world.state.voyage.sailing
     assert "Far is outside the fence that is drawn on the autopilot" in world.state.why
     assert said(world, "fence drawn")
     world.extra = {}
-    assert world.run(60, lambda w: w.state.sailing)
+    assert world.run(60, lambda w: w.state.voyage.sailing)
 
 
 def test_drawn_under_way_she_waits_inside_and_sails_on_when_it_is_drawn_wider():
     """A person's fence was never read: she sailed on to a mark outside of it."""
     world = fenced(NEAR, FAR)
-    assert world.run(120, lambda w: w.state.reached == (0,))
+    assert world.run(120, lambda w: w.state.progress.reached == (0,))
     world.extra = {"fence": (square(IN, -300, -300, 300, 240),)}
     assert world.run(200, lambda w: "Far is outside" in w.state.why)
     world.run(300)
     assert max(p[1] for p in world.track[-480:]) < 240.0
     world.extra = {"fence": (square(IN, -300, -300, 300, 400),)}
-    assert world.run(600, lambda w: w.state.reached == (0, 1))
+    assert world.run(600, lambda w: w.state.progress.reached == (0, 1))
 
 
 def test_drawn_across_her_way_she_goes_round_and_a_fence_that_is_switched_off_is_forgotten():
     world = fenced(FAR)
-    assert world.run(120, lambda w: w.state.sailing and w.position[1] > 40.0)
+    assert world.run(120, lambda w: w.state.voyage.sailing and w.position[1] > 40.0)
     keep_out = square(OUT, 100, 60, 160, 140)
     world.extra = {"fence": (keep_out,)}
-    assert world.run(600, lambda w: w.state.reached == (0,))
+    assert world.run(600, lambda w: w.state.progress.reached == (0,))
     solid = shapely.box(100.0, 60.0, 160.0, 140.0)
     assert min(shapely.distance(solid, shapely.points(p)) for p in world.track) > 5.0
     assert any("cuts the way" in a.text for _, a in world.actions if isinstance(a, act.RequestPlan))
@@ -217,4 +217,4 @@ def test_drawn_across_her_way_she_goes_round_and_a_fence_that_is_switched_off_is
     world.run(20)
     assert "Far is outside" in world.state.why
     world.shown |= {"fence_breached": None, "fence_on": False}
-    assert world.run(60, lambda w: w.state.sailing)
+    assert world.run(60, lambda w: w.state.voyage.sailing)

@@ -18,6 +18,7 @@ from companion.skipper.way.voyage import Goal
 from tests.planner.risk.test_tacks import channel
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import make
+from tests.skipper.world import with_parts
 
 WALLS = (shapely.box(-90.0, -80.0, -46.0, 500.0), shapely.box(46.0, -80.0, 90.0, 500.0))
 LEARNED = {"tried": 10, "failed": 9}     # 47 % from now on
@@ -66,11 +67,11 @@ def sailing(obstacles=WALLS):
                  config={"margin_m": 6.0, "margin_floor_m": 3.0})
     voyage = world.skipper.voyage
     world.skipper = replace(world.skipper, voyage=replace(voyage, boat=replace(voyage.boat, tack_fails=0.001)))
-    assert world.run(120, lambda w: w.state.sailing)
-    route, corner, goal = world.state.route, (36.0, 26.0), (0.0, 50.0)
-    world.state = replace(world.state, index=0, route=replace(
+    assert world.run(120, lambda w: w.state.voyage.sailing)
+    route, corner, goal = world.state.mission.route, (36.0, 26.0), (0.0, 50.0)
+    world.state = with_parts(world.state, mission={"index": 0, "route": replace(
         route, items=(*route.items[:1] * 2, route.items[-1]), points_en_m=(corner, goal, route.points_en_m[-1]),
-        leg_from_en_m=((0.0, 0.0), corner, goal), gate_of=(-1, 0, -1)))
+        leg_from_en_m=((0.0, 0.0), corner, goal), gate_of=(-1, 0, -1))})
     return world
 
 
@@ -95,7 +96,7 @@ def test_the_skipper_takes_the_new_plan_when_a_tack_of_the_old_one_has_become_to
         before, after = (of_risky(tacks_at_risk(problem, legs)) for legs in (old.legs, found.legs))
         assert (before > after) == bool(tacking)
         # as fast as the old one, so that nothing else speaks for it
-        take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id,
+        take_plan(turn, PlanOutcome(request_id=turn.state.pending.plan.request_id,
                                     plan=replace(found, cost_s=old.time_s)))
         taken.append(any(isinstance(a, UploadMission) for a in turn.actions))
     assert taken == [False, True]
@@ -106,11 +107,11 @@ def test_the_ladder_is_climbed_by_name_while_the_old_plan_is_too_risky_and_at_it
     for tacking, code in (({}, "no plan"), (LEARNED, "ladder 0")):
         turn = turn_of(world, tacking=replace(world.state.tacking, **tacking))
         asked(turn)
-        not_found(turn, turn.state.pending_plan, "nothing")
+        not_found(turn, turn.state.pending.plan, "nothing")
         assert [a.code for a in turn.actions if isinstance(a, Announce)] == [code]
-    while turn.state.pending_plan is not None and any(isinstance(a, RequestPlan) for a in turn.actions):
+    while turn.state.pending.plan is not None and any(isinstance(a, RequestPlan) for a in turn.actions):
         turn.actions.clear()
-        not_found(turn, turn.state.pending_plan, "nothing")
+        not_found(turn, turn.state.pending.plan, "nothing")
     [said] = [a.text for a in turn.actions if isinstance(a, Announce)]
     assert "the old one stays; tacks of it that fail would bring her onto something" in said
 
@@ -119,8 +120,8 @@ def test_a_tack_at_the_next_waypoint_that_has_become_too_risky_is_planned_away_f
     world = sailing()
     for tacking, from_seq in (({}, []), (LEARNED, [None])):
         turn = turn_of(world, tacking=replace(world.state.tacking, **tacking))
-        problem = asked(turn, ReplanReason.WAYPOINT, from_index=turn.state.index)
-        take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id,
+        problem = asked(turn, ReplanReason.WAYPOINT, from_index=turn.state.mission.index)
+        take_plan(turn, PlanOutcome(request_id=turn.state.pending.plan.request_id,
                                     plan=plan(problem, expansions=8000)))
         assert [a.from_seq for a in turn.actions if isinstance(a, RequestPlan)] == from_seq
 
@@ -130,8 +131,8 @@ def test_so_near_that_waypoint_no_plan_is_made_from_the_boat_for_it_would_turn_b
     for budget_s, from_seq in ((0.5, [None]), (30.0, [])):
         world.skipper = replace(world.skipper, config=replace(world.skipper.config, plan_budget_s=budget_s))
         turn = turn_of(world, tacking=replace(world.state.tacking, **LEARNED))
-        problem = asked(turn, ReplanReason.WAYPOINT, from_index=turn.state.index)
-        take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id,
+        problem = asked(turn, ReplanReason.WAYPOINT, from_index=turn.state.mission.index)
+        take_plan(turn, PlanOutcome(request_id=turn.state.pending.plan.request_id,
                                     plan=plan(problem, expansions=8000)))
         assert [a.from_seq for a in turn.actions if isinstance(a, RequestPlan)] == from_seq
 
@@ -142,7 +143,8 @@ def test_the_tack_that_begins_a_plan_is_gybed_round_too_after_two_that_failed():
     problem = asked(turn)
     found = plan(problem, expansions=8000)
     came_from_the_other_side = replace(problem, start_heading_rad=-problem.start_heading_rad)
-    turn.update(pending_plan=replace(turn.state.pending_plan, problem=came_from_the_other_side))
-    take_plan(turn, PlanOutcome(request_id=turn.state.pending_plan.request_id, plan=found))
-    loop = turn.state.pending_upload.route.points_en_m[:2]
+    turn.state = with_parts(
+        turn.state, pending={"plan": replace(turn.state.pending.plan, problem=came_from_the_other_side)})
+    take_plan(turn, PlanOutcome(request_id=turn.state.pending.plan.request_id, plan=found))
+    loop = turn.state.pending.upload.route.points_en_m[:2]
     assert all(point[1] < problem.start_en[1] for point in loop)     # to leeward, before anything else

@@ -86,7 +86,7 @@ def test_a_replay_gives_the_same_actions_over_frames_and_restarts(watched):
 def test_the_state_is_where_it_was(watched):
     """The route's points, carried over at each change, lie on the items that are on the autopilot."""
     for _, step in watched.steps:
-        route = step.state.route
+        route = step.state.mission.route
         for item, place in zip(route.items, route.points_en_m, strict=True) if route is not None else ():
             assert math.dist(step.voyage.frame.en_from_geo(item.point), place) < 0.1
     waters = [d for d in read_decisions(watched.folder) if d["kind"] == "water"]
@@ -137,7 +137,8 @@ def test_the_corridor_is_kept(watched):
     goals = [watched.mission.start, *(g.point for g in watched.mission.goals)]
     for status, step in watched.steps:
         vehicle, leg = step.snapshot.vehicle, status.goal_index
-        if vehicle is not None and step.state.route is not None:   # started again, she has to find her mission first
+        # started again, she has to find her mission first
+        if vehicle is not None and step.state.mission.route is not None:
             band_m = watched.mission.goals[leg].bandwidth_m
             assert off_leg_m(goals[leg], goals[leg + 1], vehicle.position) < band_m + 50.0
 
@@ -195,7 +196,7 @@ def test_ocean_four_hundred_kilometres_with_ten_restarts(tmp_path):
 
     def look(status, step):
         vehicle, leg = step.snapshot.vehicle, status.goal_index
-        if vehicle is not None and step.state.route is not None:
+        if vehicle is not None and step.state.mission.route is not None:
             off[leg] = max(off[leg], off_leg_m(goals[leg], goals[leg + 1], vehicle.position))
         if step.snapshot.t_s >= 5000.0 * (1 + len(resident)):
             resident.append(int(Path("/proc/self/statm").read_text().split()[1]) * 4096)
