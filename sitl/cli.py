@@ -20,6 +20,7 @@ PROGRAM = Program(
         "encounters": "vessels that would hit the boat, by the hundred: the rules of the road",
         "mismatch": "boats, seas and sensors that are not the plan's, by the hundred",
         "search": "draws that are moved towards contact until one touches",
+        "shown": "every figure that a screen shows, against what came",
         "reliability": "what was promised and how often it came, over the voyages of a campaign",
         "ablate": "what each part is worth: the same weather with one thing taken away",
         "baselines": "the companion against ArduRover alone and with its own path planning",

@@ -313,8 +313,9 @@ def _tack(view: View) -> Row:
     nearest = min(lines, key=lambda line: line.reach_s or 0.0, default=None)
     layline = "" if nearest is None else f", layline {nearest.tack[:1].upper()} in {span_text(nearest.reach_s)}"
     next_s = None if view.plan is None else view.plan.next_tack_s
+    about = "about " if view.plan is not None and view.plan.next_tack_is_planned is False else ""
     tacks = view.figures.tacks
-    return "Tack", (f"{'none planned' if next_s is None else f'in {span_text(next_s)}'}{layline}"
+    return "Tack", (f"{'none planned' if next_s is None else f'in {about}{span_text(next_s)}'}{layline}"
                     f"{'' if tacks is None else f', {tacks} done'}"), Style.PLAIN
 
 

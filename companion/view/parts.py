@@ -15,7 +15,7 @@ from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.messages import Command, CompanionStatus, TrafficStatus, VehicleState, WindForecast
 from companion.orders import Verb, permitted
 from companion.planner import Leg, Plan
-from companion.skipper.planning import next_tack_s
+from companion.skipper.planning import next_tack
 from companion.skipper.step import Route, SkipperConfig, WindHealth
 from companion.skipper.watch.watchdogs import BY_NAME
 from companion.skipper.way import (
@@ -475,6 +475,7 @@ def plan_of(
         return None
     begin, count = min(state.mission.index, len(route.items)), len(route.items)
     left = tuple(_leg(route, n, legs) for n in range(begin, count))
+    tack = next_tack(step, voyage.boat.polar)
     return values.PlanView(
         number=route.plan_id, age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),
         reason="" if chosen is None else chosen.reason,
@@ -487,7 +488,8 @@ def plan_of(
         there_s=rounded(ahead.there_s, 0), there_late_s=rounded(ahead.there_late_s, 0),
         expected_clearance_m=rounded(route.expected_clearance_m, 1),
         bound_s=None if chosen is None else rounded(chosen.plan.lower_bound_s, 1), replans=state.plans.replans,
-        next_tack_s=rounded(next_tack_s(step, voyage.boat.polar), 0),
+        next_tack_s=None if tack is None else rounded(tack.in_s, 0),
+        next_tack_is_planned=None if tack is None else tack.is_planned,
         leg=min(begin + 1, count) if count else None, count=count,
         legs=left)
 
@@ -532,6 +534,7 @@ def predicted_of(ahead: Ahead) -> tuple[values.Ahead, ...]:
         is_last = n == len(ahead.points) - 1
         is_new = not points or way.in_s - points[-1].in_s >= AHEAD_STEP_S or points[-1].tack != tack
         if len(points) < MOST_AHEAD and (is_new or is_last):
-            points.append(values.Ahead(in_s=way.in_s, at_en_m=place(way.at_en_m), tack=tack))
+            points.append(values.Ahead(
+                in_s=way.in_s, at_en_m=place(way.at_en_m), tack=tack, within_m=rounded(way.within_m, 1)))
     return tuple(points)
 

@@ -288,6 +288,7 @@ class PlanView:
     bound_s: float | None = None         # no plan is faster than that
     replans: int | None = None
     next_tack_s: float | None = None
+    next_tack_is_planned: bool | None = None    # by the plan; False: the autopilot's own, where its corridor ends
     leg: int | None = None               # the leg that is sailed, from 1 ...
     count: int | None = None             # ... of so many
     legs: tuple[LegView, ...] = ()
@@ -295,11 +296,12 @@ class PlanView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ahead:
-    """Where she is expected ``in_s`` from now, and on which tack."""
+    """Where she is expected ``in_s`` from now, and on which tack; nine in ten are within ``within_m`` of there."""
 
     in_s: float
     at_en_m: PointEn
     tack: Tack | None = None
+    within_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

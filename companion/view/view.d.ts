@@ -1,12 +1,13 @@
 // Made by python -m companion.view.schema from companion/view/values.py. Do not edit.
 
 /**
- * Where she is expected ``in_s`` from now, and on which tack.
+ * Where she is expected ``in_s`` from now, and on which tack; nine in ten are within ``within_m`` of there.
  */
 export interface Ahead {
   in_s: number;
   at_en_m: [number, number];
   tack: "port" | "starboard" | null;
+  within_m: number | null;
 }
 
 /**
@@ -252,6 +253,7 @@ export interface Plan {
   bound_s: number | null;
   replans: number | null;
   next_tack_s: number | null;
+  next_tack_is_planned: boolean | null;
   leg: number | null;
   count: number | null;
   legs: Leg[];

@@ -304,6 +304,10 @@ function expected(view, at) {
     while (minute <= b.in_s && b.in_s > a.in_s) {
       const f = (minute - a.in_s) / (b.in_s - a.in_s);
       const [x, y] = at([a.at_en_m[0] + f * (b.at_en_m[0] - a.at_en_m[0]), a.at_en_m[1] + f * (b.at_en_m[1] - a.at_en_m[1])]);
+      if (minute === 60 && b.within_m !== null) {   // nine boats in ten are within
+        const edge = at([a.at_en_m[0] + f * (b.at_en_m[0] - a.at_en_m[0]) + b.within_m, a.at_en_m[1] + f * (b.at_en_m[1] - a.at_en_m[1])]);
+        children.push(svg("circle", { cx: x, cy: y, r: Math.hypot(edge[0] - x, edge[1] - y), class: "within" }));
+      }
       children.push(svg("circle", { cx: x, cy: y, r: 2.2, class: "minute" }), svg("text", { x: x + 5, y: y - 4, class: "word small" }, `${minute / 60}′`));
       minute += 60;
     }

@@ -59,6 +59,7 @@ function alarms(view) {
 }
 
 const THERE = "The time until the next goal is reached, at the pace that the boat has lately kept; in nine cases of ten it is there by the second figure.";
+const TACK = "By the plan; 'about' is the autopilot's own, on a leg that it beats: when that comes goes with the wind.";
 const OFF_PLAN = "The chance that the boat is forced off the plan before the next goal: that the wind makes it tack or bear away unplanned, or that a vessel comes too near.";
 
 /** @param {string} name @param {string} value @param {string} unit @param {string} [kind] @param {string} [hint] */
@@ -75,7 +76,7 @@ function figures(view) {
     one("AWS", speed(wind?.aws_mps), speedUnit()), one("VMG", speed(boat?.vmg_mps), speedUnit()),
     one("COG", bearing(boat?.cog_deg), bearingUnit()), one("to mark", distance(boat?.goal_m), ""),
     one("TWD σ 1 min", wind?.sigma_deg == null ? NONE : `±${figure(wind.sigma_deg, 0)}°`, ""), one("clearance", distance(boat?.clearance_m), ""),
-    one("next tack", duration(plan?.next_tack_s), ""), one("there in", duration(plan?.there_s), "", "", THERE), one("off the plan", percent(plan?.path_risk), "", "", OFF_PLAN),
+    one("next tack", `${plan?.next_tack_is_planned === false ? "about " : ""}${duration(plan?.next_tack_s)}`, "", "", TACK), one("there in", duration(plan?.there_s), "", "", THERE), one("off the plan", percent(plan?.path_risk), "", "", OFF_PLAN),
     one("off the leg", boat?.cross_track_m == null ? NONE : `${figure(Math.abs(boat.cross_track_m), 1)} m ${boat.cross_track_m < -0.05 ? "L" : boat.cross_track_m > 0.05 ? "R" : ""}`, ""),
     ...(view?.water?.is_planned ? [one("current", `${bearing(view.water.set_deg)} ${speed(view.water.drift_mps)}`, speedUnit())] : []),
     one("battery", figure(boat?.battery_v, 1), boat?.battery_share == null ? "V" : `V ${percent(boat.battery_share)}`));

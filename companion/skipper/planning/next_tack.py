@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from companion.boat import AutopilotLimits, Polar
 from companion.geo.angles import difference_rad, heading_of
@@ -35,8 +35,21 @@ class Seen(Protocol):
         ...
 
 
+class NextTack(NamedTuple):
+    """The next tack: when [s], and whether the plan has it; else it is the autopilot's own."""
+
+    in_s: float
+    is_planned: bool
+
+
 def next_tack_s(seen: Seen, polar: Polar) -> float | None:
-    """Return the time until the next tack [s], planned or the autopilot's own; None: there is none, or no way on.
+    """Return the time until the next tack [s]; None: there is none, or no way on."""
+    found = next_tack(seen, polar)
+    return None if found is None else found.in_s
+
+
+def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
+    """Return the next tack, planned or the autopilot's own; None: there is none, or no way on.
 
     On a leg inside its no-go zone the autopilot beats: it keeps the tack that it comes on until the edge of its
     corridor, or until the other tack fetches the waypoint; in GUIDED it does not beat, and such a leg is planned anew.
@@ -64,7 +77,7 @@ def next_tack_s(seen: Seen, polar: Polar) -> float | None:
         off_rad = difference_rad(wind_rad, heading_of(end[0] - start[0], end[1] - start[1]))
         is_closed = abs(off_rad) < no_go_rad
         if number and not is_closed and (off_rad > 0.0) != side and abs(off_rad) < math.pi / 2.0:
-            return time_s
+            return NextTack(time_s, is_planned=True)
         speed_mps = max(MIN_SPEED_MPS, polar.speed_mps(max(abs(off_rad), no_go_rad), tws_mps))
         has_way = number == 0 and vehicle.speed_mps > GATHERING_WAY * speed_mps
         if is_closed:
@@ -73,7 +86,7 @@ def next_tack_s(seen: Seen, polar: Polar) -> float | None:
             close_rad = wind_rad - no_go_rad if side else wind_rad + no_go_rad
             velocity_en = vehicle.velocity_en_mps if has_way else moved((0.0, 0.0), close_rad, speed_mps)
             own_s = _own_tack_s(start, velocity_en, leg, wind_rad, side=side, limits=limits)
-            return None if own_s is None else time_s + own_s
+            return None if own_s is None else NextTack(time_s + own_s, is_planned=False)
         side = off_rad > 0.0
         time_s += math.dist(start, end) / (vehicle.speed_mps if has_way else speed_mps)
     return None
