@@ -72,9 +72,8 @@ def main(argv=None):
     with tempfile.TemporaryDirectory() as folder:
         taken = recorded(folder)
         kept = sum(p.stat().st_size for p in Path(folder, "kernels").iterdir())
-    from companion.kernels.listed import Entry
+    from companion.kernels.listed import Entry, as_text
     from companion.kernels.places import FILE
-    from companion.kernels.signatures import as_text
 
     lists, rows, inside_s = {"companion": [], "sitl": []}, {}, 0.0
     for (dispatcher, types), seconds in taken.items():

@@ -15,7 +15,7 @@ import sys
 from companion.kernels import places
 from companion.kernels.build import is_ready, prepare
 from companion.kernels.crew import planned
-from companion.kernels.linked.library import INDEX, LIBRARY
+from companion.kernels.linked import INDEX, LIBRARY
 
 PACKAGES = ("companion", "sitl")
 
@@ -34,7 +34,7 @@ def carry() -> int:
         raise RuntimeError(f"{places.CARRIED}: not all kernels are there")
     (places.CARRIED / places.MADE_FOR).write_text(f"{places.versions()}\n", encoding="utf-8")
     places.CARRIED.chmod(0o755)
-    from companion.kernels.linked.linking import link
+    from companion.kernels.linking import link
 
     if not link(PACKAGES, places.CARRIED):
         _say("there is no ld here: kernels are carried for numba alone (apt install binutils)")

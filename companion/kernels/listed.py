@@ -2,6 +2,9 @@
 
 Each program's package has one, ``kernels.txt``, written by ``python -m bench.kernels --write`` and held complete
 by a test. It makes no decision: what is missing from it is compiled when it is called.
+
+float64, int64[::1], float64[:, ::1], tuple(float64, int64), named("companion.planner.search.kernels:Grid",
+float64[::1])
 """
 
 from __future__ import annotations
@@ -10,11 +13,59 @@ import importlib
 from dataclasses import dataclass
 from typing import Any
 
+from numba import types
 from numba.core.dispatcher import Dispatcher
 
 from companion.errors import JobError
 from companion.kernels.places import FILE, PACKAGES
-from companion.kernels.signatures import from_text
+
+_SCALARS = {str(t): t for t in (
+    types.float64, types.float32, types.int64, types.int32, types.int8, types.uint64, types.uint32, types.uint8,
+    types.boolean)}
+_ENDS = {"C": "::1", "A": ":"}
+
+
+def as_text(signature: tuple[Any, ...]) -> str:
+    """Return a signature's text.
+
+    Raises:
+        JobError: a type that no kernel of ours has had.
+    """
+    return ", ".join(_text(t) for t in signature)
+
+
+def from_text(text: str) -> tuple[Any, ...]:
+    """Return the signature that ``as_text`` wrote.
+
+    Raises:
+        JobError: the text is none, or names a type that is not there any more.
+    """
+    names = {**_SCALARS, "tuple": lambda *members: types.Tuple(members), "named": _named, "__builtins__": {}}
+    try:
+        return tuple(eval(f"({text},)" if text else "()", names))  # noqa: S307 - our own list, in numba's own notation
+    except (SyntaxError, NameError, TypeError, ValueError, ImportError, AttributeError) as error:
+        raise JobError(f"{text!r} is no signature: {error}") from error
+
+
+def _text(t: Any) -> str:
+    name = str(t)
+    if name in _SCALARS:
+        return name
+    if isinstance(t, types.Array) and t.layout in _ENDS and t.mutable and str(t.dtype) in _SCALARS:
+        return f"{t.dtype}[{', '.join([*[':'] * (t.ndim - 1), _ENDS[t.layout]])}]"
+    if isinstance(t, types.BaseNamedTuple):
+        return f'named("{t.instance_class.__module__}:{t.instance_class.__qualname__}", {as_text(tuple(t.types))})'
+    if isinstance(t, types.BaseTuple):
+        return f"tuple({as_text(tuple(t.types))})"
+    raise JobError(f"{t}: the list of kernels cannot say this type")
+
+
+def _named(place: str, *members: Any) -> Any:
+    module, _, name = place.partition(":")
+    cls = getattr(importlib.import_module(module), name)
+    if len(set(members)) == 1:
+        return types.NamedUniTuple(members[0], len(members), cls)
+    return types.NamedTuple(members, cls)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

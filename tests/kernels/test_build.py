@@ -14,8 +14,7 @@ import pytest
 from companion.kernels import places
 from companion.kernels.build import Progress, is_ready, prepare
 from companion.kernels.carry import carry
-from companion.kernels.listed import read_list
-from companion.kernels.signatures import as_text
+from companion.kernels.listed import as_text, read_list
 from sitl.scene.ships import free_port
 
 ALL = ("companion", "sitl")

@@ -9,7 +9,7 @@ import pytest
 
 from companion.kernels import places
 from companion.kernels.build import prepare
-from companion.kernels.linked.library import INDEX, LIBRARY
+from companion.kernels.linked import INDEX, LIBRARY
 
 SETTLED = """
 import sys
@@ -51,7 +51,7 @@ def carried(tmp_path_factory):
     if shutil.which("ld") is None:
         pytest.skip("no linker here: apt install binutils")
     from companion.kernels.crew import planned
-    from companion.kernels.linked.linking import link
+    from companion.kernels.linking import link
 
     prepare(("companion",), say=lambda _: None)
     folder = tmp_path_factory.mktemp("carried")

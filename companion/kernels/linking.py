@@ -29,7 +29,7 @@ from numba.core.registry import cpu_target
 from companion.errors import JobError
 from companion.kernels.cache import read
 from companion.kernels.crew import Work, planned
-from companion.kernels.linked.library import HELPERS, INDEX, LIBRARY, PARTS
+from companion.kernels.linked import HELPERS, INDEX, LIBRARY, PARTS
 
 _HELPER = re.compile("|".join(prefix for prefix in PARTS.values() if prefix))
 _JUMPS = {   # to what the table has at this place: of a processor's family
