@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -28,11 +28,12 @@ class OutputName:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Displays:
-    """Whom a voyage is told to; ``token_file`` holds the token of the Signal K servers."""
+    """Whom a voyage is told to; ``token`` is what was read of ``token_file``, for the Signal K servers."""
 
     nmea: tuple[OutputName, ...] = ()
     signalk: tuple[OutputName, ...] = ()
     token_file: Path | None = None
+    token: str = field(default="", repr=False)
 
 
 def parse_nmea(text: str) -> OutputName:

@@ -24,11 +24,11 @@ from companion.program.commands import missing
 from companion.words import counted, file_name
 
 if TYPE_CHECKING:
+    from companion.addresses import Displays
     from companion.app.from_autopilot import DrawnSettings
     from companion.geofence import Mission
     from companion.geofence.mission import MissionOptions
     from companion.guard import Guard
-    from companion.outputs import DisplayOptions
     from companion.planner.nursery import Nursery
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
@@ -218,7 +218,7 @@ def _voyage(
     from companion.compose import displays_of
     from companion.guard import Guard
     from companion.mavlink.transports import open_link
-    from companion.outputs import wanted
+    from companion.outputs import checked_displays
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, VoyageArchive
 
     signing = signing_of(args.signing_key)
@@ -231,7 +231,7 @@ def _voyage(
     seed = mission.skipper.seed if args.seed is None else args.seed
     guard = Guard(lambda name, why: err.write(f"companion run: note: sailed without the {name}: {why}\n"), seed=seed,
                   pace=args.speedup)
-    told = wanted(displays_of(mission), guard)
+    told = checked_displays(displays_of(mission), guard)
     for finding in mission.findings:
         err.write(f"companion run: {finding.line(str(mission.path))}\n")
     transport = open_link(args.link, seed=seed)
@@ -289,7 +289,7 @@ def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 async def _sail(
     mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager,
-    nursery: Nursery | None, out: Console, told: DisplayOptions, guard: Guard,
+    nursery: Nursery | None, out: Console, told: Displays, guard: Guard,
 ) -> dict[str, Any] | None:
     """Sail; return the summary, None when it was ended before it began."""
     from companion.planner.worker import PlannerWorker

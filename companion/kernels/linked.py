@@ -4,8 +4,8 @@ Beside it lies an index: the kernels with their types as the list has them, the 
 environment. Of numba only the three small modules are loaded that are written in C.
 
 Numba, LLVM and what they know of a kernel take 60 MB and two seconds of a processor at every start, to call machine
-code that was made long before. So where a package is built, ``linking`` makes one library of all listed kernels
-(``library``). A kernel that is called with other types than the listed ones is what it always was: numba is loaded, and
+code that was made long before. So where a package is built, ``linking`` makes one library of all listed kernels.
+A kernel that is called with other types than the listed ones is what it always was: numba is loaded, and
 its kernels take the place of all of these.
 """
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -22,15 +22,7 @@ from companion.view.values import View
 MOST_TOKEN = 8192   # characters
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DisplayOptions:
-    """Whom to tell, and the token that a Signal K server asks for."""
-
-    displays: Displays
-    token: str = field(default="", repr=False)
-
-
-def wanted(displays: Displays, guard: Guard) -> DisplayOptions:
+def checked_displays(displays: Displays, guard: Guard) -> Displays:
     """Return whom to tell, with the token that was read; what cannot be, ``guard`` knows.
 
     A server is told without a token that cannot be read, and not at all without the library that its kind needs.
@@ -47,7 +39,7 @@ def wanted(displays: Displays, guard: Guard) -> DisplayOptions:
             token = read_token(displays.token_file)
         except InputError as error:
             guard.lost(Auxiliary.SIGNALK_TOKEN, f"{error}", for_good=True)
-    return DisplayOptions(displays=displays, token=token)
+    return replace(displays, token=token)
 
 
 def read_token(path: Path) -> str:
@@ -62,18 +54,18 @@ class Outputs:
     """The receivers that are wanted, while it is open. ``say`` hears how they stand, in words; ``guard`` knows it."""
 
     def __init__(
-        self, chosen: DisplayOptions, frame: LocalFrame, say: Say, *, seed: int = 0, guard: Guard | None = None,
+        self, chosen: Displays, frame: LocalFrame, say: Say, *, seed: int = 0, guard: Guard | None = None,
     ) -> None:
         self._frame = frame
         self._guard = guard or Guard(lambda name, why: say(
             f"{name}: not told: {why}" if why else f"{name}: told again"))
         self.nmea: list[Outlet[Lines]] = [
             (UdpOutlet if name.kind == "udp" else TcpOutlet)(name, say, seed=seed + number)
-            for number, name in enumerate(chosen.displays.nmea)]
+            for number, name in enumerate(chosen.nmea)]
         self.signalk: list[Outlet[Values]] = [
             TcpSignalK(name, say, seed=seed + number) if name.kind == "tcp" else
             WebSocketSignalK(name, say, token=chosen.token, seed=seed + number)
-            for number, name in enumerate(chosen.displays.signalk, len(chosen.displays.nmea))]
+            for number, name in enumerate(chosen.signalk, len(chosen.nmea))]
         self._stack = contextlib.AsyncExitStack()
         if guard is not None:
             for outlet in self._outlets:

@@ -24,7 +24,7 @@ from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.guard import BACKOFF_CAP_S, HELD_S, Auxiliary, Guard, reason
 from companion.mavlink.autopilot import Autopilot as Pilot
-from companion.outputs import Outputs, outputs, wanted
+from companion.outputs import Outputs, checked_displays, outputs
 from companion.page import Address
 from companion.planner.worker import InlinePlanner
 from companion.telemetry import console
@@ -153,7 +153,7 @@ def test_with_all_that_is_beside_her_broken_at_the_start_and_under_way_she_arriv
         wires = MemoryLink("boat", seed=1)
         async with serve(autopilot, [wires.far]):
             tasks.update({f"not {task.get_name()}" for task in asyncio.all_tasks()})
-            async with Outputs(wanted(displays_of(mission), guard), mission.frame(), lambda _: None,
+            async with Outputs(checked_displays(displays_of(mission), guard), mission.frame(), lambda _: None,
                                guard=guard) as displays:
                 return await app.sail(mission, wires.near, InlinePlanner(), tmp_path / "v", SailOptions(
                     limit_s=190.0, offload=at_once, is_durable=False, expansions=2000,
@@ -205,8 +205,8 @@ def test_what_is_named_and_cannot_be_used_is_left_out(tmp_path):
     assert charts_of(args, guard) == ()
     assert far_of(args, guard) is None
     (tmp_path / "m.toml").write_text(MISSION.format(feed=1, nmea=2) + 'signalk = ["ws://h"]\nsignalk_token = "t"\n')
-    told = wanted(displays_of(load_mission(tmp_path / "m.toml")), guard)
-    assert (told.token, len(told.displays.signalk)) == ("", 1)
+    told = checked_displays(displays_of(load_mission(tmp_path / "m.toml")), guard)
+    assert (told.token, len(told.signalk)) == ("", 1)
     assert {*guard.gone} == {*NAMED, Auxiliary.FAR}
     assert all("no such file" in why for why in guard.gone.values())
     guard.look()

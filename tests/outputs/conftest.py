@@ -8,7 +8,7 @@ from companion.addresses import Displays, parse_nmea, parse_signalk
 from companion.geo.frame import LocalFrame
 from companion.guard import Guard
 from companion.messages import GeoPoint
-from companion.outputs import wanted
+from companion.outputs import checked_displays
 from companion.view.values import BoatView, GoalView, LegView, PlanView, PolarView, StateView, View, WindView
 
 ORIGIN = GeoPoint(lat_deg=50.8170, lon_deg=-1.3100)
@@ -21,8 +21,8 @@ def frame():
 
 def chosen(nmea=(), signalk=(), token_file=None, guard=None):
     """Return whom to tell, by their names."""
-    return wanted(Displays(nmea=tuple(map(parse_nmea, nmea)), signalk=tuple(map(parse_signalk, signalk)),
-                           token_file=token_file), guard or Guard())
+    return checked_displays(Displays(nmea=tuple(map(parse_nmea, nmea)), signalk=tuple(map(parse_signalk, signalk)),
+                                     token_file=token_file), guard or Guard())
 
 
 def view_of(**changes):

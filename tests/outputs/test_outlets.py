@@ -252,7 +252,7 @@ def test_a_token_that_must_not_be_used_is_not_and_that_is_known(tmp_path, text, 
     with pytest.raises(InputError, match=says):
         read_token(file)
     whom = chosen((), ["ws://h"], file, guard)
-    assert (whom.token, len(whom.displays.signalk)) == ("", 1)
+    assert (whom.token, len(whom.signalk)) == ("", 1)
     assert says in guard.gone["Signal K token"]
 
 
@@ -271,10 +271,10 @@ def test_without_its_library_a_websocket_is_left_out_in_one_line(monkeypatch):
     guard = Guard()
     monkeypatch.setitem(sys.modules, "websockets", None)
     whom = chosen((), ["ws://h", "tcp:h:8375"], None, guard)
-    assert [name.text for name in whom.displays.signalk] == ["tcp:h:8375"]
+    assert [name.text for name in whom.signalk] == ["tcp:h:8375"]
     assert "pip install 'sailboat-companion[signalk]', or name the server's TCP port" in guard.gone["other displays"]
     assert "\n" not in guard.gone["other displays"]
-    assert chosen((), ["tcp:h:8375"]).displays.signalk
+    assert chosen((), ["tcp:h:8375"]).signalk
 
 
 def test_a_broadcast_that_is_not_permitted_is_told_of(frame, view, monkeypatch):
