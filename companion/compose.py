@@ -100,7 +100,7 @@ def polar_of(mission: Mission) -> Polar:
 
 
 def boat_of(mission: Mission) -> Boat:
-    """Return the mission's boat; one that does not sail has no no-go zone, and tacks cost her nothing."""
+    """Return the mission's boat; one that does not sail has no no-go zone, and tacks cost it nothing."""
     if mission.autopilot.frame == "motor":
         if isinstance(mission.boat.polar, str):
             raise InputError(str(mission.path), "[boat] polar", "a motor boat has no polar, and hers is "
@@ -429,7 +429,7 @@ def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
 
 
 def _orders(mission: Mission, key: str, given: tuple[str, ...] | str) -> tuple[str, ...]:
-    """Return the verbs that a key of ``[operator]`` permits. Raises InputError for a word that is none."""
+    """Return the verbs that a key of ``[operator]`` permits. Raises InputError for a word that is no verb."""
     words = (given,) if isinstance(given, str) else given
     for word in words:
         if word != ALL and word not in set(Verb):
@@ -492,7 +492,7 @@ def water_of(mission: Mission) -> Prior:
 
 
 def _unix_s(text: str) -> float | None:
-    """Return the Unix time [s] of an ISO 8601 time with its zone, None where it is none."""
+    """Return the Unix time [s] of an ISO 8601 time with its zone, None for other text."""
     try:
         moment = dt.datetime.fromisoformat(text)
     except ValueError:

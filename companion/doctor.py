@@ -107,7 +107,7 @@ RATES_HZ = {"WIND": 0.9, "GLOBAL_POSITION_INT": 0.9, "ATTITUDE": 0.9, "MISSION_C
 OLDEST = (4, 2)              # before it the boat is steered by L1 and the upwind corridor differs
 MODES_FS = {0: "nothing", 1: "RTL", 2: "HOLD", 3: "SmartRTL or RTL or HOLD", 4: "SmartRTL or HOLD", 5: "a disarming",
             6: "LOITER or HOLD"}
-ADRIFT = frozenset({2, 4, 5})   # what leaves a sailboat to drift: her sails are eased and nobody steers
+ADRIFT = frozenset({2, 4, 5})   # what leaves a sailboat to drift: the boat's sails are eased and nobody steers
 DRIFTS = "a sailboat in HOLD eases her sails and drifts, out of a fence and onto whatever is there"
 
 

@@ -104,7 +104,7 @@ class StepWind:
             self._first_s = sample.t_s
         self._mean90.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight,
                             speed_weight=status.speed_weight)
-        # What a turned vane says now the autopilot sails by, and it is what her motion is held against.
+        # What a turned vane says now the autopilot sails by, and it is what the boat's motion is held against.
         is_turned = Verdict.TURNED in status.verdicts
         self._mean5.update(sample.t_s, sample.twd_from_rad, sample.tws_mps,
                            weight=1.0 if is_turned else status.weight,
@@ -149,7 +149,7 @@ _LIMITS = frozenset({"SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS"})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParameterChange:
-    """A parameter that changes what a sensor says, or how she sails, was set; ``before`` None: it was not known."""
+    """A parameter that changes what a sensor says, or how the boat sails, was set; ``before`` None: unknown."""
 
     name: str
     before: float | None
@@ -425,7 +425,7 @@ class VoyageFold:
             pace=self._pace)
 
     def _follow(self) -> Shift | None:
-        """Replace the frame by one about the boat when she has left its water; None: she has not."""
+        """Replace the frame by one about the boat when it has left its water; None: it has not."""
         here = None if self._vehicle is None else self._vehicle.position
         if self._waters is None or here is None or not self.skipper.leaves_water(self.state, here):
             return None
@@ -472,7 +472,7 @@ class VoyageFold:
     def _unsure(self, t_s: float, wind: WindView) -> str:
         """Return why neither wind nor water may be planned with now, in words; empty: they may.
 
-        A wind that is learned anew is believed when she has sailed by it as she should, or has not told for long.
+        A wind that is learned anew is believed when the boat has sailed by it as it should, or has not told for long.
         """
         if self._anew_s is None:
             self._anew_s = t_s

@@ -96,7 +96,7 @@ def current_words_of(mission: Mission, unix_s: float) -> tuple[str, ...]:
 
 
 def _holds(mission: Mission, prior: Prior) -> bool:
-    """Return whether she can stem the strongest of it, whichever way it sets, in the wind of previews."""
+    """Return whether the boat can stem the strongest of it, whichever way it sets, in the wind of previews."""
     boat, drift = boat_of(mission), prior.strongest_mps
     sets = [2.0 * math.pi * n / _DIRECTIONS for n in range(_DIRECTIONS)] if prior.rows else [
         math.atan2(prior.east_mps, prior.north_mps)]
@@ -335,7 +335,7 @@ def passage_words(mission: Mission) -> str:
 
 
 def wind_limit_words(mission: Mission) -> str:
-    """Return in words the winds that she sets sail in, empty: in any."""
+    """Return in words the winds that the boat sets sail in, empty: in any."""
     boat = mission.boat
     limits = [f"{word} {limit:g} m/s" for word, limit in (
         ("more than", boat.max_tws_mps), ("less than", boat.min_tws_mps)) if limit is not None]
@@ -425,7 +425,7 @@ class FieldPreview:
 class HeadingFan:
     """Candidate headings (k,) [rad] with the speed of each (k,) [m/s], and their worth: the way made along the field.
 
-    ``wanted_rad`` is the field's own heading, ``chosen_rad`` what she would be steered by.
+    ``wanted_rad`` is the field's own heading, ``chosen_rad`` what the boat would be steered by.
     """
 
     headings_rad: NDArray[np.float64]
@@ -514,7 +514,7 @@ def heading_fan(seen: FieldPreview, q: int = 1) -> HeadingFan:
 def field_track(seen: FieldPreview, seconds: float = TRACK_S) -> NDArray[np.float64]:
     """Return a track by the field from where the boat is: rows of t, east, north, heading [s, m, rad].
 
-    A boat that has her polar's speed at once and turns at her rate, the shore kept clear of, no vessels; it ends where
+    A boat that has its polar's speed at once and turns at its rate, the shore kept clear of, no vessels; it ends where
     the goal does. The station keeper is not in it.
     """
     habits, clearance = seen.conditions.habits, _clearance(seen.area)

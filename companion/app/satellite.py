@@ -7,7 +7,7 @@ cannot be judged, is put into ``aside`` by itself: the others are read as ever.
 
 An order that was taken is on the disk (``taken.json``) before it is carried out: after a power cut it may be lost, and
 the next status says so, but it is never carried out twice. A disk that cannot keep it does not stop it: what is asked
-from far away may be what saves her.
+from far away may be what saves the boat.
 """
 
 from __future__ import annotations
@@ -262,7 +262,7 @@ class SatelliteMailbox:
         return True
 
     async def _begin_anew(self, data: bytes, unix_s: float | None) -> bool:
-        """Judge a beginning. Raises ValueError: it is none of ours."""
+        """Judge a beginning. Raises ValueError: it is not ours."""
         beginning = unpack_beginning(data, self._key)
         reply, taken = begun(beginning, self._taken, unix_s)
         if taken is not self._taken or reply is not Reply.BEGUN:   # and not only come again

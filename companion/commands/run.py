@@ -390,7 +390,7 @@ def page_of(args: argparse.Namespace, guard: Guard) -> Any:
 
 
 def charts_of(args: argparse.Namespace, guard: Guard) -> Any:
-    """Return the charts; without one that is none, or that a card no longer has, she is sailed all the same."""
+    """Return the charts; a file that is no chart, or is gone, is left out, and the boat is sailed all the same."""
     from companion.page import open_charts
 
     charts: list[Any] = []

@@ -312,7 +312,7 @@ def _empty() -> MissionOptions:
 
 
 def text_of(data: bytes, source: str) -> Text:
-    """Return the text of a file's bytes. Raises InputError for what is none."""
+    """Return the text of a file's bytes. Raises InputError for bytes that are not text."""
     text = decode(data, source)
     line_end = "\r\n" if b"\r\n" in data else "\n"
     mark = b"\xef\xbb\xbf" if data.startswith(b"\xef\xbb\xbf") else b""

@@ -1,4 +1,4 @@
-"""The view as NMEA 0183: what an instrument shows, where she is bound for, the route that she sails.
+"""The view as NMEA 0183: what an instrument shows, where the boat is bound for, the route that it sails.
 
 Fields as in NMEA 0183 version 3.01, which OpenCPN and all others understand. What is not known is an empty field, never
 0; a reading that is not to be believed has the status V.
@@ -108,7 +108,7 @@ def rmb(
     right_of_leg_m: float, origin: str, name: str, point: GeoPoint, distance_m: float, bearing_rad: float,
     closing_mps: float | None, *, has_arrived: bool,
 ) -> str:
-    """Return the waypoint: where it is, how far, how fast she comes nearer to it."""
+    """Return the waypoint: where it is, how far, how fast the boat comes nearer to it."""
     off, side = _off_track(right_of_leg_m)
     return sentence(
         "RMB", "A", off, side, origin, name, *_place(point), _miles(distance_m),
@@ -191,12 +191,12 @@ class ActiveLeg:
 
     @property
     def is_past(self) -> bool:
-        """Is she past the line across the leg at its end?"""
+        """Return whether the boat is past the line across the leg at its end."""
         return self.along_m >= self.length_m
 
 
 def course_of(view: View) -> ActiveLeg | None:
-    """Return the course; None where she sails none, or where she is is not known."""
+    """Return the course; None: the boat sails no leg, or its position is not known."""
     legs = legs_ahead(view)
     boat = view.boat
     if not legs or boat.at_en_m is None or not is_fresh(boat.age_s) or not view.state.is_sailing:
@@ -236,7 +236,7 @@ def names_ahead(view: View) -> tuple[str, ...]:
 
 
 def place_of(view: View) -> GeoPoint | None:
-    """Return where she is, None where that is not known or old."""
+    """Return the boat's position, None when it is not known or old."""
     boat = view.boat
     if boat.lat_deg is None or boat.lon_deg is None or not is_fresh(boat.age_s):
         return None

@@ -81,12 +81,12 @@ def picture_of(data: bytes) -> str:
 
 
 def open_charts(paths: Sequence[Path]) -> tuple[TileChart, ...]:
-    """Open charts, the lowest first. Raises InputError: one is none, or cannot be read."""
+    """Open charts, the lowest first. Raises InputError: a file is not a chart, or cannot be read."""
     return tuple(open_chart(path) for path in paths)
 
 
 def open_chart(path: Path) -> TileChart:
-    """Open a chart. Raises InputError: it is none, cannot be read, or has no pictures in it."""
+    """Open a chart. Raises InputError: it is not a chart, cannot be read, or has no pictures in it."""
     try:
         with open_regular(path) as file:
             head = file.read(16)

@@ -93,7 +93,7 @@ def read_token(path: Path) -> str:
 
 
 def _split(host: str) -> tuple[str, int]:
-    """Return name and port of a Host header; port 0: it is none."""
+    """Return name and port of a Host header; port 0: it is malformed."""
     match = re.fullmatch(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+)(?::([0-9]{1,5}))?", host)
     if match is None:
         return "", 0

@@ -46,7 +46,7 @@ def place_words(lat_deg: float, lon_deg: float) -> str:
 
 
 def date_words(utc: str) -> str:
-    """Return an ISO time as a date with its minute, "" for what is none.
+    """Return an ISO time as a date with its minute, "" for text that is not a time.
 
     >>> date_words("2026-06-09T10:13:20+00:00")
     '9 June 2026, 10:13 UTC'

@@ -314,7 +314,7 @@ def _draw_zone(axes: Axes, seen: FieldPreview) -> None:
 
 
 def _draw_rose(rose: Axes, seen: FieldPreview, fan: HeadingFan) -> None:
-    """Draw the boat's candidate headings as a rose: as long as the polar makes her fast."""
+    """Draw the boat's candidate headings as a rose: as long as the polar makes it fast."""
     rose.set(xlim=(-1.36, 1.36), ylim=(-1.36, 1.36), aspect="equal", xticks=[], yticks=[])
     twd, half = seen.conditions.twd_from_rad, seen.conditions.habits.no_go_half_rad
     if twd is not None:

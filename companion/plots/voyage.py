@@ -163,7 +163,7 @@ def _fans(axes: Any, chart: RecordedChart, plans: list[RecordedPlan]) -> None:
 
 
 def _sailed(axes: Any, record: VoyageRecord) -> None:
-    """Draw the track: by tack where the autopilot sailed, dotted where the boat drifted or somebody else had her."""
+    """Draw the track: by tack where the autopilot sailed, dotted where the boat drifted or somebody else had it."""
     from matplotlib.collections import LineCollection
 
     c = record.columns

@@ -438,7 +438,7 @@ def age_of(view: View) -> float | None:
 
 
 def why_of(view: View) -> str:
-    """Return what she does and why, and what is missing."""
+    """Return what the boat does and why, and what is missing."""
     state = view.state
     parts = [state.task, state.why, f"missing: {', '.join(state.wants)}" if state.wants else ""]
     return "; ".join(part for part in parts if part)

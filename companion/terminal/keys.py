@@ -1,4 +1,4 @@
-"""Keys to orders: what a key asks for, and the question before an order that moves the boat or gives her up. Pure."""
+"""Keys to orders: what a key asks for, and the question before an order that moves the boat or gives it up. Pure."""
 
 from __future__ import annotations
 

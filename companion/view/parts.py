@@ -103,7 +103,7 @@ def level_of(severity: int) -> values.Level:
 
 
 def state_of(step: Step, since_s: float) -> values.StateView:
-    """Return what she does and why."""
+    """Return what the boat does and why."""
     state, autopilot = step.state, step.snapshot.autopilot
     return values.StateView(
         phase=state.phase.value, why=state.why, task=state.progress.task, age_s=rounded(step.snapshot.t_s - since_s, 1),
@@ -133,7 +133,7 @@ def next_goal(step: Step, voyage: Voyage) -> int:
 
 
 def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatView:
-    """Return where she is and how she moves."""
+    """Return where the boat is and how it moves."""
     snapshot, autopilot = step.snapshot, step.snapshot.autopilot
     vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
     at_rest = values.BoatView(
@@ -188,7 +188,7 @@ def goals_of(step: Step, voyage: Voyage) -> tuple[values.GoalView, ...]:
 
 
 def home_of(step: Step, voyage: Voyage) -> values.PlaceView | None:
-    """Return where she was armed, as the autopilot tells."""
+    """Return where the boat was armed, as the autopilot tells."""
     autopilot = step.snapshot.autopilot
     home: PointEn | None = voyage.home_en_m
     if autopilot is not None and autopilot.home is not None:
@@ -410,7 +410,7 @@ def laylines_of(
 
 
 def _meets_s(here: PointEn, vehicle: VehicleState, mark_en: PointEn, course_rad: float) -> float | None:
-    """Return when the boat, going on as she does, is on the line that fetches the mark [s]; None: not before it."""
+    """Return when the boat, going on as it does, is on the line that fetches the mark [s]; None: not before it."""
     if vehicle.speed_mps < HAS_WAY_MPS:
         return None
     east, north = math.sin(course_rad), math.cos(course_rad)

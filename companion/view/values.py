@@ -64,7 +64,7 @@ class WaterView:
     """The current: where it goes and how fast, the standard deviation in its most uncertain direction.
 
     ``is_planned``: it is strong and sure enough for plans to reckon with it; ``verdict`` says what is not known of it.
-    ``twd_from_deg`` and ``tws_mps`` are the present wind over this water, which is what she sails by.
+    ``twd_from_deg`` and ``tws_mps`` are the present wind over this water, which is what the boat sails by.
     """
 
     set_deg: float
@@ -102,7 +102,7 @@ class Layline:
     tack: Tack
     course_deg: float
     swing_deg: float
-    reach_s: float | None = None         # until she meets it on her present course; None: she does not
+    reach_s: float | None = None         # until the boat meets it on its present course; None: it does not
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,7 +191,7 @@ Grade = Literal["good", "poor", "bad", "unknown"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateView:
-    """What she does and why, in words; ``wants`` is what is missing for her to go on. ``age_s``: since it began."""
+    """What the boat does and why, in words; ``wants`` is what is missing for it to go on. ``age_s``: since it began."""
 
     phase: str
     why: str = ""
@@ -218,7 +218,7 @@ class AlarmView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoatView:
-    """Where she is and how she moves. ``age_s``: of the position. ``cross_track_m`` is positive right of the leg."""
+    """Place and motion of the boat. ``age_s``: of the position. ``cross_track_m`` is positive right of the leg."""
 
     age_s: float | None = None
     lat_deg: float | None = None
@@ -296,7 +296,7 @@ class PlanView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ahead:
-    """Where she is expected ``in_s`` from now, and on which tack; nine in ten are within ``within_m`` of there."""
+    """Where the boat is expected ``in_s`` from now, and on which tack; nine in ten are within ``within_m`` of there."""
 
     in_s: float
     at_en_m: PointEn
@@ -306,7 +306,7 @@ class Ahead:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackPoint:
-    """Where she was, ``ago_s`` before."""
+    """Where the boat was, ``ago_s`` before."""
 
     ago_s: float
     at_en_m: PointEn
@@ -315,7 +315,7 @@ class TrackPoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VesselView:
-    """Another vessel and the closest approach to her, hull to hull, if both go on; ``cpa_s`` None: she draws away."""
+    """Another vessel and the closest approach to it, hull to hull, if both go on; ``cpa_s`` None: it draws away."""
 
     name: str
     mmsi: int | None = None
@@ -333,7 +333,7 @@ class VesselView:
     bearing_deg: float | None = None
     cpa_m: float | None = None
     cpa_s: float | None = None
-    cpa_en_m: PointEn | None = None      # where she will be then ...
+    cpa_en_m: PointEn | None = None      # where it will be then ...
     own_cpa_en_m: PointEn | None = None  # ... and where we shall be
 
 

@@ -1,7 +1,7 @@
 // Made by python -m companion.view.schema from companion/view/values.py. Do not edit.
 
 /**
- * Where she is expected ``in_s`` from now, and on which tack; nine in ten are within ``within_m`` of there.
+ * Where the boat is expected ``in_s`` from now, and on which tack; nine in ten are within ``within_m`` of there.
  */
 export interface Ahead {
   in_s: number;
@@ -52,7 +52,7 @@ export interface Band {
 }
 
 /**
- * Where she is and how she moves. ``age_s``: of the position. ``cross_track_m`` is positive right of the leg.
+ * Place and motion of the boat. ``age_s``: of the position. ``cross_track_m`` is positive right of the leg.
  */
 export interface Boat {
   age_s: number | null;
@@ -285,7 +285,7 @@ export interface Standing {
 }
 
 /**
- * What she does and why, in words; ``wants`` is what is missing for her to go on. ``age_s``: since it began.
+ * What the boat does and why, in words; ``wants`` is what is missing for it to go on. ``age_s``: since it began.
  */
 export interface State {
   phase: string;
@@ -302,7 +302,7 @@ export interface State {
 }
 
 /**
- * Where she was, ``ago_s`` before.
+ * Where the boat was, ``ago_s`` before.
  */
 export interface TrackPoint {
   ago_s: number;
@@ -311,7 +311,7 @@ export interface TrackPoint {
 }
 
 /**
- * Another vessel and the closest approach to her, hull to hull, if both go on; ``cpa_s`` None: she draws away.
+ * Another vessel and the closest approach to it, hull to hull, if both go on; ``cpa_s`` None: it draws away.
  */
 export interface Vessel {
   name: string;
@@ -372,7 +372,7 @@ export interface View {
  * The current: where it goes and how fast, the standard deviation in its most uncertain direction.
  *
  *     ``is_planned``: it is strong and sure enough for plans to reckon with it; ``verdict`` says what is not known of it.
- *     ``twd_from_deg`` and ``tws_mps`` are the present wind over this water, which is what she sails by.
+ *     ``twd_from_deg`` and ``tws_mps`` are the present wind over this water, which is what the boat sails by.
  */
 export interface Water {
   set_deg: number;

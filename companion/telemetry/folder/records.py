@@ -262,7 +262,7 @@ class VoyageFigures:
     a whole plan's, as if nobody replanned on the way. What vessels have of both is beside them.
     ``promised_clearance_m`` is the least clearance that a plan expected which was sailed, beside what was kept;
     ``promised_s``, ``median_s`` and ``late_s`` are the first plan's time, and when half and nine of ten of the winds of
-    its spread would have brought her to its end.
+    its spread would have brought the boat to its end.
     """
 
     first_s: float | None = None
