@@ -10,6 +10,7 @@ crash, and while a stranger's mission is on board, he can only let be.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -28,6 +29,7 @@ CAUSES: dict[str, frozenset[str]] = {
     "cut off": frozenset({"link_cut", "link_half", "link_quality", "kill_companion"}),
     "foreign": frozenset({"foreign_mission"}),
     "drift": frozenset({"current", "wind_speed"}),
+    "false wind": frozenset({"vane", "parameter"}),
 }
 # While it lasts nothing may be ordered, by the table of causes.
 HANDS_OFF = frozenset({"crash"})
@@ -67,7 +69,7 @@ def moments(events: Sequence[EventSpec], kinds: frozenset[str], contact_s: float
     """Return when an ideal skipper could have acted: soon after each beginning and each end of the fault."""
     signs: list[float] = []
     for event in events:
-        if event.kind in kinds:
+        if event.kind in kinds and not (event.is_of_one and math.hypot(event.east_m, event.north_m) == 0.0):
             # of a jump that the filter resists nothing shows before it is taken
             taken_s = [t for t in reach.false_s if t >= event.at_s][:1] if event.is_resisted else [event.at_s]
             signs += taken_s

@@ -18,7 +18,9 @@ like having prevented everybody on board from helping it, and is only where that
   carried. Nobody on board can help that but the crew with its anchor, who must be called in time: ``CALLED_S`` before
   it touches, or where it began later than that, within ``NOTICED_S`` of its beginning;
 - ``cut off``: it lay stopped or disarmed by the autopilot's own doing while the link was cut or the companion dead;
-- ``foreign``: the boat followed a mission that somebody else put on board and that the companion may not replace.
+- ``foreign``: the boat followed a mission that somebody else put on board and that the companion may not replace;
+- ``false wind``: the vane was turned by ``TURNED_DEG`` or more, or its offset set so, or that over for less than
+  ``REACTION_S``: by such a wind the autopilot itself can neither sail nor loiter.
 
 What counts as a mixture. The mission on the autopilot, up to the item that ends it, is at every moment one that was
 asked for as a whole, or a beginning of one that ends in a loiter at one of its own waypoints (what stands there while
@@ -75,6 +77,7 @@ NOTICED_S = 60.0
 # With less wind over the water than this there is no steerage [m/s]; and with less than this many times the current she
 # does not stem it: half of the wind is what the boat makes in light air.
 STEERAGE_MPS, STEMS = 0.8, 2.0
+TURNED_DEG = 60.0
 UNEXCUSED = "unexcused"
 # What may excuse a contact, in the words of the campaign's table.
 EXCUSES = {
@@ -86,6 +89,7 @@ EXCUSES = {
     "drift": f"carried without wind to sail by, the crew called to the anchor {CALLED_S:g} s before, or at once",
     "cut off": "stopped by the autopilot, with the link cut or the companion dead",
     "foreign": "following a stranger's mission, which may not be replaced",
+    "false wind": "with the vane turned far, by which the autopilot sails and loiters",
 }
 # Where a mission stops being read.
 _ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
@@ -103,12 +107,16 @@ class Helm(enum.Enum):
 
 @dataclass(slots=True)
 class Watch:
-    """An observer of one run, and its judge. ``operator_s`` is when a person had the boat, from and to [s]."""
+    """An observer of one run, and its judge.
+
+    ``operator_s`` is when a person had the boat, ``false_wind_s`` when the vane was turned far, from and to [s].
+    """
 
     solid: BaseGeometry
     frame: LocalFrame
     hull: Hull
     operator_s: list[tuple[float, float]] = field(default_factory=list)
+    false_wind_s: list[tuple[float, float]] = field(default_factory=list)
     called_s: list[float] = field(default_factory=list)
     t_s: list[float] = field(default_factory=list)
     en_m: list[tuple[float, float]] = field(default_factory=list)
@@ -190,6 +198,8 @@ class Watch:
             return "cut off"
         if self.missions[i] in self.foreign:
             return "foreign"
+        if any(a <= t_s <= b + REACTION_S for a, b in self.false_wind_s):
+            return "false wind"
         return UNEXCUSED
 
     def _was_called(self, i: int) -> bool:
@@ -294,6 +304,17 @@ def mission_key(items: Iterable[tuple[int, int, int]]) -> MissionKey:
         if command in _ENDS:
             break
     return tuple(out)
+
+
+def false_wind_spans(events: Iterable[EventSpec], end_s: float) -> list[tuple[float, float]]:
+    """Return when the vane was turned by ``TURNED_DEG`` or more, or its offset was set so, from and to [s]."""
+    spans = [(e.at_s, end_s if e.for_s is None else e.at_s + e.for_s) for e in events
+             if e.kind == "vane" and e.state == "offset" and abs(e.value_deg) >= TURNED_DEG]
+    offsets = sorted((e for e in events if e.parameter == "WNDVN_DIR_OFS"), key=lambda e: e.at_s)
+    for event, until_s in zip(offsets, (*(e.at_s for e in offsets[1:]), end_s), strict=False):   # there may be none
+        if abs(event.value) >= TURNED_DEG:
+            spans.append((event.at_s, until_s))
+    return spans
 
 
 def operator_spans(events: Iterable[EventSpec], end_s: float) -> list[tuple[float, float]]:

@@ -29,7 +29,15 @@ from companion.fold import Step
 from companion.messages import CompanionStatus, Mode
 from sitl.campaigns.counterfactual import ALERT_S, avoidable, by_hand
 from sitl.campaigns.fault_draw import BESIDE, draw, draw_beside, draw_planner, draw_turned_vane
-from sitl.campaigns.fault_watch import EXCUSES, MAX_SILENCE_S, UNEXCUSED, Watch, mission_key, operator_spans
+from sitl.campaigns.fault_watch import (
+    EXCUSES,
+    MAX_SILENCE_S,
+    UNEXCUSED,
+    Watch,
+    false_wind_spans,
+    mission_key,
+    operator_spans,
+)
 from sitl.campaigns.jump_draw import KINDS, MODES, Jump, draw_jump
 from sitl.means import Means
 from sitl.run.variation import DRAWABLE, Method, Variation, drawn_method
@@ -57,16 +65,15 @@ def sail_seed(
     drawn = draw(seed, scenario)
     if set(draws) & set(BESIDE):
         drawn = draw_beside(seed, drawn, draws, _jump_of(seed, scenario, base))
-    return sail_faults(drawn, seed, base, keep, method=method_of(seed, scenario, base, draws))
+    return sail_faults(drawn, seed, base, keep, method=method_of(seed, drawn, base, draws))
 
 
 def sail_turned_vane_seed(
     seed: int, base: Path = BASE, keep: Path | None = None, *, draws: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Sail what ``sail_seed`` sails, with a vane that is turned under way beside it."""
-    scenario = load_scenario(base)
-    return sail_faults(draw_turned_vane(seed, scenario), seed, base, keep,
-                       method=method_of(seed, scenario, base, draws))
+    drawn = draw_turned_vane(seed, load_scenario(base))
+    return sail_faults(drawn, seed, base, keep, method=method_of(seed, drawn, base, draws))
 
 
 def sail_worker_seed(
@@ -81,7 +88,7 @@ def sail_worker_seed(
 def method_of(seed: int, scenario: Scenario, source: Path, draws: Sequence[str]) -> Method:
     """Return by which guidance and planner a seed is sailed: ``draws`` names what is drawn of them, else the mission's.
 
-    They are drawn apart: what else a seed is does not depend on whether they are.
+    They are drawn apart, of those that ``scenario`` can be sailed by: what else a seed is does not depend on them.
     """
     from sitl.run.embedded import mission_of
 
@@ -220,7 +227,8 @@ def _sail(
     mission = load_mission(scenario.mission_path(base))
     frame = mission.frame()
     watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame, hull=boat_of(mission).hull,
-                  operator_s=operator_spans(scenario.events, scenario.limit_s))
+                  operator_s=operator_spans(scenario.events, scenario.limit_s),
+                  false_wind_s=false_wind_spans(scenario.events, scenario.limit_s))
     for event in scenario.events:
         if event.kind == "foreign_mission":
             item = waypoint(frame.geo_from_en(event.east_m, event.north_m))

@@ -18,7 +18,15 @@ from companion.telemetry.folder.recorder import read_jsonl
 from sitl import cli
 from sitl.autopilot import EPOCH_S
 from sitl.campaigns.fault_draw import BESIDE, draw, draw_beside, draw_turned_vane
-from sitl.campaigns.fault_watch import EXCUSES, REACTION_S, RESUME_S, Watch, mission_key, operator_spans
+from sitl.campaigns.fault_watch import (
+    EXCUSES,
+    REACTION_S,
+    RESUME_S,
+    Watch,
+    false_wind_spans,
+    mission_key,
+    operator_spans,
+)
 from sitl.campaigns.faults import BASE, jump_figures, run_faults, sail_faults, sail_seed
 from sitl.campaigns.jump_draw import CREEPS_MPS, KINDS, LONG_S, MODES, NEAR_M, SHORT_S, draw_jump
 from sitl.means import Means
@@ -75,6 +83,18 @@ def test_what_is_drawn_beside_a_seeds_own_faults_is_drawn_apart_and_leaves_them(
     assert [sorted(one.events, key=str) for one in one_by_one] == [
         sorted(more.events, key=str) for _, more in together[:20]]
     assert [beside(seed, ("guidance", "planner"), base) for seed in range(5)] == [plain for plain, _ in together[:5]]
+
+
+def test_a_vane_that_is_turned_far_is_a_false_wind_while_it_is():
+    turned = EventSpec(at_s=10.0, kind="vane", state="offset", value_deg=-90.0, for_s=20.0)
+    written = [EventSpec(at_s=40.0, kind="parameter", parameter="WNDVN_DIR_OFS", value=70.0),
+               EventSpec(at_s=60.0, kind="parameter", parameter="WNDVN_DIR_OFS", value=0.0)]
+    others = [EventSpec(at_s=5.0, kind="vane", state="offset", value_deg=40.0),
+              EventSpec(at_s=5.0, kind="vane", state="spikes", value_deg=170.0),
+              EventSpec(at_s=5.0, kind="parameter", parameter="FENCE_RADIUS", value=100.0)]
+    assert false_wind_spans([turned, *written, *others], 100.0) == [(10.0, 30.0), (40.0, 60.0)]
+    assert false_wind_spans(written[:1], 100.0) == [(40.0, 100.0)]
+    assert not any(false_wind_spans(draw(seed, load_scenario(BASE)).events, 300.0) for seed in range(50))
 
 
 def test_a_voyage_whose_outlets_cannot_be_used_arrives_and_says_so(tmp_path):

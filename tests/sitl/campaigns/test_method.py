@@ -42,6 +42,11 @@ def test_what_is_not_asked_for_is_the_missions_own():
     assert method_of(7, scenario, BASE, ("planner",)).guidance is None
 
 
+def test_who_may_not_steer_is_sailed_by_plan():
+    drawn = next(s for s in (draw(seed, load_scenario(BASE)) for seed in range(100)) if not s.set_auto)
+    assert {method_of(seed, drawn, BASE, DRAWABLE).guidance for seed in range(20)} == {"plan"}
+
+
 def test_a_method_is_a_missions_keys_and_guided_is_permitted_for_it():
     demo = mission("demo")
     planned = Variation(tables={"skipper": {"autopilot_beats": False}})
