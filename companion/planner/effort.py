@@ -16,6 +16,8 @@ from companion.planner.problem.value import Problem
 
 Judge = Callable[[NDArray[np.float64]], float]
 LATE = 1.1     # of the seconds: another path is not judged beyond
+SETTLES = 5.0  # times what the first path takes: so long it soon gets better, and is not judged yet
+SETTLED = 0.25  # ... and no longer than this share of the seconds
 
 
 class Effort:
@@ -24,16 +26,18 @@ class Effort:
     Algorithms call ``spend`` with what they did and stop when ``is_over``. ``fraction`` is the share used of the
     limit that decides (expansions when given), so a schedule made from it does not depend on the machine when
     there is an expansion budget. ``after_s`` of the seconds are for what is done with the path afterwards:
-    ``judging_s`` of it for the judgement that is left, of which ``needed_s`` cannot be left out.
+    ``judging_s`` of it for the judgement that is left, of which ``needed_s`` cannot be left out. ``has_answer``: a path
+    has been judged to be one; ``is_at_risk``: a tack of the best of them may fail onto something.
     """
 
     def __init__(self, budget_s: float | None, expansions: int | None) -> None:
         self.limit = expansions
         self.budget_s = math.inf if budget_s is None else budget_s
         self.after_s = self.judging_s = self.needed_s = 0.0
-        self.has_answer = False
+        self.has_answer = self.is_at_risk = False
         self._judge: Judge | None = None
-        self._judge_at_s = 0.0
+        self._judge_at_s: float | None = None    # None: nothing has been judged
+        self._first: NDArray[np.float64] | None = None    # the first path, until then
         self.used = 0
         self.first_s: float | None = None
         self._began_s = effort_s()
@@ -82,22 +86,38 @@ class Effort:
         if self.limit is None:
             self.judging_s = self.after_s = judging_s
 
-    def listen(self, judge: Judge, *, from_s: float = 0.0) -> None:
-        """Have the best path judged while the search goes on, from a time on; never where expansions decide.
+    def listen(self, judge: Judge) -> None:
+        """Have the best path judged while the search goes on; never where expansions decide.
 
-        ``judge`` is called with the path (n, 2) and returns when it is to be called next [s].
+        ``judge`` is called with the path (n, 2) and returns when it is to be called next [s]. The first time it is
+        called when the first path has had a little time to settle, for of a small budget one judgement may be all that
+        there is time for; the first path itself follows where what it settled to is no answer or has a tack at risk.
         """
         if self.limit is None:
-            self._judge, self._judge_at_s = judge, from_s
+            self._judge = judge
+
+    @property
+    def hears_at_s(self) -> float:
+        """From when on a path is judged [s]; inf without a path, and where nobody listens."""
+        if self._judge is None or self.first_s is None:
+            return math.inf
+        if self._judge_at_s is None:
+            return min(SETTLES * self.first_s, SETTLED * self.budget_s)
+        return self._judge_at_s
 
     def improved(self, path: Callable[[], NDArray[np.float64]]) -> bool:
         """Have a path judged that is better than those before, if it is time; return whether it was."""
         judge = self._judge
-        if judge is None or self.elapsed_s < self._judge_at_s:
+        if judge is None or self.first_s is None:
+            return False
+        if self.elapsed_s < self.hears_at_s:
+            self._first = path() if self._first is None else self._first
             return False
         self._judge = None    # what the judge itself searches is not judged again
         self._judge_at_s = judge(path())
-        self._judge = judge
+        if self._first is not None and (not self.has_answer or self.is_at_risk) and self.has_time(self.needed_s):
+            self._judge_at_s = judge(self._first)
+        self._judge, self._first = judge, None
         return True
 
     def again(self, share: float, share_s: float) -> Effort:

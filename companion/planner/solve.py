@@ -3,7 +3,7 @@
 An algorithm is a function ``search(problem, effort, seed) -> Outcome``. It stops when ``effort`` says so and
 returns its best waypoints; cost and legs are then computed here by the exact scorer, never by the algorithm.
 
-A budget in seconds is that of the whole answer. ``auto``'s first path is judged as soon as it is there: then there is
+A budget in seconds is that of the whole answer. ``auto``'s first path is judged soon after it is there: then there is
 an answer, and what its judgement took is kept back from the search for the last one.
 """
 
@@ -72,7 +72,8 @@ def plan(
         algorithm: one of ``ALGORITHMS``.
         settings: the algorithm's numbers, None: its defaults.
         on_better: is told of plans that can be sailed while better ones are looked for, each better than the one
-            before (its time, with ``CONTACT_S`` for the risk of its tacks); by ``auto`` with a budget in seconds alone.
+            before (its time, with ``CONTACT_S`` for the risk of its tacks); with a budget in seconds alone. ``astar``
+            has none to tell of: its first path is its only one.
 
     Raises:
         InputError: the algorithm is unknown, the settings are another's, or a budget is not positive.
@@ -120,7 +121,7 @@ def _solved(
     module, name = ALGORITHMS[empty.algorithm]
     found = getattr(importlib.import_module(module), name)
     search: Search = found if settings is None else partial(found, settings=settings)
-    from companion.planner.risk.wind import keep_limit, search_within, with_risk
+    from companion.planner.risk.wind import keep_limit, search_within
 
     if empty.algorithm == "rrtstar" and problem.is_shared:
         from companion.planner.reference.vessels import carried, judge_of, keep_share
@@ -140,16 +141,15 @@ def _solved(
 
     whole = _whole(search, problem)
     answers = _Answers(problem, effort, empty, on_better)
-    if empty.algorithm == "auto" and problem.risk is None and (on_better is not None or problem.tracking is not None):
+    is_within = problem.risk is None or empty.algorithm == "rrtstar"   # whose tree carries the limit itself (CC-RRT*)
+    if is_within and (on_better is not None or (problem.tracking is not None and empty.algorithm == "auto")):
         effort.listen(answers.judge)
-    if problem.risk is None:
-        outcome = whole(problem, effort, empty.seed)
-        return answers.last(outcome, with_risk(problem, _judged(problem, outcome, effort, empty)))
-    if empty.algorithm == "rrtstar":  # carries the limit in its own tree (CC-RRT*)
+    if is_within:
         outcome = whole(problem, effort, empty.seed)
     else:
-        outcome = search_within(whole, problem, effort, empty.seed)
-    return keep_limit(problem, _judged(problem, outcome, effort, empty))
+        told = answers.judge if on_better is not None and effort.limit is None else None
+        outcome = search_within(whole, problem, effort, empty.seed, told)
+    return answers.last(outcome, keep_limit(problem, _judged(problem, outcome, effort, empty)))
 
 
 class _Answers:
@@ -163,7 +163,7 @@ class _Answers:
 
     def judge(self, waypoints_en: NDArray[np.float64]) -> float:
         """Judge a path that the search has come to; return when the next is to be judged [s]."""
-        from companion.planner.risk.wind import with_risk
+        from companion.planner.risk.wind import keep_limit
 
         problem, effort = self._problem, self._effort
         began_s, spare_s, is_kept = effort.elapsed_s, 0.0, True
@@ -182,7 +182,7 @@ class _Answers:
         found = None
         if judged.is_feasible and is_kept:
             then_s = effort.elapsed_s
-            found = with_risk(problem, _judged(
+            found = keep_limit(problem, _judged(
                 problem, Outcome(waypoints_en=np.asarray(path)), effort, self._empty))
             needed_s += effort.elapsed_s - then_s
         effort.needed_s = max(effort.needed_s, AGAIN * needed_s)
@@ -191,7 +191,7 @@ class _Answers:
         effort.judging_s = max(effort.judging_s, effort.needed_s + spare_s)
         if found is not None and found.has_path and (self.best is None or _counted_s(found) < _counted_s(self.best)):
             self.best = replace(found, unproven=("search", "bound"))
-            effort.has_answer = True
+            effort.has_answer, effort.is_at_risk = True, found.tack_risk > 0.0
             if self._on_better is not None:
                 self._on_better(self.best)
         if self.best is not None and self._on_better is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import time
 from pathlib import Path
 
@@ -107,3 +108,49 @@ def test_with_expansions_nothing_is_handed_out_and_nothing_depends_on_the_clock(
     clock[0] += 1e6
     again = plan(p, expansions=2_000, seed=3)
     assert first.to_dict() | {"elapsed_s": 0, "first_s": 0} == again.to_dict() | {"elapsed_s": 0, "first_s": 0}
+
+
+def test_one_judgement_is_of_a_path_that_has_settled(clock):
+    """A budget that has time for one was given to the path of the first milliseconds: a fifth slower, and more."""
+    p, judged = recorded("current-later"), []
+    plan(p, budget_s=0.4, seed=1, on_better=lambda found: judged.append((found.elapsed_s, found.first_s)))
+    elapsed_s, first_s = judged[0]
+    assert elapsed_s > min(effort.SETTLES * first_s, effort.SETTLED * 0.9 * 0.4)
+
+
+def test_the_first_path_is_judged_where_what_it_settled_to_is_no_answer():
+    now = effort.Effort(1e6, None)
+    asked = []
+    now.listen(lambda path: asked.append(float(path[0])) or 1e3)
+    now.first_s = 1e5
+    assert not now.improved(lambda: np.array([1.0]))   # it may settle
+    now.first_s = 0.0
+    assert now.improved(lambda: np.array([2.0]))
+    assert asked == [2.0, 1.0]
+    now = effort.Effort(1e6, None)
+    asked = []
+    now.listen(lambda path: asked.append(float(path[0])) or setattr(now, "has_answer", True) or 1e3)
+    now.first_s = 1e5
+    now.improved(lambda: np.array([1.0]))
+    now.first_s = 0.0
+    assert now.improved(lambda: np.array([2.0]))
+    assert asked == [2.0]
+
+
+def test_plans_within_a_limit_on_their_risk_are_handed_out_as_they_come(clock):
+    raw = json.loads((REQUESTS[0].parent / "slalom.json").read_text(encoding="utf-8"))
+    p = Problem.from_json(raw | {"risk": {"max_path_risk": 0.3}})
+    handed = []
+    last = plan(p, budget_s=1.5, seed=1, on_better=handed.append)
+    assert handed
+    assert all(found.risk <= 0.3 and evaluate(p, found.waypoints_en).is_feasible for found in handed)
+    assert last.has_path
+    assert last.risk <= 0.3
+
+
+def test_the_trees_paths_are_handed_out_as_they_come(clock):
+    p, handed = load("four-beat-60"), []
+    last = plan(p, budget_s=0.06, seed=1, algorithm="rrtstar", on_better=handed.append)
+    assert handed
+    assert all(evaluate(p, found.waypoints_en).is_feasible for found in handed)
+    assert last.cost_s <= handed[-1].cost_s

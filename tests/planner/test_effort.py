@@ -42,6 +42,7 @@ def test_a_path_is_judged_when_it_is_time_and_not_within_its_own_judgement():
         return 1e3   # the next one then
 
     effort.listen(judge)
+    effort.first_s = 0.0
     part = effort.part(0.5)
     assert part.improved(lambda: np.zeros((2, 2)))
     assert not part.improved(lambda: np.ones((2, 2)))
@@ -56,6 +57,7 @@ def test_a_part_does_not_pay_for_the_judgement(monkeypatch):
     monkeypatch.setattr("companion.planner.effort.effort_s", lambda: now[0])
     effort = Effort(10.0, None)
     effort.listen(lambda _: now.__setitem__(0, now[0] + 2.0) or 99.0)
+    effort.found()
     part = effort.part(0.3)
     assert part.improved(lambda: np.zeros((2, 2)))
     assert part.remaining_s == pytest.approx(3.0)

@@ -143,6 +143,7 @@ def search(
         effort.found()
         return Outcome(waypoints_en=np.array([problem.start_en]))
     tree = Tree(problem, world_of(problem), seed, settings, vessels)
+    judged = math.inf
     while not effort.is_over and tree.size < MOST_NODES:
         samples = effort.remaining(CHUNK)
         if samples <= 0:
@@ -151,6 +152,9 @@ def search(
         effort.spend(samples)
         if tree.best >= 0:
             effort.found()
+            cost = float(tree.node[tree.best, kernels.C])
+            if cost < judged and effort.improved(lambda: tree.path_to(tree.best)):
+                judged = cost
     trace = {
         "tree": tree.edges(), "states": tree.size, "rewired": int(tree.count[kernels.REWIRED]),
         "refused": int(tree.count[kernels.REFUSED]),

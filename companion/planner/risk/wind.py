@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import NamedTuple
@@ -257,8 +257,11 @@ def keep_limit(problem: Problem, plan: Plan) -> Plan:
                    cost_s=math.inf, first_s=None, why=Why(text=reason))
 
 
-def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -> Outcome:
-    """Return the fastest path found whose promised risk is within ``problem.risk``.
+def search_within(
+    search: Search, problem: Problem, effort: Effort, seed: int,
+    on_better: Callable[[NDArray[np.float64]], object] | None = None,
+) -> Outcome:
+    """Return the fastest path found whose promised risk is within ``problem.risk``; ``on_better`` is told of each.
 
     Any search that keeps the chance constraint at each instant can be held to a limit on the whole path: the
     no-go zone is widened by e more standard deviations, the least e whose plan keeps the limit is bisected, and the
@@ -292,6 +295,8 @@ def search_within(search: Search, problem: Problem, effort: Effort, seed: int) -
             effort.found()
             if judged.time_s < best_s:
                 best, best_s, kept = outcome, judged.time_s, extra
+                if on_better is not None and outcome.waypoints_en is not None:
+                    on_better(outcome.waypoints_en)
         if settled or effort.is_over:
             break
         if limit < promised < math.inf:

@@ -129,6 +129,7 @@ def _improve(s: Searcher) -> None:
     if has_solid and not s.is_done:
         s.geodesic(s.tests(40_000, 0.15))
     while not s.is_done:
+        s.have_judged()   # also where the first path stays the best
         before = s.effort.fraction
         if before >= FINE_FROM:
             s.finish()

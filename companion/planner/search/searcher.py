@@ -138,6 +138,12 @@ class Searcher:
             self.best = candidate
             self.effort.found()
         self.effort.after_s = self.effort.judging_s + _LEG_S * len(self.best.points)
+        self.have_judged()
+
+    def have_judged(self) -> None:
+        """Have the best path judged, if it was not and it is time for that."""
+        if self.best is None:
+            return
         points = self.best.points
         if points is not self._judged and self.effort.improved(self.waypoints_en):
             self._judged = points
