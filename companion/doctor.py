@@ -74,6 +74,7 @@ class Examined:
     uid: str | None = None                       # of its board, "" when it tells none
     is_signed: bool = False                      # its frames carry signatures
     has_key: bool = False                        # ours do too
+    planner_speed: float | None = None           # of this computer, as a share of the reference core
 
 class Report:
     """The findings so far, about the parameters that were read."""
@@ -289,6 +290,7 @@ def examine(seen: Examined, needs: Needs) -> tuple[DoctorFinding, ...]:
     version(report, seen)
     mission(report, seen)
     streams(report, seen)
+    _computer(report, seen)
     return tuple(sorted(report.findings, key=lambda f: (-f.level, f.code)))
 
 def _boat(report: Report, needs: Needs) -> None:
@@ -396,3 +398,22 @@ def _navigation(report: Report, needs: Needs) -> None:
         report.add(Level.INFO, "mission end", "MIS_DONE_BEHAVE is 0: HOLD after the last item",
                    "HOLD drifts; the companion's missions end in a loiter of their own", name="MIS_DONE_BEHAVE",
                    wanted=1.0)
+
+
+LATE, NARROW = 0.03, 0.3   # of the reference core: plans come late; in narrow water they are not as fast
+
+
+def _computer(report: Report, seen: Examined) -> None:
+    """Say how fast this computer plans, where that was measured, and what follows from it."""
+    speed = seen.planner_speed
+    if speed is None:
+        return
+    what = f"this computer plans at {100.0 * speed:.0f} % of the reference core"
+    if speed >= NARROW:
+        report.add(Level.INFO, "computer", what, "as good as plans can be, and in time")
+    elif speed >= LATE:
+        report.add(Level.INFO, "computer", what, "plans come in time; in narrow water they are somewhat slower ways: "
+                   "less is looked at in their budget ([skipper] planning_budget_s)")
+    else:
+        report.add(Level.WARNING, "computer", what, "plans come late, and are asked for so much earlier; is something "
+                   "else at work on it, or is it throttled by heat or a weak supply?")

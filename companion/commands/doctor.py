@@ -10,7 +10,7 @@ import math
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,13 +98,22 @@ def run(args: argparse.Namespace) -> int:
                       name=str(args.signing_key))
         print(run_loop(seen), file=sys.stderr if args.json else sys.stdout)
     findings, changes = run_loop(diagnose(
-        open_link(args.link), needs_of(mission), wait_s=args.wait, apply=args.apply, signing=signing, system=system))
+        open_link(args.link), needs_of(mission), wait_s=args.wait, apply=args.apply, signing=signing, system=system,
+        speed=planner_speed()))
     if args.json:
         print(json.dumps(as_json(findings, changes), indent=1))
     else:
         sys.stdout.write(as_text(findings, changes, applied=args.apply))
     left = [f for f in findings if f.level is Level.ERROR and not _is_cured(f, changes)]
     return 1 if left or any(not change.is_done for change in changes) else 0
+
+
+def planner_speed() -> float | None:
+    """Return how fast this computer plans, as a share of the reference core; None where kernels are to be compiled."""
+    from companion.kernels.build import is_ready
+    from companion.planner.worker import speed
+
+    return speed() if is_ready(("companion",)) else None
 
 
 def needs_of(mission: Mission | None) -> Needs:
@@ -149,7 +158,7 @@ def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> 
 
 async def diagnose(
     transport: Transport, needs: Needs, *, wait_s: float = 30.0, listen_s: float = LISTEN_S, apply: bool = False,
-    signing: SigningStore | None = None, system: int | None = None,
+    signing: SigningStore | None = None, system: int | None = None, speed: float | None = None,
 ) -> tuple[tuple[DoctorFinding, ...], tuple[ParameterFix, ...]]:
     """Read everything, judge it, and set what is to be set if ``apply``.
 
@@ -166,7 +175,8 @@ async def diagnose(
     async with Link(transport, identity=own, target_system=system, signing=signing) as link:
         await link.wait_autopilot(wait_s)
         async with Autopilot(link) as autopilot:
-            findings = examine(await read(autopilot, listen_s, has_key=signing is not None), needs)
+            seen = await read(autopilot, listen_s, has_key=signing is not None)
+            findings = examine(replace(seen, planner_speed=speed), needs)
             changes = await _apply(autopilot, findings) if apply else ()
             return findings, changes
 

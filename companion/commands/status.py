@@ -151,6 +151,9 @@ def status_document(report: Any, autopilot: Any, is_alive: bool, bytes_in: float
             "promised_risk": _round(s.promised_risk, 4), "clearance_m": _round(s.clearance_m),
             "age_s": _age(report, "status"),
         },
+        "slow_computer": None if s.plan_answer_s is None else {
+            "plan_answer_s": _round(s.plan_answer_s), "age_s": _age(report, "co_plan"),
+        },
         "order": None if not s.order else {
             "verb": s.order, "stands_s": s.order_age_s, "age_s": _age(report, "status"),
         },
@@ -243,6 +246,8 @@ def _write_text(d: dict[str, Any], units: str) -> None:
     if d["current"] is not None:
         print(f"  current sets {show(d['current']['set_deg'], '03.0f')}°"
               f" {show(d['current']['drift_mps'], '.2f', factor)} {unit}")
+    if d["slow_computer"] is not None:
+        print(f"  slow computer: nine plans of ten within {show(d['slow_computer']['plan_answer_s'])} s")
     if d["order"] is not None:
         print(f"  order {d['order']['verb']}, for {show(d['order']['stands_s'], '.0f', 1.0 / 60.0)} min")
     if d["traffic"] is not None:

@@ -117,7 +117,8 @@ class Plan:
     predicted track, that prediction's error taken off, and ``expected_at_en`` where (None: the problem says nothing of
     the track, or nothing is solid). ``arrival`` has the quantiles of its time (None: the problem says nothing of the
     wind's strength). ``unproven`` is what there was no time for: "search" (it was handed out while better paths were
-    looked for), "bound" (no lower bound was proved); everything else that it says holds as of any plan.
+    looked for), "bound" (no lower bound was proved); everything else that it says holds as of any plan. ``speed`` is
+    what the search had of the reference core (``companion.planner.worker``), None: it was not measured.
     """
 
     status: PlanStatus
@@ -138,6 +139,7 @@ class Plan:
     expected_at_en: tuple[float, float] | None = None
     arrival: Arrival | None = None
     unproven: tuple[str, ...] = ()
+    speed: float | None = None
     why: Why = Why()
     trace: Mapping[str, Any] = field(default_factory=dict)
 
@@ -172,6 +174,7 @@ class Plan:
             **({"tack_risk": self.tack_risk} if self.tack_risk else {}),
             **({} if self.arrival is None else {"arrival": self.arrival.to_dict()}),
             **({"unproven": list(self.unproven)} if self.unproven else {}),
+            **({} if self.speed is None else {"speed": self.speed}),
             **({} if self.expected_clearance_m is None else {
                 "expected_clearance_m": self.expected_clearance_m,
                 "expected_at": None if self.expected_at_en is None else list(self.expected_at_en)}),
@@ -201,7 +204,7 @@ class Plan:
             vessel_risk=float(raw.get("vessel_risk", 0.0)),
             tack_risk=float(raw.get("tack_risk", 0.0)),
             arrival=None if raw.get("arrival") is None else Arrival.from_dict(raw["arrival"]),
-            unproven=tuple(raw.get("unproven", ())),
+            unproven=tuple(raw.get("unproven", ())), speed=raw.get("speed"),
             expected_clearance_m=raw.get("expected_clearance_m"),
             expected_at_en=None if raw.get("expected_at") is None else (raw["expected_at"][0], raw["expected_at"][1]),
             why=Why(text=raw["why"]["text"], data=raw["why"]["data"]),

@@ -17,8 +17,10 @@ import pickle
 import struct
 import sys
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -39,12 +41,40 @@ _LOG = logging.getLogger(__name__)
 _LENGTH = struct.Struct("<Q")
 _READY = b"ready"
 DEFAULT_GRACE_S = 3.0
-"""How much longer than its budget an answer may take [s] before the child is taken for hung."""
+"""How much longer than its budget an answer may take [s] before the child is taken for hung. A child that has had no
+more than its budget and half of this of the processor, and had some of it in the last such time, is waited for: it is
+the computer that is slow."""
+REFERENCE_PER_S = 400_000.0
+"""Expansions of ``auto`` in a second of the reference core: one of an AMD EPYC server's, on which the figures of the
+docs were measured. ``speed`` is held against it."""
+SPEED_EXPANSIONS = 5_000
+SPEED_TRIES = 3
+LEAST_RUN_S = 0.05    # a shorter plan does not tell how much of the processor there was
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PULSE_S = 0.5
 _SILENCE_S = 60.0
 """A child that gets ready may take as long as it takes, and says once in ``_BEAT_S`` that it lives; this long without a
 word [s] and it is taken for hung."""
 _BEAT_S = 1.0
+
+
+def speed() -> float:
+    """Return how fast this computer's processor plans, as a share of the reference core: its load and quota left aside.
+
+    It takes some 40 ms of that core, kernels loaded.
+    """
+    from companion.planner.solve import plan as planned
+    from companion.planner.solve import warm
+    from companion.planner.warm import warm_problems
+
+    warm()
+    problem = warm_problems()[1]
+    taken = []
+    for _ in range(SPEED_TRIES):
+        began_s = time.process_time()
+        planned(problem, expansions=SPEED_EXPANSIONS)
+        taken.append(time.process_time() - began_s)
+    return SPEED_EXPANSIONS / max(min(taken), 1e-6) / REFERENCE_PER_S
 
 
 def failed(reason: str, *, seed: int, algorithm: str, elapsed_s: float = 0.0) -> Plan:
@@ -172,8 +202,9 @@ class PlannerWorker:
                 await self._send(request)
                 deadline_s = effort_s() + (60.0 if budget_s is None else budget_s) + self._grace_s
                 is_last = False
+                allowed_s = deadline_s - effort_s() - 0.5 * self._grace_s + (self._child_cpu_s() or 0.0)
                 while not is_last:
-                    answer = await self._answer(deadline_s - effort_s())
+                    answer = await self._alive(deadline_s - effort_s(), allowed_s)
                     is_last, value = pickle.loads(answer)  # noqa: S301 - our own child wrote it
                     best = best if is_last else value
             except (OSError, EOFError, asyncio.IncompleteReadError, TimeoutError) as error:
@@ -234,9 +265,42 @@ class PlannerWorker:
         head = await self._child.reader.readexactly(_LENGTH.size)
         return await self._child.reader.readexactly(_LENGTH.unpack(head)[0])
 
-    async def _answer(self, limit_s: float) -> bytes:
-        """Return the next message; ``TimeoutError`` after ``limit_s`` of computing time (the loop may be scaled)."""
+    def _child_cpu_s(self) -> float | None:
+        """Return what the child has had of the processor [s], None where the system does not tell."""
+        try:
+            stat = Path(f"/proc/{self.pid}/stat").read_text(encoding="ascii", errors="replace")
+            user, system = stat.rpartition(")")[2].split()[11:13]
+            return (int(user) + int(system)) / _TICKS_PER_S
+        except (OSError, ValueError):
+            return None
+
+    async def _alive(self, limit_s: float, allowed_s: float) -> bytes:
+        """Return the next message, waited for beyond ``limit_s`` while the child works and has not had ``allowed_s``.
+
+        Raises:
+            TimeoutError: it had nothing of the processor for its grace, or all that it was allowed [s].
+        """
         task = asyncio.ensure_future(self._receive())
+        try:
+            while True:
+                before_s = self._child_cpu_s()
+                try:
+                    return await self._answer(limit_s, task)
+                except TimeoutError:
+                    now_s = self._child_cpu_s()
+                    if before_s is None or now_s is None or now_s <= before_s or now_s >= allowed_s:
+                        raise
+                limit_s = self._grace_s
+        finally:
+            if not task.done():
+                await ended(task)
+
+    async def _answer(self, limit_s: float, awaited: asyncio.Task[bytes] | None = None) -> bytes:
+        """Return the next message; ``TimeoutError`` after ``limit_s`` of computing time (the loop may be scaled).
+
+        It is that which is ``awaited`` already, and goes on being; else the next.
+        """
+        task = awaited or asyncio.ensure_future(self._receive())
         deadline_s = effort_s() + limit_s
         try:
             while True:   # looked for before the clock: this process may have been kept waiting, too
@@ -246,7 +310,7 @@ class PlannerWorker:
                 if effort_s() >= deadline_s:
                     raise TimeoutError
         finally:
-            if not task.done():
+            if awaited is None and not task.done():
                 await ended(task)
 
 
@@ -275,15 +339,21 @@ def answer_requests(source: Any, sink: Any) -> None:
     An answer is whether it is the last, and a plan or what failed; plans that can be sailed come before it as they are
     found.
     """
+    own_speed = speed()
     _write(sink, _READY)
     while True:
         head = source.read(_LENGTH.size)
         if len(head) < _LENGTH.size:
             return
         request: dict[str, Any] = pickle.loads(source.read(_LENGTH.unpack(head)[0]))  # noqa: S301 - our parent's
+        began_s, cpu_s = effort_s(), time.process_time()
+        answer: Plan | str
         try:
-            answer: Plan | str = plan(
+            found = plan(
                 request.pop("problem"), **request, on_better=lambda found: _write(sink, pickle.dumps((False, found))))
+            taken_s = effort_s() - began_s
+            share = min(1.0, (time.process_time() - cpu_s) / taken_s) if taken_s >= LEAST_RUN_S else 1.0
+            answer = replace(found, speed=own_speed * share)
         except Exception as error:
             answer = f"{type(error).__name__}: {error}"
         _write(sink, pickle.dumps((True, answer)))

@@ -50,10 +50,11 @@ def take_outcomes(turn: Turn) -> None:
         elif isinstance(outcome, CommandOutcome):
             _take_command(turn, outcome)
     state, config = turn.state, turn.config
-    if state.pending.plan is not None and turn.t_s - state.pending.plan.t_s > config.plan_timeout_s:
+    patience_s = state.plans.latency.patience_s(config.plan_timeout_s)
+    if state.pending.plan is not None and turn.t_s - state.pending.plan.t_s > patience_s:
         number = state.pending.plan.request_id
         turn.act(CancelPlan(request_id=number))
-        take_plan(turn, PlanOutcome(request_id=number, text=f"no answer within {config.plan_timeout_s:.0f} s"))
+        take_plan(turn, PlanOutcome(request_id=number, text=f"no answer within {patience_s:.0f} s"))
     if state.pending.upload is not None and turn.t_s - state.pending.upload.t_s > config.upload_timeout_s:
         take_upload(turn, UploadOutcome(
             upload_id=state.pending.upload.upload_id, result=UploadResult.TIMEOUT,

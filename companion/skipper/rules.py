@@ -48,6 +48,7 @@ from companion.skipper.step.state import (
     LoadedMission,
     Orders,
     Phase,
+    Planning,
     PositionState,
     Signs,
     SkipperState,
@@ -96,7 +97,8 @@ class Skipper:
                 under_way_s=persisted.under_way_s, arrived=persisted.arrived, set_sail_utc_s=persisted.set_sail_utc_s),
             orders=Orders(standing=persisted.standing, skipped=persisted.skipped),
             position=PositionState(place=persisted.place, restored=persisted.place),
-            tacking=Tacking(tried=persisted.tacks[0], failed=persisted.tacks[1]))
+            tacking=Tacking(tried=persisted.tacks[0], failed=persisted.tacks[1]),
+            plans=Planning(latency=persisted.latency))
 
     def fits(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage."""

@@ -153,6 +153,9 @@ def _health(
         return (*parts, values.Part(name="companion", grade="unknown", text="not heard"))
     grade: values.Grade = "good" if report.newest_age_s <= LATE_S else "bad"
     parts.append(values.Part(name="companion", grade=grade, age_s=rounded(report.newest_age_s, 1)))
+    if report.status.plan_answer_s is not None:
+        parts.append(values.Part(
+            name="planner", grade="poor", text=f"slow, nine plans of ten in {report.status.plan_answer_s:.0f} s"))
     parts += [values.Part(name=f"radio: {name}", grade="good" if age_s <= LATE_S else "poor", age_s=rounded(age_s, 1))
               for name, age_s in report.age_s.items()]
     return tuple(parts)

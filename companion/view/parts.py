@@ -243,9 +243,7 @@ def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
                     grade=by_age(snapshot.vehicle_age_s) if ekf or autopilot is None else "bad",
                     text="" if autopilot is None or ekf else "the autopilot does not believe its position"),
         values.Part(name="wind", grade=wind_grade, age_s=rounded(wind_age, 1), text=wind.verdict or wind.health.value),
-        values.Part(name="planner", grade="good" if snapshot.planner_alive else "bad",
-                    text="at work" if state.pending.plan is not None else
-                    "ready" if snapshot.planner_alive else "its process has died"),
+        _planner(step),
         values.Part(name="mission on board", grade="unknown" if mission.items is None else
                     "bad" if state.mission.foreign else "good",
                     age_s=None if mission.read_t_s is None else rounded(snapshot.t_s - mission.read_t_s, 0),
@@ -271,6 +269,16 @@ def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
             name="battery", grade="bad" if state.alarms.battery_critical or autopilot.battery_failed else "good",
             age_s=rounded(snapshot.autopilot_age_s, 1), text=f"{autopilot.battery_v:.1f} V{share}"))
     return tuple(parts)
+
+
+def _planner(step: Step) -> values.Part:
+    """Return the planner: whether it lives, what it does, and how long its answers take here."""
+    state, is_alive = step.state, step.snapshot.planner_alive
+    doing = "at work" if state.pending.plan is not None else "ready" if is_alive else "its process has died"
+    is_slow = state.plans.latency.is_slow
+    return values.Part(
+        name="planner", grade="bad" if not is_alive else "poor" if is_slow else "good",
+        text=", ".join(part for part in (doing, "slow" if is_slow else "", state.plans.latency.words) if part))
 
 
 def by_age(age_s: float | None) -> values.Grade:

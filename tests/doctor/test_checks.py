@@ -259,3 +259,12 @@ def test_with_the_key_a_signed_autopilot_answers_and_with_another_it_is_said(tmp
     assert not {"signing", "no parameters", "streams"} & {f.code for f in findings}
     with pytest.raises(LinkError, match="not signed with this key"):
         doctor({}, prepare=sign, signing=store("wrong", KEY[::-1]))
+
+
+@pytest.mark.parametrize(("speed", "level", "words"), [
+    (0.87, Level.INFO, "87 % of the reference core"), (0.25, Level.INFO, "25 %"), (0.02, Level.WARNING, "2 %")])
+def test_how_fast_this_computer_plans_is_said(speed, level, words):
+    found = [f for f in examine(Examined(parameters={"FRAME_CLASS": 2.0}, planner_speed=speed), Needs())
+             if f.code == "computer"]
+    assert [f.level for f in found] == [level]
+    assert words in found[0].what

@@ -189,6 +189,51 @@ def test_a_child_that_is_killed_or_too_slow_leaves_the_best_that_it_had_found(en
     run(main())
 
 
+# A child that gets a tenth of the processor: what takes a second and a half of its time is done in as much.
+STARVED = """
+import sys, time
+from companion.planner import plan, worker
+from companion.planner.solve import warm
+
+warm()
+
+def planned(problem, *, on_better, **request):
+    for _ in range({slices}):
+        time.sleep(0.1)
+        until_s = time.process_time() + 0.015
+        while time.process_time() < until_s:
+            pass
+    return plan(problem, expansions=1_000)
+
+worker.plan = planned
+worker.answer_requests(sys.stdin.buffer, sys.stdout.buffer)
+"""
+
+
+def test_a_child_that_shows_life_is_not_killed_for_slowness():
+    """It was killed after its budget and three seconds, on a computer that had given it a third of one."""
+    async def main():
+        async with PlannerWorker(grace_s=0.5, command=[sys.executable, "-c", STARVED.format(slices=15)]) as planner:
+            await planner.ready()
+            answer = await planner.plan(Problem.from_json(simple()), budget_s=0.2)
+            assert answer.has_path
+            assert planner.restarts == 0
+            assert 0.0 < answer.speed < 5.0
+
+    run(main())
+
+
+def test_a_child_that_has_had_its_budget_and_does_not_end_is_hung():
+    async def main():
+        async with PlannerWorker(grace_s=0.5, command=[sys.executable, "-c", STARVED.format(slices=9999)]) as planner:
+            await planner.ready()
+            answer = await planner.plan(Problem.from_json(simple()), budget_s=0.05)
+            assert answer.status is PlanStatus.UNANSWERED
+            assert planner.restarts == 1
+
+    run(main())
+
+
 def test_an_answer_that_waits_is_taken_however_late_it_is_looked_for(monkeypatch):
     """A process that is starved itself came back after its deadline, and killed a child that had answered."""
     async def main():

@@ -4,7 +4,8 @@ ArduPilot forwards what the companion sends to its other links. Two forms go out
 
 - TUNNEL, broadcast: the whole value packed into 70 bytes and its words, for ``companion status``;
 - WIND_COV and NAMED_VALUE_FLOATs ``co_twd co_tws co_sig co_psafe co_tack co_xt``: the wind with its uncertainty and the
-  most wanted figures, for any ground station's plots and the autopilot's log. They take turns.
+  most wanted figures, for any ground station's plots and the autopilot's log. They take turns. A slow computer adds
+  ``co_plan``, how long plans take there.
 
 Sent every 2 s this is under 110 bytes/s, heartbeat not counted. ``StatusReader`` joins both forms again, so a router
 that forwards only well-known messages still lets the main figures through.
@@ -38,6 +39,7 @@ _NONE16 = 0xFFFF
 _NONE8 = 0xFF
 _STATE_BYTES, _CODE_BYTES = 24, 16
 FLOATS = ("co_twd", "co_tws", "co_sig", "co_psafe", "co_tack", "co_xt")
+SLOW = "co_plan"   # of a slow computer: nine plans of ten take so long [s]; sent beside the wind, not packed
 # From here on a part that was not heard again is old [s]: four turns of the plain messages.
 STALE_S = 35.0
 
@@ -150,15 +152,18 @@ def status_messages(status: CompanionStatus, boot_s: float, turn: int) -> list[M
     turn %= 4
     if turn == 3:
         wind = wind_cov(status, boot_s)
-        return [*messages, wind] if wind is not None else messages
+        slow = [] if status.plan_answer_s is None else [_named(boot_s, SLOW, status.plan_answer_s)]
+        return [*messages, *([] if wind is None else [wind]), *slow]
     values = named_values(status)
     for name in FLOATS[2 * turn:2 * turn + 2]:
         value = values[name]
         if value is not None:
-            messages.append(wire.MAVLink_named_value_float_message(
-                round(boot_s * 1e3) & 0xFFFFFFFF, name.encode("ascii"), value
-            ))
+            messages.append(_named(boot_s, name, value))
     return messages
+
+
+def _named(boot_s: float, name: str, value: float) -> Message:
+    return wire.MAVLink_named_value_float_message(round(boot_s * 1e3) & 0xFFFFFFFF, name.encode("ascii"), value)
 
 
 def named_values(status: CompanionStatus) -> dict[str, float | None]:
@@ -208,6 +213,7 @@ class StatusReader:
         self._packed: CompanionStatus | None = None
         self._plain = CompanionStatus(t_s=0.0, state="")
         self._traffic: TrafficStatus | None = None
+        self._plan_answer_s: float | None = None
         self._heard_s: dict[str, float] = {}
 
     def take(self, t_s: float, message: Message) -> bool:
@@ -224,6 +230,9 @@ class StatusReader:
                 self._heard_s["traffic"] = t_s
             elif kind == "WIND_COV":
                 self._take_wind(t_s, message)
+            elif kind == "NAMED_VALUE_FLOAT" and message.name == SLOW:
+                self._plan_answer_s = _float(float(message.value))
+                self._heard_s[SLOW] = t_s
             elif kind == "NAMED_VALUE_FLOAT" and message.name in FLOATS:
                 self._take_float(t_s, message.name, float(message.value))
             else:
@@ -241,7 +250,9 @@ class StatusReader:
         has_packed = self._packed is not None and age_s["status"] <= STALE_S
         status = self._packed if self._packed is not None and has_packed else self._plain
         traffic = self._traffic if age_s.get("traffic", math.inf) <= STALE_S else None
-        return StatusReport(status=replace(status, traffic=traffic), age_s=age_s, has_packed=has_packed)
+        answer_s = self._plan_answer_s if age_s.get(SLOW, math.inf) <= STALE_S else None
+        return StatusReport(
+            status=replace(status, traffic=traffic, plan_answer_s=answer_s), age_s=age_s, has_packed=has_packed)
 
     def _take_wind(self, t_s: float, message: Message) -> None:
         north, east = float(message.wind_x), float(message.wind_y)

@@ -33,6 +33,7 @@ from companion.skipper.way.rejudged import is_begun_risky, is_riskier
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
 
+SLOW = "slow computer"   # the code under which it is said
 SAME_M = 1.0             # a new waypoint this near to the old one is the old one
 # Plans from a waypoint between here and a goal: one from the boat leads to the same goal.
 AT_WAYPOINT = frozenset({ReplanReason.WAYPOINT, ReplanReason.FORECAST})
@@ -45,6 +46,7 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
     if pending is None or pending.request_id != outcome.request_id:
         return
     turn.set(pending=changed(turn.state.pending, plan=None))
+    _note_latency(turn, pending, outcome)
     if turn.state.phase is Phase.OPERATOR or turn.is_taken:
         return   # the operator may have taken the boat in this very step
     if turn.state.voyage.sailing and not turn.state.mission.checked:
@@ -74,10 +76,28 @@ def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
         not_found(turn, pending, refused)
 
 
+def _note_latency(turn: Turn, pending: PendingPlan, outcome: PlanOutcome) -> None:
+    """Note how long an answer took, or one that was given up; say once what plans of such water take here.
+
+    A worker that died or hung says nothing of how fast this computer is.
+    """
+    plan = outcome.plan
+    if plan is not None and plan.status is PlanStatus.UNANSWERED:
+        return
+    latency = turn.state.plans.latency.with_answer(
+        turn.t_s - pending.t_s, turn.config.plan_budget_s, None if plan is None else plan.speed)
+    turn.set(plans=changed(turn.state.plans, latency=latency))
+    if latency.is_slow:
+        earlier = f"; it is asked {turn.late_s:.0f} s earlier" if turn.late_s > 0.0 else ""
+        turn.say(Severity.NOTICE, SLOW, f"a slow computer plans such water: {latency.words}{earlier}", every_s=math.inf)
+    elif latency.speed is not None:   # measured: in real time
+        turn.say(Severity.INFO, "planner", f"this computer plans such water: {latency.words}", every_s=math.inf)
+
+
 def _may_still_turn_before(turn: Turn, waypoint_en: PointEn) -> bool:
     """Return whether a plan from the boat begins well before a waypoint: else she would turn beyond it."""
     boat = turn.boat_en
-    begins_m = turn.speed_mps * (turn.config.plan_budget_s + UPLOAD_LATENCY_S)
+    begins_m = turn.speed_mps * (turn.plan_lead_s + UPLOAD_LATENCY_S)
     return boat is not None and distance_m(boat, waypoint_en) > 2.0 * begins_m
 
 

@@ -119,7 +119,7 @@ def _start(turn: Turn, from_index: int | None) -> Start | None:
         # Stopped, or turning in circles, she is where she is.
         stopped = turn.state.steering.own_mode in {Mode.HOLD, Mode.LOITER}
         sailing = turn.state.voyage.sailing and vehicle.speed_mps > SLOW_MPS and not stopped
-        ahead = turn.config.plan_budget_s + UPLOAD_LATENCY_S if sailing else 0.0
+        ahead = turn.plan_lead_s + UPLOAD_LATENCY_S if sailing else 0.0
         heading = math.atan2(*vehicle.velocity_en_mps) if sailing else vehicle.heading_rad
         place = moved(boat, heading, vehicle.speed_mps * ahead)
         # In a current a plan's headings are through the water.

@@ -262,7 +262,7 @@ def _extension(turn: Turn, bound: Errand | None) -> Trigger | None:
     elif 0 <= ends < len(turn.gates) - 1 and waits_for_gun(turn, turn.gates[ends + 1]):
         return None   # where she waits is planned for when it is next
     left = path_length_m([boat, *turn.ahead()])
-    if left > turn.config.look_ahead_s * max(turn.speed_mps, 1.0) or not may_restart_leg(turn):
+    if left > (turn.config.look_ahead_s + turn.late_s) * max(turn.speed_mps, 1.0) or not may_restart_leg(turn):
         return None
     return Trigger(
         reason=ReplanReason.NEXT_GOAL, text=f"the mission reaches {left:.0f} m ahead, there is more to sail",
@@ -280,7 +280,7 @@ def _waypoint(turn: Turn) -> Trigger | None:
     if state.mission.index >= last or passes or is_buoy(turn.gate):
         return None   # the tail to the next goal is there already: see _extension
     left_s = distance_m(boat, leg[1]) / max(turn.speed_mps, 0.3)
-    if not TOO_LATE_S < left_s <= turn.config.lead_s or turn.is_raised("wind untrusted"):
+    if not TOO_LATE_S + turn.late_s < left_s <= turn.config.lead_s + turn.late_s or turn.is_raised("wind untrusted"):
         return None
     if not may_restart_leg(turn):
         return None

@@ -9,6 +9,7 @@ from typing import Any
 from companion.mavlink.wire import mission_hash
 from companion.messages import GeoPoint, MissionItem, Mode
 from companion.orders import BY_VERB, Verb
+from companion.skipper.step.latency import KEPT, NO_ANSWERS, PlannerLatency
 from companion.skipper.step.route import Route
 from companion.skipper.step.standing import Standing
 from companion.skipper.way.gates import Approach
@@ -72,6 +73,7 @@ class Persisted:
     covered: tuple[tuple[int, float], ...] = ()      # goals searched, and the share that was seen
     tacks: tuple[int, int] = (0, 0)    # tried, and of these failed
     place: SavedPlace | None = None    # where she was
+    latency: PlannerLatency = NO_ANSWERS   # of the planner on this computer
     water: GeoPoint | None = None      # the origin of all metres here; None: the mission's
 
     @property
@@ -97,6 +99,7 @@ class Persisted:
             "set_sail_utc_s": self.set_sail_utc_s, "inside": None if self.inside is None else list(self.inside),
             "searched": [list(p) for p in self.searched], "covered": [list(c) for c in self.covered],
             "tacks": list(self.tacks), "place": _place_to_list(self.place),
+            "latency": [list(self.latency.answers_s), self.latency.room_s, self.latency.speed],
             **({} if self.water is None else {"water": [self.water.lat_deg, self.water.lon_deg]}),
         }
 
@@ -129,11 +132,21 @@ class Persisted:
                 searched=tuple((_number(e), _number(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
                 covered=tuple((_whole(g, 0, MAX_GOALS), _number(s)) for g, s in data.get("covered", ())[:MAX_GOALS]),
                 tacks=_tacks(data.get("tacks", (0, 0))), place=_place_from_list(data.get("place")),
+                latency=_latency(data.get("latency")),
                 water=None if data.get("water") is None else GeoPoint(
                     lat_deg=_number(data["water"][0]), lon_deg=_number(data["water"][1])),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
+
+
+def _latency(data: Any) -> PlannerLatency:
+    if data is None:
+        return NO_ANSWERS
+    answers, room, speed = data
+    return PlannerLatency(
+        answers_s=tuple(max(0.0, _number(s)) for s in answers[-KEPT:]), room_s=max(0.0, _number(room)),
+        speed=None if speed is None else max(0.0, _number(speed)))
 
 
 def _place_to_list(place: SavedPlace | None) -> list[float] | None:

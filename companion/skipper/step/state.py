@@ -13,6 +13,7 @@ from companion.field.values import GuidanceState
 from companion.messages import MissionItem, Mode
 from companion.orders import Answer, Order, Verb
 from companion.skipper.step.actions import ReplanReason
+from companion.skipper.step.latency import NO_ANSWERS, PlannerLatency
 from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted, SavedPlace
 from companion.skipper.step.standing import Standing
@@ -271,6 +272,7 @@ class Planning:
     rung: int = 0                      # step of the ladder being tried
     ladder_reason: ReplanReason | None = None
     unanswered: int = 0                # requests in a row that the planner did not answer
+    latency: PlannerLatency = NO_ANSWERS   # how long the planner takes on this computer
     effort: float = 1.0                # share of the planning budget that is asked for: less on a slow processor
     replans: int = 0
     replanned_index: int = -1          # the target for which Wolsieffer's replan was asked
@@ -423,4 +425,5 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         else (state.progress.inside.goal, state.progress.inside.utc_s),
         searched=state.progress.searched[:-1], covered=state.progress.covered,   # the last point moves with her
         tacks=(state.tacking.tried, state.tacking.failed), place=state.position.place,
+        latency=state.plans.latency,
     )

@@ -244,6 +244,16 @@ class Turn:
         return self.snapshot.t_s
 
     @property
+    def late_s(self) -> float:
+        """How much earlier than on a fast computer plans are asked for [s]: nine of ten are there as much later."""
+        return self.state.plans.latency.late_s
+
+    @property
+    def plan_lead_s(self) -> float:
+        """What she sails until a plan that is asked for now is on board, uploading aside [s]."""
+        return self.config.plan_budget_s + self.state.plans.latency.usually_late_s
+
+    @property
     def autopilot(self) -> AutopilotStatus | None:
         """The autopilot's status while it is heard."""
         age = self.snapshot.heartbeat_age_s

@@ -193,3 +193,15 @@ def test_the_reader_joins_status_and_traffic_and_says_how_old_each_is():
     assert report.age_s["traffic"] == 3.0
     assert report.age_s["status"] == 1.0
     assert reader.report(10.0 + STALE_S + 1.0).status.traffic is None
+
+
+def test_a_slow_computer_is_told_beside_the_packed_status_and_forgotten_when_it_is_told_no_more():
+    reader, status = StatusReader(), CompanionStatus(t_s=5.0, state="standard", plan_answer_s=6.5)
+    messages = [m for turn in range(4) for m in status_messages(status, 10.0, turn)]
+    codec = Codec(1, 191)
+    for message in codec.feed(b"".join(codec.pack(m) for m in messages)):
+        reader.take(1.0, message)
+    assert reader.report(2.0).status.plan_answer_s == pytest.approx(6.5)
+    assert reader.report(2.0 + STALE_S).status.plan_answer_s is None
+    quick = CompanionStatus(t_s=5.0, state="standard")
+    assert all(getattr(m, "name", "") != "co_plan" for turn in range(4) for m in status_messages(quick, 10.0, turn))
