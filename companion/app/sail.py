@@ -141,7 +141,8 @@ class _Shell:
                     self.guard.keep(Auxiliary.PAGE, functools.partial(
                         live_page, self.options.http, self.fold, self.planner, operator, self.views,
                         pace=1.0 / self.options.budget_scale, charts=self.options.charts))
-                await self._wait_autopilot(link)
+                if not await self._wait_autopilot(link):
+                    return self._summary()
                 autopilot = self._autopilot = await stack.enter_async_context(
                     Autopilot(link, assembler=self.fold.assembler))
                 for text in await self.guard.wait(Auxiliary.FEEDS, functools.partial(
@@ -325,20 +326,28 @@ class _Shell:
                 self.end_reason = "stopped"
                 return
 
-    async def _wait_autopilot(self, link: Link) -> None:
+    async def _wait_autopilot(self, link: Link) -> bool:
         """Wait until our autopilot is found and nobody else sails it, and say meanwhile that nobody is heard.
+
+        Return False when the voyage is stopped before.
 
         Raises:
             LinkError: it is not found, or another companion is at work.
         """
         waiting = asyncio.create_task(self._find(link), name="whose boat")
+        stopping = asyncio.create_task(self.stop.wait(), name="stopped before")
         try:
-            while not (await asyncio.wait([waiting], timeout=STEP_S))[0]:
+            while not (await asyncio.wait(
+                    [waiting, stopping], timeout=STEP_S, return_when=asyncio.FIRST_COMPLETED))[0]:
                 step = self._tick(self.log.now_s(), link)
                 await self._after_step(step, link)
+            if not waiting.done():
+                return False
             await waiting
+            return True
         finally:
             waiting.cancel()
+            stopping.cancel()
 
     async def _find(self, link: Link) -> None:
         self._system = (await link.wait_autopilot(self.options.wait_s)).target_system

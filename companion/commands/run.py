@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from companion.errors import InputError
 from companion.guard import Auxiliary
-from companion.program import INTERRUPTED
 from companion.program.arguments import chart_option, host_name, http_address, number, out_folder, system_id, whole
 from companion.program.commands import missing
 from companion.words import counted, file_name
@@ -130,6 +129,7 @@ def _ignoring_terminal_signals() -> Iterator[None]:
     What is ignored here is ignored by the planner's process too.
     """
     before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGHUP, signal.SIGTTOU)}
+    before |= {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
@@ -254,9 +254,8 @@ def _voyage(
 
     summary = run_loop(
         _sail(mission, transport, folder, options, manager, nursery, out, told, guard), speedup=args.speedup)
-    if summary is None:
-        return INTERRUPTED
-    if not summary["arrived_before"] and summary["end_reason"] != ADOPTED:   # the next voyage waits for no picture
+    # the next voyage waits for no picture, and where nobody was heard there is nothing to draw
+    if summary["time_s"] is not None and not summary["arrived_before"] and summary["end_reason"] != ADOPTED:
         _report(folder, err)
     code, text = outcome_of(mission.name, summary)
     out.write(f"{text}\n{folder}\n")
@@ -289,16 +288,18 @@ def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 async def _sail(
     mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager,
+<<<<<<< HEAD
     nursery: Nursery | None, out: Console, told: Displays, guard: Guard,
 ) -> dict[str, Any] | None:
     """Sail; return the summary, None when it was ended before it began."""
+=======
+    nursery: Nursery | None, out: Console, told: DisplayOptions, guard: Guard,
+) -> dict[str, Any]:
+    """Sail; return the summary. Raises KeyboardInterrupt: it was ended before it began, or a second time."""
+>>>>>>> f1dceff (Every command ends at once by SIGINT and SIGTERM, and says first that a serial port is not there)
     from companion.planner.worker import PlannerWorker
 
-    stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for end in (signal.SIGINT, signal.SIGTERM):
-        with contextlib.suppress(NotImplementedError):
-            loop.add_signal_handler(end, stop.set)
+    ending = Ending()
     async with PlannerWorker(algorithm=mission.skipper.planner, nursery=nursery) as planner:
         # The child loads its kernels while this process imports the rest.
         from companion.app.sail import sail
@@ -307,8 +308,7 @@ async def _sail(
         from companion.telemetry.console import ProgressLine
         from companion.telemetry.status import unix_of_boat
 
-        if not await _is_ready(planner, stop, out, manager):
-            return None
+        await _get_ready(planner, out, manager)
         chosen = options()
 
         with ProgressLine(out, chosen.epoch_s) as progress:
@@ -321,12 +321,12 @@ async def _sail(
                     outputs.tell(view, unix_of_boat(step.snapshot, step.snapshot.t_s), step.voyage.frame)
 
                 return await sail(
-                    mission, transport, planner, folder, chosen, on_status=show, stop=stop, on_refusal=progress.note,
-                    on_view=tell if outputs.are_any else None, guard=guard)
+                    mission, transport, planner, folder, chosen, on_status=show, stop=ending.asked(),
+                    on_refusal=progress.note, on_view=tell if outputs.are_any else None, guard=guard)
 
 
-async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, manager: ServiceManager) -> bool:
-    """Wait for the planner's kernels and say how far they are; return False when ``stop`` comes first."""
+async def _get_ready(planner: PlannerWorker, out: Console, manager: ServiceManager) -> None:
+    """Wait for the planner's kernels and say how far they are. Raises JobError: its process did not start."""
     from companion.errors import JobError
     from companion.telemetry.console import CompileProgress
 
@@ -335,14 +335,35 @@ async def _is_ready(planner: PlannerWorker, stop: asyncio.Event, out: Console, m
             preparing.say(text)
             manager.starting(text)
 
-        waits = [asyncio.ensure_future(planner.ready(say)), asyncio.ensure_future(stop.wait())]
-        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
-        for wait in waits:
-            wait.cancel()
-        ready, _ = await asyncio.gather(*waits, return_exceptions=True)
-    if isinstance(ready, TimeoutError | EOFError | OSError):
-        raise JobError(f"the planner's process did not start: {ready!r}")
-    return not stop.is_set()
+        try:
+            await planner.ready(say)
+        except (TimeoutError, EOFError, OSError) as error:
+            raise JobError(f"the planner's process did not start: {error!r}") from error
+
+
+class Ending:
+    """How SIGINT and SIGTERM end a voyage: before it is begun, and when they come again, at once.
+
+    Handlers of the event loop would wait for its turn, which comes late while libraries are loaded.
+    """
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._stop: asyncio.Event | None = None
+        for end in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(end, self._on_signal)
+
+    def asked(self) -> asyncio.Event:
+        """Return what is set by the first signal from now on: a voyage is brought to its end and told of."""
+        self._stop = asyncio.Event()
+        return self._stop
+
+    def _on_signal(self, number: int, frame: object) -> None:
+        del number, frame
+        if self._stop is None:
+            raise KeyboardInterrupt
+        stop, self._stop = self._stop, None
+        self._loop.call_soon_threadsafe(stop.set)
 
 
 def _report(folder: Path, err: Console) -> None:
@@ -352,6 +373,8 @@ def _report(folder: Path, err: Console) -> None:
         from companion.telemetry.folder import PICTURE, read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
+    except KeyboardInterrupt:
+        err.write("companion run: the picture is not drawn; companion report draws it\n")
     except Exception as error:
         refusal = missing(error) if isinstance(error, ModuleNotFoundError) else None
         err.write(f"companion run: the picture could not be drawn: {refusal or repr(error)}\n")

@@ -78,6 +78,20 @@ def system_id(text: str) -> int:
     return int(text)
 
 
+def absent_device(link: str | None) -> str:
+    """Return what is said where a LINK names a serial port that is not there; "" for one that is, and for any other.
+
+    It may be plugged in later, and is waited for.
+
+    >>> absent_device("COM77:57600"), absent_device("tcp:127.0.0.1:5760")
+    ('COM77: no such device; is it plugged in? waiting for it', '')
+    """
+    named = re.fullmatch(r"(?:serial:)?((?:/|COM\d).*?)(?::\w*)?", link or "")
+    if named is None or Path(named.group(1)).exists():
+        return ""
+    return f"{named.group(1)}: no such device; is it plugged in? waiting for it"
+
+
 def http_address(text: str) -> tuple[str, int]:
     """Return host and port to serve a page at, of ``[HOST:]PORT``; without a host this machine's own.
 

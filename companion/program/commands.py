@@ -15,7 +15,9 @@ import contextlib
 import difflib
 import importlib
 import re
+import signal
 import sys
+import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType, ModuleType
@@ -24,6 +26,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TextIO, cast
 from companion import __version__
 from companion.disk import reason
 from companion.errors import CompanionError, InputError, JobError
+from companion.program.arguments import absent_device
 from companion.words import one_line, printable
 
 if TYPE_CHECKING:
@@ -213,6 +216,12 @@ class Program:
         except InputError as error:
             sys.stderr.write(f"{error}\n")
             return error.exit_code
+        if threading.current_thread() is threading.main_thread():
+            # Also where a shell began this in its background, and has it ignore SIGINT: who sends one by hand means it.
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        said = absent_device(getattr(args, "link", None))
+        if said:
+            sys.stderr.write(f"{self.name} {args.command}: {said}\n")
         try:
             return int(args.run(args))
         except CompanionError as error:

@@ -1,0 +1,112 @@
+"""Ctrl-C and SIGTERM: a command ends at once, from its first instruction on, whoever is not heard."""
+
+import asyncio
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from companion import cli
+from companion.app.options import SailOptions, at_once
+from companion.app.sail import sail
+from companion.clock import now_s, run_virtual
+from companion.commands.run import Ending
+from companion.geofence import load_mission
+from companion.program.arguments import absent_device
+from sitl.autopilot import MemoryLink
+from sitl.scene.ships import free_port
+from sitl.trouble.fragile import FragilePlanner
+
+MISSION = 'name = "a"\n[[goal]]\nlat = 50.817\nlon = -1.3085\nradius_m = 10.0\n'
+HERE = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+
+
+def test_a_voyage_that_hears_nobody_is_stopped_when_it_is_asked(tmp_path):
+    """It was asked once nobody had been heard for 30 s, and raised that."""
+    (tmp_path / "a.toml").write_text(MISSION)
+
+    async def voyage():
+        stop = asyncio.Event()
+        asyncio.get_running_loop().call_later(3.3, stop.set)
+        options = SailOptions(epoch_s=1.78e9, offload=at_once, is_durable=False, wait_s=30.0)
+        told = await sail(load_mission(tmp_path / "a.toml"), MemoryLink("nobody", seed=1).near, FragilePlanner(),
+                          tmp_path / "v", options, stop=stop)
+        return told, now_s()
+
+    summary, ended_s = run_virtual(voyage())
+    assert (summary["end_reason"], summary["arrived"], ended_s) == ("stopped", False, pytest.approx(3.3))
+    assert json.loads((tmp_path / "v/summary.json").read_bytes())["end_reason"] == "stopped"
+
+
+def test_a_signal_ends_what_is_not_begun_stops_a_voyage_and_ends_it_the_second_time():
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    async def voyage():
+        ending = Ending()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        stop = ending.asked()
+        signal.raise_signal(signal.SIGINT)
+        await asyncio.wait_for(stop.wait(), 10.0)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+    try:
+        asyncio.run(voyage())
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def test_run_on_a_link_where_nobody_answers_ends_when_it_is_told_to(tmp_path):
+    """It went on for 25 s; the shell of a script has what it puts into its background ignore SIGINT."""
+    (tmp_path / "a.toml").write_text(MISSION)
+    run = subprocess.Popen(
+        ["/bin/sh", "-c", "trap '' INT; exec \"$@\"", "sh", sys.executable, "-m", "companion", "run", "a.toml",
+         "--link", f"tcp:127.0.0.1:{free_port()}", "--wait", "1000",
+         "--out", "v"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=HERE)
+    try:
+        assert any("nothing yet" in line for line in run.stdout)
+        run.send_signal(signal.SIGINT)
+        out, err = run.communicate(timeout=60.0)
+    finally:
+        run.kill()
+    assert (run.returncode, err) == (1, "")
+    assert "not arrived: stopped" in out
+
+
+def test_ctrl_c_while_the_program_loads_leaves_no_traceback():
+    """A library that was being imported told of it in thirty lines."""
+    begin = """
+import runpy, sys, time
+class Slow:
+    def find_spec(self, name, path=None, target=None):
+        if name == "companion.cli":
+            print("loading", flush=True)
+            time.sleep(60)
+sys.meta_path.insert(0, Slow())
+runpy.run_module("companion", run_name="__main__")
+"""
+    run = subprocess.Popen([sys.executable, "-c", begin], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                           env=HERE)
+    try:
+        assert run.stdout.readline() == "loading\n"
+        run.send_signal(signal.SIGINT)
+        _, err = run.communicate(timeout=30.0)
+    finally:
+        run.kill()
+    assert (run.returncode, err) == (-signal.SIGINT, "")
+
+
+def test_a_port_that_is_not_there_is_told_first(tmp_path, capsys):
+    """The first words were 30 s of "nothing yet"."""
+    assert cli.main(["status", "--link", str(tmp_path / "ttyUSB0:57600"), "--once", "--timeout", "0.2"]) != 0
+    first, *_ = capsys.readouterr().err.splitlines()
+    assert first == f"companion status: {tmp_path}/ttyUSB0: no such device; is it plugged in? waiting for it"
+    by_path = tmp_path / "pci-0000:01:00.0-usb-0:1"
+    by_path.touch()
+    assert absent_device(f"{by_path}:57600") == ""
+    assert absent_device("COM3").startswith("COM3: no such device")
