@@ -288,15 +288,9 @@ def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 async def _sail(
     mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager,
-<<<<<<< HEAD
     nursery: Nursery | None, out: Console, told: Displays, guard: Guard,
-) -> dict[str, Any] | None:
-    """Sail; return the summary, None when it was ended before it began."""
-=======
-    nursery: Nursery | None, out: Console, told: DisplayOptions, guard: Guard,
 ) -> dict[str, Any]:
     """Sail; return the summary. Raises KeyboardInterrupt: it was ended before it began, or a second time."""
->>>>>>> f1dceff (Every command ends at once by SIGINT and SIGTERM, and says first that a serial port is not there)
     from companion.planner.worker import PlannerWorker
 
     ending = Ending()

@@ -88,8 +88,8 @@ FAULTS = {
 ONCE = {Auxiliary.FENCE, Auxiliary.FEEDS}   # at the start, and then no more
 # Of the command, before there is a voyage; and what it shows, below.
 NAMED = {Auxiliary.ORDERS_BY_PAGE, Auxiliary.CHARTS, Auxiliary.SIGNALK_TOKEN}
-NEEDED = {"executor", "orders", "plans", "whose boat", "link heartbeat", "link rates", "link turns", "order",
-          "fence upload"}
+NEEDED = {"executor", "orders", "plans", "whose boat", "stopped before", "link heartbeat", "link rates", "link turns",
+          "order", "fence upload"}
 
 
 def break_it(monkeypatch, owner, name, windows):
