@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from companion.boat import Boat, avalon
-from companion.geo.units import MPS_PER_KNOT
+from companion.geo import MPS_PER_KNOT
 from companion.planner import Problem
 
 FOUR = [

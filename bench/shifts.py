@@ -21,7 +21,7 @@ from collections import deque
 
 import numpy as np
 
-from companion.boat.library import ardurover_sitl
+from companion.boat.polar import ardurover_sitl
 from companion.geo.angles import difference_rad, mean_direction_rad
 from companion.skipper.deeds.shift_tack import LAST_S, TURNING
 from companion.skipper.deeds.short_tack import LEAST_MPS

@@ -16,26 +16,31 @@ from companion.current import STILL, Prior, read_table
 from companion.current.prior import table_lines
 from companion.disk import read_regular
 from companion.errors import InputError, unreadable
-from companion.field.expression import MAX, PROJECT, is_name, names_in, parse, projects
 from companion.field.tree import (
     LEAST,
+    MAX,
+    PROJECT,
     Along,
     Atom,
     AwayFrom,
     AwayFromLine,
-    Conditions,
+    FieldConditions,
+    FieldTree,
     Heading,
     OutOf,
     PointTo,
     Round,
     StayAt,
-    Tree,
+    is_name,
     lengths,
+    names_in,
+    parse,
+    projects,
 )
-from companion.field.values import Habits, Situation
+from companion.field.values import GuidanceSettings, Situation
 from companion.fold import Waters
+from companion.geo import MPS_PER_KNOT
 from companion.geo.frame import LocalFrame
-from companion.geo.units import MPS_PER_KNOT
 from companion.geofence import Code, Finding, LocalArea, Mission, Severity
 from companion.geofence.mission import (
     AtomOptions,
@@ -181,7 +186,7 @@ def composed_field_of(mission: Mission, number: int, by_field: ByField, frame: L
     if projects(expression) and mission.autopilot.frame == "motor":
         raise InputError(source, place, f"{PROJECT}(...) keeps out of the no-go zone, and a motor boat has none",
                          "write what is in its brackets alone")
-    tree = Tree(expression=expression, atoms=tuple((name, atoms[name]) for name in names_in(expression)))
+    tree = FieldTree(expression=expression, atoms=tuple((name, atoms[name]) for name in names_in(expression)))
     return Composed(
         tree=tree, until=Until(by_field.until), for_s=by_field.for_s,
         water_en=None if by_field.shape is None else polygon_en(by_field.shape, frame, cover=False))
@@ -260,15 +265,15 @@ def field_findings_of(mission: Mission) -> tuple[Finding, ...]:
 
 
 def preview_conditions(mission: Mission, at_en: tuple[float, float], twd_from_rad: float | None = None,
-            tws_mps: float | None = None) -> Conditions:
+            tws_mps: float | None = None) -> FieldConditions:
     """Return a boat that lies at ``at_en`` in the wind that previews assume, or in another."""
     from_rad = math.radians(mission.wind.preview_from_deg) if twd_from_rad is None else twd_from_rad
     speed_mps = mission.wind.preview_speed_mps if tws_mps is None else tws_mps
     sails = mission.autopilot.frame == "sailboat"
-    return Conditions(
+    return FieldConditions(
         seen=Situation(t_s=0.0, en_m=at_en, velocity_en_mps=(0.0, 0.0), heading_rad=0.0, tws_mps=speed_mps,
                        twd_from_rad=from_rad if sails else None),
-        habits=Habits(
+        habits=GuidanceSettings(
             is_sailing=sails, no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
             turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s), tack_s=max(1.0, mission.boat.tack_loss_s)))
 

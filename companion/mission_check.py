@@ -30,26 +30,26 @@ from companion.compose import (
 )
 from companion.current import STILL_WATER, Prior, WaterCurrent, over_water
 from companion.errors import InputError
-from companion.field.expression import Named
 from companion.field.guidance import step
-from companion.field.leave import way_out_rad
-from companion.field.projection import NO_GO_HALF_RAD, Projection, RingZone, Zone
+from companion.field.look_ahead import way_out_rad
+from companion.field.projection import NO_GO_HALF_RAD, HysteresisRing, HysteresisZone, Projection
 from companion.field.tree import (
     LEAST,
     Along,
     AwayFrom,
     AwayFromLine,
+    FieldConditions,
+    FieldTree,
+    Named,
     OutOf,
     PointTo,
     Round,
     StayAt,
-    Tree,
     field_of,
     lengths,
     zone_of,
 )
-from companion.field.tree import Conditions as FieldConditions
-from companion.field.values import Clearance, GuidanceState, Habits, Intent, Situation
+from companion.field.values import Clearance, GuidanceSettings, GuidanceState, Intent, Situation
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence import Code, Finding, LocalArea, Mission, Severity
@@ -393,12 +393,12 @@ class FieldPreview:
     half_m: float
 
     @property
-    def tree(self) -> Tree:
+    def tree(self) -> FieldTree:
         """The field's expression and atoms."""
         return self.composed.tree
 
     @property
-    def zone(self) -> Zone | RingZone | None:
+    def zone(self) -> HysteresisZone | HysteresisRing | None:
         """The band about its trajectory."""
         return zone_of(self.tree, self.conditions)
 
@@ -458,10 +458,10 @@ def field_preview(
     number = number or every[0]
     goal = voyage.goals[number - 1]
     composed = goal.field or Composed(
-        tree=Tree(expression=Named("mark"), atoms=(("mark", PointTo(at_en=goal.en_m)),)), until=Until.PLACE)
+        tree=FieldTree(expression=Named("mark"), atoms=(("mark", PointTo(at_en=goal.en_m)),)), until=Until.PLACE)
     sails = mission.autopilot.frame == "sailboat"
     twa, speeds = boat.polar.curve(max(1.0, speed_mps))
-    habits = Habits(
+    habits = GuidanceSettings(
         is_sailing=sails, no_go_half_rad=boat.no_go_half_rad or NO_GO_HALF_RAD, polar_twa_rad=tuple(map(float, twa)),
         polar_mps=tuple(map(float, speeds)), turn_rate_radps=boat.turn_rate_radps, tack_s=max(1.0, boat.tack_loss_s),
         lag_s=LAG_S, horizon_s=60.0, keep_m=mission.margin_floor_m)
@@ -549,7 +549,7 @@ def _is_over(seen: FieldPreview, here: PointEn) -> bool:
     return until is Until.OUTSIDE and water is not None and not shapely.covers(water, shapely.points(here))
 
 
-def _speed(habits: Habits, twd: float | None, heading: float) -> float:
+def _speed(habits: GuidanceSettings, twd: float | None, heading: float) -> float:
     if twd is None:
         return habits.polar_mps[-1]
     return float(np.interp(abs(difference_rad(twd, heading)), habits.polar_twa_rad, habits.polar_mps))

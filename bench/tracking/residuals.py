@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bench.tracking.record import Track
 from bench.tracking.trials import WINDS_MPS, Trial, beats, corners
-from companion.boat.tracking import Helm, Predicted, are_near_short, predict
+from companion.boat.tracking import GuidanceModel, PredictedTrack, are_near_short, predict
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import Vehicle
@@ -49,12 +49,12 @@ def curve_mps(tws_mps: float) -> NDArray[np.float64]:
     return np.interp(np.linspace(0.0, math.pi, 91), angles, speeds)
 
 
-def helm_of(trial: Trial) -> Helm:
+def helm_of(trial: Trial) -> GuidanceModel:
     """Return the helm of a trial's autopilot."""
-    return Helm(wp_radius_m=trial.wp_radius_m, corridor_m=trial.corridor_m, wp_speed_mps=WP_SPEED_MPS)
+    return GuidanceModel(wp_radius_m=trial.wp_radius_m, corridor_m=trial.corridor_m, wp_speed_mps=WP_SPEED_MPS)
 
 
-def predicted(trial: Trial) -> Predicted:
+def predicted(trial: Trial) -> PredictedTrack:
     """Return the prediction for a trial of corners: from rest, in its steady wind."""
     return predict([(0.0, 0.0), *trial.points_en_m], helm_of(trial), curve_mps=curve_mps(trial.tws_mps),
                    twd_from_rad=0.0, speed_mps=0.0)

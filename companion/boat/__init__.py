@@ -5,9 +5,7 @@
 45.0
 """
 
-from companion.boat.boat import Boat, Hull
-from companion.boat.library import ardurover_sitl, avalon, constant
-from companion.boat.making_way import can_hold, made_good_mps, slowest_en_mps
+from companion.boat.boat import Boat, Hull, can_hold, made_good_mps, outline_en_m, slowest_en_mps
 from companion.boat.margins import (
     AutopilotLimits,
     Margin,
@@ -19,8 +17,7 @@ from companion.boat.margins import (
     required_margin,
     widest_corridor_m,
 )
-from companion.boat.outline import outline_en_m
-from companion.boat.polar import Polar, SailingAngle
+from companion.boat.polar import Polar, SailingAngle, ardurover_sitl, avalon, constant
 from companion.boat.polar_files import PolarFile, parse_polar, read_polar
 
 __all__ = [

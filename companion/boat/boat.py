@@ -1,4 +1,4 @@
-"""The boat: everything about it that a plan depends on, as one value."""
+"""The boat: everything about it that a plan depends on as one value; its leeway, its outline, what it makes good."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from companion.boat.leeway import coefficient_of, leeway_at
 from companion.boat.polar import Polar
 
 SPEED_ANGLES = 73   # of ``Boat.problem_speeds``: 2.5 degrees apart
@@ -160,3 +159,135 @@ def _speeds_of(boat: Boat) -> dict[str, Any]:
         rows.append([round(float(v), 4) for v in np.interp(angles, twa_rad, speed_mps)])
     return {"tws_mps": boat.polar.tws_mps.tolist(), "twa_deg": [round(float(a), 6) for a in np.degrees(angles)],
             "v_mps": rows}
+
+
+# Leeway: how far to leeward of her bow a boat goes through the water.
+#
+# The sail's side force grows with the square of the apparent wind and the sine of its angle. The keel's lift, which
+# grows with speed times side speed, and the drag of the flow across hull and keel, with the square of the side speed,
+# hold against it. At small angles this is the well known leeway = K heel / speed^2 (Garrett, The Symmetry of Sailing,
+# 1987), with the heel that goes with that force; without way on the drift stays finite.
+
+# Cross-flow drag of hull and keel as a share of the slope of the keel's lift: a plate's drag of 1.17 across the stream
+# (Hoerner, Fluid-Dynamic Drag, 3) over the slope 2 pi / (1 + 2 / A) of a keel whose aspect ratio A is about 1.
+CROSS_FLOW = 0.5
+# Where the leeway of a boat is stated: close-hauled, the apparent wind so many times her speed.
+STATED_AWA_RAD = math.radians(30.0)
+STATED_RATIO = 3.0
+
+
+def coefficient_of(beat_rad: float) -> float:
+    """Return the coefficient of a boat whose leeway is ``beat_rad`` where it is stated."""
+    slope = math.tan(beat_rad)
+    return (slope + CROSS_FLOW * slope * slope) / (STATED_RATIO**2 * math.sin(STATED_AWA_RAD))
+
+
+def leeway_rad(coefficient: float, aws_mps: float, awa_rad: float, speed_mps: float) -> float:
+    """Return the angle from bow to course through the water [rad, 0 or more], sheeted as for full speed.
+
+    >>> round(math.degrees(leeway_rad(coefficient_of(math.radians(5.0)), 6.0, math.radians(30.0), 2.0)), 6)
+    5.0
+    """
+    push = coefficient * aws_mps * aws_mps * abs(math.sin(awa_rad))
+    if push == 0.0:
+        return 0.0
+    side_mps = 2.0 * push / (math.sqrt(speed_mps * speed_mps + 4.0 * CROSS_FLOW * push) + abs(speed_mps))
+    return math.atan2(side_mps, abs(speed_mps))
+
+
+def leeway_at(coefficient: float, twa_rad: float, tws_mps: float, speed_mps: float) -> float:
+    """Return the same for a heading at ``twa_rad`` to the true wind."""
+    across, ahead = tws_mps * math.sin(twa_rad), tws_mps * math.cos(twa_rad) + speed_mps
+    return leeway_rad(coefficient, math.hypot(across, ahead), math.atan2(across, ahead), speed_mps)
+
+
+def outline_en_m(hull: Hull, en_m: ArrayLike, heading_rad: ArrayLike) -> NDArray[np.float64]:
+    """Return the closed outline of the hull at each place (n, 5, 2) [m]: the rectangle that holds it.
+
+    The position is amidships.
+
+    Args:
+        hull: Length and beam.
+        en_m: Places (n, 2), east north.
+        heading_rad: Headings (n,).
+
+    >>> outline_en_m(Hull(length_m=4.0, beam_m=2.0), [(10.0, 0.0)], [0.0])[0, 0].round(9).tolist()
+    [11.0, 2.0]
+
+    """
+    places = np.asarray(en_m, dtype=np.float64).reshape(-1, 1, 2)
+    heading = np.asarray(heading_rad, dtype=np.float64).reshape(-1, 1)
+    ahead = 0.5 * hull.length_m * np.array([1.0, -1.0, -1.0, 1.0, 1.0])
+    aside = 0.5 * hull.beam_m * np.array([1.0, 1.0, -1.0, -1.0, 1.0])
+    sin, cos = np.sin(heading), np.cos(heading)
+    return np.asarray(places + np.stack([ahead * sin + aside * cos, ahead * cos - aside * sin], axis=-1))
+
+
+# What a boat makes good over the ground in a current, on one heading and by beating.
+
+_HEADINGS, _NORMALS = 180, 360
+
+
+def made_good_mps(
+    boat: Boat, course_rad: float, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float],
+    no_go_half_rad: float,
+) -> float | None:
+    """Return the most that she makes good over the ground along a course [m/s], tacking and gybing as it takes.
+
+    Her velocities over the ground are the convex hull of what her polar allows outside the no-go zone, moved by the
+    current; she stays on the line on the whole where the line meets the hull. None: nowhere, she makes no way along it
+    whatever she does, and is carried off it or back.
+
+    Args:
+        boat: her polar and deepest angle.
+        course_rad: over the ground.
+        twd_from_rad: where the wind over the water comes from.
+        tws_mps: how fast it is.
+        current_en_mps: where the water goes.
+        no_go_half_rad: what she keeps out of.
+
+    """
+    # s (n . course) <= reach holds for every normal n of the hull
+    normals, reach = _reach(boat, twd_from_rad, tws_mps, current_en_mps, no_go_half_rad, course_rad)
+    along = normals @ np.array([math.sin(course_rad), math.cos(course_rad)])
+    ahead, astern = along > 1e-9, along < -1e-9
+    most = float(np.min(reach[ahead] / along[ahead]))
+    least = float(np.max(reach[astern] / along[astern]))
+    return most if most > 0.0 and most >= least else None
+
+
+def slowest_en_mps(
+    boat: Boat, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float,
+) -> tuple[float, float]:
+    """Return the slowest that she can be carried over the ground on the whole [m/s east, north]; 0, 0: she can stay.
+
+    It is the point of the hull of ``made_good_mps`` that is nearest to lying still (arguments as there).
+    """
+    normals, reach = _reach(boat, twd_from_rad, tws_mps, current_en_mps, no_go_half_rad, 0.0)
+    worst = int(np.argmin(reach))
+    if reach[worst] >= 0.0:
+        return 0.0, 0.0
+    return float(reach[worst] * normals[worst, 0]), float(reach[worst] * normals[worst, 1])
+
+
+def _reach(
+    boat: Boat, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float,
+    first_rad: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return unit normals (n, 2), the first towards ``first_rad``, and how far the hull reaches along each [m/s]."""
+    off = np.linspace(min(no_go_half_rad, boat.max_twa_rad), boat.max_twa_rad, _HEADINGS)
+    speed = boat.polar.speeds_mps(off, tws_mps)
+    headings = np.concatenate([twd_from_rad + off, twd_from_rad - off])
+    both = np.concatenate([speed, speed])
+    velocities = np.column_stack([both * np.sin(headings), both * np.cos(headings)]) + np.asarray(current_en_mps)
+    bearings = np.linspace(-math.pi, math.pi, _NORMALS, endpoint=False) + first_rad
+    normals = np.column_stack([np.sin(bearings), np.cos(bearings)])
+    return normals, np.max(normals @ velocities.T, axis=1)
+
+
+def can_hold(
+    boat: Boat, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float,
+) -> bool:
+    """Return whether she can stay where she is on the whole, and so make way everywhere (arguments as above)."""
+    return slowest_en_mps(boat, twd_from_rad=twd_from_rad, tws_mps=tws_mps, current_en_mps=current_en_mps,
+                          no_go_half_rad=no_go_half_rad) == (0.0, 0.0)

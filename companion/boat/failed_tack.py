@@ -25,7 +25,7 @@ IRONS_S = 10.0       # she lies head to wind: the skipper bears away after 8 s (
 # Of the wind's speed: hull and flogging sails. A skiff under bare poles is blown at 3 to 6 % of it.
 BLOWN_SHARE = 0.04
 # Likewise, abeam: a hull whose leeway is 5 degrees on a beat, the wind 15 degrees off her bow and her sails flogging
-# (``companion.boat.leeway``, of the push a quarter).
+# (``companion.boat.boat``, of the push a quarter).
 SET_SHARE = 0.05
 
 Track = NDArray[np.float64]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from companion.boat.polar import Polar
 from companion.disk import read_regular
 from companion.errors import InputError, unreadable
-from companion.geo.units import MPS_PER_KNOT
+from companion.geo import MPS_PER_KNOT
 
 MAX_TWS_KN = 200.0
 MAX_SPEED_KN = 100.0

@@ -1,14 +1,28 @@
 """The current: what the mission expects of it, what the boat's own track tells of it, and the wind over the water."""
 
-from companion.current.doubt import UNTOLD_MPS, Doubt
-from companion.current.estimator import CurrentEstimator, Sailing, plain
-from companion.current.motion import FITS_S, Motion, MotionCheck
-from companion.current.over_water import forecast_over_water, over_ground, over_water
-from companion.current.prior import DEFAULT_SIGMA_MPS, STILL, Expected, Prior, TableRow, read_table
-from companion.current.value import STILL_WATER, WaterCurrent
+from companion.current.estimator import UNTOLD_MPS, CurrentEstimator, Sailing, WindAngleUncertainty, plain
+from companion.current.motion import FITS_S, MotionCheck, MotionSample
+from companion.current.prior import DEFAULT_SIGMA_MPS, STILL, ExpectedCurrent, Prior, TableRow, read_table
+from companion.current.water_current import STILL_WATER, WaterCurrent, forecast_over_water, over_ground, over_water
 
 __all__ = [
-    "DEFAULT_SIGMA_MPS", "FITS_S", "STILL", "STILL_WATER", "UNTOLD_MPS", "CurrentEstimator", "Doubt",
-    "Expected", "Motion", "MotionCheck", "Prior", "Sailing", "TableRow", "WaterCurrent", "forecast_over_water",
-    "over_ground", "over_water", "plain", "read_table",
+    "DEFAULT_SIGMA_MPS",
+    "FITS_S",
+    "STILL",
+    "STILL_WATER",
+    "UNTOLD_MPS",
+    "CurrentEstimator",
+    "ExpectedCurrent",
+    "MotionCheck",
+    "MotionSample",
+    "Prior",
+    "Sailing",
+    "TableRow",
+    "WaterCurrent",
+    "WindAngleUncertainty",
+    "forecast_over_water",
+    "over_ground",
+    "over_water",
+    "plain",
+    "read_table",
 ]

@@ -47,7 +47,7 @@ KEPT_EVERY_S = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
+class MotionSample:
     """One moment: how she goes through the water that is believed, and what the polar says in the wind of now.
 
     Attributes:
@@ -94,7 +94,7 @@ class MotionCheck:
         """Take note that nobody knows how she is driven: what is settled begins anew."""
         self._t_s = None
 
-    def update(self, t_s: float, now: Motion) -> None:
+    def update(self, t_s: float, now: MotionSample) -> None:
         """Take the moment at ``t_s``."""
         self.is_odd = False
         self._follow_direction(t_s, now)
@@ -120,7 +120,7 @@ class MotionCheck:
         elif self._odd_s >= (JUMPED_S if self._has_leapt(t_s) else SURE_S):
             self._begin(t_s, now)
 
-    def _fits(self, t_s: float, now: Motion) -> bool | None:
+    def _fits(self, t_s: float, now: MotionSample) -> bool | None:
         """Return whether she moves as the wind and her polar say, None where that cannot be told."""
         angle = abs(now.twa_rad)
         if self._heels_to_windward(now):
@@ -137,12 +137,12 @@ class MotionCheck:
             return True
         return None if abs(now.across_mps) > across * abs(lacks) else False
 
-    def _heels_to_windward(self, now: Motion) -> bool:
+    def _heels_to_windward(self, now: MotionSample) -> bool:
         return LEAST_HEEL_TWA_RAD < abs(now.twa_rad) < MOST_HEEL_TWA_RAD and abs(self._heel_rad) > HEELS_RAD and (
             (self._heel_rad > 0.0) == (now.twa_rad > 0.0))
 
     # ------------------------------------------------------------------------------------ the direction
-    def _follow_direction(self, t_s: float, now: Motion) -> None:
+    def _follow_direction(self, t_s: float, now: MotionSample) -> None:
         kept = self._directions
         if not kept or t_s - kept[-1][0] >= KEPT_EVERY_S:
             kept.append((t_s, now.twd_from_rad))
@@ -161,7 +161,7 @@ class MotionCheck:
         return t_s - self._leapt_s <= BEFORE_S
 
     # ---------------------------------------------------------------------------------------- the doubt
-    def _begin(self, t_s: float, now: Motion) -> None:
+    def _begin(self, t_s: float, now: MotionSample) -> None:
         heels = self._heels_to_windward(now)
         self.fits_s, self._fitted, self.is_winds = 0.0, [], heels or self._has_leapt(t_s)
         how = "astern" if now.along_mps < 0.0 else "ahead"
@@ -176,7 +176,7 @@ class MotionCheck:
         else:
             self.doubt = f"{moves}: no current comes so suddenly, the wind or the water is another than is measured"
 
-    def _look_for_an_end(self, now: Motion, *, fits: bool) -> None:
+    def _look_for_an_end(self, now: MotionSample, *, fits: bool) -> None:
         if not fits:
             self._fitted = []
             return

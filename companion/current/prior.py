@@ -31,7 +31,7 @@ class TableRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Expected:
+class ExpectedCurrent:
     """What is expected at a time: towards east and north [m/s], how far it may be wrong [m/s], what is to be said."""
 
     east_mps: float = 0.0
@@ -60,14 +60,15 @@ class Prior:
             return math.hypot(self.east_mps, self.north_mps)
         return max(math.hypot(r.east_mps, r.north_mps) for r in self.rows)
 
-    def at(self, utc_s: float | None) -> Expected:
+    def at(self, utc_s: float | None) -> ExpectedCurrent:
         """Return what is expected at a Unix time [s]; None: the time of day is not known."""
         rows = self.rows
         if not rows:
-            return Expected(east_mps=self.east_mps, north_mps=self.north_mps, sigma_mps=self.sigma_mps)
+            return ExpectedCurrent(east_mps=self.east_mps, north_mps=self.north_mps, sigma_mps=self.sigma_mps)
         widest = max(self.sigma_mps, self.strongest_mps)
         if utc_s is None:
-            return Expected(sigma_mps=widest, verdict=f"{self.name}: no row can be chosen before the time is known")
+            return ExpectedCurrent(sigma_mps=widest,
+                                   verdict=f"{self.name}: no row can be chosen before the time is known")
         if utc_s < rows[0].utc_s or utc_s > rows[-1].utc_s:
             is_over = utc_s > rows[-1].utc_s
             row = rows[-1] if is_over else rows[0]
@@ -75,13 +76,13 @@ class Prior:
             share = min(1.0, off_s / ENDED_S)
             what = "ended" if is_over else "begins in"
             verdict = f"{self.name} {what} {_span(off_s)}{' ago' if is_over else ''}: its nearest row, widened"
-            return Expected(
+            return ExpectedCurrent(
                 east_mps=row.east_mps, north_mps=row.north_mps, verdict=verdict,
                 sigma_mps=self.sigma_mps + share * (math.hypot(widest, self.sigma_mps) - self.sigma_mps))
         after = min(max(1, bisect.bisect_right([r.utc_s for r in rows], utc_s)), len(rows) - 1)
         a, b = rows[after - 1], rows[after]
         share = (utc_s - a.utc_s) / (b.utc_s - a.utc_s)
-        return Expected(
+        return ExpectedCurrent(
             east_mps=a.east_mps + share * (b.east_mps - a.east_mps),
             north_mps=a.north_mps + share * (b.north_mps - a.north_mps), sigma_mps=self.sigma_mps)
 

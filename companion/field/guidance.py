@@ -14,15 +14,25 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.field.algebra import ZONE_M, AttractivePoint, Field, RepulsivePoint, Uniform, line_between
+import numpy as np
+
 from companion.field.look_ahead import choose
-from companion.field.projection import Projection, Zone, near_and_ahead
-from companion.field.shore import RepulsiveShore
-from companion.field.values import GuidanceState, Habits, Intent, Manoeuvre, Setpoint, Situation
+from companion.field.projection import HysteresisZone, Projection, near_and_ahead
+from companion.field.values import Clearance, GuidanceSettings, GuidanceState, Intent, Manoeuvre, Setpoint, Situation
+from companion.field.vector_fields import (
+    REPULSIVE,
+    ZONE_M,
+    AttractivePoint,
+    Field,
+    RepulsivePoint,
+    Uniform,
+    Vectors,
+    line_between,
+)
 from companion.geo.angles import wrap_pi
 
 
-def avoiding(field: Field, situation: Situation, habits: Habits) -> Field:
+def avoiding(field: Field, situation: Situation, habits: GuidanceSettings) -> Field:
     """Return the field with a repulsive point at every obstacle that is near and ahead (Schmitt, section 4.2)."""
     for obstacle in situation.obstacles:
         if near_and_ahead(situation.en_m, situation.heading_rad, obstacle.en_m, near_m=habits.near_m):
@@ -33,7 +43,7 @@ def avoiding(field: Field, situation: Situation, habits: Habits) -> Field:
 
 
 def step(
-    state: GuidanceState, situation: Situation, intent: Intent, habits: Habits
+    state: GuidanceState, situation: Situation, intent: Intent, habits: GuidanceSettings
 ) -> tuple[GuidanceState, Setpoint]:
     """Return the next state and the heading to send."""
     field = avoiding(intent.field, situation, habits)
@@ -68,7 +78,7 @@ def step(
 
 # ------------------------------------------------------------------------------- no-go protection
 def helm(
-    state: GuidanceState, situation: Situation, wanted_rad: float, habits: Habits
+    state: GuidanceState, situation: Situation, wanted_rad: float, habits: GuidanceSettings
 ) -> tuple[GuidanceState, float, str]:
     """Return (state, heading to send, why): tack, wear round, get out of irons, never point into the no-go zone.
 
@@ -118,7 +128,9 @@ def helm(
     return replace(state, wanted_rad=wanted), wanted, "field"
 
 
-def _out_of_irons(state: GuidanceState, situation: Situation, twa: float, way_mps: float, habits: Habits) -> float:
+def _out_of_irons(
+    state: GuidanceState, situation: Situation, twa: float, way_mps: float, habits: GuidanceSettings
+) -> float:
     """Return the heading that gets a boat out of irons: to the side it was caught on, by the rudder that works.
 
     With way on, the heading wanted is the one to bear away to. With sternway the rudder works in reverse: asking for
@@ -144,7 +156,9 @@ def outside_no_go(heading_rad: float, twd_from_rad: float, half_rad: float, q: i
     return wrap_pi(twd_from_rad + sign * half_rad)
 
 
-def _watch_irons(state: GuidanceState, t_s: float, twa: float, way_mps: float, habits: Habits) -> GuidanceState:
+def _watch_irons(
+    state: GuidanceState, t_s: float, twa: float, way_mps: float, habits: GuidanceSettings
+) -> GuidanceState:
     caught = abs(twa) < habits.no_go_half_rad - math.radians(8.0) and way_mps < 0.25
     if not caught or state.manoeuvre is Manoeuvre.IRONS:
         return replace(state, stuck_since_s=None)
@@ -190,14 +204,44 @@ class LastResort:
 
 def go_to(point_en: tuple[float, float], twd_from_rad: float, half_m: float = ZONE_M) -> Intent:
     """Return the intent to sail to a point: Schmitt's attractive point with its zone along the wind."""
-    return Intent(field=AttractivePoint().shifted(*point_en), zone=Zone.of_point(point_en, twd_from_rad, half_m))
+    return Intent(field=AttractivePoint().shifted(*point_en),
+                  zone=HysteresisZone.of_point(point_en, twd_from_rad, half_m))
 
 
 def follow_line(a_en: tuple[float, float], b_en: tuple[float, float], half_m: float = ZONE_M) -> Intent:
     """Return the intent to follow a line."""
-    return Intent(field=line_between(a_en, b_en, half_m), zone=Zone.of_line(a_en, b_en, half_m))
+    return Intent(field=line_between(a_en, b_en, half_m), zone=HysteresisZone.of_line(a_en, b_en, half_m))
 
 
 def hold_heading(heading_rad: float) -> Intent:
     """Return the intent to keep a heading."""
     return Intent(field=Uniform(heading_rad))
+
+
+# Away from what stands still: a repulsive field about the mission's obstacles and its fence, whatever their shape.
+
+STEP_M = 0.5   # of the difference quotient
+FAR_M = 1e5
+
+
+@dataclass(frozen=True, slots=True)
+class RepulsiveShore(Field):
+    """Away from the nearest shore: length 20 exp(-(c / sigma)²) at the clearance c, Schmitt's repulsive line bent.
+
+    The direction is the clearance's slope, of length 1 everywhere but on the lines that are equally far from two
+    shores, where the two cancel.
+    """
+
+    clearance: Clearance
+    sigma_m: float
+
+    def evaluate(self, p: Vectors) -> Vectors:
+        """Return the vectors (n, 2)."""
+        n = len(p)
+        east, north = np.array([STEP_M, 0.0]), np.array([0.0, STEP_M])
+        # Open water has no shore and an endless clearance.
+        places = np.vstack([p, p + east, p - east, p + north, p - north])
+        c = np.minimum(self.clearance(places), FAR_M).reshape(5, n)
+        slope = np.column_stack([c[1] - c[2], c[3] - c[4]]) / (2.0 * STEP_M)
+        force = REPULSIVE * np.exp(-((np.maximum(c[0], 0.0) / self.sigma_m) ** 2))
+        return np.asarray(force[:, None] * slope, dtype=np.float64)

@@ -14,18 +14,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from companion.field.algebra import ZONE_M, Field, Vectors
+from companion.field.vector_fields import ZONE_M, Field, Vectors
 from companion.geo.angles import wrap_pi
 
 NO_GO_HALF_RAD = math.pi / 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Zone:
+class HysteresisZone:
     """The hysteresis zone: a band about the line through ``at_en`` along ``course_rad``.
 
     For a line that is followed this is the line. For an attractive point it is the line of the wind through the
-    point (Schmitt 4.1.2): ``Zone.of_point``.
+    point (Schmitt 4.1.2): ``HysteresisZone.of_point``.
     """
 
     at_en: tuple[float, float]
@@ -33,12 +33,12 @@ class Zone:
     half_m: float = ZONE_M
 
     @classmethod
-    def of_point(cls, at_en: tuple[float, float], twd_from_rad: float, half_m: float = ZONE_M) -> Zone:
+    def of_point(cls, at_en: tuple[float, float], twd_from_rad: float, half_m: float = ZONE_M) -> HysteresisZone:
         """Return the zone about the line of the wind through a point."""
         return cls(at_en=at_en, course_rad=twd_from_rad, half_m=half_m)
 
     @classmethod
-    def of_line(cls, a_en: tuple[float, float], b_en: tuple[float, float], half_m: float = ZONE_M) -> Zone:
+    def of_line(cls, a_en: tuple[float, float], b_en: tuple[float, float], half_m: float = ZONE_M) -> HysteresisZone:
         """Return the zone about the line from a to b."""
         return cls(at_en=a_en, course_rad=math.atan2(b_en[0] - a_en[0], b_en[1] - a_en[1]), half_m=half_m)
 
@@ -54,7 +54,7 @@ class Zone:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RingZone:
+class HysteresisRing:
     """The hysteresis zone about a circle that is followed."""
 
     at_en: tuple[float, float]
@@ -81,7 +81,7 @@ class Projection:
     field: Field
     twd_from_rad: float
     no_go_half_rad: float = NO_GO_HALF_RAD
-    zone: Zone | RingZone | None = None
+    zone: HysteresisZone | HysteresisRing | None = None
 
     def side(self, points_en: Vectors, q: int) -> NDArray[np.int64]:
         """Return q at each point: by its side outside the zone, ``q`` inside it."""

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from companion.field.guidance import go_to, helm, step
-from companion.field.values import GuidanceState, Habits, Manoeuvre, Setpoint, Situation
+from companion.field.values import GuidanceSettings, GuidanceState, Manoeuvre, Setpoint, Situation
 from companion.geo.angles import wrap_pi
 
 RETURNED_M = 10.0
@@ -46,7 +46,7 @@ class Station:
     look_s: float = 0.5
 
 
-class Phase(enum.Enum):
+class StationPhase(enum.Enum):
     """What she is doing."""
 
     RETURN = "return"     # by the field
@@ -59,14 +59,14 @@ class Phase(enum.Enum):
 class StationState:
     """The memory: ``side`` is the sign of TWA on this board."""
 
-    phase: Phase = Phase.RETURN
+    phase: StationPhase = StationPhase.RETURN
     since_s: float = 0.0
     side: int = 1
     steering: GuidanceState = field(default_factory=GuidanceState)
 
 
 def keep(
-    state: StationState, situation: Situation, station: Station, habits: Habits
+    state: StationState, situation: Situation, station: Station, habits: GuidanceSettings
 ) -> tuple[StationState, Setpoint]:
     """Return the next state and the setpoint, its thrust included.
 
@@ -79,43 +79,43 @@ def keep(
         raise ValueError("station keeping under sail needs the wind")
     habits = replace(habits, look_ahead=False)
     distance = math.dist(situation.en_m, station.at_en)
-    if distance > (RETURNED_M if state.phase is Phase.RETURN else station.far_m):
+    if distance > (RETURNED_M if state.phase is StationPhase.RETURN else station.far_m):
         steering, setpoint = step(state.steering, situation, go_to(station.at_en, twd, 15.0), habits)
-        return replace(state, phase=Phase.RETURN, steering=steering), setpoint
+        return replace(state, phase=StationPhase.RETURN, steering=steering), setpoint
     if station.tacks:
         return _board(state, situation, station, habits, twd)
     return _loop(state, situation, station, habits, twd)
 
 
 def _board(
-    state: StationState, situation: Situation, station: Station, habits: Habits, twd: float
+    state: StationState, situation: Situation, station: Station, habits: GuidanceSettings, twd: float
 ) -> tuple[StationState, Setpoint]:
     t = situation.t_s
     de, dn = situation.en_m[0] - station.at_en[0], situation.en_m[1] - station.at_en[1]
     up = de * math.sin(twd) + dn * math.cos(twd)
     across = de * math.cos(twd) - dn * math.sin(twd)      # to starboard of the wind's eye
     twa = wrap_pi(twd - situation.heading_rad)
-    if state.phase is Phase.RETURN:
-        state = replace(state, phase=Phase.BOARD, since_s=t, side=1 if twa > 0.0 else -1)
+    if state.phase is StationPhase.RETURN:
+        state = replace(state, phase=StationPhase.BOARD, since_s=t, side=1 if twa > 0.0 else -1)
     # Wind on starboard (side +1) carries her to port of the wind's eye.
     beyond = -state.side * across
-    if state.phase is Phase.BOARD and beyond > (0.0 if up > 0.0 else station.board_max_m):
-        state = replace(state, phase=Phase.TACK, since_s=t, side=-state.side)
+    if state.phase is StationPhase.BOARD and beyond > (0.0 if up > 0.0 else station.board_max_m):
+        state = replace(state, phase=StationPhase.TACK, since_s=t, side=-state.side)
     # To windward of the point she bears off, up to a broad reach: that is how she loses height on purpose.
     height = max(0.0, up + 1.0)
     angle = min(math.radians(125.0), station.board_twa_rad + math.radians(station.bear_off_deg_per_m) * height)
-    if state.phase is Phase.TACK:
+    if state.phase is StationPhase.TACK:
         if twa * state.side > 0.0 and abs(twa) < angle + math.radians(25.0):
-            state = replace(state, phase=Phase.BOARD, since_s=t)
+            state = replace(state, phase=StationPhase.BOARD, since_s=t)
         elif t - state.since_s > 45.0:
-            state = replace(state, phase=Phase.RETURN, since_s=t)
+            state = replace(state, phase=StationPhase.RETURN, since_s=t)
     steering, heading, why = helm(state.steering, situation, twd - state.side * angle, habits)
     setpoint = Setpoint(t_s=t, heading_rad=wrap_pi(heading), reason=f"{state.phase.value}: {why}")
     return replace(state, steering=steering), setpoint
 
 
 def _loop(
-    state: StationState, situation: Situation, station: Station, habits: Habits, twd: float
+    state: StationState, situation: Situation, station: Station, habits: GuidanceSettings, twd: float
 ) -> tuple[StationState, Setpoint]:
     half, heading_rad = habits.no_go_half_rad, situation.heading_rad
     ve, vn = situation.velocity_en_mps
@@ -143,5 +143,5 @@ def _loop(
     if steering.manoeuvre in {Manoeuvre.IRONS, Manoeuvre.WEAR}:
         what, thrust = why, 1.0
     setpoint = Setpoint(
-        t_s=situation.t_s, heading_rad=wrap_pi(heading), thrust=thrust, reason=f"{Phase.LOOP.value}: {what}")
-    return replace(state, phase=Phase.LOOP, steering=steering), setpoint
+        t_s=situation.t_s, heading_rad=wrap_pi(heading), thrust=thrust, reason=f"{StationPhase.LOOP.value}: {what}")
+    return replace(state, phase=StationPhase.LOOP, steering=steering), setpoint

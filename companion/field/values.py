@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.field.algebra import Field
-from companion.field.projection import RingZone, Zone
+from companion.field.projection import HysteresisRing, HysteresisZone
+from companion.field.vector_fields import Field
 
 Clearance = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Points (n, 2) [m] to their distances from what stands still (n,) [m]: positive in free water."""
@@ -22,7 +22,7 @@ RESEND_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Obstacle:
+class MovingObstacle:
     """A moving disc to keep out of: centre, velocity, radius ``keep_m`` growing by ``growth_mps``."""
 
     en_m: tuple[float, float]
@@ -41,7 +41,7 @@ class Situation:
     heading_rad: float
     twd_from_rad: float | None
     tws_mps: float = 5.0
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: tuple[MovingObstacle, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,13 +52,13 @@ class Intent:
     """
 
     field: Field
-    zone: Zone | RingZone | None = None
+    zone: HysteresisZone | HysteresisRing | None = None
     stay_in: tuple[float, float, float, float] | None = None
     clearance: Clearance | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Habits:
+class GuidanceSettings:
     """What the boat can do, and how careful to be.
 
     ``polar_mps`` is the speed at ``polar_twa_rad`` (rising, 0..π) in the present wind. ``tack_s`` is how long a tack

@@ -19,9 +19,9 @@ from typing import Any, cast
 
 from companion.addresses import OutputName
 from companion.clock import now_s
+from companion.geo import M_PER_NM, MPS_PER_KNOT
 from companion.geo.angles import heading_of, wrap_two_pi
 from companion.geo.frame import LocalFrame
-from companion.geo.units import M_PER_NM, MPS_PER_KNOT
 from companion.messages import GeoPoint
 from companion.outputs.outlet import Outlet, Say
 from companion.view.values import GoalView, LegView, PointEn, View

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.geo.units import MPS_PER_KNOT
+from companion.geo import MPS_PER_KNOT
 from companion.messages import GeoPoint
 
 

@@ -19,9 +19,16 @@ from matplotlib.patches import Circle as Disc
 from matplotlib.patches import Patch, PathPatch, Polygon, Rectangle, Wedge
 from numpy.typing import NDArray
 
-from companion.field.algebra import AttractivePoint, Circle, Field, Line, RepulsiveLine, RepulsivePoint
-from companion.field.projection import Projection, RingZone, Zone
+from companion.field.projection import HysteresisRing, HysteresisZone, Projection
 from companion.field.tree import LEAST, Along, AwayFrom, AwayFromLine, OutOf, PointTo, Round, StayAt
+from companion.field.vector_fields import (
+    AttractiveCircle,
+    AttractiveLine,
+    AttractivePoint,
+    Field,
+    RepulsiveLine,
+    RepulsivePoint,
+)
 from companion.mission_check import FieldPreview, HeadingFan
 from companion.plots.chart import save, scale_bar
 from companion.plots.mission import draw_area, outline
@@ -80,7 +87,7 @@ def draw_boat(ax: Axes, en_m: tuple[float, float], heading_rad: float, size_m: f
     ax.add_patch(Polygon(turned + np.asarray(en_m), closed=True, facecolor=colour, edgecolor="black", lw=0.6, zorder=7))
 
 
-def draw_zone(ax: Axes, zone: Zone, reach_m: float, *, with_line: bool = True) -> None:
+def draw_zone(ax: Axes, zone: HysteresisZone, reach_m: float, *, with_line: bool = True) -> None:
     """Draw the hysteresis zone: its line black, its edges grey."""
     along = np.array([math.sin(zone.course_rad), math.cos(zone.course_rad)]) * reach_m
     left = np.array([-math.cos(zone.course_rad), math.sin(zone.course_rad)]) * zone.half_m
@@ -97,7 +104,7 @@ def atoms_figure() -> Figure:
     figure = Figure(figsize=(12.0, 8.2), layout="constrained")
     axes = figure.subplots(2, 3)
     atoms: list[tuple[str, Field, float]] = [
-        ("6.1 Line following", Line(), 120.0), ("6.2 Circle following (10 m)", Circle(), 25.0),
+        ("6.1 Line following", AttractiveLine(), 120.0), ("6.2 Circle following (10 m)", AttractiveCircle(), 25.0),
         ("6.3 Attractive point", AttractivePoint(), 12.0), ("6.4 Repulsive line", RepulsiveLine(), 200.0),
         ("6.5 Repulsive point", RepulsivePoint(), 200.0),
     ]
@@ -128,9 +135,9 @@ def trees_figure(twd_from_rad: float = math.radians(90.0)) -> Figure:
     """Return the two example trees with zones and fans, as in Figure 4.4."""
     figure = Figure(figsize=(13.0, 6.7), layout="constrained")
     one, two = (-110.0, 10.0), (40.0, 55.0)
-    line = Zone(at_en=(0.0, 0.0), course_rad=math.pi / 2.0)
-    point = Zone.of_point((0.0, 0.0), twd_from_rad)
-    boats = (("Boat 1: line following", Line() + RepulsivePoint().shifted(*two), line, one, two),
+    line = HysteresisZone(at_en=(0.0, 0.0), course_rad=math.pi / 2.0)
+    point = HysteresisZone.of_point((0.0, 0.0), twd_from_rad)
+    boats = (("Boat 1: line following", AttractiveLine() + RepulsivePoint().shifted(*two), line, one, two),
              ("Boat 2: attractive point", AttractivePoint() + RepulsivePoint().shifted(*one), point, two, one))
     for ax, (title, field, zone, own, other) in zip(figure.subplots(1, 2), boats, strict=True):
         tree = Projection(field=field, twd_from_rad=twd_from_rad, zone=zone)
@@ -306,10 +313,10 @@ def _draw_trajectory(axes: Axes, seen: FieldPreview) -> None:
 
 def _draw_zone(axes: Axes, seen: FieldPreview) -> None:
     zone = seen.zone
-    if isinstance(zone, RingZone):
+    if isinstance(zone, HysteresisRing):
         for radius in (zone.radius_m - zone.half_m, zone.radius_m + zone.half_m):
             axes.add_patch(Disc(zone.at_en, radius, fc="none", ec=GREY, lw=1.0, ls="--", zorder=4))
-    elif isinstance(zone, Zone):
+    elif isinstance(zone, HysteresisZone):
         draw_zone(axes, zone, 4.0 * seen.half_m, with_line=False)
 
 

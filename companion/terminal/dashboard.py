@@ -9,8 +9,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from companion.geo import MPS_PER_KNOT
 from companion.geo.angles import wrap_pi, wrap_two_pi
-from companion.geo.units import MPS_PER_KNOT
 from companion.terminal.keys import KEYS, KeyCommands, shown
 from companion.terminal.screen import Frame, Style
 from companion.view import Event, View

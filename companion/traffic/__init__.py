@@ -23,9 +23,9 @@ from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json, decod
 from companion.traffic.occupancy import Disc, planning_discs, time_matched_discs
 from companion.traffic.picture import Change, TrafficCounts, TrafficPicture
 from companion.traffic.plans import Conflict, Decision, TimedLeg, check_legs, decide, path_distance_m
-from companion.traffic.predict import Motion, Prediction, motion_of, predict
+from companion.traffic.predict import MotionUncertainty, Prediction, motion_of, predict
 from companion.traffic.targets import TargetLimits, Targets
-from companion.traffic.vessel import Hull, Vessel
+from companion.traffic.vessel import Vessel, VesselDimensions
 
 __all__ = [
     "LAKE", "SEA", "Alarm", "AlarmLimits", "Approach", "Assessment", "Change", "Conflict", "Decision", "DecodeCounts",

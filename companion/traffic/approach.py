@@ -11,8 +11,8 @@ import enum
 import math
 from dataclasses import dataclass
 
+from companion.geo import M_PER_NM
 from companion.geo.angles import wrap_two_pi
-from companion.geo.units import M_PER_NM
 from companion.traffic.predict import predict
 from companion.traffic.vessel import Vessel
 

@@ -19,7 +19,7 @@ from companion.geo.angles import difference_rad
 from companion.traffic.approach import AlarmLimits, Approach, OwnShip, alarm_of, cpa
 from companion.traffic.assess import Assessment
 from companion.traffic.colregs import Encounter, Policy, Role, Rule, wind_side
-from companion.traffic.predict import Motion, motion_of
+from companion.traffic.predict import MotionUncertainty, motion_of
 from companion.traffic.vessel import Vessel
 
 SOON_S = 300.0               # an approach later than this is no risk of collision yet
@@ -36,10 +36,10 @@ TACK_RAD = math.radians(10.0)   # nearer to the wind's line than this a tack is 
 
 # Who stands on is bound to keep course and speed (rule 17), and who should give way and does not has shown that she
 # keeps them: in an encounter no vessel is expected to wander. Reports that say otherwise make another plan.
-HOLDING = Motion(speed_mps=0.3, course_rad=math.radians(2.0), accel_mps2=0.01, turn_radps=math.radians(0.05))
+HOLDING = MotionUncertainty(speed_mps=0.3, course_rad=math.radians(2.0), accel_mps2=0.01, turn_radps=math.radians(0.05))
 
 
-def expected(vessel: Vessel) -> Motion:
+def expected(vessel: Vessel) -> MotionUncertainty:
     """Return how surely a vessel in an encounter keeps course and speed: as her class does, or better."""
     usual = motion_of(vessel)
     return usual if vessel.is_stopped or usual.course_rad < HOLDING.course_rad else HOLDING

@@ -17,7 +17,7 @@ from typing import Any
 import pyais
 from pyais.exceptions import AISBaseException
 
-from companion.geo.units import MPS_PER_KNOT
+from companion.geo import MPS_PER_KNOT
 from companion.messages import AisReport, GeoPoint
 
 MAX_LINE = 120           # NMEA 0183 says 82; tag blocks and careless multiplexers make more

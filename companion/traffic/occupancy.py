@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from companion.traffic.approach import OwnShip
 from companion.traffic.predict import (
     TURN_HOLD_S,
-    Motion,
+    MotionUncertainty,
     Prediction,
     motion_of,
     predict,
@@ -139,7 +139,7 @@ def _sigma_m(there: Prediction, t_s: float, keep: Keep) -> float:
 
 
 def planning_discs(
-    vessels: Iterable[Vessel], t_s: float, keep: Keep | None = None, *, motion: Motion | None = None
+    vessels: Iterable[Vessel], t_s: float, keep: Keep | None = None, *, motion: MotionUncertainty | None = None
 ) -> tuple[Disc, ...]:
     """Return the discs of all vessels for a plan that starts at ``t_s``.
 
@@ -154,7 +154,7 @@ def planning_discs(
     return tuple(disc for vessel in vessels for disc in _discs(vessel, t_s, rules, motion))
 
 
-def _discs(vessel: Vessel, t_s: float, keep: Keep, motion: Motion | None) -> list[Disc]:
+def _discs(vessel: Vessel, t_s: float, keep: Keep, motion: MotionUncertainty | None) -> list[Disc]:
     model = motion if motion is not None else motion_of(vessel)
     turn = turn_rate(vessel)
     cuts = [share * keep.horizon_s for share in _SHARES]
@@ -171,7 +171,7 @@ def _discs(vessel: Vessel, t_s: float, keep: Keep, motion: Motion | None) -> lis
 
 
 def _disc(
-    vessel: Vessel, t_s: float, begin: float, end: float, keep: Keep, motion: Motion, turn: float
+    vessel: Vessel, t_s: float, begin: float, end: float, keep: Keep, motion: MotionUncertainty, turn: float
 ) -> Disc:
     a, b = predict(vessel, t_s + begin, motion), predict(vessel, t_s + end, motion)
     span = end - begin

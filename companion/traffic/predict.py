@@ -23,7 +23,7 @@ TURN_LIMIT_RADPS = math.radians(6.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
+class MotionUncertainty:
     """How surely a vessel keeps its course and speed: standard deviations.
 
     Attributes:
@@ -47,18 +47,19 @@ class Motion:
 
 
 # Own assumptions, not from a standard: a ship holds her course, small craft, sailing and fishing boats do not.
-SHIP = Motion()
-SMALL = Motion(position_m=5.0, speed_mps=0.5, course_rad=math.radians(5.0), accel_mps2=0.02,
+SHIP = MotionUncertainty()
+SMALL = MotionUncertainty(position_m=5.0, speed_mps=0.5, course_rad=math.radians(5.0), accel_mps2=0.02,
                turn_radps=math.radians(0.5), unknown_mps=3.0)
-WANDERING = Motion(position_m=5.0, speed_mps=0.7, course_rad=math.radians(8.0), accel_mps2=0.03,
+WANDERING = MotionUncertainty(position_m=5.0, speed_mps=0.7, course_rad=math.radians(8.0), accel_mps2=0.03,
                    turn_radps=math.radians(1.0), unknown_mps=3.0)
-STOPPED = Motion(position_m=5.0, speed_mps=0.05, course_rad=0.0, accel_mps2=0.0, turn_radps=0.0, unknown_mps=0.05)
-STEADY = Motion(position_m=1.0, speed_mps=0.05, course_rad=math.radians(0.5), accel_mps2=0.0, turn_radps=0.0,
+STOPPED = MotionUncertainty(position_m=5.0, speed_mps=0.05, course_rad=0.0, accel_mps2=0.0, turn_radps=0.0,
+                            unknown_mps=0.05)
+STEADY = MotionUncertainty(position_m=1.0, speed_mps=0.05, course_rad=math.radians(0.5), accel_mps2=0.0, turn_radps=0.0,
                 unknown_mps=1.0)
 """An intruder that promises constant speed and heading (WRSC 2013)."""
 
 
-def motion_of(vessel: Vessel) -> Motion:
+def motion_of(vessel: Vessel) -> MotionUncertainty:
     """Return what may be expected of the vessel's class; a reported turn adds half its rate as doubt."""
     if vessel.is_stopped:
         return STOPPED
@@ -136,7 +137,7 @@ def tail_factor(risk: float) -> float:
     return max(0.0, -NormalDist().inv_cdf(risk))
 
 
-def predict(vessel: Vessel, t_s: float, motion: Motion | None = None) -> Prediction:
+def predict(vessel: Vessel, t_s: float, motion: MotionUncertainty | None = None) -> Prediction:
     """Return where the vessel's hull centre is at ``t_s``; for a moment before its report, at the report.
 
     The mean follows a reported turn for ``TURN_HOLD_S`` after the report and goes straight on from there.
@@ -177,7 +178,7 @@ def run(
     return (east + ahead * math.sin(course_rad), north + ahead * math.cos(course_rad)), course_rad
 
 
-def spread(motion: Motion, speed_mps: float, tau_s: float, *, is_known: bool) -> tuple[float, float]:
+def spread(motion: MotionUncertainty, speed_mps: float, tau_s: float, *, is_known: bool) -> tuple[float, float]:
     """Return the standard deviations along and across the course [m], ``tau_s`` after the report."""
     if not is_known:
         sigma = math.hypot(motion.position_m, motion.unknown_mps * tau_s)

@@ -17,7 +17,7 @@ TYPE_FISHING, TYPE_SAILING, TYPE_PLEASURE = 30, 36, 37
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hull:
+class VesselDimensions:
     """A rectangle about the antenna: metres from it to bow, stern, port and starboard side.
 
     ``is_known`` is False for the size assumed for the vessel's class, which is centred on the antenna.
@@ -70,7 +70,7 @@ class Vessel:
     nav_status: int | None = None
     ship_type: int | None = None
     name: str | None = None
-    hull: Hull
+    hull: VesselDimensions
     is_class_b: bool = False
     reports: int = 1
     is_shared_mmsi: bool = False
@@ -126,7 +126,7 @@ class Vessel:
 
 def hull_of(
     bow_m: float | None, stern_m: float | None, port_m: float | None, starboard_m: float | None, *, is_class_b: bool
-) -> Hull:
+) -> VesselDimensions:
     """Return the hull reported, or the size assumed for the class where length or beam is missing or zero.
 
     AIS writes the length alone as bow 0, stern length: the position of the antenna is then not known and is
@@ -135,7 +135,8 @@ def hull_of(
     length, beam = (bow_m or 0.0) + (stern_m or 0.0), (port_m or 0.0) + (starboard_m or 0.0)
     if length <= 0.0:
         length, beam = (CLASS_B_LENGTH_M, CLASS_B_BEAM_M) if is_class_b else (CLASS_A_LENGTH_M, CLASS_A_BEAM_M)
-        return Hull(bow_m=length / 2, stern_m=length / 2, port_m=beam / 2, starboard_m=beam / 2, is_known=False)
+        return VesselDimensions(bow_m=length / 2, stern_m=length / 2, port_m=beam / 2, starboard_m=beam / 2,
+                                is_known=False)
     if not bow_m:
         bow_m = stern_m = length / 2
     if beam <= 0.0:
@@ -143,4 +144,4 @@ def hull_of(
         port_m = starboard_m = beam / 2
     elif not port_m:
         port_m = starboard_m = beam / 2
-    return Hull(bow_m=bow_m, stern_m=stern_m or 0.0, port_m=port_m or 0.0, starboard_m=starboard_m or 0.0)
+    return VesselDimensions(bow_m=bow_m, stern_m=stern_m or 0.0, port_m=port_m or 0.0, starboard_m=starboard_m or 0.0)

@@ -16,8 +16,8 @@ import numpy as np
 from pyais import encode_dict
 
 from companion.clock import now_s
+from companion.geo import MPS_PER_KNOT
 from companion.geo.frame import LocalFrame
-from companion.geo.units import MPS_PER_KNOT
 from sitl.autopilot import Vessel
 from sitl.scene.encounter import Met
 from sitl.scene.mariner import Mariner, Receiver, met_by

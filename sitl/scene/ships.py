@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from companion.field.guidance import go_to, step
-from companion.field.values import GuidanceState, Obstacle
+from companion.field.values import GuidanceState, MovingObstacle
 from companion.geo.frame import LocalFrame
 from sitl.autopilot import Vessel
 from sitl.scene.scenario import EventSpec
@@ -105,7 +105,7 @@ class SecondBoat:
     def sail(self, ours: Motion, our_length_m: float) -> None:
         """Steer and sail for a second, with our boat where it says to be."""
         keep_m = KEEP_M + 0.5 * (our_length_m + self.length_m)
-        seen = self._boat.sense((Obstacle(en_m=ours[0], velocity_en_mps=ours[1], keep_m=keep_m, growth_mps=0.3),))
+        seen = self._boat.sense((MovingObstacle(en_m=ours[0], velocity_en_mps=ours[1], keep_m=keep_m, growth_mps=0.3),))
         self._state, setpoint = step(
             self._state, seen, go_to(self.goal_en, seen.twd_from_rad or 0.0),
             habits_for(seen.tws_mps, repulsive_sigma_m=REPULSIVE_M))

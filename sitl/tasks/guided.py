@@ -27,7 +27,7 @@ from companion.boat import ardurover_sitl
 from companion.clock import now_s
 from companion.errors import LinkError
 from companion.field.station import Station, StationState, keep
-from companion.field.values import RESEND_S, Habits, Situation
+from companion.field.values import RESEND_S, GuidanceSettings, Situation
 from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Facade
 from companion.mavlink.link import Link
@@ -45,7 +45,7 @@ ENTRY_LIMIT_S = 300.0
 AUTO_HALF_M, AUTO_LOOPS = 5.0, 100   # a station's plan: to and fro across the wind
 
 
-def ardurover_habits(tws_mps: float, **changes: float | bool) -> Habits:
+def ardurover_habits(tws_mps: float, **changes: float | bool) -> GuidanceSettings:
     """Return what ArduRover's simulated sailboat can do: a measured polar, tacks of 2 s, no irons."""
     twa, speed = ardurover_sitl().curve(max(1.0, tws_mps))
     base: dict[str, float | bool] = {
@@ -53,7 +53,7 @@ def ardurover_habits(tws_mps: float, **changes: float | bool) -> Habits:
         "no_go_half_rad": math.radians(45.0),
     }
     base.update(changes)
-    return Habits(polar_twa_rad=tuple(map(float, twa)), polar_mps=tuple(map(float, speed)), **base)  # type: ignore[arg-type]
+    return GuidanceSettings(polar_twa_rad=tuple(map(float, twa)), polar_mps=tuple(map(float, speed)), **base)  # type: ignore[arg-type]
 
 
 class Steering:

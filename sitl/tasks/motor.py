@@ -21,7 +21,7 @@ import numpy as np
 from shapely.geometry import Point, box
 
 from companion.field.guidance import follow_line, go_to, step
-from companion.field.values import GuidanceState, Habits, Obstacle, Situation
+from companion.field.values import GuidanceSettings, GuidanceState, MovingObstacle, Situation
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea
@@ -40,7 +40,7 @@ INTRUDER_KEEP_M = 15.0
 INTRUDER_GAP_M = 90.0
 LIMIT_S = 900.0
 SLOW = 0.3                # of full thrust, at least
-HABITS = Habits(
+HABITS = GuidanceSettings(
     is_sailing=False, polar_mps=(2.0, 2.0), turn_rate_radps=math.radians(20.0), tack_s=0.0, lag_s=2.0, horizon_s=60.0,
     repulsive_sigma_m=30.0, keep_m=KEEP_M,
 )
@@ -86,7 +86,7 @@ class Pilot:
         if self._intruder is not None:
             noise = self._rng.normal(0.0, 1.0, 2)
             x, y = self.intruder_at(seen.t_s)
-            other = Obstacle(en_m=(x + noise[0], y + noise[1]), velocity_en_mps=self._intruder[2],
+            other = MovingObstacle(en_m=(x + noise[0], y + noise[1]), velocity_en_mps=self._intruder[2],
                              keep_m=INTRUDER_KEEP_M, growth_mps=0.1)
             seen = replace(seen, obstacles=(other,))
         # Without the wind there is no no-go zone: she goes where the field points.

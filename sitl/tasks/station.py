@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from companion.field.controllers import line_following
 from companion.field.guidance import go_to, helm, step
 from companion.field.station import Station, StationState, keep
-from companion.field.values import GuidanceState, Habits, Situation
+from companion.field.values import GuidanceSettings, GuidanceState, Situation
 from sitl.scene import TASK_S, StationScore, station_score
 from sitl.world import LENGTH_M, Afloat, habits_for, wind_for
 
@@ -41,7 +41,7 @@ class ByPlan:
         self._from = (0.0, 0.0)
         self._q = 1
 
-    def heading(self, seen: Situation, habits: Habits) -> float:
+    def heading(self, seen: Situation, habits: GuidanceSettings) -> float:
         """Return the heading to sail [rad]."""
         twd, here = seen.twd_from_rad or 0.0, seen.en_m
         habits = replace(habits, look_ahead=False)

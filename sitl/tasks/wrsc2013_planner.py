@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from companion.field.controllers import line_following
 from companion.field.guidance import LastResort, helm
-from companion.field.values import GuidanceState, Habits, Situation
+from companion.field.values import GuidanceSettings, GuidanceState, Situation
 from companion.geo.frame import LocalFrame
 from companion.planner import Problem, plan
 from companion.planner.problem import BoatLimits, Sigma, Target, Wind, evaluate
@@ -34,7 +34,7 @@ WIND_SIGMA = Sigma(model="ar1", sigma0_rad=math.radians(3.0), sigma_inf_rad=math
 
 
 def problem_for(
-    seen: Situation, habits: Habits, goal_en: tuple[float, float], discs: tuple[Disc, ...], *,
+    seen: Situation, habits: GuidanceSettings, goal_en: tuple[float, float], discs: tuple[Disc, ...], *,
     goal_radius_m: float = GOAL_RADIUS_M,
 ) -> Problem:
     """Return the planning problem of the moment; its clock starts now, as the discs' does."""
@@ -59,7 +59,7 @@ def target_of(disc: Disc) -> Target:
 class PlanSkipper(FieldSkipper):
     """Waits on the shuttle line by line following, leaves by plan."""
 
-    def __init__(self, habits_for: Callable[..., Habits], frame: LocalFrame, seed: int) -> None:
+    def __init__(self, habits_for: Callable[..., GuidanceSettings], frame: LocalFrame, seed: int) -> None:
         super().__init__(habits_for, frame, look_ahead=True)
         self._seed = seed
         self._way: NDArray[np.float64] | None = None
@@ -120,7 +120,7 @@ class PlanSkipper(FieldSkipper):
             return self.by_field(seen, ())
         return self._follow(seen, (float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
 
-    def _check(self, seen: Situation, vessels: tuple[Vessel, ...], habits: Habits) -> None:
+    def _check(self, seen: Situation, vessels: tuple[Vessel, ...], habits: GuidanceSettings) -> None:
         """Check the active plan against the targets; plan again where that says so."""
         discs = planning_discs(vessels, seen.t_s, KEEP, motion=STEADY)
         own_discs = tuple(d for d in discs if d.from_s == 0.0)
@@ -141,7 +141,7 @@ class PlanSkipper(FieldSkipper):
             self._plan(seen, habits, discs)
         self._resort = self._resort.step(seen.t_s, too_near=near, can_plan=self._way is not None and not near)
 
-    def _plan(self, seen: Situation, habits: Habits, discs: tuple[Disc, ...]) -> None:
+    def _plan(self, seen: Situation, habits: GuidanceSettings, discs: tuple[Disc, ...]) -> None:
         """Plan to the goals that look nearest in time; keep the best that keeps clear."""
         self._planned_s = seen.t_s
         self._way = None
@@ -160,7 +160,7 @@ def _past(at_en: tuple[float, float], a: NDArray[np.float64], b: NDArray[np.floa
     return float((at_en[0] - b[0]) * (b[0] - a[0]) + (at_en[1] - b[1]) * (b[1] - a[1])) > 0.0
 
 
-def _estimate_s(seen: Situation, habits: Habits, goal: tuple[float, float]) -> float:
+def _estimate_s(seen: Situation, habits: GuidanceSettings, goal: tuple[float, float]) -> float:
     """Return about how long the way to a goal takes: straight, or a beat's two boards."""
     assert seen.twd_from_rad is not None
     de, dn = goal[0] - seen.en_m[0], goal[1] - seen.en_m[1]

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import shapely
 
-from companion.field.algebra import Uniform
 from companion.field.guidance import go_to, step
-from companion.field.leave import way_out_rad
-from companion.field.values import GuidanceState, Habits, Intent, Obstacle, Situation
+from companion.field.look_ahead import way_out_rad
+from companion.field.values import GuidanceSettings, GuidanceState, Intent, MovingObstacle, Situation
+from companion.field.vector_fields import Uniform
 from companion.geo.frame import LocalFrame
 from companion.traffic import TargetLimits, Targets, Vessel, decode_json, predict
 from companion.traffic.occupancy import Keep
@@ -34,7 +34,8 @@ class FieldSkipper:
     """Waits by shuttling through the centre, leaves by the side that is soonest reached clear of the intruder."""
 
     def __init__(
-        self, habits_for: Callable[..., Habits], frame: LocalFrame, *, look_ahead: bool, half_m: float = HALF_M
+        self, habits_for: Callable[..., GuidanceSettings], frame: LocalFrame, *, look_ahead: bool,
+        half_m: float = HALF_M
     ) -> None:
         self.irons = self.plans = 0
         self.last_resort_s = 0.0
@@ -93,7 +94,7 @@ class FieldSkipper:
         along = (seen.en_m[0] - centre[0]) * math.sin(across) + (seen.en_m[1] - centre[1]) * math.cos(across)
         return along * self._end > SHUTTLE_M
 
-    def _leave(self, seen: Situation, habits: Habits) -> Intent:
+    def _leave(self, seen: Situation, habits: GuidanceSettings) -> Intent:
         """Head for the side of the square that is reached soonest on a heading that stays clear."""
         assert seen.twd_from_rad is not None
         if max(abs(seen.en_m[0]), abs(seen.en_m[1])) > self._half_m + 30.0 and self._exit_rad is not None:
@@ -103,7 +104,7 @@ class FieldSkipper:
         return Intent(field=Uniform(self._exit_rad))
 
 
-def obstacles_of(vessels: tuple[Vessel, ...], seen: Situation) -> tuple[Obstacle, ...]:
+def obstacles_of(vessels: tuple[Vessel, ...], seen: Situation) -> tuple[MovingObstacle, ...]:
     """Return the discs of the vessels as obstacles of the guidance, at the sigmas and clearance of ``KEEP``."""
     out = []
     for vessel in vessels:
@@ -115,6 +116,6 @@ def obstacles_of(vessels: tuple[Vessel, ...], seen: Situation) -> tuple[Obstacle
         sigma_now = max(now.sigma_along_m, now.sigma_across_m)
         sigma_later = max(later.sigma_along_m, later.sigma_across_m)
         keep = now.reach_m + KEEP.own_radius_m + KEEP.clearance_m + k * sigma_now
-        out.append(Obstacle(en_m=now.mean_en_m, velocity_en_mps=now.velocity_en_mps, keep_m=keep,
+        out.append(MovingObstacle(en_m=now.mean_en_m, velocity_en_mps=now.velocity_en_mps, keep_m=keep,
                             growth_mps=k * (sigma_later - sigma_now) / 90.0))
     return tuple(out)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.field.values import Habits, Obstacle, Situation
+from companion.field.values import GuidanceSettings, MovingObstacle, Situation
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from sitl.world.vaimos import STEP_S, VaimosParameters, polar, sail_heading, state_at
 from sitl.world.wind import AR1, Wind
@@ -35,7 +35,7 @@ def polar_at(tws_mps: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return _POLARS[key]
 
 
-def habits_for(tws_mps: float, **changes: float | bool) -> Habits:
+def habits_for(tws_mps: float, **changes: float | bool) -> GuidanceSettings:
     """Return what VAIMOS can do in this wind: her polar, slow tacks, leeway of 3 % of the wind."""
     twa, speed = polar_at(tws_mps)
     base: dict[str, float | bool] = {
@@ -43,7 +43,7 @@ def habits_for(tws_mps: float, **changes: float | bool) -> Habits:
         "no_go_half_rad": math.radians(47.0),
     }
     base.update(changes)
-    return Habits(polar_twa_rad=twa, polar_mps=speed, **base)  # type: ignore[arg-type]
+    return GuidanceSettings(polar_twa_rad=twa, polar_mps=speed, **base)  # type: ignore[arg-type]
 
 
 def wind_for(twd_from_rad: float, tws_mps: float, seed: int) -> AR1:
@@ -80,7 +80,7 @@ class Afloat:
         """Velocity over ground in the last second."""
         return self._velocity
 
-    def sense(self, obstacles: tuple[Obstacle, ...] = ()) -> Situation:
+    def sense(self, obstacles: tuple[MovingObstacle, ...] = ()) -> Situation:
         """Return what is measured now."""
         twd, tws = self.wind.at(self.t_s)
         measured = twd + float(self.rng.normal(0.0, VANE_SD_RAD))

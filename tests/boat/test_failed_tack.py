@@ -9,8 +9,8 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from companion.boat.boat import coefficient_of
 from companion.boat.failed_tack import AGAIN_SHARE, SET_SHARE, failed_tack, lee_set
-from companion.boat.leeway import coefficient_of
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.departed import IRONS_RAD, side_mps
 from sitl.autopilot.boat.parameters import Parameters

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.boat import Boat, ardurover_sitl, constant
-from companion.boat.leeway import coefficient_of, leeway_at, leeway_rad
+from companion.boat.boat import coefficient_of, leeway_at, leeway_rad
 from companion.compose import boat_of
 from companion.geofence import load_mission
 

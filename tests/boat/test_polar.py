@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant
-from companion.geo.units import MPS_PER_KNOT
+from companion.geo import MPS_PER_KNOT
 
 POLARS = [constant(1.5), avalon(), ardurover_sitl()]
 ANGLES = st.floats(-50.0, 50.0)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from companion.boat import parse_polar, read_polar
 from companion.errors import InputError
-from companion.geo.units import MPS_PER_KNOT
+from companion.geo import MPS_PER_KNOT
 
 GRID = (
     "TWA\\TWS;4;6;8;10;12\n0;0.0;0.0;0.0;0.0;0.0\n45;2.1;3.0;3.6;3.9;4.0\n"

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.boat import ardurover_sitl
-from companion.current import CurrentEstimator, Doubt
-from companion.current.doubt import UNTOLD_MPS
+from companion.current import CurrentEstimator, WindAngleUncertainty
+from companion.current.estimator import UNTOLD_MPS
 from companion.geo.angles import difference_rad
 from companion.messages import WindForecast
 from tests.current.test_estimator import POLAR, reading, sailed, turned_vane
@@ -25,7 +25,7 @@ def forecast(from_rad, tws, sigma_rad=0.1):
 
 
 def doubt(sigmas, believed=(0.0,) * 6, *, is_planned=False):
-    return Doubt(believed=believed, covariance=tuple(map(tuple, np.diag(np.square(sigmas)).tolist())),
+    return WindAngleUncertainty(believed=believed, covariance=tuple(map(tuple, np.diag(np.square(sigmas)).tolist())),
                  is_planned=is_planned)
 
 

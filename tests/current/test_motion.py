@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from companion.boat import ardurover_sitl
-from companion.current import CurrentEstimator, Motion, MotionCheck, Sailing, over_water
+from companion.current import CurrentEstimator, MotionCheck, MotionSample, Sailing, over_water
 from tests.current.test_estimator import reading, turned_vane
 
 POLAR = ardurover_sitl()
@@ -154,11 +154,14 @@ def test_heel_to_windward_tells_of_a_vane_whose_speed_does_not():
 
 
 @pytest.mark.parametrize("now", [
-    Motion(along_mps=0.05, across_mps=0.0, speed_mps=2.2, twa_rad=1.2, twd_from_rad=0.0, tws_mps=5.0, heading_rad=-1.2,
+    MotionSample(along_mps=0.05, across_mps=0.0, speed_mps=2.2, twa_rad=1.2, twd_from_rad=0.0, tws_mps=5.0,
+                 heading_rad=-1.2,
            sigma_mps=0.2),                                                    # aground, moored
-    Motion(along_mps=-0.4, across_mps=0.0, speed_mps=1.2, twa_rad=0.5, twd_from_rad=0.0, tws_mps=5.0, heading_rad=-0.5,
+    MotionSample(along_mps=-0.4, across_mps=0.0, speed_mps=1.2, twa_rad=0.5, twd_from_rad=0.0, tws_mps=5.0,
+                 heading_rad=-0.5,
            sigma_mps=0.2),                                                    # in irons
-    Motion(along_mps=-0.4, across_mps=0.0, speed_mps=2.2, twa_rad=1.2, twd_from_rad=0.0, tws_mps=1.0, heading_rad=-1.2,
+    MotionSample(along_mps=-0.4, across_mps=0.0, speed_mps=2.2, twa_rad=1.2, twd_from_rad=0.0, tws_mps=1.0,
+                 heading_rad=-1.2,
            sigma_mps=0.2),                                                    # hardly any wind
 ])
 def test_who_stands_still_or_lies_in_irons_tells_nothing(now):

@@ -9,20 +9,21 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from companion.field.algebra import (
+from companion.field.projection import HysteresisZone, Projection, near_and_ahead
+from companion.field.vector_fields import (
+    AttractiveCircle,
+    AttractiveLine,
     AttractivePoint,
-    Circle,
     Field,
-    Line,
     RepulsiveLine,
     RepulsivePoint,
     Uniform,
     line_between,
     repulsive_line_between,
 )
-from companion.field.projection import Projection, Zone, near_and_ahead
 
-ATOMS: tuple[Field, ...] = (Line(), Circle(), AttractivePoint(), RepulsivePoint(), RepulsiveLine(), Uniform(1.0))
+ATOMS: tuple[Field, ...] = (AttractiveLine(), AttractiveCircle(), AttractivePoint(), RepulsivePoint(), RepulsiveLine(),
+                            Uniform(1.0))
 metre = st.floats(-500.0, 500.0)
 angle = st.floats(-math.pi, math.pi)
 atom = st.sampled_from(ATOMS)
@@ -40,14 +41,14 @@ def test_fields_are_finite_everywhere_their_centre_included(field: Field) -> Non
 
 
 def test_line_goes_along_and_inclines_by_45_degrees_at_most() -> None:
-    v = Line()([(0.0, 0.0), (0.0, 50.0), (0.0, -1e6)])
+    v = AttractiveLine()([(0.0, 0.0), (0.0, 50.0), (0.0, -1e6)])
     assert v[0] == pytest.approx((10.0, 0.0))
     assert math.degrees(math.atan2(v[1, 1], v[1, 0])) == pytest.approx(-22.5)
     assert math.degrees(math.atan2(v[2, 1], v[2, 0])) == pytest.approx(45.0, abs=0.1)
 
 
 def test_circle_is_tangent_at_ten_metres_clockwise_and_leads_there() -> None:
-    v = Circle()([(0.0, 10.0), (10.0, 0.0), (0.0, 100.0), (0.0, 1.0)])
+    v = AttractiveCircle()([(0.0, 10.0), (10.0, 0.0), (0.0, 100.0), (0.0, 1.0)])
     assert v[0] == pytest.approx((10.0, 0.0))
     assert v[1] == pytest.approx((0.0, -10.0))
     assert v[2, 1] < -7.0
@@ -89,7 +90,7 @@ def test_rotation_turns_pattern_and_vectors_clockwise(field: Field, x: float, y:
 
 
 def test_rotation_by_a_quarter_turns_east_to_south() -> None:
-    assert Line().rotated(math.pi / 2.0)((0.0, 0.0))[0] == pytest.approx((0.0, -10.0), abs=1e-9)
+    assert AttractiveLine().rotated(math.pi / 2.0)((0.0, 0.0))[0] == pytest.approx((0.0, -10.0), abs=1e-9)
 
 
 @property_test
@@ -108,7 +109,7 @@ def test_sum(a: Field, b: Field, x: float, y: float) -> None:
 
 
 def test_evaluation_of_many_points_is_that_of_each() -> None:
-    tree = Circle().enlarged(10.0) + RepulsivePoint().shifted(15.0, 5.0).rotated(0.7)
+    tree = AttractiveCircle().enlarged(10.0) + RepulsivePoint().shifted(15.0, 5.0).rotated(0.7)
     points = np.random.default_rng(1).uniform(-200.0, 200.0, (50, 2))
     assert tree(points) == pytest.approx(np.vstack([tree(p) for p in points]))
 
@@ -124,14 +125,14 @@ def test_a_line_between_two_points_runs_from_one_to_the_other() -> None:
 # ------------------------------------------------------------------------------------ Schmitt's trees
 def test_figure_4_1() -> None:
     """F1 = circle enlarged ten times + repulsive point at (15, 5)."""
-    f1 = Circle().enlarged(10.0) + RepulsivePoint().shifted(15.0, 5.0)
-    there = Circle()((0.0, 10.0))[0]
+    f1 = AttractiveCircle().enlarged(10.0) + RepulsivePoint().shifted(15.0, 5.0)
+    there = AttractiveCircle()((0.0, 10.0))[0]
     d = np.array([0.0 - 15.0, 100.0 - 5.0])
     away = 20.0 * math.exp(-float(d @ d) / 1e4) * d / np.hypot(*d)
     assert f1((0.0, 100.0))[0] == pytest.approx(there + away)
     # At the obstacle it decides (20 against 10), far away the circle does.
     assert f1((15.0 + 1e-9, 5.0))[0, 0] > 0.0
-    assert f1((900.0, 5.0))[0] == pytest.approx(Circle()((90.0, 0.5))[0], abs=1e-6)
+    assert f1((900.0, 5.0))[0] == pytest.approx(AttractiveCircle()((90.0, 0.5))[0], abs=1e-6)
 
 
 WIND = math.radians(0.0)
@@ -140,13 +141,15 @@ WIND = math.radians(0.0)
 def vectorfield1() -> Projection:
     """Figure 4.2: line following, the other boat, projection."""
     other = RepulsivePoint().shifted(30.0, 40.0)
-    return Projection(field=Line() + other, twd_from_rad=WIND, zone=Zone(at_en=(0.0, 0.0), course_rad=math.pi / 2.0))
+    return Projection(field=AttractiveLine() + other, twd_from_rad=WIND,
+                      zone=HysteresisZone(at_en=(0.0, 0.0), course_rad=math.pi / 2.0))
 
 
 def vectorfield2() -> Projection:
     """Figure 4.3: attractive point, the other boat, projection."""
     other = RepulsivePoint().shifted(30.0, 40.0)
-    return Projection(field=AttractivePoint() + other, twd_from_rad=WIND, zone=Zone.of_point((0.0, 0.0), WIND))
+    return Projection(field=AttractivePoint() + other, twd_from_rad=WIND,
+                      zone=HysteresisZone.of_point((0.0, 0.0), WIND))
 
 
 @pytest.mark.parametrize("tree", [vectorfield1(), vectorfield2()])

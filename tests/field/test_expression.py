@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.errors import InputError
-from companion.field.expression import (
+from companion.field.tree import (
     Added,
     Longest,
     Named,

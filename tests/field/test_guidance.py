@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from companion.field.guidance import LastResort, follow_line, go_to, helm, hold_heading, step
 from companion.field.look_ahead import foresee, margins
-from companion.field.values import GuidanceState, Habits, Intent, Manoeuvre, Obstacle, Situation
+from companion.field.values import GuidanceSettings, GuidanceState, Intent, Manoeuvre, MovingObstacle, Situation
 from companion.geo.angles import wrap_pi
 from sitl.world.afloat import Afloat, habits_for, wind_for
 from sitl.world.wind import AR1
 
 angle = st.floats(-math.pi, math.pi)
-HABITS = Habits()
+HABITS = GuidanceSettings()
 
 
 def seen(heading_deg: float = 90.0, twd_deg: float = 0.0, speed: float = 2.0, **more: object) -> Situation:
@@ -36,7 +36,7 @@ def test_no_setpoint_is_ever_inside_the_no_go_zone(wanted: float, heading: float
                                                    doing: Manoeuvre, t: float, q: int, failed: int,
                                                    look: bool) -> None:
     situation = seen(math.degrees(heading), math.degrees(twd), speed, t_s=t,
-                     obstacles=(Obstacle(en_m=(30.0, 40.0)),))
+                     obstacles=(MovingObstacle(en_m=(30.0, 40.0)),))
     state = GuidanceState(q=q, manoeuvre=doing, failed_tacks=failed, irons_side=q)
     for out in (helm(state, situation, wanted, HABITS)[1],
                 step(state, situation, hold_heading(wanted), replace(HABITS, look_ahead=look))[1].heading_rad):
@@ -109,7 +109,7 @@ def test_without_the_recovery_she_stays_in_irons_for_long() -> None:
 @settings(max_examples=60)
 @given(st.floats(-100, 100), st.floats(-100, 100), st.floats(-3, 3), st.floats(-3, 3), st.floats(2.0, 30.0), angle)
 def test_margins_are_the_least_sampled_ones(x: float, y: float, vx: float, vy: float, keep: float, h: float) -> None:
-    obstacle = Obstacle(en_m=(x, y), velocity_en_mps=(vx, vy), keep_m=keep)
+    obstacle = MovingObstacle(en_m=(x, y), velocity_en_mps=(vx, vy), keep_m=keep)
     track, lost = foresee(np.array([h, h + 1.0]), 0.0, seen(), HABITS)
     got = margins(track, (obstacle,))
     t = np.arange(track.shape[1]) * 2.5
@@ -120,7 +120,9 @@ def test_margins_are_the_least_sampled_ones(x: float, y: float, vx: float, vy: f
     assert (lost >= 0.0).all()
 
 
-def sail(intent: Intent, habits: Habits, obstacle: Obstacle | None, seconds: int) -> tuple[Afloat, float, int]:
+def sail(
+    intent: Intent, habits: GuidanceSettings, obstacle: MovingObstacle | None, seconds: int
+) -> tuple[Afloat, float, int]:
     """Sail the model by the guidance; return the boat, the least distance and the tacks' count of irons."""
     boat = Afloat.launch(wind_for(0.0, 6.0, 3), np.random.default_rng(3), (0.0, -150.0), math.radians(60.0))
     state, least = GuidanceState(), math.inf
@@ -144,7 +146,7 @@ def test_beating_to_a_point_dead_upwind(look: bool) -> None:
 
 def test_following_a_line_past_a_boat_that_lies_on_it() -> None:
     line = follow_line((0.0, -100.0), (300.0, -100.0))
-    lying = Obstacle(en_m=(120.0, -100.0), keep_m=15.0)
+    lying = MovingObstacle(en_m=(120.0, -100.0), keep_m=15.0)
     boat, least, _ = sail(line, habits_for(6.0), lying, 260)
     assert least > 15.0
     assert boat.en_m[0] > 350.0
@@ -155,10 +157,10 @@ def test_following_a_line_past_a_boat_that_lies_on_it() -> None:
 
 def test_a_motorboat_needs_no_wind() -> None:
     s = seen(0.0, twd_from_rad=None)
-    habits = Habits(is_sailing=False, polar_mps=(2.0, 2.0))
+    habits = GuidanceSettings(is_sailing=False, polar_mps=(2.0, 2.0))
     _, setpoint = step(GuidanceState(), s, hold_heading(0.0), habits)
     assert setpoint.heading_rad == pytest.approx(0.0, abs=1e-9)
-    ahead = Obstacle(en_m=(0.0, 60.0), keep_m=20.0)
+    ahead = MovingObstacle(en_m=(0.0, 60.0), keep_m=20.0)
     _, setpoint = step(GuidanceState(), replace(s, obstacles=(ahead,)), hold_heading(0.0), habits)
     assert setpoint.margin_m is not None
     assert setpoint.margin_m >= 0.0

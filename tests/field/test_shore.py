@@ -11,17 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon, box
 
-from companion.field.algebra import REPULSIVE
-from companion.field.guidance import go_to, hold_heading, step
-from companion.field.shore import RepulsiveShore
-from companion.field.values import GuidanceState, Habits, Situation
+from companion.field.guidance import RepulsiveShore, go_to, hold_heading, step
+from companion.field.values import GuidanceSettings, GuidanceState, Situation
+from companion.field.vector_fields import REPULSIVE
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea
 from companion.messages import GeoPoint
 
 FRAME = LocalFrame(GeoPoint(lat_deg=51.1, lon_deg=-1.3))
-HABITS = Habits(lag_s=2.0, tack_s=2.0, turn_rate_radps=math.radians(40.0))
+HABITS = GuidanceSettings(lag_s=2.0, tack_s=2.0, turn_rate_radps=math.radians(40.0))
 
 
 def area(*rocks: Polygon, limits: Polygon | None = None) -> LocalArea:

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
-from companion.geo.flat_earth import flat_en_from_lonlat, flat_lonlat_from_en
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
+from companion.planner.reference.flat import flat_en_from_lonlat, flat_lonlat_from_en
 from tests.geofence.strategies import QUIET
 
 GEOD = Geod(ellps="WGS84")

@@ -6,8 +6,7 @@ from dataclasses import replace
 import pytest
 from shapely.geometry import box
 
-from companion.field.expression import parse
-from companion.field.tree import AwayFrom, Heading, OutOf, PointTo, Round, StayAt, Tree
+from companion.field.tree import AwayFrom, FieldTree, Heading, OutOf, PointTo, Round, StayAt, parse
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.step import actions as act
@@ -27,7 +26,7 @@ MARK = Goal(en_m=(200.0, 40.0), radius_m=8.0, name="the mark")
 
 
 def field(text, until=Until.TOLD, for_s=None, water=None, **named):
-    tree = Tree(expression=parse(text, tuple(named), "", ""), atoms=tuple(named.items()))
+    tree = FieldTree(expression=parse(text, tuple(named), "", ""), atoms=tuple(named.items()))
     return Composed(tree=tree, until=until, for_s=for_s, water_en=water)
 
 

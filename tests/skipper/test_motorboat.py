@@ -6,8 +6,7 @@ import pytest
 from shapely.geometry import box
 
 from companion.boat import Boat, constant
-from companion.field.expression import parse
-from companion.field.tree import Round, Tree
+from companion.field.tree import FieldTree, Round, parse
 from companion.mavlink.trust.identity import Identity
 from companion.messages import Mode
 from companion.skipper.rules import Skipper
@@ -57,7 +56,8 @@ def test_it_is_under_way_at_once():
 def test_by_field_without_a_wind(guidance):
     from companion.skipper.step.config import Guidance
 
-    tree = Tree(expression=parse("ring", ("ring",), "", ""), atoms=(("ring", Round(at_en=(0.0, 80.0), radius_m=40.0)),))
+    tree = FieldTree(expression=parse("ring", ("ring",), "", ""),
+                     atoms=(("ring", Round(at_en=(0.0, 80.0), radius_m=40.0)),))
     goal = Goal(en_m=(0.0, 40.0), radius_m=8.0, name="ring",
                 field=Composed(tree=tree, until=Until.TIME, for_s=200.0) if guidance == "ring" else None)
     world = make(goal, Goal(en_m=(0.0, 160.0), radius_m=6.0),

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
+from companion.geo import MPS_PER_KNOT
 from companion.geo.angles import wrap_pi, wrap_two_pi
-from companion.geo.units import MPS_PER_KNOT
 from companion.mavlink.wire.frames import Message
 from companion.messages import (
     AisReport,

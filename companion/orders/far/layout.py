@@ -13,7 +13,7 @@ EPOCH_S = 1_577_836_800      # 2020-01-01T00:00:00Z: minutes in three bytes from
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Field:
+class BitField:
     """One field: ``size`` bytes; ``step`` of one count, in the SI unit of the value; ``unit`` is what the table says.
 
     ``unknown``: the count for a value that is not known, None: it always is. ``circle``: so many counts make a turn.
@@ -55,7 +55,7 @@ class Field:
 class Layout:
     """Fields one behind the other."""
 
-    fields: tuple[Field, ...]
+    fields: tuple[BitField, ...]
 
     @property
     def size(self) -> int:

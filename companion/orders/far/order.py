@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from companion.orders.far.layout import Field, Layout
+from companion.orders.far.layout import BitField, Layout
 from companion.orders.far.seal import BEGINNING, ORDER, SEAL_BYTES, FarKey
 from companion.orders.order import Place, Wanted, mark_of
 from companion.orders.verbs import BY_VERB, Verb, verb_of
@@ -16,20 +16,21 @@ VERSION = 1
 MOST_COUNTER = 0xFFFF
 MARK_BYTES = 4
 LAYOUT = Layout((
-    Field(name="version", size=1, says=f"{VERSION}"),
-    Field(name="verb", size=1, says="its number, as in [orders](orders.md)"),
-    Field(name="number", size=1, says="of a refuge in the mission, 0: the nearest, or by `lat`; else 0"),
-    Field(name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"),
-    Field(name="counter", size=2, says="from 1, never twice since one beginning"),
-    Field(name="lat", size=4, is_signed=True, unit="1e-7 deg",
+    BitField(name="version", size=1, says=f"{VERSION}"),
+    BitField(name="verb", size=1, says="its number, as in [orders](orders.md)"),
+    BitField(name="number", size=1, says="of a refuge in the mission, 0: the nearest, or by `lat`; else 0"),
+    BitField(name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"),
+    BitField(name="counter", size=2, says="from 1, never twice since one beginning"),
+    BitField(name="lat", size=4, is_signed=True, unit="1e-7 deg",
           says="of a goal; of a refuge the number of its name (`param3` in [orders](orders.md)) or 0; else 0"),
-    Field(name="lon", size=4, is_signed=True, unit="1e-7 deg", says="of a goal; else 0"),
+    BitField(name="lon", size=4, is_signed=True, unit="1e-7 deg", says="of a goal; else 0"),
 ))
 SIZE = LAYOUT.size + SEAL_BYTES
 BEGINNING_LAYOUT = Layout((
-    Field(name="version", size=1, says=f"{VERSION}"),
-    Field(name="began", size=3, unit="min since 2020-01-01 UTC", says="when it was given: later than every one before"),
-    Field(name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"),
+    BitField(name="version", size=1, says=f"{VERSION}"),
+    BitField(name="began", size=3, unit="min since 2020-01-01 UTC",
+             says="when it was given: later than every one before"),
+    BitField(name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"),
 ))
 BEGINNING_SIZE = BEGINNING_LAYOUT.size + SEAL_BYTES
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from companion.mavlink.wire import narrow
 from companion.messages import GeoPoint
 from companion.orders.far.judge import REPLIES, Reply
-from companion.orders.far.layout import Field, Layout
+from companion.orders.far.layout import BitField, Layout
 from companion.orders.far.seal import SEAL_BYTES, STATUS, FarKey
 from companion.orders.verbs import BY_VERB, Verb, verb_of
 
@@ -21,43 +21,44 @@ HEARD, ARMED, UNDER_WAY, TROUBLE = 1, 2, 4, 8
 _NONE8, _NONE16, _NONE24, _NONE32 = 0xFF, 0xFFFF, 0xFFFFFF, -(1 << 31)
 _NONE4 = 0xF
 
-_METRE = Field(name="goal_m", size=2, step=10.0, unit="10 m", unknown=_NONE16, says="to the goal sailed for")
-_TO_WAYPOINT = Field(name="waypoint_m", size=2, unit="m", unknown=_NONE16, says="to the autopilot's next waypoint")
-_SPEED = Field(name="sog", size=1, step=0.1, unit="0.1 m/s", unknown=_NONE8, says="speed over ground")
-_TWD = Field(name="twd", size=1, step=math.radians(2.0), unit="2 deg", unknown=_NONE8, circle=180,
+_METRE = BitField(name="goal_m", size=2, step=10.0, unit="10 m", unknown=_NONE16, says="to the goal sailed for")
+_TO_WAYPOINT = BitField(name="waypoint_m", size=2, unit="m", unknown=_NONE16, says="to the autopilot's next waypoint")
+_SPEED = BitField(name="sog", size=1, step=0.1, unit="0.1 m/s", unknown=_NONE8, says="speed over ground")
+_TWD = BitField(name="twd", size=1, step=math.radians(2.0), unit="2 deg", unknown=_NONE8, circle=180,
              says="mean true wind, where from")
-_TWS = Field(name="tws", size=1, step=0.2, unit="0.2 m/s", unknown=_NONE8, says="mean true wind speed")
-_SIGMA = Field(name="sigma", size=1, step=math.radians(1.0), unit="deg", unknown=_NONE8,
+_TWS = BitField(name="tws", size=1, step=0.2, unit="0.2 m/s", unknown=_NONE8, says="mean true wind speed")
+_SIGMA = BitField(name="sigma", size=1, step=math.radians(1.0), unit="deg", unknown=_NONE8,
                says="its direction's spread a minute ahead")
-_AGE = Field(name="plan_age", size=1, step=60.0, unit="min", unknown=_NONE8, says="since the plan was made")
-_RISK = Field(name="risk", size=1, step=1.0 / 250.0, unit="0.4 %", unknown=_NONE8,
+_AGE = BitField(name="plan_age", size=1, step=60.0, unit="min", unknown=_NONE8, says="since the plan was made")
+_RISK = BitField(name="risk", size=1, step=1.0 / 250.0, unit="0.4 %", unknown=_NONE8,
               says="the plan's probability of not staying clear, at each instant")
-_CLEAR = Field(name="clearance", size=1, step=2.0, unit="2 m", unknown=_NONE8,
+_CLEAR = BitField(name="clearance", size=1, step=2.0, unit="2 m", unknown=_NONE8,
                says="from the hull to the nearest obstacle or fence")
-_CPA = Field(name="cpa", size=1, step=4.0, unit="4 m", unknown=_NONE8, says="closest approach of the worst vessel")
-_BATTERY = Field(name="battery", size=1, step=0.2, unit="0.2 V", unknown=_NONE8, says="voltage")
-_GOAL = Field(name="goal", size=1, unknown=_NONE8, says="the goal sailed for, from 1")
-_GOALS = Field(name="goals", size=1, unknown=_NONE8, says="goals in all")
-_MINUTE = Field(name="minute", size=3, unit="min since 2020-01-01 UTC", unknown=_NONE24,
+_CPA = BitField(name="cpa", size=1, step=4.0, unit="4 m", unknown=_NONE8, says="closest approach of the worst vessel")
+_BATTERY = BitField(name="battery", size=1, step=0.2, unit="0.2 V", unknown=_NONE8, says="voltage")
+_GOAL = BitField(name="goal", size=1, unknown=_NONE8, says="the goal sailed for, from 1")
+_GOALS = BitField(name="goals", size=1, unknown=_NONE8, says="goals in all")
+_MINUTE = BitField(name="minute", size=3, unit="min since 2020-01-01 UTC", unknown=_NONE24,
                 says="when, by the boat's clock")
-_LAT = Field(name="lat", size=4, is_signed=True, unit="1e-7 deg", unknown=_NONE32, says="position")
-_LON = Field(name="lon", size=4, is_signed=True, unit="1e-7 deg", unknown=_NONE32, says="position")
+_LAT = BitField(name="lat", size=4, is_signed=True, unit="1e-7 deg", unknown=_NONE32, says="position")
+_LON = BitField(name="lon", size=4, is_signed=True, unit="1e-7 deg", unknown=_NONE32, says="position")
 
 LAYOUT = Layout((
-    Field(name="version", size=1, says=f"{VERSION}"),
-    Field(name="flags", size=1, says="1 the autopilot is heard, 2 armed, 4 under way, 8 the disk does not keep what it "
+    BitField(name="version", size=1, says=f"{VERSION}"),
+    BitField(name="flags", size=1,
+             says="1 the autopilot is heard, 2 armed, 4 under way, 8 the disk does not keep what it "
           "should; the upper four bits: the number of the order that stands, 0 none"),
     _MINUTE, _LAT, _LON, _METRE, _TO_WAYPOINT, _SPEED, _TWD, _TWS, _SIGMA,
-    Field(name="phase", size=1, says=", ".join(f"{n} {word}" for n, word in enumerate(PHASES))),
+    BitField(name="phase", size=1, says=", ".join(f"{n} {word}" for n, word in enumerate(PHASES))),
     _GOAL, _GOALS, _AGE, _RISK, _CLEAR, _CPA,
-    Field(name="watchdog", size=1, says="the worst that is raised, 0 none: " + ", ".join(
+    BitField(name="watchdog", size=1, says="the worst that is raised, 0 none: " + ", ".join(
         f"{n} {word}" for n, word in enumerate(narrow.WATCHDOGS, 1))),
     _BATTERY,
-    Field(name="order", size=2, unknown=0, says="the counter of the order that came last, 0: none has come"),
-    Field(name="reply", size=1, says="what became of it (lower four bits): " + ", ".join(
+    BitField(name="order", size=2, unknown=0, says="the counter of the order that came last, 0: none has come"),
+    BitField(name="reply", size=1, says="what became of it (lower four bits): " + ", ".join(
         f"{n} {word}" for n, word in enumerate(REPLIES, 1)) + "; the traffic's alarm (upper four bits): " + ", ".join(
         f"{n} {word}" for n, word in enumerate(ALARMS)) + f", {_NONE4} no vessel was ever heard"),
-    Field(name="sequence", size=1, says="counts the statuses of one start, modulo 256: a gap is a loss"),
+    BitField(name="sequence", size=1, says="counts the statuses of one start, modulo 256: a gap is a loss"),
 ))
 SIZE = LAYOUT.size + SEAL_BYTES
 

@@ -15,9 +15,23 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from companion.compose import boat_of
-from companion.field.expression import Added, Expression, Longest, Named, Weighed
-from companion.field.leave import BEYOND_M, LOOK_S, MOST_LOOK_S
-from companion.field.tree import Along, Atom, AwayFrom, AwayFromLine, Heading, OutOf, PointTo, Round, StayAt
+from companion.field.look_ahead import BEYOND_M, LOOK_S, MOST_LOOK_S
+from companion.field.tree import (
+    Added,
+    Along,
+    Atom,
+    AwayFrom,
+    AwayFromLine,
+    Expression,
+    Heading,
+    Longest,
+    Named,
+    OutOf,
+    PointTo,
+    Round,
+    StayAt,
+    Weighed,
+)
 from companion.geofence import Mission
 from companion.mission_check import FieldPreview
 

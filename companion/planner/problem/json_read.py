@@ -339,14 +339,14 @@ def _parse_beat(beat: _Reader) -> Beat:
 
 
 def _parse_tracking(track: _Reader) -> Tracking:
-    from companion.boat.tracking import Helm
+    from companion.boat.tracking import GuidanceModel
     from companion.planner.problem.tracking import Tracking
 
-    default = Helm()
+    default = GuidanceModel()
     numbers = {name: track.number(name, getattr(default, name)) for name in HELM_KEYS}
     angle = track.number("no_go_half_deg", math.degrees(default.no_go_half_rad))
     try:
-        helm = Helm(**numbers, no_go_half_rad=math.radians(angle))
+        helm = GuidanceModel(**numbers, no_go_half_rad=math.radians(angle))
     except ValueError as error:
         raise InputError(track.source, track.place, str(error), "see docs/problem-format.md") from error
     solids = track.raw.get("solids") or []

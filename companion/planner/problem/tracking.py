@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.boat.tracking import Helm
+from companion.boat.tracking import GuidanceModel
 from companion.geo.segments import PolygonIndex
 
 
@@ -30,7 +30,7 @@ class Tracking:
 
     """
 
-    helm: Helm
+    helm: GuidanceModel
     floor_m: float
     reach_m: float = 0.0
     solids: tuple[shapely.Geometry, ...] = ()

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from companion.boat.tracking import (
     CURVE_NODES,
-    Predicted,
+    PredictedTrack,
     are_near_short,
     drawn_winds,
     loop_m,
@@ -193,7 +193,7 @@ def _with_boards(
 
 
 def _boards(
-    tracking: Tracking, tracks: Sequence[Predicted], whole: NDArray[np.float64], leg: int,
+    tracking: Tracking, tracks: Sequence[PredictedTrack], whole: NDArray[np.float64], leg: int,
 ) -> list[list[tuple[float, tuple[float, float]]]]:
     """Return of each board's length of a leg, for each track that comes there: the least clearance, and where."""
     on_leg = [track.en_m[track.leg == leg] for track in tracks]

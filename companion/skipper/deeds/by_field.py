@@ -15,10 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from companion.field.guidance import follow_line, go_to, hold_heading, step
-from companion.field.leave import way_out_rad
-from companion.field.station import RETURNED_M, Phase, Station, StationState, keep
-from companion.field.tree import LEAST, Conditions, field_of, lengths, zone_of
-from companion.field.values import Habits, Intent, Obstacle, Setpoint, Situation
+from companion.field.look_ahead import way_out_rad
+from companion.field.station import RETURNED_M, Station, StationPhase, StationState, keep
+from companion.field.tree import LEAST, FieldConditions, field_of, lengths, zone_of
+from companion.field.values import GuidanceSettings, Intent, MovingObstacle, Setpoint, Situation
 from companion.frozen import changed
 from companion.geo.angles import wrap_pi
 from companion.messages import Mode
@@ -30,7 +30,7 @@ from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
 from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.state import ByField
-from companion.skipper.step.state import Phase as Doing
+from companion.skipper.step.state import StationPhase as Doing
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import marks_of
 from companion.skipper.way.geometry import distance_m
@@ -56,7 +56,7 @@ SLOW = 0.3                    # of full thrust, at least: a motorboat is slower 
 
 
 # ------------------------------------------------------------------------------------- what is seen
-def obstacles(turn: Turn, vessels: Sequence[Vessel]) -> tuple[Obstacle, ...]:
+def obstacles(turn: Turn, vessels: Sequence[Vessel]) -> tuple[MovingObstacle, ...]:
     """Return the discs that the field keeps out of: hull, half the distance that plans keep, and what is not known."""
     hull = turn.voyage.boat.hull
     own_m = hull.reach_m + KEEP_SHARE * turn.config.traffic_clearance_m
@@ -65,7 +65,7 @@ def obstacles(turn: Turn, vessels: Sequence[Vessel]) -> tuple[Obstacle, ...]:
         motion = None if held_of(turn, vessel) is None else expected(vessel)
         now, later = predict(vessel, turn.t_s, motion), predict(vessel, turn.t_s + GROWN_S, motion)
         radius_m = now.radius_m(GIVE_UP_RISK)
-        out.append(Obstacle(
+        out.append(MovingObstacle(
             en_m=now.mean_en_m, velocity_en_mps=now.velocity_en_mps, keep_m=radius_m + own_m,
             growth_mps=max(0.0, later.radius_m(GIVE_UP_RISK) - radius_m) / GROWN_S))
     return tuple(out)
@@ -106,7 +106,7 @@ def situation(turn: Turn) -> Situation | None:
     if boat is None or vehicle is None or (wind is None and turn.config.sails):
         return None
     seen = obstacles(turn, near(turn))
-    buoys = tuple(Obstacle(en_m=mark, keep_m=keep_m) for mark, keep_m in marks_of(turn.voyage))
+    buoys = tuple(MovingObstacle(en_m=mark, keep_m=keep_m) for mark, keep_m in marks_of(turn.voyage))
     return Situation(
         t_s=turn.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
         twd_from_rad=wind[0] if wind is not None and turn.config.sails else None,
@@ -114,11 +114,11 @@ def situation(turn: Turn) -> Situation | None:
     )
 
 
-def habits(turn: Turn, tws_mps: float) -> Habits:
+def habits(turn: Turn, tws_mps: float) -> GuidanceSettings:
     """Return what the voyage's boat can do in this wind, and the margins of its plans."""
     boat = turn.voyage.boat
     twa, speed = boat.polar.curve(max(1.0, tws_mps))
-    return Habits(
+    return GuidanceSettings(
         is_sailing=turn.config.sails,
         no_go_half_rad=turn.planned_no_go_rad, polar_twa_rad=tuple(map(float, twa)),
         polar_mps=tuple(map(float, speed)), turn_rate_radps=boat.turn_rate_radps, tack_s=max(1.0, boat.tack_loss_s),
@@ -169,7 +169,7 @@ def strength(turn: Turn, seen: Situation, field: Composed) -> float:
     place = field.tree.station_en
     if place is not None and distance_m(seen.en_m, place) < Station(at_en=place).far_m:
         return math.inf
-    conditions = Conditions(seen=seen, habits=habits(turn, seen.tws_mps), way_out_rad=0.0)
+    conditions = FieldConditions(seen=seen, habits=habits(turn, seen.tws_mps), way_out_rad=0.0)
     return float(lengths(field.tree, conditions, np.array([seen.en_m]))[0])
 
 
@@ -177,7 +177,7 @@ def _composed(turn: Turn, seen: Situation, field: Composed) -> Setpoint:
     """Return what a goal's field says, kept clear of vessels and shore; about its station the station keeper."""
     memory, tree, can = turn.state.by_field, field.tree, habits(turn, seen.tws_mps)
     way_out = None if tree.leaves is None else way_out_rad(seen, tree.leaves, can, memory.way_out_rad)
-    conditions = Conditions(seen=seen, habits=can, way_out_rad=way_out)
+    conditions = FieldConditions(seen=seen, habits=can, way_out_rad=way_out)
     station = _station(turn, seen, field, conditions)
     if station is not None:
         after, setpoint = keep(memory.station, seen, station, can)
@@ -196,13 +196,13 @@ def _composed(turn: Turn, seen: Situation, field: Composed) -> Setpoint:
     return replace(setpoint, thrust=0.0) if lies else setpoint
 
 
-def _station(turn: Turn, seen: Situation, field: Composed, conditions: Conditions) -> Station | None:
+def _station(turn: Turn, seen: Situation, field: Composed, conditions: FieldConditions) -> Station | None:
     """Return the station to keep: she is there, under sail, with room, and nothing else presses."""
     place = field.tree.station_en
     if place is None or conditions.twd_from_rad is None:
         return None
     station = _station_at(turn, place)
-    is_there = turn.state.by_field.station.phase is not Phase.RETURN
+    is_there = turn.state.by_field.station.phase is not StationPhase.RETURN
     if distance_m(seen.en_m, place) > (station.far_m if is_there else RETURNED_M):
         return None
     if float(turn.voyage.area.clearance_m([place])[0]) < turn.config.margin_floor_m + ROOM_M:

@@ -8,7 +8,7 @@ from typing import Any
 
 from companion.boat import AutopilotLimits
 from companion.boat.failed_tack import TRIES
-from companion.boat.tracking import Helm, beat_band_m
+from companion.boat.tracking import GuidanceModel, beat_band_m
 from companion.geo.angles import difference_rad
 from companion.skipper.step.shifting import shifting
 from companion.skipper.step.turn import Turn
@@ -44,7 +44,7 @@ def boards_within_m(turn: Turn) -> float | None:
         return None
     boat = turn.voyage.boat
     limits = turn.snapshot.limits or AutopilotLimits(sail_xtrack_max_m=corridor)
-    helm = replace(Helm.of(limits), corridor_m=corridor, no_go_half_rad=turn.no_go_half_rad)
+    helm = replace(GuidanceModel.of(limits), corridor_m=corridor, no_go_half_rad=turn.no_go_half_rad)
     return beat_band_m(helm, boat.polar, tws_mps=wind[1]) + CARRIED_S * math.hypot(*turn.current_en_mps)
 
 

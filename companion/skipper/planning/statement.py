@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from companion.current import STILL_WATER, Doubt, WaterCurrent, forecast_over_water
+from companion.current import STILL_WATER, WaterCurrent, WindAngleUncertainty, forecast_over_water
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.messages import WindForecast
 from companion.planner.problem import strength_dict
@@ -191,7 +191,7 @@ def problem_dict(
     margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
     extra_obstacles: Sequence[str] = (), title: str = "", beat: dict[str, Any] | None = None,
     max_path_risk: float | None = None, tracking: dict[str, Any] | None = None,
-    current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0, doubt: Doubt | None = None,
+    current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0, doubt: WindAngleUncertainty | None = None,
     failing: dict[str, Any] | None = None, is_wind_known: bool = True,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from companion.boat import AutopilotLimits
-from companion.boat.tracking import Helm, stated_error_m
+from companion.boat.tracking import GuidanceModel, stated_error_m
 from companion.messages import WindForecast
 from companion.planner import Problem
 from companion.planner.track import Expected, expected
@@ -27,7 +27,7 @@ def problem_tracking(
 ) -> dict[str, Any]:
     """Return the ``tracking`` of a problem: the autopilot's parameters, the hull, and what is solid as it is."""
     limits, area, route = turn.snapshot.limits, turn.voyage.area, turn.state.mission.route
-    helm = Helm.of(limits or AutopilotLimits(sail_xtrack_max_m=turn.tack_corridor_m))
+    helm = GuidanceModel.of(limits or AutopilotLimits(sail_xtrack_max_m=turn.tack_corridor_m))
     before = None
     if from_index is not None and route is not None:
         before = route.leg_from_en_m[from_index]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from companion.boat import AutopilotLimits
-from companion.current import STILL_WATER, Doubt, WaterCurrent
+from companion.current import STILL_WATER, WaterCurrent, WindAngleUncertainty
 from companion.geofence import Zone
 from companion.mavlink.trust import Identity
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
@@ -165,7 +165,7 @@ class Snapshot:
     heartbeat_age_s: float | None = None
     wind: WindView = WindView()
     current: WaterCurrent = STILL_WATER
-    doubt: Doubt | None = None
+    doubt: WindAngleUncertainty | None = None
     unsure: str = ""                       # why no plan may be made for wind and water now, in words; empty: it may
     mission: MissionOnBoard = MissionOnBoard()
     identity: Identity = field(default_factory=Identity)   # as far as the autopilot has told it

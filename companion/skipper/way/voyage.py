@@ -16,7 +16,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.boat import Boat, outline_en_m
-from companion.field.tree import Tree
+from companion.field.tree import FieldTree
 from companion.geo.frame import LocalFrame
 from companion.geofence import Zone
 
@@ -90,7 +90,7 @@ class Until(enum.Enum):
 class Composed:
     """A field to sail by, at the longest for ``for_s``; ``water_en`` is what ``until`` speaks of."""
 
-    tree: Tree
+    tree: FieldTree
     until: Until = Until.TOLD
     for_s: float | None = None
     water_en: Polygon | None = None

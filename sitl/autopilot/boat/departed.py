@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from companion.boat.leeway import CROSS_FLOW
+from companion.boat.boat import CROSS_FLOW
 from companion.kernels.jit import kernel
 from sitl.autopilot.boat.scalars import clip
 
@@ -23,7 +23,7 @@ def side_mps(
 ) -> float:
     """Return the speed to starboard [m/s] at which the water's push balances that of the sail.
 
-    As ``companion.boat.leeway`` has it, and an eased sail leaves ``WINDAGE`` of the push.
+    As ``companion.boat.boat`` has it, and an eased sail leaves ``WINDAGE`` of the push.
     """
     drawing = clip((abs(awa_rad) - sail_rad) / max(ideal_rad, 0.1), 0.0, 1.0)
     push = coefficient * aws_mps * aws_mps * abs(math.sin(awa_rad)) * (WINDAGE + (1.0 - WINDAGE) * drawing)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat.leeway import coefficient_of
+from companion.boat.boat import coefficient_of
 from companion.geo.shift import Shift
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.scalars import hash01

@@ -7,7 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from companion.geo.units import MPS_PER_KNOT
+from companion.geo import MPS_PER_KNOT
 from companion.messages import GeoPoint
 
 LIST_MAX = 25

@@ -16,8 +16,10 @@ from bench.tracking.recordings import load
 from bench.tracking.residuals import boards, curve_mps, residuals
 from bench.tracking.trials import CORNERS_DEG, WINDS_MPS, beats, corners
 from companion.boat import AutopilotLimits, ardurover_sitl
+from companion.boat import track_kernels as s
+from companion.boat.track_kernels import turn_to
 from companion.boat.tracking import (
-    Helm,
+    GuidanceModel,
     are_near_short,
     beat_band_m,
     curve_of,
@@ -26,11 +28,9 @@ from companion.boat.tracking import (
     predict,
     stated_error_m,
 )
-from companion.boat.tracking import scurve as s
-from companion.boat.tracking.kernel import turn_to
 
 POLAR = ardurover_sitl()
-HELM = Helm(wp_radius_m=3.0, wp_speed_mps=5.0)
+HELM = GuidanceModel(wp_radius_m=3.0, wp_speed_mps=5.0)
 
 
 @pytest.fixture(scope="module")
@@ -124,8 +124,8 @@ def test_a_wider_radius_cuts_the_corner_more(radius):
     path = [(0.0, 0.0), (70.0, 0.0), (70.0, -70.0)]
 
     def near(r):
-        return float(shapely.distance(shapely.LineString(track(path, Helm(wp_radius_m=r, wp_speed_mps=5.0)).en_m),
-                                      shapely.Point(70.0, 0.0)))
+        sailed = track(path, GuidanceModel(wp_radius_m=r, wp_speed_mps=5.0)).en_m
+        return float(shapely.distance(shapely.LineString(sailed), shapely.Point(70.0, 0.0)))
 
     assert near(radius) < near(2.0 * radius)
     assert near(radius) == pytest.approx(radius, rel=0.45)
@@ -160,7 +160,7 @@ def test_the_band_is_the_corridor_and_an_overshoot_that_grows_with_speed():
     assert 11.0 < beat_band_m(HELM, POLAR, tws_mps=5.0) < 12.8
     assert beat_band_m(HELM, POLAR, tws_mps=9.0) > beat_band_m(HELM, POLAR, tws_mps=3.0)
     with pytest.raises(ValueError, match="no band"):
-        beat_band_m(Helm(corridor_m=0.0), POLAR, tws_mps=5.0)
+        beat_band_m(GuidanceModel(corridor_m=0.0), POLAR, tws_mps=5.0)
 
 
 @pytest.mark.parametrize("sigma_deg", [9.0, 18.6])
@@ -211,13 +211,13 @@ def test_the_point_runs_a_leg_from_rest_to_rest_without_a_leap(length, fastest, 
 def test_the_helm_is_that_of_the_parameters():
     limits = AutopilotLimits.from_params({
         "WP_RADIUS": 4.0, "WP_SPEED": 5.0, "ATC_ACCEL_MAX": 1.5, "SAIL_XTRACK_MAX": 20.0, "SAIL_NO_GO_ANGLE": 40.0})
-    helm = Helm.of(limits)
+    helm = GuidanceModel.of(limits)
     assert (helm.wp_radius_m, helm.wp_speed_mps, helm.accel_mps2, helm.jerk_mps3) == (4.0, 5.0, 1.5, 1.5)
     assert helm.corridor_m == 20.0
     assert helm.no_go_half_rad == pytest.approx(math.radians(40.0))
     assert AutopilotLimits.from_params({"ATC_ACCEL_MAX": 1.5, "WP_ACCEL": 0.8, "WP_JERK": 2.0}).wp_accel_mps2 == 0.8
     with pytest.raises(ValueError, match="wp_speed_mps"):
-        Helm(wp_speed_mps=0.0)
+        GuidanceModel(wp_speed_mps=0.0)
 
 
 @given(st.one_of(st.floats(-20.0, 20.0), st.sampled_from([math.pi, -math.pi, 3.0 * math.pi, -3.0 * math.pi, 0.0])))

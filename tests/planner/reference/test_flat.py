@@ -7,13 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.geo.flat_earth import flat_en_from_lonlat
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.parts import Target
-from companion.planner.reference.flat import FlatPlane
+from companion.planner.reference.flat import FlatPlane, flat_en_from_lonlat
 from companion.planner.settings import AUTO, AstarSettings, Choice, RrtstarSettings
 from tests.planner.problems import box, simple
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from companion.boat.library import ardurover_sitl
+from companion.boat.polar import ardurover_sitl
 from sitl.autopilot import no_go_half_rad, settled_polar, tack_loss_s
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from companion.boat.library import ardurover_sitl, constant
+from companion.boat.polar import ardurover_sitl, constant
 from companion.errors import JobError
 from sitl.clairvoyant import Craft, Goal, Race, Weather, best
 from sitl.world import AR1

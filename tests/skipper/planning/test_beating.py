@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from shapely.geometry import box
 
-from companion.boat.tracking import Helm, beat_band_m
+from companion.boat.tracking import GuidanceModel, beat_band_m
 from companion.skipper.planning.autopilot_beats import (
     is_left_to_beat,
     may_restart_leg,
@@ -40,7 +40,7 @@ def turn(*obstacles, at=(0.0, 0.0), xtrack_m=10.0, irons=(), **config) -> Turn:
 
 def test_the_room_is_the_boards_band_the_hull_and_the_floor():
     now = turn()
-    helm = replace(Helm.of(now.snapshot.limits), corridor_m=10.0)
+    helm = replace(GuidanceModel.of(now.snapshot.limits), corridor_m=10.0)
     band = beat_band_m(helm, now.voyage.boat.polar, tws_mps=5.0)
     assert 11.0 < band < 13.0
     assert room_m(now) == pytest.approx(band + now.voyage.boat.hull.reach_m + now.config.margin_floor_m)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.boat import constant
-from companion.boat.leeway import coefficient_of, leeway_rad
+from companion.boat.boat import coefficient_of, leeway_rad
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.departed import side_mps, speed_share
 from sitl.autopilot.boat.parameters import Parameters

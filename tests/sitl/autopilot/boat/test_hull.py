@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.boat import Polar, constant
-from companion.geo.units import MPS_PER_KNOT
+from companion.geo import MPS_PER_KNOT
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import Vehicle

@@ -63,7 +63,7 @@ class Field(abc.ABC):
 
 # --------------------------------------------------------------------------------------------- atoms
 @dataclass(frozen=True, slots=True)
-class Line(Field):
+class AttractiveLine(Field):
     """Along the line through A = (-100, 0) and B = (100, 0), eastwards, inclined to it by up to 45 degrees.
 
     The angle to the line is -(2 gamma / pi) atan(e / r): Jaulin and Le Bars 2012, line 4 of their controller.
@@ -79,7 +79,7 @@ class Line(Field):
 
 
 @dataclass(frozen=True, slots=True)
-class Circle(Field):
+class AttractiveCircle(Field):
     """Onto the circle of 10 m about the origin and round it clockwise (Jaulin's circle regulation, v0 = vr = 10).
 
     With ``v0`` negative anticlockwise.
@@ -239,7 +239,7 @@ def line_between(a_en: tuple[float, float], b_en: tuple[float, float], r_m: floa
     """Return the line field from a towards b: the atom, rotated and shifted."""
     middle = (0.5 * (a_en[0] + b_en[0]), 0.5 * (a_en[1] + b_en[1]))
     course = math.atan2(b_en[0] - a_en[0], b_en[1] - a_en[1])
-    return Line(r_m=r_m).rotated(course - math.pi / 2.0).shifted(*middle)
+    return AttractiveLine(r_m=r_m).rotated(course - math.pi / 2.0).shifted(*middle)
 
 
 def repulsive_line_between(a_en: tuple[float, float], b_en: tuple[float, float], sigma_m: float) -> Field:

@@ -1,6 +1,0 @@
-"""Miles and knots in metres: one place for both."""
-
-from __future__ import annotations
-
-M_PER_NM = 1852.0
-MPS_PER_KNOT = M_PER_NM / 3600.0
