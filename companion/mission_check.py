@@ -53,7 +53,7 @@ from companion.field.values import Clearance, GuidanceSettings, GuidanceState, I
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence import Code, Finding, LocalArea, Mission, Severity
-from companion.geofence.check import Conditions, check_area
+from companion.geofence.check import AreaConditions, check_area
 from companion.geofence.mission import AreaOptions, kind_of, place_troubles, read_mission
 from companion.planner import Plan, Problem
 from companion.planner.problem import assumed, strength_dict
@@ -140,7 +140,7 @@ def check_mission(
             require_sailable(mission)
     except InputError as error:
         return CheckedMission(mission=None, refusals=(error,))
-    found = check_area(mission.area, Conditions(
+    found = check_area(mission.area, AreaConditions(
         start=mission.start, goals=tuple(g.point for g in mission.goals), margin_m=mission.margin_m,
         is_passage=mission.is_passage,
         twd_from_rad=math.radians(mission.wind.preview_from_deg if from_deg is None else from_deg),

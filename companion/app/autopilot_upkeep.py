@@ -12,7 +12,7 @@ from companion.clock import now_s
 from companion.errors import LinkError
 from companion.fold import VoyageFold
 from companion.geofence import Mission
-from companion.geofence.fence import FenceStatus, fence_for_autopilot
+from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.transfers import CommandAnswer

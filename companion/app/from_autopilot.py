@@ -18,7 +18,7 @@ from pathlib import Path
 from companion.disk import Disk, read_regular, reason
 from companion.errors import CompanionError, InputError, TransferError, UnreadableError
 from companion.geofence import Document
-from companion.geofence.mission import Drawn, MissionOptions, drawing_of, drawn_mission, kept, read_kept
+from companion.geofence.mission import DrawnMission, MissionOptions, drawing_of, drawn_mission, kept, read_kept
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.mission_lists import ReadResult
@@ -70,7 +70,7 @@ class FoundMission:
     """
 
     document: Document
-    drawn: Drawn
+    drawn: DrawnMission
     plan: Path
     is_new: bool
     board: str

@@ -23,7 +23,7 @@ from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.geofence import Area, Document
-    from companion.geofence.fence import AutopilotFence
+    from companion.geofence.autopilot_fence import AutopilotFence
     from companion.messages import GeoPoint
 
 _EPILOG = """\
@@ -171,7 +171,7 @@ def grown_marks(document: Document, point_radius_m: float) -> Document:
 
 
 def _check(args: argparse.Namespace) -> int:
-    from companion.geofence.check import Conditions, check_area
+    from companion.geofence.check import AreaConditions, check_area
 
     document = read_input(args)
     start, goals, margin_m = places(args)
@@ -186,7 +186,7 @@ def _check(args: argparse.Namespace) -> int:
         names = [goal.name for goal in mission.goals] if not args.goal else []
     area = area_of(document, point_radius_m(args))
     bad = print_findings(document.findings, args.file)
-    bad |= print_findings(check_area(area, Conditions(
+    bad |= print_findings(check_area(area, AreaConditions(
         start=start, goals=goals, near=args.near or document.home, drawing=Path(args.file).stem, margin_m=margin_m,
         no_go_half_rad=math.radians(args.no_go), twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
     )), args.file)
@@ -203,7 +203,7 @@ def _check(args: argparse.Namespace) -> int:
 
 def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
     """Return the autopilot's fence for the arguments. Raises JobError with the reason when there is none."""
-    from companion.geofence.fence import FenceStatus, fence_for_autopilot
+    from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 
     start, goals, margin_m = places(args)
     if start is None or margin_m is None:

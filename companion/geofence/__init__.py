@@ -5,8 +5,7 @@ metres for the planner. ``read(path)`` reads any single file into a ``Document``
 """
 
 from companion.geofence.area import Area, Fence, LocalArea
-from companion.geofence.document import Document
-from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.document import Code, Document, Finding, Severity
 from companion.geofence.formats.registry import read
 from companion.geofence.mission.goals import Goal
 from companion.geofence.mission.mission import Mission, load_mission

@@ -15,8 +15,8 @@ from shapely.geometry.base import BaseGeometry
 from companion.geo.angles import difference_rad, heading_of
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, LocalArea, buffer_in, parts
-from companion.geofence.fence.autopilot_fence import FenceStatus, fence_for_autopilot
-from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
+from companion.geofence.document import Code, Finding, Severity
 from companion.geofence.formats.fence_items import MAX_FENCE_ITEMS, zones_to_items
 from companion.geofence.formats.rings import Findings
 from companion.geofence.shapes import Circle, Zone, ZoneKind, center_of, polygon_en
@@ -31,7 +31,7 @@ SEA_ROUND_M = 500.0   # open water round everything, without a fence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Conditions:
+class AreaConditions:
     """What the area is checked for: places, margin and wind. None leaves the check that needs it out.
 
     ``is_passage``: edges are too long to be straight in one frame.
@@ -48,7 +48,7 @@ class Conditions:
     no_go_half_rad: float = math.radians(47.0)
 
 
-def check_area(area: Area, conditions: Conditions) -> tuple[Finding, ...]:
+def check_area(area: Area, conditions: AreaConditions) -> tuple[Finding, ...]:
     """Return what is found, worst first."""
     findings = Findings()
     shapes = [z.shape for z in area.fence.inclusions] + [o.shape for o in area.solids]
@@ -114,7 +114,7 @@ def _holes(area: Area, findings: Findings) -> None:
             findings.add(Severity.WARNING, Code.HOLE, zone.name or "keep-out zone", text)
 
 
-def _places(local: LocalArea, conditions: Conditions, findings: Findings) -> None:
+def _places(local: LocalArea, conditions: AreaConditions, findings: Findings) -> None:
     from companion.geofence.mission.mission import trouble_at
 
     places = [(Code.START_OUTSIDE, "start", conditions.start)] if conditions.start is not None else []
@@ -134,7 +134,7 @@ def _places(local: LocalArea, conditions: Conditions, findings: Findings) -> Non
             )
 
 
-def _round_the_water(local: LocalArea, conditions: Conditions, findings: Findings) -> None:
+def _round_the_water(local: LocalArea, conditions: AreaConditions, findings: Findings) -> None:
     """Mention that the largest obstacle of an area without a fence looks like a shore with the water inside it."""
     if local.limits is not None or not local.polygons:
         return
@@ -193,7 +193,7 @@ def _connected(local: LocalArea, places: Sequence[tuple[float, float]], margin_m
     )
 
 
-def _way_through(local: LocalArea, conditions: Conditions, findings: Findings) -> None:
+def _way_through(local: LocalArea, conditions: AreaConditions, findings: Findings) -> None:
     if conditions.start is None or not conditions.goals or conditions.margin_m is None:
         return
     places = [local.frame.en_from_geo(p) for p in (conditions.start, *conditions.goals)]
@@ -217,7 +217,7 @@ def _way_through(local: LocalArea, conditions: Conditions, findings: Findings) -
     )
 
 
-def _gaps(local: LocalArea, conditions: Conditions, findings: Findings) -> None:
+def _gaps(local: LocalArea, conditions: AreaConditions, findings: Findings) -> None:
     """Name the gaps that the margin closes, and those that it leaves too narrow to beat through."""
     margin_m = conditions.margin_m or 0.0
     bodies: list[tuple[str, BaseGeometry]] = list(zip(local.names, local.polygons, strict=True))
@@ -256,7 +256,7 @@ def _gaps(local: LocalArea, conditions: Conditions, findings: Findings) -> None:
 
 
 def _gap(
-    width_m: float, course_rad: float, place: str, margin_m: float, conditions: Conditions,
+    width_m: float, course_rad: float, place: str, margin_m: float, conditions: AreaConditions,
 ) -> Finding | None:
     """Return what is wrong with a gap whose way through is ``course_rad`` (or its opposite)."""
     if width_m < 2.0 * margin_m:
@@ -281,7 +281,7 @@ def _gap(
     )
 
 
-def _items(area: Area, conditions: Conditions, findings: Findings) -> None:
+def _items(area: Area, conditions: AreaConditions, findings: Findings) -> None:
     """Say how many of the autopilot's items the area takes as it stands, and simplified."""
     zones: list[Zone] = [*area.fence.inclusions, *(o.zone() for o in area.solids)]
     count = len(zones_to_items(zones)[0])

@@ -27,7 +27,7 @@ from companion.errors import InputError
 from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, LocalArea, Mission, ZoneKind
-from companion.geofence.fence import FenceStatus, fence_for_autopilot
+from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.geofence.mission import free_water
 from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint

@@ -49,7 +49,10 @@ class DecodeCounts:
 
 
 class NmeaDecoder:
-    """Sentences to reports; keeps the fragments of messages in several sentences, bounded in number and time."""
+    """Sentences to reports; keeps the fragments of messages in several sentences, bounded in number and time.
+
+    pyais decodes; its own assemblers (3.3) forget no fragment by time, drop what comes out of order and count nothing.
+    """
 
     def __init__(self) -> None:
         self.counts = DecodeCounts()

@@ -27,7 +27,7 @@ from companion.clock import now_s, run, run_virtual
 from companion.compose import boat_of
 from companion.errors import JobError, LinkError
 from companion.geofence import Mission, load_mission
-from companion.geofence.fence import FenceStatus, fence_for_autopilot
+from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
 from companion.mavlink.transfers import Outcome

@@ -26,9 +26,7 @@ from companion.compose import (
     water_of,
 )
 from companion.geofence import load_mission
-from companion.geofence.mission.atom_options import ATOMS
-from companion.geofence.mission.goal_options import KINDS
-from companion.geofence.mission.options import tables
+from companion.geofence.mission.options import ATOMS, KINDS, tables
 from companion.skipper.step.config import Permissions
 from companion.skipper.watch.watchdogs import TABLE
 from companion.skipper.way.gates import gates_of

@@ -11,8 +11,16 @@ from hypothesis import strategies as st
 
 from companion.editor.toml import blocks_of, made, rewritten, text_of
 from companion.geofence.mission import MissionOptions, parse_options, read_options
-from companion.geofence.mission.goal_options import BoxOptions, GateOptions, MarkOptions, PointOptions
-from companion.geofence.mission.options import AreaOptions, RefugeOptions, SkipperOptions, StartOptions
+from companion.geofence.mission.options import (
+    AreaOptions,
+    BoxOptions,
+    GateOptions,
+    MarkOptions,
+    PointOptions,
+    RefugeOptions,
+    SkipperOptions,
+    StartOptions,
+)
 from companion.geofence.mission.text import dump_options
 
 MISSIONS = sorted(Path("missions").glob("*.toml"))

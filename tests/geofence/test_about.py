@@ -9,9 +9,8 @@ from pyproj import Geod
 from shapely.geometry import Polygon
 
 from companion.geo.frame import LocalFrame
-from companion.geofence.about import polygons_about
-from companion.geofence.area import Area, Fence
-from companion.geofence.fence.autopilot_fence import FenceStatus, fence_for_autopilot
+from companion.geofence.area import Area, Fence, polygons_about
+from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind, drawn
 from companion.messages import GeoPoint
 

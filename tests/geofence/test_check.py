@@ -8,7 +8,7 @@ from shapely.geometry import Polygon
 
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, Circle, Code, Fence, Obstacle, Severity, Zone, ZoneKind
-from companion.geofence.check import Conditions, check_area
+from companion.geofence.check import AreaConditions, check_area
 from companion.messages import GeoPoint
 
 ORIGIN = GeoPoint(lat_deg=50.8, lon_deg=-1.3)
@@ -33,7 +33,7 @@ def goal(east, north):
 
 
 def found(area, **conditions):
-    return {(f.code, f.severity): f for f in check_area(area, Conditions(**conditions))}
+    return {(f.code, f.severity): f for f in check_area(area, AreaConditions(**conditions))}
 
 
 @pytest.mark.parametrize(("area", "conditions", "why"), [
@@ -58,8 +58,9 @@ def test_a_shore_that_is_drawn_round_the_water_is_mentioned(area, conditions, wh
 
 def test_a_good_area_has_no_findings():
     area = Area(obstacles=(rock(50, 50, 80, 80, "a"),), fence=Fence((keep_in(box(-200, -200, 200, 200)),)))
-    assert check_area(area, Conditions(start=ORIGIN, goals=(goal(0.0, 150.0),), margin_m=10.0, twd_from_rad=0.0)) == ()
-    assert check_area(Area(), Conditions(start=ORIGIN)) == ()
+    assert check_area(area,
+                      AreaConditions(start=ORIGIN, goals=(goal(0.0, 150.0),), margin_m=10.0, twd_from_rad=0.0)) == ()
+    assert check_area(Area(), AreaConditions(start=ORIGIN)) == ()
 
 
 def test_inclusions_that_ardupilot_would_intersect():
@@ -97,7 +98,7 @@ def test_gaps_too_narrow_for_the_margin_and_the_wind():
     assert "needs 29.3 m" in beating.text
     assert found(area, margin_m=10.0, twd_from_rad=math.radians(90.0)) == {}
     between = Area(obstacles=(*area.obstacles, rock(-5, 30, 5, 100, "plug")))
-    assert all("west / east" not in f.place for f in check_area(between, Conditions(margin_m=13.0)))
+    assert all("west / east" not in f.place for f in check_area(between, AreaConditions(margin_m=13.0)))
 
 
 def test_no_way_through_names_the_margin_that_opens_one():

@@ -21,8 +21,7 @@ from companion.geofence.mission import (
     offer,
     read_kept,
 )
-from companion.geofence.mission.course import MAX_GOALS, course_of
-from companion.geofence.mission.drawn import tag
+from companion.geofence.mission.autopilot_mission import MAX_GOALS, course_of, tag
 from companion.messages import Command, GeoPoint, MissionItem
 
 LAT, LON = 50.82, -1.31

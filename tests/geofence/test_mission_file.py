@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from companion.errors import InputError
 from companion.geofence import load_mission
-from companion.geofence.formats.raw.text import decode
+from companion.geofence.formats.untrusted import decode
 from companion.geofence.mission.options import tables
 from companion.geofence.mission.text import dump_options, parse_options
 from tests.geofence.strategies import QUIET

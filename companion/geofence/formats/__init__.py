@@ -8,10 +8,10 @@ from companion.geofence.formats.fence_items import (
     zones_to_items,
 )
 from companion.geofence.formats.losses import Written
-from companion.geofence.formats.raw.text import MAX_BYTES, MAX_POSITIONS, decode, read_bytes
 from companion.geofence.formats.registry import FORMATS, format_of, parse, write
 from companion.geofence.formats.rings import Findings
 from companion.geofence.formats.routes import lines_as_route
+from companion.geofence.formats.untrusted import MAX_BYTES, MAX_POSITIONS, decode, read_bytes
 from companion.geofence.formats.wkt import KINDS, drawings_of
 
 __all__ = [

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from shapely.geometry import Polygon
 
-from companion.geofence.findings import Code, Severity
+from companion.geofence.document import Code, Severity
 from companion.geofence.formats.losses import Losses, without_holes
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg

@@ -13,14 +13,11 @@ from typing import Any
 from shapely.geometry import LineString, Point, Polygon
 
 from companion.errors import InputError
-from companion.geofence.document import Document, Mark, Track
-from companion.geofence.findings import Code, Severity
+from companion.geofence.document import Code, Document, Mark, Severity, Track
 from companion.geofence.formats.losses import Losses, Written, leave_out
-from companion.geofence.formats.raw.json_node import JsonNode, parse_json
-from companion.geofence.formats.raw.text import MAX_DEPTH, MAX_POSITIONS
-from companion.geofence.formats.reading import Reading
 from companion.geofence.formats.rings import polygons_from_rings
-from companion.geofence.formats.routes import RoutePoint, items_of, pins_as_dangers, pins_as_route
+from companion.geofence.formats.routes import Reading, RoutePoint, items_of, pins_as_dangers, pins_as_route
+from companion.geofence.formats.untrusted import MAX_DEPTH, MAX_POSITIONS, JsonNode, parse_json
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 
@@ -30,7 +27,7 @@ _KINDS = {
 }
 
 
-class _Reading(Reading):
+class _GeoJsonReading(Reading):
     def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
         super().__init__(source, kind, areas=areas)
         self.items: list[MissionItem] = []
@@ -208,7 +205,7 @@ def read_geojson(
     Points without properties that say what they are are the places to sail to, or, with ``areas``, dangers.
     """
     root = parse_json(text, source)
-    reading = _Reading(source, kind, areas=areas)
+    reading = _GeoJsonReading(source, kind, areas=areas)
     root_kind = root.member("type").text()
     crs = root.get("crs")
     if crs is not None:

@@ -17,14 +17,11 @@ import gpxpy.gpx
 from shapely.geometry import Point
 
 from companion.errors import InputError
-from companion.geofence.document import Document, Mark, Track
-from companion.geofence.findings import Code, Severity
+from companion.geofence.document import Code, Document, Mark, Severity, Track
 from companion.geofence.formats.fence_items import ring_of
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out, without_holes
-from companion.geofence.formats.raw.text import MAX_POSITIONS, printable
-from companion.geofence.formats.raw.xml_safe import parse_xml
-from companion.geofence.formats.reading import Reading
-from companion.geofence.formats.routes import RoutePoint, items_of, line_as_area, pins_as_route, route_of
+from companion.geofence.formats.routes import Reading, RoutePoint, items_of, line_as_area, pins_as_route, route_of
+from companion.geofence.formats.untrusted import MAX_POSITIONS, parse_xml, printable
 from companion.geofence.shapes import Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 
@@ -33,7 +30,7 @@ _KINDS = {k.value: k for k in ZoneKind}
 _MISSION, _TRACK = "mission", "track"
 
 
-class _Reading(Reading):
+class _GpxReading(Reading):
     def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
         super().__init__(source, kind, areas=areas)
         self.route: list[RoutePoint] = []
@@ -65,7 +62,7 @@ def read_gpx(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
     except (gpxpy.gpx.GPXException, ValueError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(source, "", f"is not GPX ({str(error).splitlines()[0][:80] if str(error) else 'damaged'})"
                          ) from None
-    reading = _Reading(source, kind, areas=areas)
+    reading = _GpxReading(source, kind, areas=areas)
     count = len(gpx.waypoints) + sum(len(r.points) for r in gpx.routes) + gpx.get_track_points_no()
     if count > MAX_POSITIONS:
         raise InputError(source, "", f"holds more than {MAX_POSITIONS} positions", "simplify it")
@@ -93,7 +90,7 @@ def read_gpx(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
     return document
 
 
-def _waypoint(node: Any, place: str, reading: _Reading) -> None:
+def _waypoint(node: Any, place: str, reading: _GpxReading) -> None:
     point = reading.point(node, place)
     role = (node.type or "").strip().lower()
     if role in {"home", "return"}:
@@ -114,7 +111,7 @@ def _altitude_m(node: Any) -> float:
     return float(node.elevation) if node.elevation is not None and math.isfinite(node.elevation) else 0.0
 
 
-def _route(node: Any, place: str, reading: _Reading) -> None:
+def _route(node: Any, place: str, reading: _GpxReading) -> None:
     points = [reading.point(p, f"{place} point {i + 1}") for i, p in enumerate(node.points)]
     role = (node.type or "").strip().lower()
     if role in _KINDS or (reading.areas and role != _MISSION):
@@ -129,7 +126,7 @@ def _route(node: Any, place: str, reading: _Reading) -> None:
         )
 
 
-def _track(node: Any, place: str, reading: _Reading) -> None:
+def _track(node: Any, place: str, reading: _GpxReading) -> None:
     role = (node.type or "").strip().lower()
     for segment_number, segment in enumerate(node.segments, start=1):
         where = f"{place} segment {segment_number}"

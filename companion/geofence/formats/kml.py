@@ -16,14 +16,12 @@ from xml.sax.saxutils import escape
 from shapely.geometry import LineString, Point, Polygon
 
 from companion.errors import InputError
-from companion.geofence.document import Document, Mark, Track
-from companion.geofence.findings import Code, Severity
+from companion.geofence.document import Code, Document, Mark, Severity, Track
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out
-from companion.geofence.formats.raw.text import MAX_BYTES, MAX_POSITIONS, number, printable
-from companion.geofence.formats.raw.xml_safe import child_text, local_name, parse_xml
-from companion.geofence.formats.reading import Reading
+from companion.geofence.formats.mission_planner import decimal
 from companion.geofence.formats.rings import polygons_from_rings
 from companion.geofence.formats.routes import (
+    Reading,
     RoutePoint,
     items_of,
     pins_as_dangers,
@@ -31,7 +29,15 @@ from companion.geofence.formats.routes import (
     route_of,
     track_points,
 )
-from companion.geofence.formats.wpl import decimal
+from companion.geofence.formats.untrusted import (
+    MAX_BYTES,
+    MAX_POSITIONS,
+    child_text,
+    local_name,
+    number,
+    parse_xml,
+    printable,
+)
 from companion.geofence.shapes import Zone, ZoneKind, unwrapped, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 
@@ -56,7 +62,7 @@ def unzip_kmz(data: bytes, source: str) -> bytes:
     return content
 
 
-class _Reading(Reading):
+class _KmlReading(Reading):
     def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
         super().__init__(source, kind, areas=areas)
         self.route: list[RoutePoint] = []
@@ -99,7 +105,7 @@ def read_kml(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
     root = parse_xml(data, source)
     if local_name(root) != "kml":
         raise InputError(source, "line 1", f"the root is <{local_name(root)[:30]}>, not <kml>")
-    reading = _Reading(source, kind, areas=areas)
+    reading = _KmlReading(source, kind, areas=areas)
     placemarks = [e for e in root.iter() if local_name(e) == "Placemark"]
     for index, placemark in enumerate(placemarks):
         name = child_text(placemark, "name")
@@ -149,7 +155,7 @@ def _shapes(element: Any) -> Iterator[Any]:
             yield from _shapes(child)
 
 
-def _shape(element: Any, name: str, data_of: dict[str, str], place: str, *, reading: _Reading) -> None:
+def _shape(element: Any, name: str, data_of: dict[str, str], place: str, *, reading: _KmlReading) -> None:
     word = data_of.get("kind", "").strip().lower()
     if word and word not in _KINDS:
         raise InputError(reading.source, place, f"{word[:30]!r} is not a kind", "write inclusion or exclusion")
@@ -201,7 +207,7 @@ def _shape(element: Any, name: str, data_of: dict[str, str], place: str, *, read
         reading.marks.append(Mark(geometry=LineString(unwrapped(lonlat)), kind=kind, name=name, margin_m=margin_m))
 
 
-def _point(lonlat: tuple[float, float], alt_m: float, mark: Mark, role: str, reading: _Reading) -> None:
+def _point(lonlat: tuple[float, float], alt_m: float, mark: Mark, role: str, reading: _KmlReading) -> None:
     point = track_points([lonlat])[0]
     if role in {"home", "return"}:
         reading.places[role] = point

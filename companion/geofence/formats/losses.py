@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from shapely.geometry import Polygon
 
-from companion.geofence.document import Document
-from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.document import Code, Document, Finding, Severity
 from companion.geofence.shapes import CIRCLE_SIDES, Circle, Zone, ZoneKind, drawn
 from companion.words import counted
 

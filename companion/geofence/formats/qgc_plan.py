@@ -9,12 +9,11 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from companion.geofence.document import Document
-from companion.geofence.findings import Code, Severity
+from companion.geofence.document import Code, Document, Severity
 from companion.geofence.formats.fence_items import ring_of
 from companion.geofence.formats.losses import Losses, Written, leave_out, without_holes
-from companion.geofence.formats.raw.json_node import JsonNode, parse_json
 from companion.geofence.formats.rings import Findings, polygons_from_rings
+from companion.geofence.formats.untrusted import JsonNode, parse_json
 from companion.geofence.shapes import Circle, Zone, ZoneKind
 from companion.messages import Command, GeoPoint, MissionItem
 

@@ -13,8 +13,7 @@ import shapely
 
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
-from companion.geofence.document import Document
-from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.document import Code, Document, Finding, Severity
 from companion.geofence.formats.geojson import read_geojson, write_geojson
 from companion.geofence.formats.gpx import read_gpx, write_gpx
 from companion.geofence.formats.kml import read_kml, unzip_kmz, write_kml, write_kmz
@@ -23,15 +22,15 @@ from companion.geofence.formats.mission_planner import (
     read_fen,
     read_poly,
     read_rally,
+    read_waypoints,
     write_fen,
     write_poly,
     write_rally,
+    write_waypoints,
 )
 from companion.geofence.formats.qgc_plan import read_plan, write_plan
-from companion.geofence.formats.raw.json_node import parse_json
-from companion.geofence.formats.raw.text import decode, read_bytes
+from companion.geofence.formats.untrusted import decode, parse_json, read_bytes
 from companion.geofence.formats.wkt import read_wkt, write_wkt
-from companion.geofence.formats.wpl import read_waypoints, write_waypoints
 from companion.geofence.shapes import Circle, ZoneKind, center_of
 from companion.messages import GeoPoint
 

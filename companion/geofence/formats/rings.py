@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from companion.geofence.findings import Code, Finding, Severity
+from companion.geofence.document import Code, Finding, Severity
 from companion.geofence.shapes import ZoneKind, unwrapped
 
 Ring = Sequence[Sequence[float]]

@@ -7,13 +7,27 @@ from collections.abc import Iterable, Sequence
 
 from shapely.geometry import LineString, Point
 
-from companion.geofence.document import Document, Mark
-from companion.geofence.findings import Code, Severity
+from companion.geofence.document import Code, Document, Mark, Severity, Track
 from companion.geofence.formats.losses import Losses
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import Zone, ZoneKind, unwrapped, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 from companion.words import counted
+
+# What every format that holds shapes, routes and points gathers while it is read.
+
+class Reading:
+    """One file being read: a zone that does not say what it is, is ``kind``; read for its ``areas``, so is a pin."""
+
+    def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
+        self.source, self.kind, self.areas = source, kind, areas
+        self.findings = Findings()
+        self.zones: list[Zone] = []
+        self.marks: list[Mark] = []
+        self.tracks: list[Track] = []
+        self.rally: list[MissionItem] = []
+        self.pins: list[RoutePoint] = []
+
 
 _START_NAMES = {"start", "home"}
 RoutePoint = tuple[GeoPoint, float, str]  # place, altitude [m], name
@@ -113,5 +127,3 @@ def lines_as_route(document: Document) -> Document:
         items, names = items_of((p, 0.0, "") for p in document.tracks[0].points)
         return replace(document, items=items, item_names=names, tracks=())
     return document
-
-

@@ -1,8 +1,8 @@
 """WKT and EWKT: one geometry per statement, ``#`` comments, an optional ``name|kind|`` before it.
 
 x is longitude and y latitude, as every program but a strict EPSG:4326 database writes them; ``axis`` says otherwise
-or lets the place decide. The scanner is our own, because shapely's stops at the first unclosed ring and at an SRID,
-and names no line.
+or lets the place decide. The scanner is our own: ``shapely.from_wkt`` (2.2, GEOS 3.14) names no line, closes no ring or
+all of them unsaid, and refuses SRID=, TRIANGLE, TIN and two geometries in one statement, which PostGIS and QGIS write.
 """
 
 from __future__ import annotations
@@ -19,10 +19,9 @@ from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from companion.errors import InputError
-from companion.geofence.document import Document, Mark
-from companion.geofence.findings import Code, Severity
-from companion.geofence.formats.raw.text import MAX_POSITIONS, require_shallow
+from companion.geofence.document import Code, Document, Mark, Severity
 from companion.geofence.formats.rings import Findings, polygons_from_rings
+from companion.geofence.formats.untrusted import MAX_POSITIONS, require_shallow
 from companion.geofence.shapes import Zone, ZoneKind, drawn, wrap_lon_deg
 
 Coordinates = list[tuple[float, float]]

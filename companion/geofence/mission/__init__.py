@@ -1,19 +1,8 @@
 """A mission: goals, area and options, read from TOML, made from drawings, checked before anything believes it."""
 
-from companion.geofence.mission.atom_options import (
-    AtomOptions,
-    CircleAtomOptions,
-    HeadingAtomOptions,
-    LeaveAtomOptions,
-    LineAtomOptions,
-    PointAtomOptions,
-    RepulsiveLineAtomOptions,
-    RepulsivePointAtomOptions,
-    StationAtomOptions,
-)
-from companion.geofence.mission.drawn import (
+from companion.geofence.mission.autopilot_mission import (
     NO_NAME,
-    Drawn,
+    DrawnMission,
     drawing_of,
     drawn_mission,
     hindrance,
@@ -22,31 +11,39 @@ from companion.geofence.mission.drawn import (
     read_kept,
 )
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
-from companion.geofence.mission.goal_options import (
-    BoxOptions,
-    FieldOptions,
-    GateOptions,
-    GoalOptions,
-    Latitude,
-    Longitude,
-    MarkOptions,
-    PointOptions,
-    SearchOptions,
-    kind_of,
-)
 from companion.geofence.mission.goals import Box, ByField, Gate, free_water, is_file
 from companion.geofence.mission.mission import load_area, load_mission, load_settings, place_troubles, read_mission
 from companion.geofence.mission.options import (
     AreaOptions,
+    AtomOptions,
+    BoxOptions,
+    CircleAtomOptions,
+    FieldOptions,
+    GateOptions,
+    GoalOptions,
+    HeadingAtomOptions,
+    Latitude,
+    LeaveAtomOptions,
+    LineAtomOptions,
+    Longitude,
+    MarkOptions,
     MissionOptions,
+    PointAtomOptions,
+    PointOptions,
     RefugeOptions,
+    RepulsiveLineAtomOptions,
+    RepulsivePointAtomOptions,
+    SearchOptions,
     StartOptions,
+    StationAtomOptions,
     WindOptions,
+    kind_of,
 )
 from companion.geofence.mission.text import parse_options, read_options, without_defaults
 
 __all__ = [
-    "NO_NAME", "PERMITS", "AreaOptions", "AtomOptions", "Box", "BoxOptions", "ByField", "CircleAtomOptions", "Drawn",
+    "NO_NAME", "PERMITS", "AreaOptions", "AtomOptions", "Box", "BoxOptions", "ByField", "CircleAtomOptions",
+    "DrawnMission",
     "FieldOptions", "Gate", "GateOptions", "GoalOptions", "HeadingAtomOptions", "Latitude", "LeaveAtomOptions",
     "LineAtomOptions", "Longitude", "MarkOptions", "MissionFiles", "MissionOptions", "PointAtomOptions",
     "PointOptions", "RefugeOptions", "RepulsiveLineAtomOptions", "RepulsivePointAtomOptions", "SearchOptions",

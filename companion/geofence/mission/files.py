@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from companion.geofence.document import Document
-from companion.geofence.findings import Finding, Severity
+from companion.geofence.document import Document, Finding, Severity
 from companion.geofence.formats.losses import Losses, Written
 from companion.geofence.formats.registry import write
-from companion.geofence.mission.course import Stop, course_of
+from companion.geofence.mission.autopilot_mission import MissionStop, course_of
 from companion.geofence.mission.mission import Mission
 from companion.geofence.mission.options import (
     AreaOptions,
@@ -98,7 +97,7 @@ def mission_files(
         losses.add(Severity.WARNING if is_loss else Severity.NOTE,
                    f"{finding.place}: {finding.text}" + (": not carried over" if is_loss else ""))
     names = document.item_names or ("",) * len(document.items)
-    points = [Stop(number=n, point=point).goal("", radius_m) for n, point in enumerate(goals, start=1)]
+    points = [MissionStop(number=n, point=point).goal("", radius_m) for n, point in enumerate(goals, start=1)]
     goal_options = points or [stop.goal(names[stop.number - 1], radius_m) for stop in course.stops]
     if not goal_options:
         raise ValueError("there is no goal: give --goal, or draw waypoints")

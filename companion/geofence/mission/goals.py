@@ -13,16 +13,16 @@ from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area
 from companion.geofence.formats.registry import parse, read
-from companion.geofence.mission.atom_options import LeaveAtomOptions
-from companion.geofence.mission.goal_options import (
+from companion.geofence.mission.options import (
     BoxOptions,
     FieldOptions,
     GateOptions,
     GoalOptions,
+    LeaveAtomOptions,
     MarkOptions,
+    MissionOptions,
     SearchOptions,
 )
-from companion.geofence.mission.options import MissionOptions
 from companion.geofence.shapes import Shape, ZoneKind, center_of, polygon_en
 from companion.messages import GeoPoint
 

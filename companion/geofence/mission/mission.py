@@ -14,12 +14,10 @@ from companion.disk import open_regular
 from companion.errors import InputError, unreadable
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
-from companion.geofence.document import Document
-from companion.geofence.findings import Finding, Severity
-from companion.geofence.formats.raw.text import decode
+from companion.geofence.document import Code, Document, Finding, Severity
 from companion.geofence.formats.registry import FAR_M, check_place, parse, read
+from companion.geofence.formats.untrusted import decode
 from companion.geofence.mission.goals import Gate, Goal, GoalReader, RefugePoint, refuges_of
-from companion.geofence.mission.names import called, name_findings
 from companion.geofence.mission.options import (
     AreaOptions,
     AutopilotOptions,
@@ -38,6 +36,7 @@ from companion.geofence.mission.options import (
 from companion.geofence.mission.text import parse_options, read_options
 from companion.geofence.shapes import Obstacle, Shape, Zone, ZoneKind
 from companion.messages import GeoPoint
+from companion.words import file_name
 
 AS_IT_IS: Mapping[Path, bytes] = {}   # nothing is given: every file is read from the disk
 RANGE_M = 50_000.0  # the frame is below 1 m wrong to here; what lies farther off is a mistake
@@ -388,3 +387,27 @@ def gate_trouble(gate: Gate, frame: LocalFrame, local: LocalArea, floor_m: float
     where = np.asarray(opening)[int(np.argmin(local.clearance_m(opening)))]
     return (f"between its marks there are {max(0.0, clearance_m):.0f} m to {local.nearest_name(where)}: "
             f"the margin's floor is {floor_m:g} m")
+
+
+# What a mission is called: by its name, or by its file's; and what is worth knowing about that.
+
+_NAMELESS = file_name("")
+
+
+def called(name: str | None, path: Path) -> str:
+    """Return a mission's name; of one that has none, its file's."""
+    return name if name is not None and name.strip() else path.stem
+
+
+def name_findings(name: str | None, path: Path) -> tuple[Finding, ...]:
+    """Return what is found about the name that a mission file gives (None: it gives none)."""
+    own = called(name, path)
+    stem = file_name(own)
+    if name is not None and not name.strip():
+        text, remedy = f"is empty: the mission is called {own!r}, as its file", "write a name, or leave the key out"
+    elif "/" in own or "\\" in own or not own.isprintable() or (stem == _NAMELESS and own != stem):
+        text = f"{own[:60]!r} cannot be part of a file's name: voyages and state are called {stem!r}"
+        remedy = "write it with letters and digits"
+    else:
+        return ()
+    return (Finding(severity=Severity.WARNING, code=Code.FORMAT, place="name", text=text, remedy=remedy),)

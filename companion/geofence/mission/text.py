@@ -14,10 +14,8 @@ import numpy as np
 import tomli_w
 
 from companion.errors import InputError
-from companion.geofence.formats.raw.text import decode, read_bytes
-from companion.geofence.mission.atom_options import ATOMS, AtomOptions
-from companion.geofence.mission.goal_options import KINDS, PointOptions
-from companion.geofence.mission.options import MissionOptions, tables
+from companion.geofence.formats.untrusted import decode, read_bytes
+from companion.geofence.mission.options import ATOMS, KINDS, AtomOptions, MissionOptions, PointOptions, tables
 from companion.words import choices
 
 MAX_TOML_BYTES = 1024 * 1024

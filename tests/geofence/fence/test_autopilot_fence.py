@@ -12,8 +12,7 @@ from shapely.geometry import Polygon
 
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, Circle, Fence, Obstacle, Zone, ZoneKind, load_mission
-from companion.geofence.fence.autopilot_fence import AutopilotFence, FenceStatus, fence_for_autopilot
-from companion.geofence.fence.proof import prove
+from companion.geofence.autopilot_fence import AutopilotFence, FenceStatus, fence_for_autopilot, prove
 from companion.geofence.formats.fence_items import MAX_FENCE_ITEMS, items_to_zones, zones_to_items
 from companion.geofence.formats.rings import Findings
 from companion.geofence.shapes import unwrapped

@@ -10,8 +10,8 @@ from shapely.geometry import Polygon
 
 from companion.errors import InputError
 from companion.geofence.area import Area, Fence
-from companion.geofence.check import Conditions, check_area
-from companion.geofence.findings import Code, Severity
+from companion.geofence.check import AreaConditions, check_area
+from companion.geofence.document import Code, Severity
 from companion.geofence.formats.registry import check_place, parse, write
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import ZoneKind
@@ -189,8 +189,8 @@ def test_entity_bombs_are_refused(root):
 
 
 def test_nesting_and_size_are_limited(tmp_path):
-    from companion.geofence.formats.raw.text import MAX_BYTES
     from companion.geofence.formats.registry import read
+    from companion.geofence.formats.untrusted import MAX_BYTES
 
     deep = b"<kml>" + b"<Folder>" * 5000 + b"</Folder>" * 5000 + b"</kml>"
     with pytest.raises(InputError, match="nest deeper"):
@@ -286,7 +286,7 @@ def test_fuzzed_files_are_refused_in_one_line_or_read(extension, data):
         write(document, "", format_name=name)
     if not any(f.severity is Severity.ERROR for f in document.findings):
         inside = tuple(z for z in document.zones if z.kind is ZoneKind.INCLUSION)
-        check_area(Area(obstacles=document.as_obstacles(10.0), fence=Fence(inside)), Conditions(margin_m=12.0))
+        check_area(Area(obstacles=document.as_obstacles(10.0), fence=Fence(inside)), AreaConditions(margin_m=12.0))
 
 
 @settings(**QUIET, max_examples=200)

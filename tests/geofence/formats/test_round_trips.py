@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
-from companion.geofence.document import Document
-from companion.geofence.findings import Severity
+from companion.geofence.document import Document, Severity
 from companion.geofence.formats.registry import parse, write
 from companion.geofence.shapes import Circle, ZoneKind
 from tests.geofence.strategies import QUIET, documents

@@ -3,7 +3,7 @@
 Every keep-out zone holds its obstacles and stays inside what the planner keeps clear of; the keep-in zone lies
 inside the limits and holds all water that the planner may use. So the fence never lets through what the files
 forbid, and never stops a boat that is where its plan may put it. Both halves are proved on the items' own integers
-(``fence_proof``), in the plane of longitude and latitude in which ArduPilot draws its polygons.
+(``prove``), in the plane of longitude and latitude in which ArduPilot draws its polygons.
 """
 
 from __future__ import annotations
@@ -15,22 +15,222 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from companion.geofence.area import Area
-from companion.geofence.fence.plane import EQUATOR_M, Plane, cut_by_rings, limits_in, plane_of, shape_in
-from companion.geofence.fence.proof import prove
-from companion.geofence.fence.simplify import circle_round, enclosing_circle, grown_polygon, shrunk_polygon
+from companion.geofence.area import Area, parts
+from companion.geofence.document import Severity
 from companion.geofence.formats.fence_items import (
     MAX_FENCE_ITEMS,
     MAX_RING,
     STORAGE_BYTES,
+    items_to_zones,
     storage_bytes,
     zones_to_items,
 )
-from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
+from companion.geofence.formats.rings import Findings
+from companion.geofence.shapes import Circle, Obstacle, Shape, Zone, ZoneKind, center_of, wrap_lon_deg
+from companion.geofence.simplify import circle_round, enclosing_circle, grown_polygon, shrunk_polygon
 from companion.messages import GeoPoint, MissionItem
+
+# An area in the plane of longitude and latitude, scaled to metres, in which ArduPilot draws its fence.
+
+AUTOPILOT_METRES_PER_DEGREE = 111_318.845  # ArduPilot's sphere (LATLON_TO_M), which draws its circles
+EQUATOR_M, FLATTENING = 6_378_137.0, 1.0 / 298.257223563  # WGS 84
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Longitude and latitude scaled to metres: straight lines stay straight, as on the autopilot.
+
+    Lengths are wrong by at most ``error`` (a fraction) within the area, ArduPilot's own sphere included.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    error: float
+
+    @property
+    def scale(self) -> NDArray[np.float64]:
+        """Metres per degree of longitude and of latitude, on the ellipsoid."""
+        sin2 = math.sin(math.radians(self.lat_deg)) ** 2
+        e2 = FLATTENING * (2.0 - FLATTENING)
+        east = EQUATOR_M / math.sqrt(1.0 - e2 * sin2) * math.cos(math.radians(self.lat_deg))
+        north = EQUATOR_M * (1.0 - e2) / (1.0 - e2 * sin2) ** 1.5
+        return np.asarray(np.radians(np.array([east, north])))
+
+    def metres(self, polygon: Polygon) -> Polygon:
+        """Return a polygon of degrees in metres; longitudes are brought near the plane's."""
+        def scaled(coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
+            lonlat = coordinates[:, :2] - np.array([self.lon_deg, self.lat_deg])
+            lonlat[:, 0] -= 360.0 * np.round(np.median(lonlat[:, 0]) / 360.0)
+            return np.asarray(lonlat * self.scale)
+        return shapely.transform(shapely.force_2d(polygon), scaled)
+
+    def point(self, point: GeoPoint) -> tuple[float, float]:
+        """Return a place in the plane [m]."""
+        lon = math.remainder(point.lon_deg - self.lon_deg, 360.0)
+        x, y = np.array([lon, point.lat_deg - self.lat_deg]) * self.scale
+        return float(x), float(y)
+
+    def degrees(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return (n, 2) places of the plane as longitude and latitude [deg]."""
+        return np.asarray(xy / self.scale + np.array([self.lon_deg, self.lat_deg]))
+
+    def geo(self, x: float, y: float) -> GeoPoint:
+        """Return a place of the plane, rounded as on the wire."""
+        lon, lat = self.degrees(np.array([[x, y]]))[0]
+        return GeoPoint(lat_deg=round(float(lat), 7), lon_deg=wrap_lon_deg(round(float(lon), 7)))
+
+
+def plane_of(area: Area, near: GeoPoint) -> Plane:
+    """Return the plane of the area. The scale's error grows with tan(latitude) times the extent."""
+    reach_deg = 0.0
+    shapes = [o.shape for o in area.solids] + [z.shape for z in area.fence.inclusions]
+    for shape in shapes:
+        if isinstance(shape, Circle):
+            lats = [shape.center.lat_deg - shape.radius_m / 1.1e5, shape.center.lat_deg + shape.radius_m / 1.1e5]
+        else:
+            lats = [float(shape.bounds[1]), float(shape.bounds[3])]
+        reach_deg = max(reach_deg, *(abs(lat - near.lat_deg) for lat in lats))
+    flat = math.tan(math.radians(min(85.0, abs(near.lat_deg) + reach_deg))) * math.radians(reach_deg)
+    scale = Plane(near.lat_deg, near.lon_deg, 0.0).scale
+    cosine = np.array([math.cos(math.radians(near.lat_deg)), 1.0])
+    sphere = float(np.max(np.abs(scale / (AUTOPILOT_METRES_PER_DEGREE * cosine) - 1.0)))
+    return Plane(near.lat_deg, near.lon_deg, flat + sphere + 1e-4)
+
+
+def shape_in(shape: Shape, plane: Plane, *, cover: bool) -> tuple[Polygon, tuple[float, float, float] | None]:
+    """Return a shape in the plane; a circle as (x, y, radius) too, its polygon drawn around or inside."""
+    if isinstance(shape, Circle):
+        x, y = plane.point(shape.center)
+        radius = shape.radius_m * (1.0 + plane.error if cover else 1.0 - plane.error)
+        return circle_round(x, y, radius, inside=not cover), (x, y, radius)
+    return plane.metres(shape), None
+
+
+def limits_in(
+    area: Area, plane: Plane, places: list[tuple[float, float]],
+) -> tuple[BaseGeometry | None, Circle | None]:
+    """Return the piece of the keep-in zones' intersection that holds the start, and the circle if it is one."""
+    limits: BaseGeometry | None = None
+    for zone in area.fence.inclusions:
+        polygon, _ = shape_in(zone.shape, plane, cover=False)
+        if zone.margin_m:
+            polygon = shapely.buffer(polygon, -zone.margin_m * (1.0 + plane.error))
+        limits = polygon if limits is None else shapely.intersection(limits, polygon)
+    if limits is None:
+        return None, None
+    here = shapely.points(places[0])
+    piece = next((p for p in parts(limits) if shapely.covers(p, here)), Polygon())
+    only = area.fence.inclusions[0] if len(area.fence.inclusions) == 1 else None
+    rim = only.shape if only is not None and isinstance(only.shape, Circle) and not only.margin_m else None
+    return piece, rim
+
+
+def cut_by_rings(
+    area: Area, plane: Plane, places: list[tuple[float, float]], limits: BaseGeometry | None, notes: list[str],
+) -> BaseGeometry | None:
+    """Return the limits cut to the hole of any obstacle that surrounds the start: a lake in its shore."""
+    here = shapely.points(places[0])
+    for obstacle in area.solids:
+        polygon, _ = shape_in(obstacle.shape, plane, cover=True)
+        for ring in polygon.interiors:
+            if shapely.covers(Polygon(ring), here):
+                hole = Polygon(ring)
+                if obstacle.margin_m:
+                    hole = shapely.buffer(hole, -obstacle.margin_m)
+                limits = hole if limits is None else shapely.intersection(limits, hole)
+                notes.append(f"the boat sails inside {obstacle.name or 'an obstacle'}: its shore is a keep-in zone")
+    return limits
+
+
+# The proof that fence items are a proper fence for an area, from the items' own integers.
+
+def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: Sequence[GeoPoint]) -> str:
+    """Return why the items are not a proper fence for the area, "" when they are. Independent of how they were made.
+
+    Checked with shapely on the items as they go to the autopilot: every obstacle that the keep-in zones leave in
+    reach is covered by the keep-out zones; the keep-in zones lie inside the limits; no keep-out zone reaches water
+    farther than ``margin_m`` from every obstacle; all water of the start's piece that is ``margin_m`` inside the
+    limits stays inside the keep-in zones; no place is shut out.
+    """
+    findings = Findings()
+    zones, _ = items_to_zones(items, findings)
+    if any(f.severity is Severity.ERROR for f in findings):
+        return findings[0].text
+    plane = plane_of(area, inside[0])
+    slack_m = 1e-6
+    keep_in: BaseGeometry | None = None
+    for zone in zones:
+        if zone.kind is ZoneKind.INCLUSION:
+            outer, _ = shape_in(zone.shape, plane, cover=True)
+            keep_in = outer if keep_in is None else shapely.intersection(keep_in, outer)
+    out_small = shapely.union_all([
+        _inner(z.shape, plane) for z in zones if z.kind is ZoneKind.EXCLUSION
+    ] or [Polygon()])
+    obstacles = [(o, shape_in(o.shape, plane, cover=True)[0]) for o in area.solids]
+    for obstacle, polygon in obstacles:
+        reach = polygon if keep_in is None else shapely.intersection(polygon, keep_in)
+        left = shapely.difference(reach, shapely.buffer(out_small, slack_m))
+        if shapely.area(left) > slack_m * max(1.0, float(polygon.length)):
+            return f"the keep-out zones do not hold {obstacle.name or 'an obstacle'}"
+    for zone in area.fence.inclusions:
+        polygon, _ = shape_in(zone.shape, plane, cover=False)
+        if any(_within_rim(z, zone, margin_m, plane) for z in zones):
+            continue
+        reach = shapely.difference(keep_in, out_small) if keep_in is not None else None
+        if reach is None or not shapely.covers(shapely.buffer(polygon, slack_m), reach):
+            return f"the keep-in zone is not inside {zone.name or 'the limits'}"
+    margin = shapely.union_all([
+        shapely.buffer(p, max(margin_m, o.margin_m or 0.0), quad_segs=16) for o, p in obstacles
+    ] or [Polygon()])
+    limits, _ = limits_in(area, plane, [plane.point(inside[0])])
+    limits = cut_by_rings(area, plane, [plane.point(inside[0])], limits, [])
+    useful: BaseGeometry | None = None
+    if limits is not None:
+        useful = shapely.buffer(limits, -margin_m, quad_segs=16)
+        margin = shapely.union(margin, shapely.difference(shapely.box(*limits.buffer(1e4).bounds), useful))
+    for zone in zones:
+        outer, _ = shape_in(zone.shape, plane, cover=True)
+        if zone.kind is ZoneKind.EXCLUSION and not shapely.covers(shapely.buffer(margin, slack_m), outer):
+            return f"the keep-out zone {zone.name or center_of(zone.shape)} reaches beyond the planner's margin"
+        inner = _inner(zone.shape, plane)
+        if zone.kind is ZoneKind.EXCLUSION or useful is None:
+            continue
+        if any(_within_rim(zone, rim, margin_m, plane) for rim in area.fence.inclusions):
+            continue
+        if not shapely.covers(shapely.buffer(inner, slack_m), _piece(useful, plane.point(inside[0]))):
+            return "the keep-in zone shuts out water that the planner may use"
+    for index, place in enumerate(inside):
+        point = shapely.points(plane.point(place))
+        shut = any(z.kind is ZoneKind.EXCLUSION and shapely.covers(shape_in(z.shape, plane, cover=True)[0], point)
+                   for z in zones)
+        if shut or (keep_in is not None and not shapely.covers(keep_in, point)):
+            return f"the {'start' if index == 0 else f'goal {index}'} would be outside the autopilot's fence"
+    return ""
+
+
+def _within_rim(zone: Zone, rim: Zone, margin_m: float, plane: Plane) -> bool:
+    """Whether a circle lies inside another by no more than the margin: their radii share one scale."""
+    if not (isinstance(zone.shape, Circle) and isinstance(rim.shape, Circle)) or rim.margin_m:
+        return False
+    (x0, y0), (x1, y1) = plane.point(zone.shape.center), plane.point(rim.shape.center)
+    apart_m = math.hypot(x1 - x0, y1 - y0) * (1.0 + plane.error)
+    spare_m = rim.shape.radius_m - zone.shape.radius_m
+    return zone.kind is ZoneKind.INCLUSION and apart_m <= spare_m <= margin_m - apart_m
+
+
+def _piece(useful: BaseGeometry, place: tuple[float, float]) -> BaseGeometry:
+    here = shapely.points(place)
+    return next((p for p in parts(useful) if shapely.covers(p, here)), useful)
+
+
+def _inner(shape: Shape, plane: Plane) -> Polygon:
+    """Return a polygon inside the shape (a circle's is drawn inside it)."""
+    return shape_in(shape, plane, cover=False)[0]
+
 
 # How much of the margin a simplification may use: the least that fits leaves the most room between plan and fence.
 STEPS = (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)

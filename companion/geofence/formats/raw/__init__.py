@@ -1,1 +1,0 @@
-"""Raw content: bytes as text, JSON and XML, within limits that a stranger's file cannot break."""
