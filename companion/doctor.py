@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from companion.boat import AutopilotLimits, Hull, narrowest_corridor_m, proposed_margin, widest_corridor_m
-from companion.mavlink.transfers import lookup
+from companion.mavlink.microservices import lookup
 from companion.mavlink.wire import believable
 from companion.messages import MissionItem
 from companion.skipper.step import ends_safely

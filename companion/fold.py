@@ -18,7 +18,8 @@ from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
 from companion.geofence import Zone
 from companion.geofence.formats import Findings, items_to_zones
-from companion.mavlink.trust import GAP_S, UID_EVERY_S, Identity, Witness
+from companion.mavlink.reception import PlausibilityFilter
+from companion.mavlink.vehicle_identity import GAP_S, UID_EVERY_S, Identity
 from companion.mavlink.wire import (
     AUTOPILOT_COMPONENT,
     RANGES,
@@ -256,7 +257,7 @@ class VoyageFold:
         self._air = StepWind(wind)
         self.state: SkipperState = skipper.initial(persisted, known)
         self.assembler = VehicleAssembler()
-        self._witness = Witness()
+        self._witness = PlausibilityFilter()
         self._identity = Identity()
         self._uid_s = -float("inf")
         self._neighbours: tuple[str, ...] = ()

@@ -18,8 +18,8 @@ from companion.compose import config_of, estimator_of, target_limits_of, voyage_
 from companion.errors import InputError
 from companion.fold import Step, VoyageFold
 from companion.geofence import load_mission
+from companion.mavlink.reception import OWN_COMPONENT
 from companion.mavlink.tlog import TlogRecord, read_tlog
-from companion.mavlink.trust import OWN_COMPONENT
 from companion.mavlink.wire import Codec, Message
 from companion.messages import MissionItem
 from companion.orders import Order

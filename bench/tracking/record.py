@@ -15,9 +15,9 @@ from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
-from companion.mavlink.transfers import Outcome
+from companion.mavlink.microservices import TransferOutcome
+from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.transports import open_link
-from companion.mavlink.trust import LinkIdentity
 from companion.messages import Command, Mode, waypoint
 from sitl.ardurover import ArduRover, require
 from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
@@ -99,7 +99,7 @@ async def _sail(trial: Trial, pilot: Pilot, wind: Risen, now: Callable[[], Now])
     points = [waypoint(frame.geo_from_en(*p)) for p in trial.points_en_m]
     loiter = waypoint(frame.geo_from_en(*trial.points_en_m[-1]), command=Command.NAV_LOITER_UNLIM)
     done = await pilot.upload_mission([*points, loiter])
-    if done.outcome is not Outcome.OK:
+    if done.outcome is not TransferOutcome.OK:
         raise JobError(f"{trial.name}: the mission was not taken: {done.text}")
     for _ in range(30):
         await pilot.arm()

@@ -15,8 +15,9 @@ from companion.geofence import Mission
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transfers import CommandAnswer
-from companion.mavlink.trust import LISTEN_S, OWN_COMPONENT, type_words, yields_to
+from companion.mavlink.microservices import CommandAnswer
+from companion.mavlink.reception import OWN_COMPONENT
+from companion.mavlink.vehicle_identity import LISTEN_S, type_words, yields_to
 from companion.mavlink.wire import RANGES
 from companion.messages import MissionItem
 from companion.skipper.step import Severity, is_given_up

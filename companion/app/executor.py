@@ -16,8 +16,8 @@ from typing import Any, Protocol
 
 from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
-from companion.mavlink.transfers import CommandAnswer
-from companion.mavlink.transfers import Outcome as WireOutcome
+from companion.mavlink.microservices import CommandAnswer
+from companion.mavlink.microservices import TransferOutcome as WireOutcome
 from companion.planner import Plan, Problem
 from companion.planner.settings import Settings
 from companion.skipper.step import (

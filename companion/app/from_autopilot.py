@@ -22,8 +22,9 @@ from companion.geofence.mission import DrawnMission, MissionOptions, drawing_of,
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.mission_lists import ReadResult
-from companion.mavlink.transports import SigningStore, Transport
-from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
+from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
+from companion.mavlink.signing import SigningStore
+from companion.mavlink.transports import Transport
 from companion.mavlink.wire import mission_hash
 from companion.messages import GeoPoint, MissionItem
 from companion.mission_check import require_sailable

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from companion.app.from_autopilot import DrawnSettings
 from companion.disk import Disk
-from companion.mavlink.transports import SigningStore
+from companion.mavlink.signing import SigningStore
 from companion.page import Address, TileChart
 from companion.telemetry.folder import VoyageArchive
 from companion.wind import Estimator, WindRoom

@@ -39,8 +39,8 @@ from companion.geofence import Mission
 from companion.guard import Auxiliary, Guard
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
+from companion.mavlink.reception import LinkIdentity, LinkStats
 from companion.mavlink.transports import Transport
-from companion.mavlink.trust import LinkIdentity, LinkStats
 from companion.mavlink.wire import Drop
 from companion.messages import CompanionStatus, MissionItem
 from companion.skipper import Skipper

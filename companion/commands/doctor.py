@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from companion.doctor import DoctorFinding, Examined, Needs
     from companion.geofence import Mission
     from companion.mavlink.autopilot import Autopilot
-    from companion.mavlink.transports import SigningStore, Transport
+    from companion.mavlink.signing import SigningStore
+    from companion.mavlink.transports import Transport
 
 LISTEN_S = 6.0   # long enough for messages of once a second to show their rate
 
@@ -85,7 +86,8 @@ def run(args: argparse.Namespace) -> int:
     from companion.commands.key import put_on
     from companion.doctor import Level
     from companion.geofence import load_mission
-    from companion.mavlink.transports import SigningStore, open_link
+    from companion.mavlink.signing import SigningStore
+    from companion.mavlink.transports import open_link
     from companion.mission_check import require_sailable
 
     mission = require_sailable(load_mission(args.mission)) if args.mission is not None else None
@@ -141,8 +143,8 @@ def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> 
     from companion.clock import run as run_loop
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
+    from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
     from companion.mavlink.transports import open_link
-    from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
 
     async def ask() -> AutopilotLimits:
         own = LinkIdentity(component=TOOL_COMPONENT)
@@ -168,7 +170,7 @@ async def diagnose(
     from companion.doctor import examine
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
-    from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
+    from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
 
     # Beside a companion that sails: by its ids the two would take each other for a second one.
     own = LinkIdentity(component=TOOL_COMPONENT)

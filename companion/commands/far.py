@@ -84,7 +84,7 @@ class _Count:
 
 def run_order(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.mavlink.transports import read_key
+    from companion.mavlink.signing import read_key
     from companion.orders.far import FarKey, FarOrder, pack_order
     from companion.orders.phrase import phrase
 
@@ -107,7 +107,7 @@ def run_order(args: argparse.Namespace) -> int:
 
 def run_begin(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.mavlink.transports import read_key
+    from companion.mavlink.signing import read_key
     from companion.orders.far import Beginning, FarKey, minutes_of, pack_beginning
 
     key = FarKey(read_key(args.key), args.system)
@@ -196,7 +196,7 @@ def _keep_count(key: Path, count: _Count) -> None:
 
 def run_status(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.mavlink.transports import read_key
+    from companion.mavlink.signing import read_key
     from companion.orders.far import FarKey, unpack_status
 
     data = _bytes_of(args.source)

@@ -21,7 +21,8 @@ from companion.program.arguments import system_id
 
 if TYPE_CHECKING:
     from companion.mavlink.autopilot import Autopilot
-    from companion.mavlink.transports import SigningStore, Transport
+    from companion.mavlink.signing import SigningStore
+    from companion.mavlink.transports import Transport
 
     Opens = Callable[[], Transport]
 
@@ -67,7 +68,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 
 def _new(args: argparse.Namespace) -> int:
-    from companion.mavlink.transports import make_key
+    from companion.mavlink.signing import make_key
 
     make_key(args.file, _asked_passphrase() if args.passphrase else "")
     print(f"{args.file}: a new key, which only you can read; keep a copy where the boat is not")
@@ -76,7 +77,8 @@ def _new(args: argparse.Namespace) -> int:
 
 def _run(work: Callable[..., Coroutine[None, None, str]], args: argparse.Namespace) -> int:
     from companion.clock import run as run_loop
-    from companion.mavlink.transports import SigningStore, open_link
+    from companion.mavlink.signing import SigningStore
+    from companion.mavlink.transports import open_link
 
     store = SigningStore(args.file, time.time())
     opens = functools.partial(open_link, args.link)
@@ -136,7 +138,7 @@ async def _connected(
 ) -> AsyncIterator[tuple[Autopilot, str]]:
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
-    from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
+    from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
 
     own = LinkIdentity(component=TOOL_COMPONENT)
     async with (

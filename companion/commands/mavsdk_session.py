@@ -84,8 +84,8 @@ def find_system(link: str, timeout_s: float, system: int | None) -> int:
     """
     from companion.clock import run
     from companion.mavlink.link import Link
+    from companion.mavlink.reception import SHORE
     from companion.mavlink.transports import open_link
-    from companion.mavlink.trust import SHORE
 
     async def listen() -> int:
         async with Link(open_link(link), identity=SHORE, target_system=system, streams=(), is_quiet=True) as heard:

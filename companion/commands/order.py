@@ -98,8 +98,9 @@ async def _give(args: argparse.Namespace, wanted: Wanted) -> Answer:
     import time
 
     from companion.mavlink.link import Link
-    from companion.mavlink.transports import SigningStore, open_link
-    from companion.mavlink.trust import SHORE
+    from companion.mavlink.reception import SHORE
+    from companion.mavlink.signing import SigningStore
+    from companion.mavlink.transports import open_link
     from companion.orders import give
 
     signing = None if args.signing_key is None else SigningStore(args.signing_key, time.time())

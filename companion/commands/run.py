@@ -378,7 +378,7 @@ def signing_of(path: Path | None) -> Any:
     """Return the key that frames are signed with, None: they are not."""
     if path is None:
         return None
-    from companion.mavlink.transports import SigningStore
+    from companion.mavlink.signing import SigningStore
 
     return SigningStore(path, time.time())
 
@@ -433,7 +433,7 @@ def far_of(args: argparse.Namespace, guard: Guard) -> Any:
                              "name its folder: --far DIR")
         return None
     from companion.app.options import SatelliteLink
-    from companion.mavlink.transports import read_key
+    from companion.mavlink.signing import read_key
 
     key_file = args.far_key or args.signing_key
     if key_file is None:

@@ -297,8 +297,8 @@ def heard(link: str) -> tuple[int | None, str]:
     """Return the system id of the autopilot on a link, None when none is heard, and why the port cannot be opened."""
     from companion.clock import run
     from companion.mavlink.link import Link
+    from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
     from companion.mavlink.transports import TransportState, open_link
-    from companion.mavlink.trust import TOOL_COMPONENT, LinkIdentity
 
     async def listen() -> tuple[int | None, str]:
         transport = open_link(link)

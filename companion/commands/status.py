@@ -58,7 +58,7 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
     from companion.clock import now_s
     from companion.errors import LinkError
     from companion.mavlink.link import Link
-    from companion.mavlink.trust import SHORE
+    from companion.mavlink.reception import SHORE
     from companion.mavlink.wire import StatusReader, VehicleAssembler
 
     reader, vehicle = StatusReader(), VehicleAssembler()

@@ -126,8 +126,8 @@ async def ashore(args: argparse.Namespace, charts: Any) -> int:
     """Show what a radio brings."""
     from companion.clock import now_s
     from companion.mavlink.link import Link
+    from companion.mavlink.reception import SHORE
     from companion.mavlink.transports import open_link
-    from companion.mavlink.trust import SHORE
     from companion.mavlink.wire import StatusReader, VehicleAssembler
     from companion.messages import VehicleState
     from companion.page import Address, LiveSource

@@ -88,7 +88,7 @@ def _source(args: argparse.Namespace) -> ViewSource:
         return OnBoard(args.socket)
     signing = None
     if args.signing_key is not None:
-        from companion.mavlink.transports import SigningStore
+        from companion.mavlink.signing import SigningStore
 
         signing = SigningStore(args.signing_key, time.time())
     return RadioSource(args.link, system=args.system, timeout_s=args.timeout, signing=signing)
@@ -215,8 +215,8 @@ class RadioSource(ViewSource):
 
     def __init__(self, name: str, *, system: int | None, timeout_s: float, signing: Any = None) -> None:
         from companion.mavlink.link import Link
+        from companion.mavlink.reception import SHORE
         from companion.mavlink.transports import open_link
-        from companion.mavlink.trust import SHORE
         from companion.mavlink.wire import StatusReader, VehicleAssembler
 
         super().__init__(name)

@@ -17,15 +17,13 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s
 from companion.mavlink.link import Link
-from companion.mavlink.mission_lists import Lists, Method, ReadResult, TransferResult
-from companion.mavlink.transfers.commands import CommandAnswer
-from companion.mavlink.transfers.machines import Outcome
-from companion.mavlink.transfers.params import ParamAnswer, ParamList, ParamRead, ParamSet, ParamTable, names_of
+from companion.mavlink.microservices.command import CommandAnswer, TransferOutcome
+from companion.mavlink.microservices.parameters import ParamAnswer, ParamList, ParamRead, ParamSet, ParamTable, names_of
+from companion.mavlink.mission_lists import Method, MissionLists, ReadResult, TransferResult
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.assembler import Value, VehicleAssembler
+from companion.mavlink.wire.companion_status import high_latency2, status_messages
 from companion.mavlink.wire.frames import Message
-from companion.mavlink.wire.high_latency import high_latency2
-from companion.mavlink.wire.status import status_messages
 from companion.messages import (
     AutopilotStatus,
     CompanionStatus,
@@ -63,7 +61,7 @@ class Autopilot:
         self._is_fed = assembler is not None
         self.assembler = assembler or VehicleAssembler()
         self._bad = self.assembler.dropped_by_type.copy()
-        self._lists = Lists(link, lambda: self.assembler.status)
+        self._lists = MissionLists(link, lambda: self.assembler.status)
         self._timeout_s = timeout_s
         self._listeners: list[OnValue] = []
         self._version_asked = False
@@ -164,7 +162,7 @@ class Autopilot:
         if answer.is_ok and not await self._wait_status(lambda s: s.mode is mode, since_s):
             shown = self.status.mode if self.status else None
             text = f"accepted, but the heartbeat shows {shown.name if shown is not None else 'no known mode'}"
-            return CommandAnswer(outcome=Outcome.MISMATCH, text=text, result=answer.result)
+            return CommandAnswer(outcome=TransferOutcome.MISMATCH, text=text, result=answer.result)
         return answer
 
     async def arm(self) -> CommandAnswer:
@@ -180,7 +178,8 @@ class Autopilot:
         answer = await self.link.command(wire.MAV_CMD_COMPONENT_ARM_DISARM, 1.0 if is_armed else 0.0)
         if answer.is_ok and not await self._wait_status(lambda s: s.is_armed is is_armed, since_s):
             return CommandAnswer(
-                outcome=Outcome.MISMATCH, text="accepted, but the heartbeat does not show it", result=answer.result
+                outcome=TransferOutcome.MISMATCH, text="accepted, but the heartbeat does not show it",
+                result=answer.result
             )
         return answer
 
@@ -192,7 +191,7 @@ class Autopilot:
 
         Confirmed by MISSION_CURRENT; sent again when that does not show it.
         """
-        answer = CommandAnswer(outcome=Outcome.TIMEOUT, text="not sent")
+        answer = CommandAnswer(outcome=TransferOutcome.TIMEOUT, text="not sent")
         for _ in range(SET_CURRENT_TRIES):
             since_s = now_s()
             resets = reset and self.status is not None and self.status.mode is Mode.AUTO
@@ -201,7 +200,8 @@ class Autopilot:
                 return answer
         now = self.status.mission_seq if self.status else None
         return CommandAnswer(
-            outcome=Outcome.MISMATCH, text=f"item {seq} was accepted, MISSION_CURRENT shows {now}", result=answer.result
+            outcome=TransferOutcome.MISMATCH, text=f"item {seq} was accepted, MISSION_CURRENT shows {now}",
+            result=answer.result
         )
 
     async def tack(self) -> CommandAnswer:

@@ -17,24 +17,75 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s
 from companion.errors import LinkError
-from companion.mavlink.rates import RateKeeper
-from companion.mavlink.transfers.commands import CommandAnswer, CommandSend
-from companion.mavlink.transfers.machines import Machine, Outcome, Party, ResultT_co
-from companion.mavlink.transports.signing import TICKS_PER_S, SigningStore
-from companion.mavlink.transports.transport import Transport, TransportState
-from companion.mavlink.trust.census import LISTEN_S, OtherCompanion, Speaker, listed
-from companion.mavlink.trust.identity import GAP_S
-from companion.mavlink.trust.link_stats import LinkStats, Throughput
-from companion.mavlink.trust.reception import Heard, LinkIdentity, Objection, Reception
+from companion.mavlink.microservices.command import (
+    CommandAnswer,
+    CommandSend,
+    Machine,
+    Party,
+    ResultT_co,
+    TransferOutcome,
+)
+from companion.mavlink.reception import Heard, LinkIdentity, LinkStats, Objection, Reception, Throughput
+from companion.mavlink.signing import TICKS_PER_S, SigningStore
+from companion.mavlink.transports import Transport, TransportState
+from companion.mavlink.vehicle_identity import GAP_S, LISTEN_S, OtherCompanion, Speaker, listed
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.frames import Codec, Drop, Message
 from companion.mavlink.wire.streams import DEFAULT_STREAMS, Stream, StreamMonitor
+
+# The rates of an autopilot's messages: asked for one by one, and again when they were forgotten.
+
+# Streams below their rate are asked for again this often, at most [s].
+REASK_S = 30.0
+
+
+class Asks(Protocol):
+    """Whoever sends a command and waits for its answer: the link."""
+
+    async def command(self, command: int, *params: float, give_up_s: float = ...) -> CommandAnswer:
+        """Send a COMMAND_LONG."""
+
+
+class RateKeeper:
+    """Asks for every stream of the monitor's table whenever ``wanted`` is set."""
+
+    def __init__(self, link: Asks, monitor: StreamMonitor) -> None:
+        self.wanted = asyncio.Event()
+        self._link, self._monitor = link, monitor
+        self._asked_s = 0.0
+        self._refused: set[str] = set()
+
+    def look(self, t_s: float) -> None:
+        """Ask again when a vital stream has fallen below its rate."""
+        if t_s - self._asked_s > REASK_S and any(
+            s.rate_hz > 0.0 and s.name not in self._refused for s in self._monitor.below_rate(t_s)
+        ):
+            self.wanted.set()
+
+    async def keep(self, found: asyncio.Event) -> None:
+        """Ask whenever it is wanted, once the autopilot is found; for ever."""
+        while True:
+            await self.wanted.wait()
+            await found.wait()
+            self.wanted.clear()
+            self._asked_s = now_s()
+            for stream in self._monitor.table:
+                if stream.rate_hz <= 0.0 or self.wanted.is_set():
+                    continue
+                answer = await self._link.command(
+                    wire.MAV_CMD_SET_MESSAGE_INTERVAL, stream.msg_id, 1e6 / stream.rate_hz, give_up_s=4.0
+                )
+                if answer.outcome in {TransferOutcome.REFUSED, TransferOutcome.UNSUPPORTED}:
+                    self._refused.add(stream.name)
+                if answer.outcome is TransferOutcome.LINK:
+                    break  # the next heartbeat after the gap asks again
+
 
 OnMessage = Callable[[float, Message], None]
 OnFrame = Callable[[float, bytes], None]
@@ -310,8 +361,8 @@ class Link:
         """Send a COMMAND_LONG (or the prepared ``message``) and return its answer."""
         machine = CommandSend(self.party, command, params, message=message, give_up_s=give_up_s)
         answer = await self.perform(machine, f"command {command}")
-        if answer.outcome is Outcome.TIMEOUT and self.is_lost:
-            return CommandAnswer(outcome=Outcome.LINK, text="the link is silent")
+        if answer.outcome is TransferOutcome.TIMEOUT and self.is_lost:
+            return CommandAnswer(outcome=TransferOutcome.LINK, text="the link is silent")
         return answer
 
     # ------------------------------------------------------------------------------------------ inside

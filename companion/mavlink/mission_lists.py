@@ -15,9 +15,9 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.clock import now_s
 from companion.mavlink.link import Link
-from companion.mavlink.transfers.ftp import FENCE_FILE, MISSION_FILE, RALLY_FILE, FtpRead, FtpWrite
-from companion.mavlink.transfers.lists import ListClear, ListDownload, ListUpload
-from companion.mavlink.transfers.machines import Outcome
+from companion.mavlink.microservices.command import TransferOutcome
+from companion.mavlink.microservices.ftp import FENCE_FILE, MISSION_FILE, RALLY_FILE, FtpRead, FtpWrite
+from companion.mavlink.microservices.mission import ListClear, ListDownload, ListUpload
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.items import ENDING, first_difference, pack_mission_dat, padded, sailed, unpack_mission_dat
 from companion.messages import AutopilotStatus, GeoPoint, MissionItem, MissionState, MissionType
@@ -36,7 +36,7 @@ class TransferResult:
     (without home) the autopilot holds now, None when that is not known.
     """
 
-    outcome: Outcome
+    outcome: TransferOutcome
     text: str = ""
     method: str = ""
     duration_s: float = 0.0
@@ -45,14 +45,14 @@ class TransferResult:
     @property
     def is_ok(self) -> bool:
         """The list is there."""
-        return self.outcome is Outcome.OK
+        return self.outcome is TransferOutcome.OK
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadResult:
     """How a download ended. ``items`` (without home) is None unless ``outcome`` is OK."""
 
-    outcome: Outcome
+    outcome: TransferOutcome
     text: str = ""
     items: tuple[MissionItem, ...] | None = None
     home: MissionItem | None = None
@@ -60,10 +60,10 @@ class ReadResult:
     @property
     def is_ok(self) -> bool:
         """The list was read."""
-        return self.outcome is Outcome.OK
+        return self.outcome is TransferOutcome.OK
 
 
-class Lists:
+class MissionLists:
     """The lists of the autopilot behind ``link``; one transfer at a time.
 
     ``version`` and ``home`` are told to it when they are heard.
@@ -95,11 +95,15 @@ class Lists:
     ) -> TransferResult:
         """Put a mission on the autopilot, read it back and compare, as ``Autopilot.upload_mission`` says."""
         async with self._link.lock("lists"):
-            result = TransferResult(outcome=Outcome.LINK, text="the link is silent")
+            result = TransferResult(outcome=TransferOutcome.LINK, text="the link is silent")
             for chosen in self._ways(items, method, keep_first, is_guarded=stopgap is not None):
                 if chosen == "ftp" and self._ftp_works is False:
                     continue
-                if chosen == "items" and result.method == "guarded" and result.outcome is not Outcome.UNSUPPORTED:
+                if (
+                    chosen == "items"
+                    and result.method == "guarded"
+                    and result.outcome is not TransferOutcome.UNSUPPORTED
+                ):
                     break   # what failed by a bad link is not tried again without the guard
                 if chosen == "guarded" and stopgap is not None:
                     result = await self._upload_guarded(items, keep_first, stopgap)
@@ -107,7 +111,7 @@ class Lists:
                     result = await self._upload_once(items, chosen, keep_first)
                 if result.is_ok or self._link.is_lost:
                     break
-                if chosen == "items" and result.outcome not in {Outcome.TIMEOUT, Outcome.MISMATCH}:
+                if chosen == "items" and result.outcome not in {TransferOutcome.TIMEOUT, TransferOutcome.MISMATCH}:
                     break
         return result
 
@@ -118,7 +122,7 @@ class Lists:
             machine = ListUpload(self._link.party, MissionType.MISSION, items, first=start, partial=True)
             written = await self._link.perform(machine)
             result = TransferResult(outcome=written.outcome, text=written.text, method="partial")
-            if written.outcome in {Outcome.OK, Outcome.UNCONFIRMED}:
+            if written.outcome in {TransferOutcome.OK, TransferOutcome.UNCONFIRMED}:
                 part = slice(start - 1, start - 1 + len(items))
                 result = compared(items, await self._read(MissionType.MISSION, "items"), "partial", part)
         return replace(result, duration_s=now_s() - began_s)
@@ -126,16 +130,16 @@ class Lists:
     async def write(self, kind: MissionType, items: Sequence[MissionItem]) -> TransferResult:
         """Put a fence or rally points on the autopilot, read back and compare."""
         began_s = now_s()
-        result = TransferResult(outcome=Outcome.LINK, text="the link is silent")
+        result = TransferResult(outcome=TransferOutcome.LINK, text="the link is silent")
         async with self._link.lock("lists"):
             for _ in range(UPLOAD_TRIES):
                 written = await self._link.perform(ListUpload(self._link.party, kind, items))
-                if written.outcome in {Outcome.OK, Outcome.UNCONFIRMED}:
+                if written.outcome in {TransferOutcome.OK, TransferOutcome.UNCONFIRMED}:
                     result = compared(items, await self._read(kind, "items"), "items")
                 else:
-                    outcome = written.outcome if not self._link.is_lost else Outcome.LINK
+                    outcome = written.outcome if not self._link.is_lost else TransferOutcome.LINK
                     result = TransferResult(outcome=outcome, text=written.text, method="items")
-                if result.outcome not in {Outcome.TIMEOUT, Outcome.MISMATCH} or self._link.is_lost:
+                if result.outcome not in {TransferOutcome.TIMEOUT, TransferOutcome.MISMATCH} or self._link.is_lost:
                     break
         return replace(result, duration_s=now_s() - began_s)
 
@@ -182,9 +186,9 @@ class Lists:
             written = await self._link.perform(FtpWrite(party, MISSION_FILE, data, seq=self._next_ftp_seq()))
             self._ftp_seq = written.next_seq
             outcome, text = written.outcome, written.text
-            if outcome is Outcome.OK:
+            if outcome is TransferOutcome.OK:
                 self._ftp_works = True
-            elif outcome in {Outcome.UNSUPPORTED, Outcome.REFUSED} and self._ftp_works is None:
+            elif outcome in {TransferOutcome.UNSUPPORTED, TransferOutcome.REFUSED} and self._ftp_works is None:
                 self._ftp_works = False
         elif method == "partial":
             # not padded: every item written restarts the present leg
@@ -195,22 +199,23 @@ class Lists:
         else:
             listed = await self._link.perform(ListUpload(party, kind, (home, *sent)))
             outcome, text = listed.outcome, listed.text
-        if outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
+        if outcome not in {TransferOutcome.OK, TransferOutcome.UNCONFIRMED}:
             if self._link.is_lost:
-                outcome = Outcome.LINK
+                outcome = TransferOutcome.LINK
             return TransferResult(outcome=outcome, text=text, method=method)
         read = await self._read(kind, "ftp" if method == "ftp" else "items")
         if read.items is None:
-            outcome = read.outcome if not self._link.is_lost else Outcome.LINK
+            outcome = read.outcome if not self._link.is_lost else TransferOutcome.LINK
             return TransferResult(outcome=outcome, text=f"written, not read back: {read.text}", method=method)
         difference = first_difference(sailed(sent), sailed(read.items))
         if not difference and len(read.items) < len(sent):
             difference = f"{len(sent)} items written, {len(read.items)} read back"
         if difference:
-            return TransferResult(outcome=Outcome.MISMATCH, text=difference, method=method, count=len(read.items))
+            return TransferResult(outcome=TransferOutcome.MISMATCH, text=difference, method=method,
+                                  count=len(read.items))
         tail = len(read.items) - len(sent)
         text = f"{tail} old items stand behind the end" if tail > 0 else ""
-        return TransferResult(outcome=Outcome.OK, text=text, method=method, count=len(read.items))
+        return TransferResult(outcome=TransferOutcome.OK, text=text, method=method, count=len(read.items))
 
     async def _upload_guarded(
         self, items: Sequence[MissionItem], keep_first: int, stopgap: MissionItem,
@@ -220,35 +225,35 @@ class Lists:
         closed = (*items[:keep_first], stopgap, *items[seq:])
         if len(closed) > seq:
             done = await self._link.perform(ListUpload(party, kind, (stopgap,), first=seq, partial=True))
-            if done.outcome is not Outcome.OK:
+            if done.outcome is not TransferOutcome.OK:
                 unknown = done.ack == wire.MAV_MISSION_UNSUPPORTED
-                return self._guarded(Outcome.UNSUPPORTED if unknown else done.outcome, done.text)
+                return self._guarded(TransferOutcome.UNSUPPORTED if unknown else done.outcome, done.text)
             total = self._mission_total()
             if total is not None and len(items) <= total + 1:
                 done = await self._link.perform(ListUpload(party, kind, closed[seq:], first=seq + 1, partial=True))
-            if total is None or len(items) > total + 1 or done.outcome is Outcome.REFUSED:
+            if total is None or len(items) > total + 1 or done.outcome is TransferOutcome.REFUSED:
                 done = await self._link.perform(ListUpload(party, kind, (self._home_item(items), *closed)))
-            if done.outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
+            if done.outcome not in {TransferOutcome.OK, TransferOutcome.UNCONFIRMED}:
                 return self._guarded(done.outcome, done.text)
             read = await self._read(kind, "items")
             difference = first_difference(closed, (read.items or ())[:len(closed)])
             if read.items is None or difference:
-                return self._guarded(Outcome.MISMATCH if read.items is not None else read.outcome, difference)
+                return self._guarded(TransferOutcome.MISMATCH if read.items is not None else read.outcome, difference)
         done = await self._link.perform(ListUpload(party, kind, (items[keep_first],), first=seq, partial=True))
-        if done.outcome not in {Outcome.OK, Outcome.UNCONFIRMED}:
+        if done.outcome not in {TransferOutcome.OK, TransferOutcome.UNCONFIRMED}:
             return self._guarded(done.outcome, done.text)
         read = await self._read(kind, "items")
         if read.items is None:
             return self._guarded(read.outcome, f"written, not read back: {read.text}")
         difference = first_difference(sailed(items), sailed(read.items))
-        result = self._guarded(Outcome.MISMATCH if difference else Outcome.OK, difference)
+        result = self._guarded(TransferOutcome.MISMATCH if difference else TransferOutcome.OK, difference)
         return replace(result, count=len(read.items))
 
-    def _guarded(self, outcome: Outcome, text: str) -> TransferResult:
-        if outcome is Outcome.UNCONFIRMED:
-            outcome = Outcome.TIMEOUT   # it may not stand there: nothing is written behind it
-        if outcome is not Outcome.OK and self._link.is_lost:
-            outcome = Outcome.LINK
+    def _guarded(self, outcome: TransferOutcome, text: str) -> TransferResult:
+        if outcome is TransferOutcome.UNCONFIRMED:
+            outcome = TransferOutcome.TIMEOUT   # it may not stand there: nothing is written behind it
+        if outcome is not TransferOutcome.OK and self._link.is_lost:
+            outcome = TransferOutcome.LINK
         return TransferResult(outcome=outcome, text=text, method="guarded")
 
     async def _read(self, kind: MissionType, method: Method) -> ReadResult:
@@ -257,22 +262,22 @@ class Lists:
             if result.is_ok or self._link.is_lost:
                 return result
         read = await self._link.perform(ListDownload(self._link.party, kind))
-        if read.outcome is not Outcome.OK:
-            outcome = read.outcome if not self._link.is_lost else Outcome.LINK
+        if read.outcome is not TransferOutcome.OK:
+            outcome = read.outcome if not self._link.is_lost else TransferOutcome.LINK
             return ReadResult(outcome=outcome, text=read.text)
         return _without_home(kind, read.items)
 
     async def _read_ftp(self, kind: MissionType) -> ReadResult:
         read = await self._link.perform(FtpRead(self._link.party, _FILES[kind], seq=self._next_ftp_seq()))
         self._ftp_seq = read.next_seq
-        if read.outcome is not Outcome.OK:
+        if read.outcome is not TransferOutcome.OK:
             return ReadResult(outcome=read.outcome, text=read.text)
         try:
             found, start, items = unpack_mission_dat(read.data)
         except ValueError as error:
-            return ReadResult(outcome=Outcome.MISMATCH, text=str(error))
+            return ReadResult(outcome=TransferOutcome.MISMATCH, text=str(error))
         if found is not kind or start != 0:
-            return ReadResult(outcome=Outcome.MISMATCH, text=f"the file holds {found.name} from item {start}")
+            return ReadResult(outcome=TransferOutcome.MISMATCH, text=f"the file holds {found.name} from item {start}")
         return _without_home(kind, items)
 
     def _next_ftp_seq(self) -> int:
@@ -292,11 +297,11 @@ def compared(
     if read.items is None:
         return TransferResult(outcome=read.outcome, text=read.text, method=method)
     difference = first_difference(items, read.items[part])
-    outcome = Outcome.MISMATCH if difference else Outcome.OK
+    outcome = TransferOutcome.MISMATCH if difference else TransferOutcome.OK
     return TransferResult(outcome=outcome, text=difference, method=method, count=len(read.items))
 
 
 def _without_home(kind: MissionType, items: tuple[MissionItem, ...]) -> ReadResult:
     if kind is not MissionType.MISSION:
-        return ReadResult(outcome=Outcome.OK, items=items)
-    return ReadResult(outcome=Outcome.OK, items=items[1:], home=items[0] if items else None)
+        return ReadResult(outcome=TransferOutcome.OK, items=items)
+    return ReadResult(outcome=TransferOutcome.OK, items=items[1:], home=items[0] if items else None)

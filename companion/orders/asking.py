@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from companion.mavlink.transfers import Machine, Party
-from companion.mavlink.trust import OWN_COMPONENT
+from companion.mavlink.microservices import Machine, Party
+from companion.mavlink.reception import OWN_COMPONENT
 from companion.mavlink.wire import Message, VehicleAssembler
 from companion.messages import StatusText
 from companion.orders.fields import COMMANDS, RESULTS, message_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from companion.mavlink.trust import OWN_COMPONENT
+from companion.mavlink.reception import OWN_COMPONENT
 from companion.orders.fields import VERB_COMMAND, params_of
 from companion.orders.order import Wanted
 from companion.orders.verbs import TABLE

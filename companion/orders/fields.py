@@ -10,7 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.trust import OWN_COMPONENT
+from companion.mavlink.reception import OWN_COMPONENT
 from companion.mavlink.wire import Message
 from companion.orders.order import Place, Result, Wanted, mark_of
 from companion.orders.verbs import BY_VERB, TABLE, Verb, verb_of

@@ -156,7 +156,7 @@ def far_status(
     )
 
 
-# Status to the radio: a frame of it every so often [s]; see companion.mavlink.wire.status for its bytes.
+# Status to the radio: a frame of it every so often [s]; see companion.mavlink.wire.companion_status for its bytes.
 STATUS_EVERY_S = 2.0
 TROUBLE_EVERY_S = 600.0   # trouble with the disk that lasts is said again
 

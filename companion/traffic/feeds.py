@@ -154,7 +154,7 @@ class AisFeed:
         )
 
 
-class _Datagrams(asyncio.DatagramProtocol):
+class _AisDatagrams(asyncio.DatagramProtocol):
     def __init__(self, feed: AisFeed) -> None:
         self._feed = feed
 
@@ -179,7 +179,7 @@ async def open_feed(name: str, on_report: OnReport, *, seed: int = 0) -> AsyncIt
     if feed.name.kind == "udpin":
         try:
             wire, _ = await loop.create_datagram_endpoint(
-                lambda: _Datagrams(feed), local_addr=(feed.name.host, feed.name.port)
+                lambda: _AisDatagrams(feed), local_addr=(feed.name.host, feed.name.port)
             )
         except OSError as error:
             raise LinkError(f"AIS feed {name}: {error}") from error

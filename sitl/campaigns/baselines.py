@@ -30,9 +30,9 @@ from companion.geofence import Mission, load_mission
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
-from companion.mavlink.transfers import Outcome
+from companion.mavlink.microservices import TransferOutcome
+from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.transports import open_link
-from companion.mavlink.trust import LinkIdentity
 from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
 from sitl.ardurover import ArduRover, require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
@@ -253,7 +253,7 @@ def sail_ardurover(
                 if fence.status is not FenceStatus.OK:
                     raise JobError(f"{scenario.name} does not fit in ArduRover's fence: {fence.reason}")
                 done = await pilot.upload_fence(fence.items)
-                if done.outcome is not Outcome.OK:
+                if done.outcome is not TransferOutcome.OK:
                     raise JobError(f"the fence was not taken: {done.text}")
 
             def now() -> Now | None:
@@ -281,7 +281,7 @@ async def _sail(pilot: Pilot, track: Track, now: Callable[[], Now | None], limit
     points: list[MissionItem] = [waypoint(g.point) for g in track.mission.goals]
     done = await pilot.upload_mission([*points, waypoint(track.mission.goals[-1].point,
                                                          command=Command.NAV_LOITER_UNLIM)])
-    if done.outcome is not Outcome.OK:
+    if done.outcome is not TransferOutcome.OK:
         raise JobError(f"the mission was not taken: {done.text}")
     for _ in range(30):
         await pilot.arm()

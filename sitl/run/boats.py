@@ -22,8 +22,8 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
+from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.transports import open_link
-from companion.mavlink.trust import LinkIdentity
 from companion.mavlink.wire import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import MOTOR, ArduRover, require

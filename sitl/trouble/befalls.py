@@ -17,8 +17,8 @@ from companion.clock import now_s
 from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
+from companion.mavlink.reception import OWN_COMPONENT, LinkIdentity
 from companion.mavlink.transports import Transport
-from companion.mavlink.trust import OWN_COMPONENT, LinkIdentity
 from companion.mavlink.wire import Codec
 from companion.messages import GeoPoint, MissionItem, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryEnd, MemoryLink, VaneFault, VaneState, serve

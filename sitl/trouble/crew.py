@@ -11,8 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.geo.frame import LocalFrame
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
+from companion.mavlink.reception import SHORE
 from companion.mavlink.transports import Transport
-from companion.mavlink.trust import SHORE
 from companion.messages import Command, GeoPoint, waypoint
 from companion.orders import Place, Verb, Wanted, give, phrase
 from sitl.scene import EventSpec

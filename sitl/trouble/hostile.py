@@ -22,7 +22,7 @@ from companion.fold import Step
 from companion.geo.angles import difference_rad
 from companion.geofence import load_mission
 from companion.mavlink.reads import READS
-from companion.mavlink.transports import SigningStore
+from companion.mavlink.signing import SigningStore
 from companion.messages import GeoPoint
 from companion.skipper.deeds import TOLD_S
 from companion.skipper.step import Phase

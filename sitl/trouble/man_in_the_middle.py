@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.clock import now_s
-from companion.mavlink.transports import EPOCH_S, TICKS_PER_S, Transport, open_link, read_key
+from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, read_key
+from companion.mavlink.transports import Transport, open_link
 from sitl.trouble.forgeries import Forger, Forgery
 from sitl.trouble.signer import SignedEnd, Signer
 

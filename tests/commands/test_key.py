@@ -17,7 +17,7 @@ from companion.commands.key import put_on, take_off
 from companion.errors import JobError, LinkError
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transports import SigningStore, make_key, read_key
+from companion.mavlink.signing import SigningStore, make_key, read_key
 from sitl.autopilot import Autopilot as Boat
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
 from sitl.scene.ships import free_port

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion import cli
-from companion.mavlink.trust import census
+from companion.mavlink import vehicle_identity
 from companion.mavlink.wire.codec import status_texts
 from companion.mavlink.wire.frames import Codec
 from sitl.scene.ships import free_port
@@ -65,7 +65,7 @@ class Boat:
 
 @pytest.fixture
 def boat(monkeypatch):
-    monkeypatch.setattr(census, "LISTEN_S", 0.3)
+    monkeypatch.setattr(vehicle_identity, "LISTEN_S", 0.3)
     boats = []
 
     def launch(**how):

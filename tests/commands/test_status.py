@@ -8,9 +8,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion import cli
-from companion.mavlink.trust import census
+from companion.mavlink import vehicle_identity
+from companion.mavlink.wire.companion_status import status_messages
 from companion.mavlink.wire.frames import Codec
-from companion.mavlink.wire.status import status_messages
 from companion.messages import CompanionStatus
 from sitl.scene.ships import free_port
 
@@ -22,7 +22,8 @@ STATUS = CompanionStatus(t_s=1.0, state="standard", tws_mps=5.0, twd_from_rad=0.
 @pytest.fixture
 def air(monkeypatch):
     """Return a port on which an autopilot's heartbeats and a companion's status are heard."""
-    monkeypatch.setattr(census, "LISTEN_S", 0.3)   # the autopilot's heartbeat before that counts it, and no more
+    monkeypatch.setattr(vehicle_identity, "LISTEN_S",
+                        0.3)   # the autopilot's heartbeat before that counts it, and no more
     port, stop = free_port(), threading.Event()
     threads = []
 

@@ -14,7 +14,7 @@ from companion.commands.doctor import as_json, as_text, diagnose, limits_at, nee
 from companion.doctor import Examined, Level, Needs, examine
 from companion.errors import LinkError
 from companion.geofence import load_mission
-from companion.mavlink.transports.signing import EPOCH_S, TICKS_PER_S, SigningStore
+from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, SigningStore
 from companion.messages import GeoPoint, MissionItem
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot.links.memory import frames

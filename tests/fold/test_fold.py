@@ -18,7 +18,7 @@ from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transports.endpoints import open_link
+from companion.mavlink.transports import open_link
 from companion.mavlink.wire.frames import Codec
 from companion.mavlink.wire.parameter_ranges import RANGES, believable, effect_of, refusal
 from companion.messages import GeoPoint, VehicleState, WindQuality, WindSample, WindSource

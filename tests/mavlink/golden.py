@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from companion.mavlink.microservices.command import Party
 from companion.mavlink.tlog import messages_of, read_tlog
-from companion.mavlink.transfers.machines import Party
 
 DATA = Path(__file__).parent / "data"
 PARTY = Party(1, 1, 1, 191)

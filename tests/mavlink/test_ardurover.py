@@ -8,11 +8,11 @@ from companion import clock
 from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transfers.machines import Outcome
-from companion.mavlink.transports.endpoints import open_link
-from companion.mavlink.trust.reception import LinkIdentity
+from companion.mavlink.microservices.command import TransferOutcome
+from companion.mavlink.reception import LinkIdentity
+from companion.mavlink.transports import open_link
+from companion.mavlink.wire.companion_status import StatusReader
 from companion.mavlink.wire.items import first_difference, mission_hash, sailed
-from companion.mavlink.wire.status import StatusReader
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, Mode, StatusText, waypoint
 from sitl.ardurover.program import find
 from sitl.ardurover.simulation import ArduRover
@@ -85,7 +85,7 @@ async def orders(near, shore_near):
         autopilot.on_value(lambda v: texts.append(v.text) if isinstance(v, StatusText) else None)
         await ready(autopilot)
         refused = await autopilot.set_mode(Mode.AUTO)
-        assert (refused.outcome, "No Mission" in refused.text) == (Outcome.REFUSED, True)
+        assert (refused.outcome, "No Mission" in refused.text) == (TransferOutcome.REFUSED, True)
 
         for method in ("items", "ftp"):
             assert (await autopilot.upload_mission(mission(29), method=method)).is_ok
@@ -106,7 +106,7 @@ async def orders(near, shore_near):
         new = [*short[:2], *mission(8, 0.001)[2:]]
         assert (await autopilot.upload_mission(new, method="partial", keep_first=2)).is_ok
         await holds(autopilot, new)
-        assert (await autopilot.set_current(99)).outcome is Outcome.REFUSED
+        assert (await autopilot.set_current(99)).outcome is TransferOutcome.REFUSED
 
         odd = [
             MissionItem(command=16, lat_e7=LAT, lon_e7=LON, alt_m=1.236, frame=6, params=(3.7, 2.0, 3.0, 4.0)),
@@ -126,14 +126,14 @@ async def orders(near, shore_near):
         ]
         assert (await autopilot.upload_fence(fence)).is_ok
         bad = await autopilot.upload_fence([fence[0]] * 2)
-        assert (bad.outcome, "Fence validation failed" in bad.text) == (Outcome.REFUSED, True)
+        assert (bad.outcome, "Fence validation failed" in bad.text) == (TransferOutcome.REFUSED, True)
         assert first_difference(fence, (await autopilot.read_fence()).items) == "", "the old fence stays"
         assert (await autopilot.upload_rally([MissionItem(command=5100, lat_e7=LAT, lon_e7=LON + 9000)])).is_ok
 
         assert (await autopilot.get_parameter("MAV_SYSID")).value == 1.0
         assert (await autopilot.set_parameter("SAIL_XTRACK_MAX", 25.0)).value == 25.0
         table = await autopilot.read_parameters()
-        assert (table.outcome, table.get("SAIL_XTRACK_MAX")) == (Outcome.OK, 25.0)
+        assert (table.outcome, table.get("SAIL_XTRACK_MAX")) == (TransferOutcome.OK, 25.0)
 
         for _ in range(6):
             autopilot.send_status(CompanionStatus(t_s=now_s(), state="standard", tws_mps=5.0, twd_from_rad=1.0))

@@ -10,11 +10,11 @@ from companion.clock import now_s, run_virtual
 from companion.errors import LinkError
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transfers.machines import Outcome
-from companion.mavlink.trust.reception import LinkIdentity
+from companion.mavlink.microservices.command import TransferOutcome
+from companion.mavlink.reception import LinkIdentity
+from companion.mavlink.wire.companion_status import StatusReader
 from companion.mavlink.wire.frames import Drop
 from companion.mavlink.wire.items import canonical, mission_hash, sailed
-from companion.mavlink.wire.status import StatusReader
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
@@ -55,7 +55,7 @@ def test_a_mission_goes_up_and_comes_back(method):
     async def main(boat, link, autopilot, memory):
         items = mission(9)
         result = await autopilot.upload_mission(items, method=method)
-        assert (result.outcome, result.count) == (Outcome.OK, 10)
+        assert (result.outcome, result.count) == (TransferOutcome.OK, 10)
         read = await autopilot.read_mission()
         assert [canonical(i) for i in read.items] == [canonical(i) for i in items]
         assert mission_hash(read.items) == mission_hash(items)
@@ -154,19 +154,19 @@ def test_behind_a_stopgap_no_mixture_is_ever_on_board(old):
 def test_refusals_have_the_autopilots_words():
     async def main(boat, link, autopilot, memory):
         answer = await autopilot.set_mode(Mode.AUTO)
-        assert answer.outcome is Outcome.REFUSED
+        assert answer.outcome is TransferOutcome.REFUSED
         assert "No Mission" in answer.text
         many = await autopilot.upload_mission(mission(700), method="items")
-        assert many.outcome is Outcome.REFUSED
+        assert many.outcome is TransferOutcome.REFUSED
         assert "655" in many.text
         bad = [MissionItem(command=5001, lat_e7=511000000, lon_e7=-13000000, params=(5.0, 0.0, 0.0, 0.0), frame=0)] * 3
         fence = await autopilot.upload_fence(bad)
-        assert fence.outcome is Outcome.REFUSED
+        assert fence.outcome is TransferOutcome.REFUSED
         assert "Fence validation failed" in fence.text
         missing = await autopilot.get_parameter("NO_SUCH_PARAM")
-        assert missing.outcome is Outcome.TIMEOUT
+        assert missing.outcome is TransferOutcome.TIMEOUT
         current = await autopilot.set_current(99)
-        assert current.outcome is Outcome.REFUSED
+        assert current.outcome is TransferOutcome.REFUSED
 
     sail(main)
 
@@ -189,7 +189,7 @@ def test_fences_rally_points_and_parameters():
         assert (await autopilot.set_parameter("SAIL_XTRACK_MAX", 25.0)).is_ok
         assert (await autopilot.get_parameter("SAIL_XTRACK_MAX")).value == 25.0
         table = await autopilot.read_parameters()
-        assert table.outcome is Outcome.OK
+        assert table.outcome is TransferOutcome.OK
         assert table.get("MAV_SYSID") == table.get("SYSID_THISMAV") == 1.0
         assert table.get("SAIL_XTRACK_MAX") == 25.0
 
@@ -238,7 +238,7 @@ def test_an_ftp_upload_cut_short_leaves_the_old_mission_whole(cut_after_s):
         await asyncio.sleep(cut_after_s)
         memory.cut()
         result = await upload
-        assert result.outcome is Outcome.LINK
+        assert result.outcome is TransferOutcome.LINK
         memory.mend()
         await asyncio.sleep(5.0)
         read = await autopilot.read_mission()
@@ -254,7 +254,7 @@ def test_a_cut_item_upload_is_told_and_repaired_by_the_next():
         upload = asyncio.ensure_future(autopilot.upload_mission(new, method="items"))
         await asyncio.sleep(0.09)
         memory.cut()
-        assert (await upload).outcome is Outcome.LINK
+        assert (await upload).outcome is TransferOutcome.LINK
         memory.mend()
         await asyncio.sleep(2.0)
         assert (await autopilot.upload_mission(new)).is_ok
@@ -433,5 +433,5 @@ def test_a_program_that_died_during_an_ftp_upload_is_followed_by_one_that_succee
         return result, hashes[0]
 
     result, seen = run_virtual(whole())
-    assert (result.outcome, result.method) == (Outcome.OK, "ftp")
+    assert (result.outcome, result.method) == (TransferOutcome.OK, "ftp")
     assert seen == mission_hash(mission(7))

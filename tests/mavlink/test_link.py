@@ -12,10 +12,10 @@ from companion.clock import now_s, run, run_virtual
 from companion.errors import LinkError
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transfers.machines import Outcome
-from companion.mavlink.transports.endpoints import open_link
-from companion.mavlink.transports.signing import EPOCH_S, SigningStore
-from companion.mavlink.trust.reception import LinkIdentity
+from companion.mavlink.microservices.command import TransferOutcome
+from companion.mavlink.reception import LinkIdentity
+from companion.mavlink.signing import EPOCH_S, SigningStore
+from companion.mavlink.transports import open_link
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.frames import Codec, Drop, SigningState
 from companion.mavlink.wire.items import mission_hash
@@ -191,7 +191,7 @@ def test_a_command_on_a_dead_link_says_so():
         await asyncio.sleep(3.0)
         began_s = now_s()
         answer = await autopilot.set_mode(Mode.HOLD)
-        assert answer.outcome is Outcome.LINK
+        assert answer.outcome is TransferOutcome.LINK
         assert now_s() - began_s < 10.0
 
     with_peer(main, streams=())

@@ -7,7 +7,7 @@ import pytest
 from companion.clock import run_virtual
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.trust import SHORE, LinkIdentity
+from companion.mavlink.reception import SHORE, LinkIdentity
 from companion.messages import Mode
 from sitl.autopilot import Autopilot as Boat
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve

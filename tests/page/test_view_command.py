@@ -105,8 +105,8 @@ def test_ashore_the_page_shows_what_the_radio_brings():
 
     from pymavlink.dialects.v20 import ardupilotmega as wire
 
+    from companion.mavlink.wire.companion_status import status_messages
     from companion.mavlink.wire.frames import Codec
-    from companion.mavlink.wire.status import status_messages
     from tests.view.test_heard import STATUS
 
     radio, port, over = free_port(), free_port(), threading.Event()

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion import clock
 from companion.errors import InputError, JobError
 from companion.geo.angles import difference_rad
-from companion.mavlink.transports.endpoints import open_link
+from companion.mavlink.transports import open_link
 from sitl.ardurover.program import check, fetch, find
 from sitl.ardurover.simulation import ArduRover, free_instance
 from sitl.autopilot import HOME

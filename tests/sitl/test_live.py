@@ -16,7 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.clock import now_s, run_virtual
 from companion.geo.angles import difference_rad
 from companion.geo.frame import LocalFrame
-from companion.mavlink.transports.endpoints import open_link
+from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint
 from companion.traffic.feeds import open_feed
 from companion.traffic.nmea import NmeaDecoder

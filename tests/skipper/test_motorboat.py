@@ -7,7 +7,7 @@ from shapely.geometry import box
 
 from companion.boat import Boat, constant
 from companion.field.tree import FieldTree, Round, parse
-from companion.mavlink.trust.identity import Identity
+from companion.mavlink.vehicle_identity import Identity
 from companion.messages import Mode
 from companion.skipper.rules import Skipper
 from companion.skipper.step import actions as act

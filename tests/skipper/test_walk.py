@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from companion.mavlink.trust.identity import Identity
+from companion.mavlink.vehicle_identity import Identity
 from companion.messages import Mode, StatusText
 from companion.planner import plan
 from companion.skipper.step import actions as act

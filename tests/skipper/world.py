@@ -17,7 +17,7 @@ from companion.boat import AutopilotLimits, Boat, ardurover_sitl
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import LocalArea
-from companion.mavlink.trust.identity import Identity
+from companion.mavlink.vehicle_identity import Identity
 from companion.messages import (
     AutopilotStatus,
     Command,

@@ -6,8 +6,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.mavlink.wire import StatusReader
+from companion.mavlink.wire.companion_status import status_messages
 from companion.mavlink.wire.frames import Codec
-from companion.mavlink.wire.status import status_messages
 from companion.messages import CompanionStatus, GeoPoint, TrafficStatus
 from companion.view import HeardFold
 from tests.view.test_view import valid

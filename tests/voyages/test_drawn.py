@@ -21,7 +21,7 @@ from companion.geofence import load_mission, read
 from companion.geofence.mission import load_settings
 from companion.mavlink.autopilot import Autopilot as Ours
 from companion.mavlink.link import Link
-from companion.mavlink.trust import SHORE
+from companion.mavlink.reception import SHORE
 from companion.mavlink.wire.codec import mission_item
 from companion.messages import GeoPoint, waypoint
 from companion.orders import Result, give, phrase

@@ -18,7 +18,7 @@ from companion.clock import run_virtual
 from companion.compose import config_of, voyage_of
 from companion.disk import Disk
 from companion.geofence import load_mission
-from companion.mavlink.trust.identity import Identity
+from companion.mavlink.vehicle_identity import Identity
 from companion.messages import AutopilotStatus, MissionItem, MissionState, Mode
 from companion.skipper import Skipper
 from companion.skipper.step import actions

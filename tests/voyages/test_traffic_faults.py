@@ -13,8 +13,8 @@ from companion.clock import now_s, run_virtual
 from companion.commands.status import EXIT_ALARM, exit_code, status_document, traffic_line
 from companion.geofence import load_mission
 from companion.mavlink.tlog import read_tlog
+from companion.mavlink.wire.companion_status import StatusReader
 from companion.mavlink.wire.frames import Codec
-from companion.mavlink.wire.status import StatusReader
 from companion.replay import replay
 from sitl.run.embedded import run_embedded
 from sitl.scene.scenario import load_scenario

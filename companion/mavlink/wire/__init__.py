@@ -1,14 +1,11 @@
 """What is on the wire: frames, messages as values and back, lists of items, streams, our own status."""
 
-from companion.mavlink.wire.assembler import VehicleAssembler
+from companion.mavlink.wire.assembler import MEMORY_S, VehicleAssembler
 from companion.mavlink.wire.codec import AUTOPILOT_COMPONENT, autopilot_version, is_autopilot_heartbeat
-from companion.mavlink.wire.dialect import Dialect
-from companion.mavlink.wire.fixes import MEMORY_S
-from companion.mavlink.wire.frames import Codec, Drop, Message
-from companion.mavlink.wire.high_latency import CONTROL_COMMAND, HIGH_LATENCY_S
+from companion.mavlink.wire.companion_status import CONTROL_COMMAND, HIGH_LATENCY_S, StatusReader, StatusReport
+from companion.mavlink.wire.frames import Codec, Dialect, Drop, Message
 from companion.mavlink.wire.items import first_difference, mission_hash
 from companion.mavlink.wire.parameter_ranges import RANGES, Effect, believable, effect_of
-from companion.mavlink.wire.status import StatusReader, StatusReport
 from companion.mavlink.wire.streams import Stream
 
 __all__ = [

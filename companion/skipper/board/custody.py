@@ -7,7 +7,7 @@ for. What a stranger's autopilot has on board sails on; ours is told nothing eit
 from __future__ import annotations
 
 from companion.frozen import changed
-from companion.mavlink.trust import ROVERS, Identity, type_words
+from companion.mavlink.vehicle_identity import ROVERS, Identity, type_words
 from companion.skipper.step.actions import CancelPlan, Severity, StopOrders
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn

@@ -13,7 +13,7 @@ from typing import Any
 from companion.boat import AutopilotLimits
 from companion.current import STILL_WATER, WaterCurrent, WindAngleUncertainty
 from companion.geofence import Zone
-from companion.mavlink.trust import Identity
+from companion.mavlink.vehicle_identity import Identity
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
 from companion.orders import Order
 from companion.skipper.step.config import DRY_RUN, Permissions

@@ -1,6 +1,6 @@
 """A link without a network: two transports in one process, with a radio's faults between them.
 
-Both ends have the shape of ``companion.mavlink.transports.transport.Transport``. Nothing is lost by default. Faults are
+Both ends have the shape of ``companion.mavlink.transports.Transport``. Nothing is lost by default. Faults are
 drawn from a seed, frame by frame, so that under the virtual clock a bad link repeats exactly.
 """
 

@@ -6,7 +6,7 @@ import struct
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.wire.dialect import Dialect, _layout
+from companion.mavlink.wire.frames import Dialect, _layout
 
 NUMBERS = sorted(wire.mavlink_map)
 KEY = bytes(range(32))

@@ -8,13 +8,12 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.clock import run_virtual
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
-from companion.mavlink.transfers.commands import CommandSend
-from companion.mavlink.transfers.ftp import FtpRead, FtpWrite
-from companion.mavlink.transfers.lists import ListClear, ListDownload, ListUpload
-from companion.mavlink.transfers.machines import Party
-from companion.mavlink.transfers.params import ParamList, ParamRead, ParamSet
+from companion.mavlink.microservices.command import CommandSend, Party
+from companion.mavlink.microservices.ftp import FtpRead, FtpWrite
+from companion.mavlink.microservices.mission import ListClear, ListDownload, ListUpload
+from companion.mavlink.microservices.parameters import ParamList, ParamRead, ParamSet
 from companion.mavlink.wire.assembler import VehicleAssembler
-from companion.mavlink.wire.status import StatusReader
+from companion.mavlink.wire.companion_status import StatusReader
 from companion.messages import MissionItem, MissionType
 from sitl.autopilot import MemoryLink
 

@@ -5,9 +5,8 @@ import math
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
+from companion.mavlink.wire.companion_status import WATCHDOGS, high_latency2, number_of, watchdog_of
 from companion.mavlink.wire.frames import Codec
-from companion.mavlink.wire.high_latency import high_latency2
-from companion.mavlink.wire.narrow import WATCHDOGS, number_of, watchdog_of
 from companion.messages import AutopilotStatus, CompanionStatus, GeoPoint, Mode, VehicleState
 
 VEHICLE = VehicleState(t_s=9.0, boot_s=123.456, position=GeoPoint(lat_deg=50.8, lon_deg=-1.3),

@@ -8,17 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.wire.frames import Codec
-from companion.mavlink.wire.status import (
+from companion.mavlink.wire.companion_status import (
     MAX_PAYLOAD_BYTES,
     STALE_S,
     StatusReader,
     pack_status,
+    pack_traffic,
     status_messages,
     unpack_status,
+    unpack_traffic,
 )
-from companion.mavlink.wire.traffic import MAX_PAYLOAD_BYTES as TRAFFIC_BYTES
-from companion.mavlink.wire.traffic import pack_traffic, unpack_traffic
+from companion.mavlink.wire.frames import Codec
 from companion.messages import CompanionStatus, GeoPoint, TrafficStatus
 
 ASCII = st.characters(min_codepoint=32, max_codepoint=126)
@@ -160,7 +160,7 @@ SEEN = st.builds(
 @given(SEEN)
 def test_what_is_seen_of_vessels_survives_the_air(seen):
     payload = pack_traffic(seen)
-    assert len(payload) <= TRAFFIC_BYTES
+    assert len(payload) <= MAX_PAYLOAD_BYTES
     back = unpack_traffic(payload)
     for field in dataclasses.fields(TrafficStatus):
         sent, got = getattr(seen, field.name), getattr(back, field.name)

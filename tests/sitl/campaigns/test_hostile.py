@@ -12,7 +12,7 @@ from companion.clock import run
 from companion.errors import InputError
 from companion.mavlink.link import Link
 from companion.mavlink.reads import ASHORE, READS
-from companion.mavlink.transports.endpoints import open_link
+from companion.mavlink.transports import open_link
 from companion.mavlink.wire.frames import Codec, Drop, SigningState
 from sitl import cli
 from sitl.autopilot import Autopilot, AutopilotConfig, serve

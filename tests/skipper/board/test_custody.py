@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from companion.mavlink.trust.identity import Identity
+from companion.mavlink.vehicle_identity import Identity
 from companion.messages import MissionItem, Mode
 from companion.skipper.step import actions as act
 from companion.skipper.step.saved import Persisted

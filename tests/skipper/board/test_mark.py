@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from companion.clock import run, run_virtual
 from companion.mavlink.autopilot import Autopilot as Pilot
 from companion.mavlink.link import Link
-from companion.mavlink.transports.endpoints import open_link
+from companion.mavlink.transports import open_link
 from companion.messages import Command, GeoPoint, MissionItem, waypoint
 from companion.skipper.board.mark import are_marked, marked
 from sitl.ardurover.program import find

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.clock import now_s, run_virtual
 from companion.errors import LinkError
-from companion.mavlink.transports.transport import TransportState
+from companion.mavlink.transports import TransportState
 from sitl.autopilot import Impairment, MemoryLink
 from sitl.autopilot.links.memory import FrameStream, frames
 from sitl.autopilot.server import pieces

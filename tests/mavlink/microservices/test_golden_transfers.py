@@ -2,11 +2,10 @@
 
 import pytest
 
-from companion.mavlink.transfers.commands import CommandSend
-from companion.mavlink.transfers.ftp import MISSION_FILE, FtpRead, FtpWrite, unpack
-from companion.mavlink.transfers.lists import ListDownload, ListUpload
-from companion.mavlink.transfers.machines import Outcome
-from companion.mavlink.transfers.params import ParamRead, ParamSet
+from companion.mavlink.microservices.command import CommandSend, TransferOutcome
+from companion.mavlink.microservices.ftp import MISSION_FILE, FtpRead, FtpWrite, unpack
+from companion.mavlink.microservices.mission import ListDownload, ListUpload
+from companion.mavlink.microservices.parameters import ParamRead, ParamSet
 from companion.mavlink.wire.codec import mission_item
 from companion.mavlink.wire.items import first_difference, pack_mission_dat, unpack_mission_dat
 from companion.messages import MissionType
@@ -31,12 +30,12 @@ def test_mission_upload_and_download_say_what_the_recorded_client_said():
     assert len(items) == 7
     machine = ListUpload(PARTY, MissionType.MISSION, items)
     sent = relive(machine, upload)
-    assert machine.result.outcome is Outcome.OK
+    assert machine.result.outcome is TransferOutcome.OK
     assert [fields(m) for m in sent] == client(upload, "MISSION_COUNT", "MISSION_ITEM_INT")
 
     reader = ListDownload(PARTY, MissionType.MISSION)
     sent = relive(reader, download)
-    assert reader.result.outcome is Outcome.OK
+    assert reader.result.outcome is TransferOutcome.OK
     assert [fields(m) for m in sent] == [fields(m) for m in said(download, 191)]
     assert first_difference(items[1:], reader.result.items[1:]) == ""
     assert reader.result.items[0].frame == 0, "item 0 comes back as the live home"
@@ -47,7 +46,7 @@ def test_partial_write_sends_only_its_items():
     items = items_of(talk)
     machine = ListUpload(PARTY, MissionType.MISSION, items, first=4, partial=True)
     sent = relive(machine, talk)
-    assert machine.result.outcome is Outcome.OK
+    assert machine.result.outcome is TransferOutcome.OK
     assert [fields(m) for m in sent] == client(talk, "MISSION_WRITE_PARTIAL_LIST", "MISSION_ITEM_INT")
 
 
@@ -56,7 +55,7 @@ def test_ack_13_does_not_end_an_upload():
     items = items_of(talk)
     machine = ListUpload(PARTY, MissionType.MISSION, items)
     sent = relive(machine, talk)
-    assert machine.result.outcome is Outcome.OK
+    assert machine.result.outcome is TransferOutcome.OK
     assert [m.seq for m in sent if m.get_type() == "MISSION_ITEM_INT"] == [0, 1, 2, 3, 4, 5, 6]
     assert 13 in [m.type for m in said(talk, 1) if m.get_type() == "MISSION_ACK"]
 
@@ -70,7 +69,7 @@ def test_a_cancelled_upload_is_offered_again():
     assert len(counts) >= 2, "after ACK 15 the list is offered once more"
     asked = [m.seq for m in said(talk, 1) if m.get_type() == "MISSION_REQUEST"]
     assert [m.seq for m in sent[1:counts[1]]] == asked, "each repeated request is answered"
-    assert machine.result.outcome is Outcome.TIMEOUT, "the recording has no second upload"
+    assert machine.result.outcome is TransferOutcome.TIMEOUT, "the recording has no second upload"
 
 
 @pytest.mark.parametrize(("low_s", "high_s", "ack", "words"), [
@@ -87,7 +86,7 @@ def test_refusals_carry_the_reason(low_s, high_s, ack, words):
     machine = ListUpload(PARTY, MissionType.MISSION, [good[1]] * first.count)
     sent = relive(machine, talk)
     assert fields(sent[0]) == fields(first)
-    assert machine.result.outcome is Outcome.REFUSED
+    assert machine.result.outcome is TransferOutcome.REFUSED
     assert machine.result.ack == ack
     assert words in machine.result.text
     assert "Field Elevation" not in machine.result.text
@@ -102,17 +101,17 @@ def test_fence_upload_and_its_refusals():
     items = [i for i in items_of(good) if i.command >= 5000]
     machine = ListUpload(PARTY, MissionType.FENCE, items)
     sent = relive(machine, good)
-    assert machine.result.outcome is Outcome.OK
+    assert machine.result.outcome is TransferOutcome.OK
     assert [fields(m) for m in sent] == client(good, "MISSION_COUNT", "MISSION_ITEM_INT")[:11]
 
     machine = ListUpload(PARTY, MissionType.FENCE, items_of(bad))
     relive(machine, bad)
-    assert machine.result.outcome is Outcome.REFUSED
+    assert machine.result.outcome is TransferOutcome.REFUSED
     assert "Incorrect item count; Fence validation failed" in machine.result.text
 
     machine = ListUpload(PARTY, MissionType.FENCE, items[:1] * 85)
     relive(machine, many)
-    assert machine.result.outcome is Outcome.REFUSED
+    assert machine.result.outcome is TransferOutcome.REFUSED
     assert "Only 84 items are supported" in machine.result.text
 
 
@@ -127,12 +126,12 @@ def test_ftp_write_and_read_are_the_recorded_bytes():
 
     machine = FtpWrite(PARTY, MISSION_FILE, data, seq=1)
     sent = relive(machine, write)
-    assert machine.result.outcome is Outcome.OK
+    assert machine.result.outcome is TransferOutcome.OK
     assert [m.payload for m in sent] == [m.payload for m in said(write, 191)]
 
     reader = FtpRead(PARTY, MISSION_FILE, seq=unpack(said(read, 191)[0].payload).seq)
     sent = relive(reader, read)
-    assert reader.result.outcome is Outcome.OK
+    assert reader.result.outcome is TransferOutcome.OK
     assert [m.payload for m in sent] == [m.payload for m in said(read, 191)]
     back = unpack_mission_dat(reader.result.data)[2]
     assert first_difference(items[1:], back[1:]) == ""
@@ -142,15 +141,15 @@ def test_ftp_of_a_missing_file_is_unsupported():
     talk = load("ftp_not_found")
     machine = FtpRead(PARTY, "@MISSION/none.dat", seq=unpack(said(talk, 191)[0].payload).seq)
     relive(machine, talk)
-    assert machine.result.outcome is Outcome.UNSUPPORTED
+    assert machine.result.outcome is TransferOutcome.UNSUPPORTED
     assert "file not found" in machine.result.text
 
 
 @pytest.mark.parametrize(("command", "params", "nth", "outcome", "words"), [
-    (176, (1.0, 10.0), 0, Outcome.REFUSED, "No Mission. Can't set AUTO.; Flight mode change failed"),
-    (176, (1.0, 10.0), 1, Outcome.OK, ""),
-    (400, (1.0,), 0, Outcome.REFUSED, "Arm: Accels inconsistent; Arm: AHRS: waiting for home"),
-    (193, (), 0, Outcome.UNSUPPORTED, ""),
+    (176, (1.0, 10.0), 0, TransferOutcome.REFUSED, "No Mission. Can't set AUTO.; Flight mode change failed"),
+    (176, (1.0, 10.0), 1, TransferOutcome.OK, ""),
+    (400, (1.0,), 0, TransferOutcome.REFUSED, "Arm: Accels inconsistent; Arm: AHRS: waiting for home"),
+    (193, (), 0, TransferOutcome.UNSUPPORTED, ""),
 ])
 def test_commands_with_the_autopilots_words(command, params, nth, outcome, words):
     talk = load("commands_refused")
@@ -169,17 +168,17 @@ def test_parameters():
     asked_s = next(t for t, m in talk if getattr(m, "param_id", "") == "WP_RADIUS")
     machine = ParamRead(PARTY, ["WP_RADIUS"])
     relive(machine, between(talk, asked_s, asked_s + 0.15))
-    assert (machine.result.outcome, machine.result.value) == (Outcome.OK, 3.0)
+    assert (machine.result.outcome, machine.result.value) == (TransferOutcome.OK, 3.0)
 
     machine = ParamRead(PARTY, ["NO_SUCH_PARAM"])
     relive(machine, between(talk, 0.2045, 9.0))
-    assert machine.result.outcome is Outcome.TIMEOUT
+    assert machine.result.outcome is TransferOutcome.TIMEOUT
 
     machine = ParamSet(PARTY, "SAIL_XTRACK_MAX", 30.0)
     relive(machine, between(talk, 1.3, 1.345))
-    assert (machine.result.outcome, machine.result.value) == (Outcome.OK, 30.0)
+    assert (machine.result.outcome, machine.result.value) == (TransferOutcome.OK, 30.0)
 
     machine = ParamSet(PARTY, "SAIL_XTRACK_MAX", 25.0)
     relive(machine, between(talk, 1.3, 1.345))
-    assert machine.result.outcome is Outcome.REFUSED, "the echo shows another value"
+    assert machine.result.outcome is TransferOutcome.REFUSED, "the echo shows another value"
     assert "stays 30" in machine.result.text

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.transfers.machines import Outcome, Party, Retry, Texts
+from companion.mavlink.microservices.command import Party, Retransmission, Texts, TransferOutcome
 from companion.mavlink.wire.codec import mission_item, mission_item_int
 from companion.mavlink.wire.frames import Message
 from companion.messages import MissionItem, MissionType
@@ -35,7 +35,7 @@ ACK_WORDS = {
 class ListResult:
     """How an upload ended; ``ack`` is the MISSION_ACK type, None when none came."""
 
-    outcome: Outcome
+    outcome: TransferOutcome
     text: str = ""
     ack: int | None = None
     requests: int = 0
@@ -58,7 +58,7 @@ class ListUpload:
         self.result: ListResult | None = None
         self._party, self._type, self._first, self._partial = party, mission_type, first, partial
         self._items: Mapping[int, MissionItem] = {first + i: item for i, item in enumerate(items)}
-        self._retry = Retry(give_up_s=8.0)
+        self._retry = Retransmission(give_up_s=8.0)
         self._texts = Texts(party)
         self._sent: set[int] = set()
         self._heard_s = 0.0
@@ -104,15 +104,16 @@ class ListUpload:
     def tick(self, t_s: float) -> list[Message]:
         """Offer again, or give up."""
         if self._refusal is not None:
-            return self._end(Outcome.REFUSED, self._reason(self._refusal), self._refusal)
+            return self._end(TransferOutcome.REFUSED, self._reason(self._refusal), self._refusal)
         if self._sent:
             if len(self._sent) == len(self._items):
-                return self._end(Outcome.UNCONFIRMED, "all items sent, no final acknowledgement")
+                return self._end(TransferOutcome.UNCONFIRMED, "all items sent, no final acknowledgement")
             return self._end(
-                Outcome.TIMEOUT, f"the autopilot stopped asking after {len(self._sent)} of {len(self._items)} items"
+                TransferOutcome.TIMEOUT,
+                f"the autopilot stopped asking after {len(self._sent)} of {len(self._items)} items"
             )
         if not self._retry.again(t_s):
-            return self._end(Outcome.TIMEOUT, "no answer to the offer of a list")
+            return self._end(TransferOutcome.TIMEOUT, "no answer to the offer of a list")
         self._wake_s = self._retry.wake_s
         return [self._offer()]
 
@@ -126,7 +127,7 @@ class ListUpload:
         if ack == wire.MAV_MISSION_ACCEPTED:
             if len(self._sent) < len(self._items):
                 return []  # a late echo of an earlier upload
-            return self._end(Outcome.OK, "", ack)
+            return self._end(TransferOutcome.OK, "", ack)
         if ack == wire.MAV_MISSION_INVALID_SEQUENCE:
             return []  # the upload goes on as long as requests come
         if ack in {wire.MAV_MISSION_OPERATION_CANCELLED, wire.MAV_MISSION_DENIED} and (
@@ -147,7 +148,7 @@ class ListUpload:
         said = str(self._texts)
         return f"{words}: {said}" if said else words
 
-    def _end(self, outcome: Outcome, text: str, ack: int | None = None) -> list[Message]:
+    def _end(self, outcome: TransferOutcome, text: str, ack: int | None = None) -> list[Message]:
         self.result = ListResult(outcome=outcome, text=text, ack=ack, requests=self._requests)
         return []
 
@@ -156,7 +157,7 @@ class ListUpload:
 class DownloadResult:
     """How a download ended; ``items`` is complete when ``outcome`` is OK (for missions item 0 is home)."""
 
-    outcome: Outcome
+    outcome: TransferOutcome
     text: str = ""
     items: tuple[MissionItem, ...] = ()
 
@@ -167,7 +168,7 @@ class ListDownload:
     def __init__(self, party: Party, mission_type: MissionType) -> None:
         self.result: DownloadResult | None = None
         self._party, self._type = party, mission_type
-        self._retry = Retry()
+        self._retry = Retransmission()
         self._texts = Texts(party)
         self._count: int | None = None
         self._items: dict[int, MissionItem] = {}
@@ -199,7 +200,7 @@ class ListDownload:
                 wire.MAV_MISSION_ACCEPTED, wire.MAV_MISSION_INVALID_SEQUENCE
             }:
                 words = f"MISSION_ACK {message.type} ({ACK_WORDS.get(message.type, 'unknown')}) {self._texts}"
-                self.result = DownloadResult(outcome=Outcome.REFUSED, text=words.strip())
+                self.result = DownloadResult(outcome=TransferOutcome.REFUSED, text=words.strip())
             return []
         if kind == "MISSION_COUNT":
             if self._count == message.count:
@@ -210,14 +211,14 @@ class ListDownload:
             try:
                 self._items[message.seq] = mission_item(message)
             except ValueError as error:
-                self.result = DownloadResult(outcome=Outcome.MISMATCH, text=f"item {message.seq}: {error}")
+                self.result = DownloadResult(outcome=TransferOutcome.MISMATCH, text=f"item {message.seq}: {error}")
                 return []
         else:
             return []
         self._retry.progress(t_s)
         if len(self._items) == self._count:
             items = tuple(self._items[i] for i in range(self._count))
-            self.result = DownloadResult(outcome=Outcome.OK, items=items)
+            self.result = DownloadResult(outcome=TransferOutcome.OK, items=items)
             return [wire.MAVLink_mission_ack_message(*self._party.target, 0, int(self._type))]
         return [self._question()]
 
@@ -227,7 +228,7 @@ class ListDownload:
             text = "no answer to the request of a list" if self._count is None else (
                 f"item {len(self._items)} of {self._count} never came"
             )
-            self.result = DownloadResult(outcome=Outcome.TIMEOUT, text=text)
+            self.result = DownloadResult(outcome=TransferOutcome.TIMEOUT, text=text)
             return []
         return [self._question()]
 
@@ -243,7 +244,7 @@ class ListClear:
     def __init__(self, party: Party, mission_type: MissionType) -> None:
         self.result: ListResult | None = None
         self._party, self._type = party, mission_type
-        self._retry = Retry(give_up_s=8.0)
+        self._retry = Retransmission(give_up_s=8.0)
         self._texts = Texts(party)
 
     @property
@@ -267,13 +268,14 @@ class ListClear:
             refused = message.type != wire.MAV_MISSION_ACCEPTED
             words = f"MISSION_ACK {message.type} ({ACK_WORDS.get(message.type, 'unknown')}) {self._texts}".strip()
             self.result = ListResult(
-                outcome=Outcome.REFUSED if refused else Outcome.OK, text=words if refused else "", ack=message.type
+                outcome=TransferOutcome.REFUSED if refused else TransferOutcome.OK, text=words if refused else "",
+                ack=message.type
             )
         return []
 
     def tick(self, t_s: float) -> list[Message]:
         """Ask again, or give up."""
         if not self._retry.again(t_s):
-            self.result = ListResult(outcome=Outcome.TIMEOUT, text="no answer to clear")
+            self.result = ListResult(outcome=TransferOutcome.TIMEOUT, text="no answer to clear")
             return []
         return [wire.MAVLink_mission_clear_all_message(*self._party.target, int(self._type))]

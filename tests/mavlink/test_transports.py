@@ -11,8 +11,14 @@ from hypothesis import strategies as st
 
 from companion.clock import run
 from companion.errors import InputError, LinkError
-from companion.mavlink.transports.endpoints import BACKOFF_CAP_S, backoff_s, open_link
-from companion.mavlink.transports.transport import MAX_WRITE_BUFFER_BYTES, TransportState, parse_link
+from companion.mavlink.transports import (
+    BACKOFF_CAP_S,
+    MAX_WRITE_BUFFER_BYTES,
+    TransportState,
+    backoff_s,
+    open_link,
+    parse_link,
+)
 
 
 @pytest.mark.parametrize(("text", "kind", "where"), [

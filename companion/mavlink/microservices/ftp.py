@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.transfers.machines import Outcome, Party, Retry
+from companion.mavlink.microservices.command import Party, Retransmission, TransferOutcome
 from companion.mavlink.wire.frames import Message
 
 MISSION_FILE = "@MISSION/mission.dat"
@@ -68,7 +68,7 @@ def unpack(payload: list[int]) -> Packet:
 class FtpResult:
     """How a file transfer ended; ``data`` is what was read."""
 
-    outcome: Outcome
+    outcome: TransferOutcome
     text: str = ""
     data: bytes = b""
     error: int | None = None
@@ -85,7 +85,7 @@ class _Ftp:
         self._session = 0
         self._request = Packet(0, 0, 0)
         # a session is repeated longer than other conversations: it is all or nothing
-        self._retry = Retry(first_s=0.5, cap_s=1.5, give_up_s=12.0)
+        self._retry = Retransmission(first_s=0.5, cap_s=1.5, give_up_s=12.0)
         self._reset_done = False
 
     @property
@@ -100,7 +100,7 @@ class _Ftp:
         return self._gave_up()
 
     def _gave_up(self) -> list[Message]:
-        return self._end(Outcome.TIMEOUT, "MAVFTP does not answer")
+        return self._end(TransferOutcome.TIMEOUT, "MAVFTP does not answer")
 
     def _ask(self, t_s: float, opcode: int, *, size: int = 0, offset: int = 0, data: bytes = b"") -> list[Message]:
         self._request = Packet(self._seq, self._session, opcode, size, 0, 0, offset, data)
@@ -130,12 +130,12 @@ class _Ftp:
 
     def _refused(self, packet: Packet) -> list[Message]:
         error = self._error(packet)
-        outcome = Outcome.UNSUPPORTED if error in {_UNKNOWN_COMMAND, _NOT_FOUND} else Outcome.REFUSED
+        outcome = TransferOutcome.UNSUPPORTED if error in {_UNKNOWN_COMMAND, _NOT_FOUND} else TransferOutcome.REFUSED
         words = f"MAVFTP error {error} ({ERRORS.get(error, 'unknown')}) at opcode {self._request.opcode}"
         return self._end(outcome, words, error=error)
 
     def _end(
-        self, outcome: Outcome, text: str = "", *, data: bytes = b"", error: int | None = None
+        self, outcome: TransferOutcome, text: str = "", *, data: bytes = b"", error: int | None = None
     ) -> list[Message]:
         # + 2: a late answer to the last request cannot be taken for one to the next session's first
         self.result = FtpResult(
@@ -170,7 +170,7 @@ class FtpWrite(_Ftp):
         if opcode == RESET:
             return self._ask(t_s, CREATE, data=self._path)
         if opcode == TERMINATE:
-            return self._end(Outcome.OK)
+            return self._end(TransferOutcome.OK)
         if opcode == CREATE:
             self._session = packet.session
         else:
@@ -181,7 +181,7 @@ class FtpWrite(_Ftp):
 
     def _gave_up(self) -> list[Message]:
         if self._request.opcode == TERMINATE:
-            return self._end(Outcome.UNCONFIRMED, "the file was written, closing it was not acknowledged")
+            return self._end(TransferOutcome.UNCONFIRMED, "the file was written, closing it was not acknowledged")
         return super()._gave_up()
 
 
@@ -265,7 +265,7 @@ class FtpRead(_Ftp):
         data = bytearray()
         while len(data) in self._chunks and self._chunks[len(data)]:
             data += self._chunks[len(data)]
-        return self._end(Outcome.OK, data=bytes(data))
+        return self._end(TransferOutcome.OK, data=bytes(data))
 
     def _gave_up(self) -> list[Message]:
         if self._request.opcode == TERMINATE:

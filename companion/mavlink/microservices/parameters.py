@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.transfers.machines import Outcome, Party, Retry
+from companion.mavlink.microservices.command import Party, Retransmission, TransferOutcome
 from companion.mavlink.wire.frames import Message
 
 # 4.7 renamed these [ArduPilot PR #29617]; SRn_ numbered serial links from 0, MAVn_ numbers MAVLink links from 1.
@@ -50,7 +50,7 @@ def lookup(parameters: Mapping[str, float], name: str) -> float | None:
 class ParamAnswer:
     """How a read or a write ended; ``name`` is the one that the autopilot uses, ``value`` what it has now."""
 
-    outcome: Outcome
+    outcome: TransferOutcome
     name: str
     value: float | None = None
     param_type: int | None = None
@@ -59,14 +59,14 @@ class ParamAnswer:
     @property
     def is_ok(self) -> bool:
         """Read, or written and echoed."""
-        return self.outcome is Outcome.OK
+        return self.outcome is TransferOutcome.OK
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParamTable:
     """All parameters; ``is_complete`` is False when some never came."""
 
-    outcome: Outcome
+    outcome: TransferOutcome
     values: Mapping[str, float]
     types: Mapping[str, int]
     text: str = ""
@@ -82,7 +82,7 @@ class ParamRead:
     def __init__(self, party: Party, names: Iterable[str], *, give_up_s: float = 5.0) -> None:
         self.result: ParamAnswer | None = None
         self._party, self._names = party, tuple(names)
-        self._retry = Retry(first_s=0.6, give_up_s=give_up_s)
+        self._retry = Retransmission(first_s=0.6, give_up_s=give_up_s)
 
     @property
     def wake_s(self) -> float:
@@ -102,7 +102,7 @@ class ParamRead:
             and message.param_id in self._names and self.result is None
         ):
             self.result = ParamAnswer(
-                outcome=Outcome.OK, name=message.param_id, value=float(message.param_value),
+                outcome=TransferOutcome.OK, name=message.param_id, value=float(message.param_value),
                 param_type=message.param_type,
             )
         return []
@@ -112,7 +112,7 @@ class ParamRead:
         if not self._retry.again(t_s):
             names = " or ".join(self._names)
             self.result = ParamAnswer(
-                outcome=Outcome.TIMEOUT, name=self._names[0],
+                outcome=TransferOutcome.TIMEOUT, name=self._names[0],
                 text=f"no answer for parameter {names} (it does not exist, or unsigned frames are ignored)",
             )
             return []
@@ -134,7 +134,7 @@ class ParamSet:
         self.result: ParamAnswer | None = None
         self._party, self._name, self._type = party, name, param_type
         self._value = _float32(value)
-        self._retry = Retry(first_s=0.6, give_up_s=5.0)
+        self._retry = Retransmission(first_s=0.6, give_up_s=5.0)
         self._other: float | None = None
 
     @property
@@ -157,7 +157,7 @@ class ParamSet:
             value = float(message.param_value)
             if abs(value - self._value) <= 1e-6 * max(1.0, abs(self._value)):
                 self.result = ParamAnswer(
-                    outcome=Outcome.OK, name=self._name, value=value, param_type=message.param_type
+                    outcome=TransferOutcome.OK, name=self._name, value=value, param_type=message.param_type
                 )
             else:
                 self._other = value  # perhaps a late answer to an earlier read: let it be written again
@@ -169,10 +169,10 @@ class ParamSet:
             return [self._say()]
         if self._other is not None:
             text = f"{self._name} stays {self._other:g} though {self._value:g} was written"
-            self.result = ParamAnswer(outcome=Outcome.REFUSED, name=self._name, value=self._other, text=text)
+            self.result = ParamAnswer(outcome=TransferOutcome.REFUSED, name=self._name, value=self._other, text=text)
         else:
             self.result = ParamAnswer(
-                outcome=Outcome.TIMEOUT, name=self._name, text=f"no echo of parameter {self._name}"
+                outcome=TransferOutcome.TIMEOUT, name=self._name, text=f"no echo of parameter {self._name}"
             )
         return []
 
@@ -217,7 +217,7 @@ class ParamList:
             self._wake_s = t_s + SILENCE_S
             self._silent = 0
         if self._count and len(self._by_index) == self._count:
-            self.result = ParamTable(outcome=Outcome.OK, values=self._values, types=self._types)
+            self.result = ParamTable(outcome=TransferOutcome.OK, values=self._values, types=self._types)
         return []
 
     def tick(self, t_s: float) -> list[Message]:
@@ -230,7 +230,7 @@ class ParamList:
                 "no parameter replies (is signing enabled on the autopilot?)"
             )
             self.result = ParamTable(
-                outcome=Outcome.TIMEOUT, values=self._values, types=self._types, text=text
+                outcome=TransferOutcome.TIMEOUT, values=self._values, types=self._types, text=text
             )
             return []
         if not self._by_index:

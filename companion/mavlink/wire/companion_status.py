@@ -21,10 +21,9 @@ from dataclasses import dataclass, replace
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.geo.angles import wrap_two_pi
-from companion.mavlink.wire import traffic as traffic_wire
 from companion.mavlink.wire.codec import e7, geo_point
 from companion.mavlink.wire.frames import Message
-from companion.messages import CompanionStatus, TrafficStatus
+from companion.messages import AutopilotStatus, CompanionStatus, TrafficStatus, VehicleState
 
 # TUNNEL payload types from 32768 on are free for private use; ours is read by nobody else.
 PAYLOAD_TYPE = 0xC05A
@@ -146,9 +145,9 @@ def status_messages(status: CompanionStatus, boot_s: float, turn: int) -> list[M
         0, 0, PAYLOAD_TYPE, len(payload), list(payload.ljust(MAX_PAYLOAD_BYTES, b"\x00"))
     )]
     if status.traffic is not None and turn % 2 == 0:
-        seen = traffic_wire.pack_traffic(status.traffic)
+        seen = pack_traffic(status.traffic)
         messages.append(wire.MAVLink_tunnel_message(
-            0, 0, traffic_wire.PAYLOAD_TYPE, len(seen), list(seen.ljust(MAX_PAYLOAD_BYTES, b"\x00"))))
+            0, 0, TRAFFIC_PAYLOAD_TYPE, len(seen), list(seen.ljust(MAX_PAYLOAD_BYTES, b"\x00"))))
     turn %= 4
     if turn == 3:
         wind = wind_cov(status, boot_s)
@@ -225,8 +224,8 @@ class StatusReader:
             if kind == "TUNNEL" and message.payload_type == PAYLOAD_TYPE:
                 self._packed = unpack_status(bytes(message.payload[:message.payload_length]), t_s)
                 self._heard_s["status"] = t_s
-            elif kind == "TUNNEL" and message.payload_type == traffic_wire.PAYLOAD_TYPE:
-                self._traffic = traffic_wire.unpack_traffic(bytes(message.payload[:message.payload_length]))
+            elif kind == "TUNNEL" and message.payload_type == TRAFFIC_PAYLOAD_TYPE:
+                self._traffic = unpack_traffic(bytes(message.payload[:message.payload_length]))
                 self._heard_s["traffic"] = t_s
             elif kind == "WIND_COV":
                 self._take_wind(t_s, message)
@@ -275,3 +274,148 @@ class StatusReader:
         }[name]
         self._plain = replace(self._plain, t_s=t_s, **changes)  # type: ignore[arg-type]
         self._heard_s[name] = t_s
+
+
+# What the companion sees of other vessels, on the air: a TUNNEL of its own beside the status. Pure.
+#
+# It goes out every other time with the status and only where vessels or feeds are: at most 35 bytes/s more.
+
+TRAFFIC_PAYLOAD_TYPE = 0xC05B
+TRAFFIC_VERSION = 1
+# Version, feeds, silent feeds, shared MMSIs, clock jumps; vessels, refused, silence [s], TCPA [s], bearing [0.01 deg];
+# range and CPA [m], the two risks. The words follow: alarm, role, rule, name.
+_TRAFFIC_PACK = struct.Struct("<BBBBBHHHHHffff")
+_MARK = "\x1f"
+_WORDS = 4
+
+
+def _byte(value: int) -> int:
+    return max(0, min(255, value))
+
+
+def pack_traffic(status: TrafficStatus) -> bytes:
+    """Return the payload of a TUNNEL, at most 128 bytes; the name is cut to what fits."""
+    bearing = status.bearing_rad
+    head = _TRAFFIC_PACK.pack(
+        TRAFFIC_VERSION, _byte(status.feeds), _byte(status.silent_feeds), _byte(status.shared_mmsi),
+        _byte(status.clock_jumps),
+        _u16(status.vessels), _u16(status.refused), _u16(status.silence_s), _u16(status.tcpa_s),
+        _NONE16 if bearing is None else round(math.degrees(wrap_two_pi(bearing)) * 100.0) % 36000,
+        _f32(status.range_m), _f32(status.cpa_m), _f32(status.promised_risk), _f32(status.path_risk),
+    )
+    words = _MARK.join(w.replace(_MARK, " ") for w in (status.alarm, status.role, status.rule, status.name))
+    return head + words.encode("ascii", "replace")[:MAX_PAYLOAD_BYTES - _TRAFFIC_PACK.size]
+
+
+def unpack_traffic(payload: bytes) -> TrafficStatus:
+    """Return what is in a TUNNEL payload.
+
+    Raises:
+        ValueError: it is not one of ours, is of another version, or is torn.
+    """
+    if len(payload) < _TRAFFIC_PACK.size or payload[0] != TRAFFIC_VERSION:
+        raise ValueError(f"traffic payload of {len(payload)} bytes, version {payload[0] if payload else None}")
+    (_, feeds, silent, shared, jumps, vessels, refused, silence, tcpa, bearing, range_m, cpa_m, promised,
+     path) = _TRAFFIC_PACK.unpack_from(payload)
+    words = payload[_TRAFFIC_PACK.size:].decode("ascii", "replace").split(_MARK)
+    if len(words) != _WORDS:
+        raise ValueError("traffic payload is torn")
+    return TrafficStatus(
+        vessels=vessels, refused=refused, feeds=feeds, silent_feeds=silent, shared_mmsi=shared, clock_jumps=jumps,
+        silence_s=_scaled(silence), tcpa_s=_scaled(tcpa), range_m=_float(range_m), cpa_m=_float(cpa_m),
+        promised_risk=_float(promised), path_risk=_float(path),
+        bearing_rad=None if bearing == _NONE16 else math.radians(bearing / 100.0),
+        alarm=words[0], role=words[1], rule=words[2], name=words[3],
+    )
+
+
+# The watchdogs as numbers, for links that have no room for words.
+
+# In the order in which they were numbered: a new one goes to the end, for a status of last year must read the same.
+WATCHDOGS = (
+    "link silent", "position lost", "position jump", "wind untrusted", "becalmed", "drifting", "in irons",
+    "vessel too near", "no progress", "heading against course", "off the corridor", "stuck waypoint", "mission ended",
+    "fence breach", "foreign mission", "reboot", "battery low", "battery critical", "leaking", "dark", "shore lost",
+    "out of time", "dragged off", "planner dead", "strong wind", "light wind", "fence off",
+    "wind contradicted",
+)
+
+
+def number_of(watchdog: str) -> int:
+    """Return the number of a watchdog, 0 for none (an empty name)."""
+    return WATCHDOGS.index(watchdog) + 1 if watchdog else 0
+
+
+def watchdog_of(number: int) -> str:
+    """Return the watchdog of a number, empty for 0; one that is not known here is named by its number."""
+    if number == 0:
+        return ""
+    return WATCHDOGS[number - 1] if number <= len(WATCHDOGS) else f"watchdog {number}"
+
+
+# HIGH_LATENCY2 of the companion: the boat and the companion's view of her in one message of 42 bytes. Pure.
+#
+# Sent as component 191 after MAV_CMD_CONTROL_HIGH_LATENCY, for a program that passes it on over a narrow link. A
+# station may take it for the vehicle's own (QGroundControl looks at no component id): so type, mode and arming are the
+# autopilot's, and custom0 is its base mode, where ArduPilot has it too. custom1 and custom2 are ours.
+
+CONTROL_COMMAND = int(wire.MAV_CMD_CONTROL_HIGH_LATENCY)
+HIGH_LATENCY_S = 5.0          # as the protocol has it (mavlink.io, High Latency Protocol)
+NO_TEMPERATURE = -128
+FIX_3D = 3
+
+
+def high_latency2(
+    status: CompanionStatus, vehicle: VehicleState | None, autopilot: AutopilotStatus | None, watchdog: str = "",
+) -> Message | None:
+    """Return the message, None while the position or the mode is not known: it has no number for that.
+
+    custom1 is the plan's P(safe) [%], -1 without a plan; custom2 the number of the worst watchdog that is raised.
+    """
+    if vehicle is None or autopilot is None or autopilot.mode is None:
+        return None
+    lat_e7, lon_e7 = e7(vehicle.position)
+    base_mode = wire.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | (
+        wire.MAV_MODE_FLAG_SAFETY_ARMED if autopilot.is_armed else 0)
+    remaining, risk = autopilot.battery_remaining, status.promised_risk
+    return wire.MAVLink_high_latency2_message(
+        timestamp=round(vehicle.boot_s * 1e3) & 0xFFFFFFFF, type=autopilot.vehicle_type or wire.MAV_TYPE_SURFACE_BOAT,
+        autopilot=wire.MAV_AUTOPILOT_ARDUPILOTMEGA, custom_mode=int(autopilot.mode), latitude=lat_e7, longitude=lon_e7,
+        altitude=0, target_altitude=0, heading=_half_degrees(vehicle.heading_rad),
+        target_heading=_half_degrees(autopilot.target_bearing_rad),
+        target_distance=_saturated16(status.waypoint_distance_m, 0.1),
+        throttle=0, airspeed=0, airspeed_sp=0, groundspeed=_saturated8(vehicle.speed_mps, 5.0),
+        windspeed=_saturated8(status.tws_mps, 5.0), wind_heading=_half_degrees(status.twd_from_rad), eph=0, epv=0,
+        temperature_air=NO_TEMPERATURE, climb_rate=0,
+        battery=-1 if remaining is None else round(100.0 * remaining),
+        wp_num=_saturated16(status.waypoint_seq), failure_flags=_failures(autopilot),
+        custom0=base_mode - 256 if base_mode > 127 else base_mode,
+        custom1=-1 if risk is None else round(100.0 * (1.0 - risk)), custom2=number_of(watchdog),
+    )
+
+
+def _failures(autopilot: AutopilotStatus) -> int:
+    flags = 0
+    if autopilot.gps_fix is not None and autopilot.gps_fix < FIX_3D:
+        flags |= wire.HL_FAILURE_FLAG_GPS
+    if not autopilot.ekf_ok:
+        flags |= wire.HL_FAILURE_FLAG_ESTIMATOR
+    if autopilot.battery_failed:
+        flags |= wire.HL_FAILURE_FLAG_BATTERY
+    if autopilot.receiver_lost:
+        flags |= wire.HL_FAILURE_FLAG_RC_RECEIVER
+    if autopilot.fence_breached:
+        flags |= wire.HL_FAILURE_FLAG_GEOFENCE
+    return flags
+
+
+def _half_degrees(angle_rad: float | None) -> int:
+    return 0 if angle_rad is None else round(math.degrees(wrap_two_pi(angle_rad)) / 2.0) % 180
+
+
+def _saturated8(value: float | None, scale: float) -> int:
+    return 0 if value is None else max(0, min(255, round(value * scale)))
+
+
+def _saturated16(value: float | None, scale: float = 1.0) -> int:
+    return 0 if value is None else max(0, min(0xFFFF, round(value * scale)))

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.errors import InputError
-from companion.mavlink.transfers.ftp import FtpRead, FtpWrite, Packet, unpack
-from companion.mavlink.transfers.lists import ListDownload, ListUpload
-from companion.mavlink.transfers.machines import Outcome, Party, Retry
-from companion.mavlink.transfers.params import ALIASES, ParamList, names_of
-from companion.mavlink.transports.signing import AHEAD_S, EPOCH_S, TICKS_PER_S, SigningStore, read_key
+from companion.mavlink.microservices.command import Party, Retransmission, TransferOutcome
+from companion.mavlink.microservices.ftp import FtpRead, FtpWrite, Packet, unpack
+from companion.mavlink.microservices.mission import ListDownload, ListUpload
+from companion.mavlink.microservices.parameters import ALIASES, ParamList, names_of
+from companion.mavlink.signing import AHEAD_S, EPOCH_S, TICKS_PER_S, SigningStore, read_key
 from companion.mavlink.wire.codec import heartbeat
 from companion.mavlink.wire.frames import Codec, SigningState
 from companion.mavlink.wire.streams import Stream, StreamMonitor
@@ -24,7 +24,7 @@ PARTY = Party(1, 1, 1, 191)
 @settings(max_examples=200)
 @given(st.floats(0.0, 1e7), st.floats(0.01, 3.0), st.floats(0.5, 30.0))
 def test_a_retry_ends_at_any_time_of_day(start_s, first_s, give_up_s):
-    retry = Retry(first_s=first_s, give_up_s=give_up_s)
+    retry = Retransmission(first_s=first_s, give_up_s=give_up_s)
     retry.progress(start_s)
     for _ in range(10_000):
         now_s = retry.wake_s
@@ -110,10 +110,10 @@ def test_an_upload_over_a_bad_line_ends_complete_or_says_why(seed):
     peer = LossyPeer(random.Random(seed), 0.3)
     machine = ListUpload(PARTY, MissionType.MISSION, ITEMS)
     peer.talk(machine)
-    if machine.result.outcome is Outcome.OK:
+    if machine.result.outcome is TransferOutcome.OK:
         assert [peer.stored[i].x for i in range(12)] == [i.lat_e7 for i in ITEMS]
     else:
-        assert machine.result.outcome in {Outcome.TIMEOUT, Outcome.UNCONFIRMED}
+        assert machine.result.outcome in {TransferOutcome.TIMEOUT, TransferOutcome.UNCONFIRMED}
         assert machine.result.text
 
 
@@ -122,7 +122,7 @@ def test_uploads_over_a_bad_line_mostly_succeed():
     for seed in range(30):
         machine = ListUpload(PARTY, MissionType.MISSION, ITEMS)
         LossyPeer(random.Random(seed), 0.3).talk(machine)
-        good += machine.result.outcome is Outcome.OK
+        good += machine.result.outcome is TransferOutcome.OK
     # a last acknowledgement lost is a success that only a reading back can tell
     assert good >= 15
 
@@ -132,7 +132,7 @@ def test_a_download_over_a_bad_line_is_exact(seed):
     peer = LossyPeer(random.Random(seed), 0.3, ITEMS)
     machine = ListDownload(PARTY, MissionType.MISSION)
     peer.talk(machine)
-    assert machine.result.outcome is Outcome.OK
+    assert machine.result.outcome is TransferOutcome.OK
     assert [i.lat_e7 for i in machine.result.items] == [i.lat_e7 for i in ITEMS]
 
 
@@ -169,7 +169,7 @@ def test_a_burst_read_fills_its_gaps(lost):
                 Packet(seq, 2, 128, 0, 5, 0, request.offset, part) if part else nak))
         else:
             queue += machine.receive(0.4, message(Packet(seq, 2, 128, 0, opcode)))
-    assert machine.result.outcome is Outcome.OK
+    assert machine.result.outcome is TransferOutcome.OK
     assert machine.result.data == data
     assert sent_reads <= len(lost) + 1
 
@@ -190,14 +190,14 @@ def test_a_session_left_open_is_reset_once(error):
         refused = opcodes == [6]
         queue = machine.receive(0.1, answer(request, 129 if refused else 128, bytes([error]) if refused else b""))
     assert opcodes == [6, 2, 6, 7, 1]
-    assert machine.result.outcome is Outcome.OK
+    assert machine.result.outcome is TransferOutcome.OK
 
     machine = FtpWrite(PARTY, "@MISSION/mission.dat", b"data")
     queue = machine.start(0.0)
     for _ in range(3):
         request = unpack(queue[0].payload)
         queue = machine.receive(0.1, answer(request, 128 if request.opcode == 2 else 129, bytes([error])))
-    assert machine.result.outcome is Outcome.REFUSED, "once, not for ever"
+    assert machine.result.outcome is TransferOutcome.REFUSED, "once, not for ever"
 
 
 def test_lost_parameters_are_asked_for_by_their_number():
@@ -214,7 +214,7 @@ def test_lost_parameters_are_asked_for_by_their_number():
     for _ in range(5):
         for request in machine.tick(machine.wake_s):
             machine.receive(machine.wake_s, value(request.param_index))
-    assert machine.result.outcome is Outcome.OK
+    assert machine.result.outcome is TransferOutcome.OK
     assert machine.result.values == {f"P{i}": float(i) for i in range(50)}
 
 

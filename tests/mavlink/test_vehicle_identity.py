@@ -3,7 +3,7 @@
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.trust.census import LISTEN_S, Census, OtherCompanion, Standing, yields_to
+from companion.mavlink.vehicle_identity import LISTEN_S, Census, CensusState, OtherCompanion, yields_to
 from companion.mavlink.wire.frames import Codec
 
 
@@ -22,14 +22,14 @@ def listened(*beats, wanted=None, until_s=LISTEN_S):
 
 
 def test_one_rover_alone_is_ours_after_a_while_and_not_before():
-    assert listened(beat(7), until_s=LISTEN_S - 0.1).standing is Standing.LISTENING
+    assert listened(beat(7), until_s=LISTEN_S - 0.1).standing is CensusState.LISTENING
     choice = listened(beat(7))
-    assert (choice.standing, choice.system) == (Standing.CHOSEN, 7)
+    assert (choice.standing, choice.system) == (CensusState.CHOSEN, 7)
 
 
 def test_several_are_listed_and_none_is_taken():
     choice = listened(beat(7, armed=True, mode=10), beat(1), beat(3, wire.MAV_TYPE_QUADROTOR))
-    assert choice.standing is Standing.REFUSED
+    assert choice.standing is CensusState.REFUSED
     assert choice.system is None
     assert choice.reason == (
         "3 autopilots are heard: system 1 (surface boat, ArduPilot, HOLD, disarmed); system 3 (quadrotor, ArduPilot, "
@@ -39,8 +39,8 @@ def test_several_are_listed_and_none_is_taken():
 
 def test_the_one_that_is_named_is_taken_at_once_whoever_else_speaks():
     choice = listened(beat(7), beat(1), wanted=1, until_s=0.0)
-    assert (choice.standing, choice.system) == (Standing.CHOSEN, 1)
-    assert listened(beat(7), wanted=1).standing is Standing.LISTENING
+    assert (choice.standing, choice.system) == (CensusState.CHOSEN, 1)
+    assert listened(beat(7), wanted=1).standing is CensusState.LISTENING
 
 
 @pytest.mark.parametrize("wanted", [None, 1])
@@ -50,7 +50,7 @@ def test_the_one_that_is_named_is_taken_at_once_whoever_else_speaks():
 ])
 def test_what_is_no_rover_is_no_boat_of_ours(wanted, other):
     choice = listened(beat(**other), wanted=wanted)
-    assert choice.standing is Standing.REFUSED
+    assert choice.standing is CensusState.REFUSED
     assert "not a rover" in choice.reason
 
 
@@ -59,7 +59,7 @@ def test_what_is_no_rover_is_no_boat_of_ours(wanted, other):
     {"kind": wire.MAV_TYPE_ONBOARD_CONTROLLER, "autopilot": wire.MAV_AUTOPILOT_INVALID},
 ])
 def test_stations_and_companions_are_no_autopilots(other):
-    assert listened(beat(**other)).standing is Standing.LISTENING
+    assert listened(beat(**other)).standing is CensusState.LISTENING
 
 
 def test_who_has_gone_is_forgotten():

@@ -5,7 +5,7 @@ import random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.trust.witness import CONTEST_OVER_S, SWITCH_S, Witness
+from companion.mavlink.reception import CONTEST_OVER_S, SWITCH_S, PlausibilityFilter
 from companion.mavlink.wire.assembler import VehicleAssembler
 from companion.mavlink.wire.frames import Codec, Drop
 from companion.messages import Mode, VehicleState
@@ -35,7 +35,7 @@ class Air:
     """A true autopilot that says ATTITUDE, WIND, ATTITUDE ... every 50 ms, and whoever else writes to the link."""
 
     def __init__(self):
-        self.witness, self.true, self.reader = Witness(), Codec(1, 1), Codec(9, 9)
+        self.witness, self.true, self.reader = PlausibilityFilter(), Codec(1, 1), Codec(9, 9)
         self.t_s, self.count = ZERO_S + 50.0, 0
         self.dropped = 0
 

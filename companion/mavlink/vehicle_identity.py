@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
@@ -69,7 +69,7 @@ class Speaker:
         return f"system {self.system} ({type_words(self.vehicle_type)}, {maker}, {mode}, {armed})"
 
 
-class Standing(enum.Enum):
+class CensusState(enum.Enum):
     """What the census says."""
 
     LISTENING = "listening"   # nobody yet, or not long enough
@@ -78,10 +78,10 @@ class Standing(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class AutopilotChoice:
     """The census's answer: ``system`` when CHOSEN, ``reason`` when REFUSED."""
 
-    standing: Standing = Standing.LISTENING
+    standing: CensusState = CensusState.LISTENING
     system: int | None = None
     reason: str = ""
 
@@ -151,24 +151,25 @@ class Census:
         other = self._companions.get(system)
         return other if other is not None and other.beats >= COMPANION_BEATS and t_s - other.last_s <= GONE_S else None
 
-    def choice(self, t_s: float) -> Choice:
+    def choice(self, t_s: float) -> AutopilotChoice:
         """Return which autopilot is ours, by what was heard until ``t_s``."""
         heard = self.heard(t_s)
         if self.wanted is not None:
             ours = [s for s in heard if s.system == self.wanted]
             if not ours:
-                return Choice()
+                return AutopilotChoice()
         else:
             if not heard or t_s - min(s.first_s for s in heard) < LISTEN_S:
-                return Choice()
+                return AutopilotChoice()
             if len(heard) > 1:
-                return Choice(standing=Standing.REFUSED, reason=(
+                return AutopilotChoice(standing=CensusState.REFUSED, reason=(
                     f"{len(heard)} autopilots are heard: {listed(heard)}: say which is yours, with --system N or "
                     "[autopilot] system in the mission"))
             ours = list(heard)
         if not ours[0].is_rover:
-            return Choice(standing=Standing.REFUSED, reason=f"{ours[0].describe()} is not a rover: no boat of ours")
-        return Choice(standing=Standing.CHOSEN, system=ours[0].system)
+            return AutopilotChoice(standing=CensusState.REFUSED,
+                                   reason=f"{ours[0].describe()} is not a rover: no boat of ours")
+        return AutopilotChoice(standing=CensusState.CHOSEN, system=ours[0].system)
 
 
 def listed(speakers: Iterable[Speaker]) -> str:
@@ -181,3 +182,53 @@ def yields_to(token: int, other: OtherCompanion) -> bool:
     return not other.is_starting or other.token < token
 
 
+# Who the autopilot says it is, folded from its messages: type, board, frame. Pure.
+#
+# A system id is no identity: every ArduPilot vehicle is delivered with id 1. The board's UID is one. It is asked for at
+# the start, again after a reboot or a gap in which the autopilot may have become another, and now and then.
+
+# Without a heartbeat for longer than this the next one may be another autopilot's, or a reboot's [s].
+GAP_S = 5.0
+# A UID that is known is asked for again this often [s].
+UID_EVERY_S = 30.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """The autopilot of one system id.
+
+    Attributes:
+        system: its MAVLink system id.
+        uid: the board's, "" of a board that has none, None before it was told.
+        is_confirmed: the UID was told since the last reboot and gap, and nothing has contradicted it since.
+        is_contested: two autopilots speak with these ids.
+        vehicle_type: MAV_TYPE of its heartbeats.
+        frame_class: FRAME_CLASS, None before it was read.
+        sails: SAIL_ENABLE, None before it was read.
+    """
+
+    system: int | None = None
+    uid: str | None = None
+    is_confirmed: bool = False
+    is_contested: bool = False
+    vehicle_type: int | None = None
+    frame_class: int | None = None
+    sails: bool | None = None
+    other_uid: str | None = None      # a UID that differs, told once
+
+    def told(self, system: int, uid: str) -> Identity:
+        """Take an AUTOPILOT_VERSION. One that differs is believed when it is told twice running."""
+        if self.uid is None or uid in {self.uid, self.other_uid}:
+            return replace(self, system=system, uid=uid, is_confirmed=True, other_uid=None)
+        return replace(self, is_confirmed=False, other_uid=uid)
+
+    def doubted(self) -> Identity:
+        """Take a reboot or a gap."""
+        return replace(self, is_confirmed=False)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Identity:
+        """Take parameters; others than the frame's do not matter."""
+        frame, sails = values.get("FRAME_CLASS"), values.get("SAIL_ENABLE")
+        return replace(
+            self, frame_class=self.frame_class if frame is None else int(frame),
+            sails=self.sails if sails is None else sails != 0.0)
