@@ -63,7 +63,7 @@ from companion.skipper.step import (
     WindView,
 )
 from companion.traffic import TargetLimits, Targets
-from companion.wind import Estimator, Verdict, WindRoom, WindStatus, make
+from companion.wind import Estimator, WindStatus, WindTracker, WindVerdict, make
 
 __all__ = ["Step", "VoyageFold", "Waters", "begun"]
 
@@ -72,14 +72,14 @@ SETTLED_S = 20.0
 
 # A spiking vane is not among them: its spikes are not fed, and what is left is widened.
 _UNTRUSTED = frozenset({
-    Verdict.FROZEN, Verdict.SILENT, Verdict.HELD, Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR, Verdict.TURNED,
-})
+    WindVerdict.FROZEN, WindVerdict.SILENT, WindVerdict.HELD, WindVerdict.SYNTHESISED, WindVerdict.NO_SPEED_SENSOR,
+    WindVerdict.TURNED })
 
 
 class StepWind:
     """The wind room with the means over 90 s and 5 s beside its forecast."""
 
-    def __init__(self, room: WindRoom) -> None:
+    def __init__(self, room: WindTracker) -> None:
         self.room = room
         self._begin()
 
@@ -106,7 +106,7 @@ class StepWind:
         self._mean90.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight,
                             speed_weight=status.speed_weight)
         # What a turned vane says now the autopilot sails by, and it is what the boat's motion is held against.
-        is_turned = Verdict.TURNED in status.verdicts
+        is_turned = WindVerdict.TURNED in status.verdicts
         self._mean5.update(sample.t_s, sample.twd_from_rad, sample.tws_mps,
                            weight=1.0 if is_turned else status.weight,
                            speed_weight=1.0 if is_turned else status.speed_weight)
@@ -135,9 +135,9 @@ class StepWind:
 
 
 def _health(status: WindStatus, record_s: float) -> WindHealth:
-    is_calm = Verdict.CALM in status.verdicts
+    is_calm = WindVerdict.CALM in status.verdicts
     # In a calm the autopilot holds the old direction, by its least speed: that is the calm and no fault.
-    if any(v in _UNTRUSTED and not (is_calm and v is Verdict.HELD) for v in status.verdicts):
+    if any(v in _UNTRUSTED and not (is_calm and v is WindVerdict.HELD) for v in status.verdicts):
         return WindHealth.UNTRUSTED
     if is_calm:
         return WindHealth.LIGHT
@@ -243,7 +243,7 @@ class VoyageFold:
     """
 
     def __init__(
-        self, skipper: Skipper, wind: WindRoom, permissions: Permissions, persisted: Persisted | None = None,
+        self, skipper: Skipper, wind: WindTracker, permissions: Permissions, persisted: Persisted | None = None,
         *, known: tuple[str, ...] = (), traffic: TargetLimits | None = None, waters: Waters | None = None,
         water: Prior = STILL,
     ) -> None:

@@ -52,7 +52,7 @@ from companion.telemetry.folder import (
     read_rows,
     require_files,
 )
-from companion.wind import WindRoom
+from companion.wind import WindTracker
 from companion.words import counted
 
 TOLERANCE = 1e-6
@@ -156,7 +156,7 @@ class RecordedInput:
         for (start_s, persisted, known, epoch_s), end_s, gap_s in zip(
                 self._starts, ends, _gaps(self._decisions), strict=True):
             fold = VoyageFold(
-                skipper, WindRoom(estimator=estimator_of(self.mission)), self._permissions, persisted, known=known,
+                skipper, WindTracker(estimator=estimator_of(self.mission)), self._permissions, persisted, known=known,
                 traffic=target_limits_of(self.mission), waters=waters, water=water_of(self.mission),
             )
             yield from self._life(fold, start_s, end_s, gap_s, fed, epoch_s)

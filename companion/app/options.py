@@ -12,7 +12,7 @@ from companion.disk import Disk
 from companion.mavlink.signing import SigningStore
 from companion.page import Address, TileChart
 from companion.telemetry.folder import VoyageArchive
-from companion.wind import Estimator, WindRoom
+from companion.wind import Estimator, WindTracker
 
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
 
@@ -27,9 +27,9 @@ async def at_once(work: Callable[[], None]) -> None:
     work()
 
 
-def wind_room(estimator: Estimator) -> WindRoom:
+def wind_room(estimator: Estimator) -> WindTracker:
     """Return the wind room of an estimator."""
-    return WindRoom(estimator=estimator)
+    return WindTracker(estimator=estimator)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +92,7 @@ class SailOptions:
     far: SatelliteLink | None = None
     known: tuple[str, ...] = ()
     signing: SigningStore | None = None
-    room: Callable[[Estimator], WindRoom] = field(default=wind_room, repr=False)
+    room: Callable[[Estimator], WindTracker] = field(default=wind_room, repr=False)
     token: int = 1
     budget_scale: float = 1.0
     command: str = ""

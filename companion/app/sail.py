@@ -49,7 +49,7 @@ from companion.telemetry.console import DISK, GONE, left_behind
 from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, fence_record, order_record, outcome_record
 from companion.telemetry.state_file import StateFile
 from companion.telemetry.status import TelemetrySender, companion_status, speak_high_latency, unix_of_boat
-from companion.traffic.listening import Feeds
+from companion.traffic.feeds import Feeds
 
 STEP_S = 1.0
 TEND_EVERY_S = 5.0        # records are synced, and taken up again after trouble

@@ -1,11 +1,37 @@
 """Orders: what the crew may ask of the boat, how it is asked over MAVLink and in words, and how it is answered."""
 
-from companion.orders.asking import GIVE_UP_S, OrderSend, give, lead_in
-from companion.orders.buttons import qgc_actions
-from companion.orders.fields import COMMANDS, RESULTS, message_of, wanted_of
-from companion.orders.order import FAR, LOCAL, MAVLINK, Answer, Order, Place, Result, Source, Wanted, mark_of, which
-from companion.orders.phrase import phrase
-from companion.orders.verbs import ALL, BY_VERB, TABLE, Verb, permitted, unknown, verb_named
+from companion.orders.mavlink_commands import (
+    COMMANDS,
+    GIVE_UP_S,
+    RESULTS,
+    OrderSend,
+    give,
+    lead_in,
+    message_of,
+    qgc_actions,
+    wanted_of,
+)
+from companion.orders.order import (
+    ALL,
+    BY_VERB,
+    FAR,
+    LOCAL,
+    MAVLINK,
+    TABLE,
+    Answer,
+    Order,
+    Place,
+    Result,
+    Source,
+    Verb,
+    Wanted,
+    mark_of,
+    permitted,
+    phrase,
+    unknown,
+    verb_named,
+    which,
+)
 
 __all__ = [
     "ALL", "BY_VERB", "COMMANDS", "FAR", "GIVE_UP_S", "LOCAL", "MAVLINK", "RESULTS", "TABLE", "Answer", "Order",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from companion.orders.verbs import TABLE
+from companion.orders.order import TABLE
 
 MADE_BY = "<!-- made by python -m companion.orders.document -->"
 

@@ -2,15 +2,116 @@
 
 from __future__ import annotations
 
+import difflib
 import enum
 import math
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from companion.errors import InputError
 from companion.messages import GeoPoint
-from companion.orders.verbs import Verb
+
+# The verbs: what can be asked of the boat, by number on the radio and by word everywhere else.
+
+ALL = "all"   # of the verbs, where a mission says which are permitted
+
+
+class Verb(enum.StrEnum):
+    """What is asked."""
+
+    HOLD = "hold"
+    GO_ON = "go_on"
+    SKIP_GOAL = "skip_goal"
+    REFUGE = "refuge"
+    HOME = "home"
+    GOAL = "goal"
+    REPLAN = "replan"
+    STOP = "stop"
+    ADOPT = "adopt"
+    REPLACE = "replace"
+    WHY = "why"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerbRow:
+    """A verb as a person has to know it: its number in param1, what it takes, does, and is refused for."""
+
+    verb: Verb
+    number: int
+    means: str
+    refused: str
+    takes: str = ""
+    stands: bool = False     # until ``go_on``, or another order that stands
+    button: str = ""         # of a ground station; empty: it has none, for what it takes cannot be typed there
+
+
+TABLE: tuple[VerbRow, ...] = (
+    VerbRow(verb=Verb.HOLD, number=1, stands=True, button="Hold here",
+        means="loiter here, where there is room near by, until told to go on",
+        refused="a person has her, the battery or a failsafe comes first, uploading is not permitted"),
+    VerbRow(verb=Verb.GO_ON, number=2, button="Go on",
+        means="the end of whatever order stands: on to the next goal; without one the end of a stay in a box",
+        refused="never"),
+    VerbRow(verb=Verb.SKIP_GOAL, number=3, button="Skip this goal",
+        means="the goal that is next is given up, the one behind it becomes the next",
+        refused="it is the last one: hold, home or a refuge say where to stay instead"),
+    VerbRow(verb=Verb.REFUGE, number=4, takes="[NAME]", stands=True, button="To the nearest refuge",
+        means="sail to the refuge of that name, or the nearest, and stay there until told to go on",
+        refused="the mission has none of that name (they are listed); she is not under way; as `hold`"),
+    VerbRow(verb=Verb.HOME, number=5, stands=True, button="Home",
+        means="sail to where she was armed and stay there until told to go on; planned like any leg, never RTL",
+        refused="the autopilot has not told where home is, or it is in no free water; she is not under way; as `hold`"),
+    VerbRow(verb=Verb.GOAL, number=6, takes="LAT LON", stands=True,
+        means="sail to that place, then on to the goals that are left",
+        refused="it is no position (0, 0; not a number; outside ±90 or ±180), on land, outside the fence, nearer to "
+        "something than the margin's floor, farther than 50 km (on a passage than its longest leg), or latitude and "
+        "longitude are swapped; she is not under way; as `hold`"),
+    VerbRow(verb=Verb.REPLAN, number=7, button="Plan again",
+        means="a new plan from where she is", refused="she is not sailing to anywhere"),
+    VerbRow(verb=Verb.STOP, number=8, stands=True, button="Give the boat up",
+        means="nothing more is asked of the boat until told to go on: what is on board the autopilot sails on",
+        refused="never"),
+    VerbRow(verb=Verb.ADOPT, number=9, button="Sail what was drawn",
+        means="end this voyage, and sail the mission that somebody has drawn and uploaded",
+        refused="nothing drawn is on offer, it cannot be sailed, or this voyage's goals are in its mission file"),
+    VerbRow(verb=Verb.REPLACE, number=10, button="Replace the mission on board",
+        means="overwrite a mission on the autopilot that is not ours", refused="the mission on board is ours, or "
+        "uploading is not permitted"),
+    VerbRow(verb=Verb.WHY, number=11, button="Why?",
+        means="say what she does and why, and when she tacks next", refused="never: reading is always permitted"),
+)
+BY_VERB = {row.verb: row for row in TABLE}
+_BY_NUMBER = {row.number: row.verb for row in TABLE}
+
+
+def verb_of(number: float) -> Verb | None:
+    """Return the verb of a number as it came in a parameter, None when it is none (a fraction, NaN)."""
+    return _BY_NUMBER.get(int(number)) if abs(number) < 1e6 and number == int(number) else None
+
+
+def verb_named(word: str) -> Verb | None:
+    """Return the verb that a person's word means (``go-on`` and ``GO_ON`` too), None when it is none."""
+    plain = word.strip().lower().replace("-", "_").replace(" ", "_")
+    return Verb(plain) if plain in set(Verb) else None
+
+
+def unknown(word: str) -> str:
+    """Return what to say of a word that is no verb: the nearest one, else all of them."""
+    near = difflib.get_close_matches(word.lower().replace("-", "_"), [*Verb], n=1)
+    meant = f"did you mean {near[0]}?" if near else f"there are {', '.join(Verb)}"
+    return f"there is no order {word[:40]!r}; {meant}"
+
+
+def permitted(verb: Verb, orders: Iterable[str]) -> bool:
+    """Return whether a mission that permits ``orders`` (words of verbs, or ``all``) permits this one.
+
+    Reading is always permitted.
+    """
+    words = set(orders)
+    return verb is Verb.WHY or ALL in words or verb.value in words
+
 
 MAVLINK, LOCAL, FAR = "mavlink", "local", "far"   # the ways in which orders come
 MARK_BITS = 24   # a float32 holds so many exactly
@@ -165,3 +266,44 @@ def which(wanted: Wanted, names: Sequence[str]) -> int | None:
     if mark:
         return next((n for n, name in enumerate(names) if name and mark_of(name) == mark), None)
     return wanted.number - 1 if 1 <= wanted.number <= len(names) else None
+
+
+# Orders in words, as a person types them: ``hold``, ``refuge Bay``, ``goal 51.1 -1.3``.
+
+def phrase(words: Sequence[str]) -> Wanted:
+    """Return what the words want.
+
+    Raises:
+        InputError: no verb of ours, or not what it takes.
+
+    >>> phrase(["goal", "51.1", "-1.3"]).words
+    'goal 51.10000 -1.30000'
+    """
+    if not words:
+        raise InputError("VERB", "", "is missing", f"there are {', '.join(Verb)}")
+    verb = verb_named(words[0])
+    if verb is None:
+        said, _, remedy = unknown(words[0]).partition("; ")
+        raise InputError(words[0][:40], "", said, remedy)
+    rest = list(words[1:])
+    if verb is Verb.REFUGE:
+        number = int(rest[0]) if len(rest) == 1 and rest[0].isdecimal() and len(rest[0]) < 7 else 0
+        return Wanted(verb=verb, number=number, name="" if number else " ".join(rest))
+    if verb is Verb.GOAL:
+        return Wanted(verb=verb, place=_place(rest))
+    if rest:
+        raise InputError(str(verb), "", f"takes nothing, and was given {' '.join(rest)[:40]!r}")
+    return Wanted(verb=verb)
+
+
+def _place(words: list[str]) -> Place:
+    usage = f"write {Verb.GOAL} {BY_VERB[Verb.GOAL].takes} in degrees, as in goal 51.1234 -1.3456"
+    parts = [part for word in words for part in word.split(",") if part]
+    try:
+        lat_deg, lon_deg = (float(part) for part in parts)
+    except ValueError:
+        raise InputError(Verb.GOAL, "", f"{' '.join(words)[:40]!r} is not a position", usage) from None
+    place = Place(lat_deg=lat_deg, lon_deg=lon_deg)
+    if place.trouble:
+        raise InputError(Verb.GOAL, "", place.trouble, usage)
+    return place

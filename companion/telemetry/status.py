@@ -21,8 +21,7 @@ from companion.skipper.way import Voyage, gates_of
 from companion.telemetry.folder.logbook import Logbook
 from companion.telemetry.folder.records import VoyageFigures, sigma_ahead_rad
 from companion.traffic import TrafficCounts
-from companion.traffic.feeds import AisFeed
-from companion.traffic.listening import Feeds
+from companion.traffic.feeds import AisFeed, Feeds
 
 
 def companion_status(

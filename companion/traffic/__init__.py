@@ -17,14 +17,12 @@ the moment that the discs were made for (a plan's t = 0).
 """
 
 from companion.traffic.approach import LAKE, SEA, Alarm, AlarmLimits, Approach, OwnShip, cpa, peril_m
-from companion.traffic.assess import Assessment, assess
-from companion.traffic.colregs import Encounter, Policy, Role, Rule, classify
+from companion.traffic.colregs import Assessment, Encounter, Policy, Role, Rule, assess, classify
 from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json, decode_nmea
 from companion.traffic.occupancy import Disc, planning_discs, time_matched_discs
-from companion.traffic.picture import Change, TrafficCounts, TrafficPicture
 from companion.traffic.plans import Conflict, Decision, TimedLeg, check_legs, decide, path_distance_m
 from companion.traffic.predict import MotionUncertainty, Prediction, motion_of, predict
-from companion.traffic.targets import TargetLimits, Targets
+from companion.traffic.targets import TargetChange, TargetLimits, Targets, TrafficCounts, TrafficPicture
 from companion.traffic.vessel import Vessel, VesselDimensions
 
 __all__ = [

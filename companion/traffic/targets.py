@@ -6,6 +6,7 @@ that cannot be. Everything refused is counted; nothing raises.
 
 from __future__ import annotations
 
+import enum
 import heapq
 import math
 from collections.abc import Mapping
@@ -16,9 +17,58 @@ from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
 from companion.messages import AisReport
 from companion.traffic.approach import peril_m
-from companion.traffic.picture import Change, TrafficCounts, TrafficPicture
 from companion.traffic.predict import predict, risk_factor
 from companion.traffic.vessel import Vessel, hull_of
+
+# The vessels as the rest of the program sees them: one picture a step, and what happened to the reports behind it.
+
+class TargetChange(enum.Enum):
+    """Why an active plan should be checked again."""
+
+    APPEARED = "appeared"
+    TURNED = "turned"
+    SPEED = "changed speed"
+    SURPRISE = "is not where it was expected"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrafficCounts:
+    """What happened to the reports, for the status."""
+
+    heard: int = 0
+    own: int = 0
+    late: int = 0             # older than what is known of the vessel
+    stale: int = 0            # too old when it came
+    far: int = 0              # not near enough to matter, or not on the globe's useful part
+    static_unknown: int = 0   # name and size of a vessel whose position was never heard
+    shared_mmsi: int = 0      # two vessels with one MMSI
+    clock_jumps: int = 0
+    forgotten: int = 0        # expired, or pushed out by the bound
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrafficPicture:
+    """All vessels at ``t_s``: what the rest of the program sees."""
+
+    t_s: float
+    vessels: tuple[Vessel, ...] = ()
+    changes: tuple[tuple[float, int, TargetChange], ...] = ()   # (when, MMSI, what), the last 32
+    counts: TrafficCounts = TrafficCounts()
+    last_heard_s: float | None = None
+
+    def age_s(self, vessel: Vessel) -> float:
+        """Return how old the vessel's position is [s]."""
+        return max(0.0, self.t_s - vessel.t_s)
+
+    @property
+    def silence_s(self) -> float | None:
+        """Seconds since any report; None: never heard one. AIS is not all traffic, and a stopped feed is silent."""
+        return None if self.last_heard_s is None else max(0.0, self.t_s - self.last_heard_s)
+
+    def changed_since(self, t_s: float) -> tuple[tuple[float, int, TargetChange], ...]:
+        """Return the changes after ``t_s``: an active plan is checked again when there is one."""
+        return tuple(change for change in self.changes if change[0] > t_s)
+
 
 # How far off a report may be from what can be reached and still be the same vessel [m, m/s]: fast ferries do 25.
 REACH_SLACK_M, REACH_MPS = 400.0, 30.0
@@ -64,7 +114,7 @@ class Targets:
     frame: LocalFrame
     limits: TargetLimits = TargetLimits()
     vessels: Mapping[Key, Vessel] = field(default_factory=dict)
-    changes: tuple[tuple[float, int, Change], ...] = ()
+    changes: tuple[tuple[float, int, TargetChange], ...] = ()
     counts: TrafficCounts = field(default_factory=TrafficCounts)
     last_heard_s: float | None = None
     spare: tuple[tuple[float, Key], ...] = ()   # who goes next: peril [m] and whose, the least perilous first
@@ -188,7 +238,7 @@ class Targets:
             newcomer = peril_m(*own, vessels[report.mmsi, branch], now_s), (report.mmsi, branch)
             del vessels[max(newcomer, spare[0])[1]]
             forgotten += 1
-        changes = (*self.changes, (now_s, report.mmsi, Change.APPEARED))[-32:]
+        changes = (*self.changes, (now_s, report.mmsi, TargetChange.APPEARED))[-32:]
         counts = replace(counts, forgotten=counts.forgotten + forgotten)
         return replace(self, vessels=vessels, changes=changes, counts=counts, last_heard_s=now_s, spare=spare,
                        spare_s=spare_s)
@@ -267,20 +317,20 @@ def _moved(vessel: Vessel, report: AisReport, en: tuple[float, float], t_s: floa
     )
 
 
-def _change(before: Vessel, after: Vessel) -> Change | None:
+def _change(before: Vessel, after: Vessel) -> TargetChange | None:
     """Return what the vessel did that its earlier reports did not say."""
     there = predict(before, after.t_s)
     off = math.dist(there.mean_en_m, after.centre_en_m)
     if off > there.reach_m * 0.2 + risk_factor(SURPRISE_RISK) * max(there.sigma_along_m, there.sigma_across_m):
-        return Change.SURPRISE
+        return TargetChange.SURPRISE
     a, b = before.speed_mps, after.speed_mps
     if a is None or b is None:
         return None
     if abs(b - a) > max(TURNED_MPS, TURNED_SHARE * a):
-        return Change.SPEED
+        return TargetChange.SPEED
     if before.course_rad is not None and after.course_rad is not None and b > 0.3:
         # What was announced by the rate of turn is no change.
         turned = abs(difference_rad(after.course_rad, there.course_rad))
         if turned > TURNED_RAD:
-            return Change.TURNED
+            return TargetChange.TURNED
     return None

@@ -35,7 +35,7 @@ from companion.page import Address
 from companion.skipper.deeds import CALL
 from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT
-from companion.wind import Estimator, WindRoom
+from companion.wind import Estimator, WindTracker
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.run.variation import Variation
 from sitl.scene import (
@@ -200,7 +200,7 @@ async def run_embedded(
 
 async def _sail_and_restart(
     world: World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_status: OnStatus | None,
-    expansions: int | None, worker_pace: float | None, room: Callable[[Estimator], WindRoom] | None,
+    expansions: int | None, worker_pace: float | None, room: Callable[[Estimator], WindTracker] | None,
 ) -> None:
     """Run the companion; kill it where the scenario says, and start it again."""
     kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)

@@ -15,7 +15,7 @@ from companion.errors import InputError
 from companion.geofence import Mission
 from companion.messages import WindForecast
 from companion.mission_check import require_sailable
-from companion.wind import Estimator, WindRoom
+from companion.wind import Estimator, WindTracker
 from sitl.world import Wind
 
 MEAN_S = 30.0       # [s] over which what will blow is averaged: a plan is of legs, not of puffs
@@ -24,7 +24,7 @@ AHEAD_S = 300.0
 NO_SPREAD_RAD = 1e-4
 
 
-class Unspread(WindRoom):
+class Unspread(WindTracker):
     """The wind room whose forecasts are believed to be certain: what a planner without wind uncertainty is told."""
 
     def forecast_table(
@@ -40,7 +40,7 @@ class Unspread(WindRoom):
         return _certain(replace(table, mean_twd_from_rad=np.full_like(table.mean_twd_from_rad, mean)))
 
 
-class Foreknown(WindRoom):
+class Foreknown(WindTracker):
     """The wind room that knows what will blow: the mean of the ``MEAN_S`` from each horizon on, and no spread.
 
     A plan is still made for one mean direction, and what the wind will depart from it is added to the zone.
@@ -80,7 +80,7 @@ class Variation:
     """Keys of the mission's tables that are other ones, and the wind room: of the wind and the mission's estimator."""
 
     tables: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    room: Callable[[Wind, Estimator], WindRoom] | None = None
+    room: Callable[[Wind, Estimator], WindTracker] | None = None
 
     def mission(self, mission: Mission) -> Mission:
         """Return the mission so changed."""
@@ -89,12 +89,12 @@ class Variation:
         return replace(mission, options=msgspec.structs.replace(mission.options, **changes))
 
 
-def unspread(_: Wind, estimator: Estimator) -> WindRoom:
+def unspread(_: Wind, estimator: Estimator) -> WindTracker:
     """Return the room without spread."""
     return Unspread(estimator=estimator)
 
 
-def foreknown(wind: Wind, estimator: Estimator) -> WindRoom:
+def foreknown(wind: Wind, estimator: Estimator) -> WindTracker:
     """Return the room that knows what will blow."""
     return Foreknown(wind, estimator)
 

@@ -31,7 +31,7 @@ from companion.telemetry import console
 from companion.telemetry.folder import Logbook
 from companion.telemetry.folder.recorder import read_jsonl
 from companion.telemetry.state_file import StateFile
-from companion.traffic.listening import Feeds
+from companion.traffic.feeds import Feeds
 from companion.view import ViewFold
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.scene.ships import free_port

@@ -25,7 +25,7 @@ from companion.messages import GeoPoint, VehicleState, WindQuality, WindSample, 
 from companion.skipper import Skipper
 from companion.skipper.step.config import Permissions
 from companion.skipper.step.snapshot import Disbelieved, ParameterChanged, WindHealth
-from companion.wind import WindRoom
+from companion.wind import WindTracker
 from companion.wind.parameters import VaneParameters
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, serve
@@ -38,7 +38,7 @@ DEMO = "missions/archipelago.toml"
 def fresh():
     mission = load_mission(DEMO)
     return VoyageFold(
-        Skipper(voyage=voyage_of(mission), config=config_of(mission)), WindRoom(estimator=estimator_of(mission)),
+        Skipper(voyage=voyage_of(mission), config=config_of(mission)), WindTracker(estimator=estimator_of(mission)),
         Permissions())
 
 
@@ -191,7 +191,7 @@ def test_a_fault_of_its_own_is_said_once_and_ends_nothing(monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("of all things")
 
-    monkeypatch.setattr(WindRoom, "set_parameters", broken)
+    monkeypatch.setattr(WindTracker, "set_parameters", broken)
     for n in range(3):
         told(fold, "WNDVN_TYPE", 10.0 + n)
     [said] = disbelieved(fold)

@@ -20,7 +20,7 @@ from companion.orders import (
     wanted_of,
     which,
 )
-from companion.orders.fields import GLOBAL_FRAMES, PLACE_COMMAND, VERB_COMMAND
+from companion.orders.mavlink_commands import GLOBAL_FRAMES, PLACE_COMMAND, VERB_COMMAND
 
 FLOAT32 = st.floats(width=32, allow_nan=True, allow_infinity=True)
 INT32 = st.integers(-2**31, 2**31 - 1)

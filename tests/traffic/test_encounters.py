@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from companion.traffic import SEA, Alarm, Policy, Role, Rule, TrafficPicture, assess
-from companion.traffic.encounters import ACTS_RAD, HOLDING, OVER_S, act_limits, expected, follow
+from companion.traffic.colregs import ACTS_RAD, HOLDING, OVER_S, act_limits, expected, follow
 from companion.traffic.predict import SHIP, motion_of
 from tests.traffic.conftest import own, vessel
 

@@ -16,9 +16,9 @@ from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.messages import AisReport, GeoPoint, VehicleState
 from companion.skipper import Skipper
-from companion.traffic import Change, TargetLimits, Targets
+from companion.traffic import TargetChange, TargetLimits, Targets
 from companion.traffic.nmea import NmeaDecoder
-from companion.wind import WindRoom
+from companion.wind import WindTracker
 from tests.traffic.conftest import FRAME, report
 
 
@@ -100,16 +100,16 @@ def test_another_continent_is_counted_not_tracked() -> None:
 
 def test_changes_say_when_to_check_a_plan_again() -> None:
     t = Targets.empty(FRAME).heard(report(0.0, (0.0, 0.0), course_rad=0.0, speed_mps=5.0))
-    assert t.changes[-1][2] is Change.APPEARED
+    assert t.changes[-1][2] is TargetChange.APPEARED
     straight = t.heard(report(10.0, (0.0, 50.0), course_rad=0.02, speed_mps=5.1))
     assert len(straight.changes) == 1
     turned = t.heard(report(10.0, (8.0, 49.0), course_rad=0.4, speed_mps=5.0))
-    assert turned.changes[-1][2] is Change.TURNED
+    assert turned.changes[-1][2] is TargetChange.TURNED
     slowed = t.heard(report(10.0, (0.0, 45.0), course_rad=0.0, speed_mps=2.0))
-    assert slowed.changes[-1][2] is Change.SPEED
+    assert slowed.changes[-1][2] is TargetChange.SPEED
     assert straight.picture(10.0).changed_since(5.0) == ()
     elsewhere = t.heard(report(10.0, (200.0, 50.0), course_rad=0.0, speed_mps=5.0))
-    assert elsewhere.changes[-1][2] is Change.SURPRISE
+    assert elsewhere.changes[-1][2] is TargetChange.SURPRISE
 
 
 def test_the_number_of_vessels_is_bounded_and_the_farthest_goes() -> None:
@@ -170,7 +170,7 @@ def test_a_flood_of_new_numbers_pushes_out_no_ship_on_collision_course_and_costs
 def test_the_voyage_tells_the_targets_where_its_boat_is() -> None:
     mission = load_mission(Path("missions/open-water.toml"))
     voyage = voyage_of(mission)
-    fold = VoyageFold(Skipper(voyage=voyage, config=config_of(mission)), WindRoom(), permissions_of(mission))
+    fold = VoyageFold(Skipper(voyage=voyage, config=config_of(mission)), WindTracker(), permissions_of(mission))
 
     def hear(t_s: float, en: tuple[float, float], mmsi: int) -> None:
         fold.take(AisReport(t_s=t_s, mmsi=mmsi, position=voyage.frame.geo_from_en(*en)))

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from companion.messages import ApparentWind, GeoPoint, VehicleState, WindSample, WindSource
-from companion.wind import WindRoom, apparent_wind
+from companion.wind import WindTracker, apparent_wind
 from companion.wind.study.records import weather
 
 HERE = GeoPoint(lat_deg=47.0, lon_deg=8.0)
@@ -30,7 +30,7 @@ def voyage(*, seconds=1500.0, seed=5, speed_mps=6.0, leg_s=120.0, dt_s=1.0, boat
 
 def sail(fault=None, *, parameters=None, room=None, **options):
     """Sail with ``fault(t, boat, apparent) -> apparent or None``; return [(t, status)] and the room."""
-    room = room or WindRoom(parameters)
+    room = room or WindTracker(parameters)
     log = []
     for boat, felt, _ in voyage(**options):
         room.update(boat)

@@ -11,7 +11,7 @@ from companion.geofence import load_mission
 from companion.messages import VehicleState, WindSample
 from companion.skipper import Skipper
 from companion.skipper.step.snapshot import WindHealth
-from companion.wind import VaneParameters, Verdict, WindRoom, apparent_wind, make
+from companion.wind import VaneParameters, WindTracker, WindVerdict, apparent_wind, make
 from tests.wind.boat import HERE
 
 BREEZE_S, END_S = 300.0, 900.0
@@ -51,29 +51,29 @@ def sail(room, **how):
 @pytest.mark.parametrize("tws_mps", [0.0, 0.2, 0.6])
 @pytest.mark.parametrize("parameters", [None, VaneParameters(vane_type=3, speed_type=3)], ids=["unread", "read"])
 def test_a_calm_is_a_calm_and_no_fault_of_the_sensor(tws_mps, parameters):
-    room = WindRoom(parameters)
+    room = WindTracker(parameters)
     log = sail(room, tws_mps=tws_mps)
     after = [set(s.verdicts) for t, s in log if t > BREEZE_S + 60.0]
-    assert all(v == {Verdict.CALM} for v in after), after[-1]
+    assert all(v == {WindVerdict.CALM} for v in after), after[-1]
     table = room.forecast_table(END_S, [0.0, 60.0])
     assert table.mean_tws_mps[0] == pytest.approx(tws_mps, abs=0.4)
 
 
 def test_a_calm_in_a_fast_current_is_no_missing_sensor():
-    log = sail(WindRoom(), current=(1.5, 0.0))
-    assert Verdict.NO_SPEED_SENSOR not in log[-1][1].verdicts
+    log = sail(WindTracker(), current=(1.5, 0.0))
+    assert WindVerdict.NO_SPEED_SENSOR not in log[-1][1].verdicts
 
 
 def test_below_the_vanes_least_speed_the_anemometer_still_measures():
     """ArduRover then holds the true wind of before: 5 m/s, with 0.5 m/s on the anemometer."""
-    room, held = WindRoom(VaneParameters(vane_type=3, speed_type=3, speed_min_mps=0.8)), None
+    room, held = WindTracker(VaneParameters(vane_type=3, speed_type=3, speed_min_mps=0.8)), None
     for boat, felt, true in wind_dies():
         room.update(boat)
         room.update(felt)
         held = true if boat.t_s < BREEZE_S else held
         status = room.update(WindSample(t_s=true.t_s, twd_from_rad=held.twd_from_rad, tws_mps=held.tws_mps))
-    assert Verdict.HELD in status.verdicts
-    assert Verdict.CALM in status.verdicts
+    assert WindVerdict.HELD in status.verdicts
+    assert WindVerdict.CALM in status.verdicts
     assert room.forecast_table(END_S, [0.0]).mean_tws_mps[0] < 1.2
 
 
@@ -102,7 +102,7 @@ def test_a_weight_of_nothing_still_only_moves_the_clock(name):
 def test_the_skippers_means_fall_with_the_wind():
     mission = load_mission(Path("missions/open-water.toml"))
     skipper = Skipper(voyage=voyage_of(mission), config=config_of(mission))
-    fold = VoyageFold(skipper, WindRoom(), permissions_of(mission))
+    fold = VoyageFold(skipper, WindTracker(), permissions_of(mission))
     seen = {}
     for boat, felt, true in wind_dies():
         for value in (boat, felt, true):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from companion.wind import Forecaster
-from companion.wind.estimators import kernel
-from companion.wind.estimators.prior import CONSTANTS
+from companion.wind.estimators import forecaster_kernels as kernel
+from companion.wind.estimators.forecaster import CONSTANTS
 from companion.wind.study.fit import Prepared, crps_circular, figures
 from companion.wind.study.records import NOISE_RADPS, RHO_HZ, equation_17, weather
 from companion.wind.study.score import HORIZONS_S

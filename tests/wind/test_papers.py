@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from companion.errors import InputError
 from companion.wind import make
-from companion.wind.study.ar1 import fit_ar1
-from companion.wind.study.records import NOISE_RADPS, RHO_HZ, Record, equation_17, parse_csv, weather
+from companion.wind.study.records import NOISE_RADPS, RHO_HZ, Record, equation_17, fit_ar1, parse_csv, weather
 from companion.wind.study.score import crps_circular, crps_normal, score
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from companion.wind import make
-from companion.wind.estimators.prior import CONSTANTS
+from companion.wind.estimators.forecaster import CONSTANTS
 from companion.wind.study.fit import Prepared, figures
 from companion.wind.study.records import parse_csv
 from companion.wind.study.score import HORIZONS_S, average, score

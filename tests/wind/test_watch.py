@@ -8,10 +8,10 @@ import pytest
 
 from companion.geo.angles import wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
-from companion.wind import VaneParameters, Verdict, WindRoom, apparent_wind
+from companion.wind import VaneParameters, WindTracker, WindVerdict, apparent_wind
 from tests.wind.boat import HERE, sail, turned, voyage
 
-QUIET = {Verdict.GOOD, Verdict.TURNING}
+QUIET = {WindVerdict.GOOD, WindVerdict.TURNING}
 
 
 def verdicts(log, first_s=0.0, last_s=math.inf):
@@ -36,14 +36,14 @@ def test_a_frozen_vane():
         return felt
 
     log, room = sail(fault, seconds=1100.0)
-    assert Verdict.FROZEN not in verdicts(log, 0.0, 500.0)
-    found = [t for t, s in log if Verdict.FROZEN in s.verdicts]
+    assert WindVerdict.FROZEN not in verdicts(log, 0.0, 500.0)
+    found = [t for t, s in log if WindVerdict.FROZEN in s.verdicts]
     assert found, "never recognised"
     assert found[0] <= 620.0                         # at the first tack under it, if not before
     assert found[-1] < 802.0                         # clears as soon as the vane moves
-    widest = max(s.widening for _, s in log if Verdict.FROZEN in s.verdicts)
+    widest = max(s.widening for _, s in log if WindVerdict.FROZEN in s.verdicts)
     assert widest > 2.0
-    bad = [s for t, s in log if Verdict.FROZEN in s.verdicts]
+    bad = [s for t, s in log if WindVerdict.FROZEN in s.verdicts]
     assert all(s.weight == 0.0 and s.sample.quality is WindQuality.SUSPECT for s in bad)
     # The forecast stood its ground while the wind seemed to tack with the boat.
     assert abs(wrap_pi(room.forecast_table(1100.0).mean_twd_from_rad[0] - 0.3)) < 0.5
@@ -60,8 +60,8 @@ def test_a_silent_vane_that_repeats_itself_is_found_without_a_tack():
 
     log, _ = sail(fault, seconds=720.0, leg_s=10000.0)
     # She only yaws by 2 deg in the waves: not enough to be sure. A helmsman's wander is.
-    assert Verdict.FROZEN not in verdicts(log)
-    room = WindRoom()
+    assert WindVerdict.FROZEN not in verdicts(log)
+    room = WindTracker()
     seen = set()
     for boat, felt, _ in voyage(seconds=720.0, leg_s=10000.0):
         heading = boat.heading_rad + math.radians(4.0) * math.sin(boat.t_s / 15.0)
@@ -69,7 +69,7 @@ def test_a_silent_vane_that_repeats_itself_is_found_without_a_tack():
         status = room.update(felt if boat.t_s < 500.0 else replace(felt, awa_rad=0.7))
         if boat.t_s > 560.0:
             seen |= set(status.verdicts)
-    assert Verdict.FROZEN in seen
+    assert WindVerdict.FROZEN in seen
 
 
 def test_a_spiking_vane():
@@ -81,12 +81,12 @@ def test_a_spiking_vane():
         return felt
 
     log, room = sail(fault)
-    assert Verdict.SPIKING not in verdicts(log, 0.0, 500.0)
-    found = [t for t, s in log if Verdict.SPIKING in s.verdicts]
+    assert WindVerdict.SPIKING not in verdicts(log, 0.0, 500.0)
+    found = [t for t, s in log if WindVerdict.SPIKING in s.verdicts]
     assert found
     assert found[0] < 600.0
     assert found[-1] < 900.0
-    assert all(1.0 < s.widening <= 2.0 for _, s in log if s.verdicts == (Verdict.SPIKING,))
+    assert all(1.0 < s.widening <= 2.0 for _, s in log if s.verdicts == (WindVerdict.SPIKING,))
     same = sail()[1]
     a, b = room.forecast_table(1500.0), same.forecast_table(1500.0)
     assert np.abs(np.degrees(a.mean_twd_from_rad - b.mean_twd_from_rad)).max() < 3.0
@@ -97,7 +97,7 @@ def test_a_shift_is_not_a_spike():
         return turned(felt, math.radians(70.0)) if t >= 600.0 else felt
 
     log, _ = sail(fault, leg_s=10000.0, seconds=1200.0)
-    assert Verdict.SPIKING not in verdicts(log)
+    assert WindVerdict.SPIKING not in verdicts(log)
     assert sum(s.weight == 0.0 for _, s in log) < 10
 
 
@@ -109,17 +109,17 @@ def test_a_vane_mounted_wrong(error_deg):
         seed=2, boat_mps=3.0,
     )
     last = next(s for t, s in log if t >= 3590.0)
-    assert Verdict.MISALIGNED in last.verdicts
+    assert WindVerdict.MISALIGNED in last.verdicts
     assert math.degrees(last.offset_rad) == pytest.approx(error_deg, abs=7.0)
     assert last.extra_sigma_rad > math.radians(6.0)
-    assert Verdict.MISALIGNED not in verdicts(log, 7000.0)
+    assert WindVerdict.MISALIGNED not in verdicts(log, 7000.0)
 
 
 def test_tacks_that_see_different_directions():
     """Upwash: the vane reads 7 deg too wide on both tacks, so the true wind jumps by more than twice that at a tack."""
     log, _ = sail(
         lambda t, boat, felt: turned(felt, math.radians(math.copysign(7.0, felt.awa_rad))), seconds=4000.0, leg_s=150.0)
-    assert Verdict.MISALIGNED in verdicts(log, 2000.0)
+    assert WindVerdict.MISALIGNED in verdicts(log, 2000.0)
     assert math.degrees(log[-1][1].side_rad) == pytest.approx(7.0, abs=3.0)
 
 
@@ -130,7 +130,7 @@ def test_a_calm():
         return still if lull else felt
 
     log, _ = sail(fault)
-    calm = [t for t, s in log if Verdict.CALM in s.verdicts]
+    calm = [t for t, s in log if WindVerdict.CALM in s.verdicts]
     assert calm
     assert 600.0 < calm[0] < 640.0
     assert 790.0 < calm[-1] < 830.0
@@ -142,9 +142,9 @@ def test_a_calm():
 def test_a_sensor_that_returns_after_a_gap():
     log, room = sail(lambda t, boat, felt: None if 600.0 <= t < 900.0 else felt)
     silent = room.status(1500.0 + 40.0)
-    assert Verdict.SILENT in silent.verdicts
+    assert WindVerdict.SILENT in silent.verdicts
     assert silent.age_s == pytest.approx(41.0)
-    back = [(t, s) for t, s in log if Verdict.RETURNED in s.verdicts]
+    back = [(t, s) for t, s in log if WindVerdict.RETURNED in s.verdicts]
     assert 900.0 <= back[0][0] <= 901.0
     assert back[-1][0] < 935.0
     assert back[0][1].widening > 1.5 > 1.1 > back[-1][1].widening
@@ -183,45 +183,47 @@ def test_wind_that_the_autopilot_holds():
             sample = replace(old, t_s=sample.t_s)
         return sample, felt
 
-    room = WindRoom()
+    room = WindTracker()
     log = wind_of_the_autopilot(room, change=change)
-    found = [t for t, s in log if Verdict.HELD in s.verdicts]
+    found = [t for t, s in log if WindVerdict.HELD in s.verdicts]
     assert 405.0 < found[0] < 425.0
     assert 595.0 < found[-1] < 601.0
-    assert all(s.sample.quality is WindQuality.HELD and s.widening > 1.0 for t, s in log if Verdict.HELD in s.verdicts)
+    assert all(s.sample.quality is WindQuality.HELD and s.widening > 1.0 for t,
+               s in log if WindVerdict.HELD in s.verdicts)
 
 
 def test_wind_below_the_least_speed_of_the_vane_is_held():
-    room = WindRoom(VaneParameters(vane_type=4, speed_type=4, speed_min_mps=1.0))
+    room = WindTracker(VaneParameters(vane_type=4, speed_type=4, speed_min_mps=1.0))
 
     def change(boat, sample, felt):
         return sample, replace(felt, aws_mps=0.7) if boat.t_s > 300.0 else felt
 
     log = wind_of_the_autopilot(room, change=change, seconds=600.0)
-    assert Verdict.HELD not in verdicts(log, 0.0, 299.0)
-    assert all(Verdict.HELD in s.verdicts for t, s in log if t > 302.0)
+    assert WindVerdict.HELD not in verdicts(log, 0.0, 299.0)
+    assert all(WindVerdict.HELD in s.verdicts for t, s in log if t > 302.0)
 
 
 def test_no_speed_sensor_and_an_invented_direction():
-    room = WindRoom()
+    room = WindTracker()
     room.set_parameters({"WNDVN_TYPE": 1.0, "WNDVN_SPEED_TYPE": 0.0})
     log = wind_of_the_autopilot(room, seconds=60.0, change=lambda boat, s, felt: (replace(s, tws_mps=0.0), felt))
-    assert {Verdict.SYNTHESISED, Verdict.NO_SPEED_SENSOR} <= set(log[-1][1].verdicts)
+    assert {WindVerdict.SYNTHESISED, WindVerdict.NO_SPEED_SENSOR} <= set(log[-1][1].verdicts)
     assert log[-1][1].extra_sigma_rad > math.radians(45.0)
-    assert Verdict.CALM not in log[-1][1].verdicts
+    assert WindVerdict.CALM not in log[-1][1].verdicts
     room.set_parameters(VaneParameters(vane_type=4, speed_type=4))
-    later = wind_of_the_autopilot(WindRoom(VaneParameters(vane_type=4, speed_type=4)), seconds=60.0)
+    later = wind_of_the_autopilot(WindTracker(VaneParameters(vane_type=4, speed_type=4)), seconds=60.0)
     assert verdicts(later) <= QUIET
 
 
 def test_a_speed_of_nothing_on_a_boat_that_sails_is_no_sensor():
-    log = wind_of_the_autopilot(WindRoom(), seconds=60.0, change=lambda boat, s, felt: (replace(s, tws_mps=0.0), felt))
-    assert Verdict.NO_SPEED_SENSOR in log[-1][1].verdicts
+    log = wind_of_the_autopilot(WindTracker(), seconds=60.0, change=lambda boat, s,
+                                felt: (replace(s, tws_mps=0.0), felt))
+    assert WindVerdict.NO_SPEED_SENSOR in log[-1][1].verdicts
 
 
 def test_the_low_pass_is_accounted_for():
     """WIND after a 3.2 s filter: with the parameter known to be off, nothing is added."""
-    filtered, plain = WindRoom(), WindRoom(VaneParameters(true_filter_hz=-1.0))
+    filtered, plain = WindTracker(), WindTracker(VaneParameters(true_filter_hz=-1.0))
     log = wind_of_the_autopilot(filtered)
     wind_of_the_autopilot(plain)
     assert log[-1][1].extra_sigma_rad > math.radians(0.5)
@@ -231,7 +233,7 @@ def test_the_low_pass_is_accounted_for():
 
 
 def test_no_forecast_before_wind_and_the_planner_gets_a_table_after():
-    room = WindRoom()
+    room = WindTracker()
     assert room.status(0.0) is None
     assert room.forecast_table(0.0) is None
     _, room = sail(room=room, seconds=100.0)
@@ -242,7 +244,7 @@ def test_no_forecast_before_wind_and_the_planner_gets_a_table_after():
 
 
 def test_duplicates_change_nothing_and_the_fold_is_deterministic():
-    once, twice = WindRoom(), WindRoom()
+    once, twice = WindTracker(), WindTracker()
     for boat, felt, _ in voyage(seconds=300.0):
         once.update(boat)
         once.update(felt)
@@ -255,7 +257,7 @@ def test_duplicates_change_nothing_and_the_fold_is_deterministic():
 
 
 def test_wind_is_preferred_to_apparent_wind_while_it_comes():
-    room = WindRoom()
+    room = WindTracker()
     for boat, felt, _ in voyage(seconds=100.0):
         room.update(boat)
         room.update(felt)
@@ -273,21 +275,21 @@ def test_widening_reaches_the_table():
 
 def test_a_steady_wind_over_a_drifting_boat_is_a_wind():
     """On the bench it was "an old true wind", for ever (issue 13, point 5): vane and anemometer make the same one."""
-    room = WindRoom()
+    room = WindTracker()
     true = WindSample(t_s=0.0, twd_from_rad=0.0, tws_mps=5.0)
     for t in range(180):
         boat = VehicleState(t_s=float(t), boot_s=float(t), position=HERE, velocity_en_mps=(0.0, -0.9), heading_rad=0.0)
         sample = replace(true, t_s=float(t))
         room.update(boat)
         room.update(apparent_wind(sample, boat))
-        assert Verdict.HELD not in room.update(sample).verdicts
+        assert WindVerdict.HELD not in room.update(sample).verdicts
     later = replace(true, t_s=200.0, twd_from_rad=1.0)      # the same true wind, though the vane has turned
     for t in range(180, 200):
         boat = replace(boat, t_s=float(t))
         room.update(boat)
         room.update(apparent_wind(replace(later, t_s=float(t)), boat))
         status = room.update(replace(true, t_s=float(t)))
-    assert Verdict.HELD in status.verdicts
+    assert WindVerdict.HELD in status.verdicts
 
 
 def test_a_vane_that_her_motion_contradicts_is_not_fed_until_it_fits_again():
@@ -297,14 +299,14 @@ def test_a_vane_that_her_motion_contradicts_is_not_fed_until_it_fits_again():
     room.contradict("the vane was turned")
     for t in range(1, 61):
         status = room.update(WindSample(t_s=at_s + t, twd_from_rad=2.0, tws_mps=6.0))
-    assert Verdict.TURNED in status.verdicts
+    assert WindVerdict.TURNED in status.verdicts
     assert status.sample.quality is WindQuality.SUSPECT
     assert "the vane was turned" in status.reason
     after = room.forecast_table(at_s + 60.0)
     assert abs(wrap_pi(after.mean_twd_from_rad[0] - before.mean_twd_from_rad[0])) < 0.2, "the wind before the turn"
     assert after.sigma_twd_rad[0] > 1.5 * before.sigma_twd_rad[0]
     room.contradict("")
-    assert Verdict.TURNED not in room.update(WindSample(t_s=at_s + 62.0, twd_from_rad=0.3, tws_mps=6.0)).verdicts
+    assert WindVerdict.TURNED not in room.update(WindSample(t_s=at_s + 62.0, twd_from_rad=0.3, tws_mps=6.0)).verdicts
 
 
 def test_what_was_read_by_another_offset_is_forgotten():
@@ -318,4 +320,4 @@ def test_what_was_read_by_another_offset_is_forgotten():
         status = room.update(WindSample(t_s=at_s + t, twd_from_rad=-2.0, tws_mps=6.0))
     assert room.forecast_table(at_s + 30.0).mean_twd_from_rad[0] == pytest.approx(-2.0, abs=0.05)
     room.set_parameters({"WNDVN_TYPE": 0.0})
-    assert Verdict.SYNTHESISED not in status.verdicts
+    assert WindVerdict.SYNTHESISED not in status.verdicts

@@ -1,18 +1,26 @@
 """Orders and statuses far away: a few sealed bytes each, over a link that delays, loses, doubles and reorders them."""
 
-from companion.orders.far.judge import MOST_AHEAD_S, MOST_JUMP, WINDOW, Reply, Taken, begun, judged, reply_of
-from companion.orders.far.layout import minutes_of, unix_of
 from companion.orders.far.order import (
     BEGINNING_SIZE,
+    MOST_AHEAD_S,
     MOST_COUNTER,
+    MOST_JUMP,
+    WINDOW,
     Beginning,
+    FarKey,
     FarOrder,
+    Reply,
+    Taken,
+    begun,
+    judged,
+    minutes_of,
     pack_beginning,
     pack_order,
+    reply_of,
+    unix_of,
     unpack_beginning,
     unpack_order,
 )
-from companion.orders.far.seal import FarKey
 from companion.orders.far.status import FarStatus, pack_status, unpack_status
 
 __all__ = [

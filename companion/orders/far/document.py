@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from companion.orders.far import order, status
-from companion.orders.far.seal import SEAL_BYTES
+from companion.orders.far.order import SEAL_BYTES
 
 MADE_BY = "<!-- made by python -m companion.orders.far.document -->"
 

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 from companion.mavlink.wire import companion_status
 from companion.messages import GeoPoint
-from companion.orders.far.judge import REPLIES, Reply
-from companion.orders.far.layout import BitField, Layout
-from companion.orders.far.seal import SEAL_BYTES, STATUS, FarKey
-from companion.orders.verbs import BY_VERB, Verb, verb_of
+from companion.orders.far.order import REPLIES, SEAL_BYTES, STATUS, BitField, FarKey, Layout, Reply
+from companion.orders.order import BY_VERB, Verb, verb_of
 
 VERSION = 1
 # The skipper's phases and the traffic's alarms in the order in which they were numbered: new ones go to the end.

@@ -36,7 +36,7 @@ from companion.skipper.way.gates import marks_of
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Composed, PointEn
 from companion.traffic import Vessel, predict
-from companion.traffic.encounters import expected
+from companion.traffic.colregs import expected
 
 NAME = "vessel too near"      # the watchdog's
 KEEP_SHARE = 0.5              # of the distance that plans keep: what the last resort defends

@@ -1,6 +1,6 @@
 """How a plan gives way: regions that a planner in time keeps out of beside the vessels' own discs.
 
-Under the rules of the road (``companion.traffic.encounters``) a change of course is to be early, apparent (rule 8) and
+Under the rules of the road (``companion.traffic.colregs``) a change of course is to be early, apparent (rule 8) and
 not across the other's bow (rule 15). All three are regions that go with time, so that every planner that knows moving
 discs obeys them, and nothing else of it changes:
 
@@ -24,7 +24,7 @@ from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Disc, Policy, Role, Vessel, predict
-from companion.traffic.encounters import APPARENT_RAD, Held
+from companion.traffic.colregs import APPARENT_RAD, OngoingEncounter
 
 AHEAD_S = 60.0               # crossing ahead of a bow by more than this is no risk
 BOW_STEP = 1.0               # of their radius: the row's discs overlap, nothing slips through
@@ -37,7 +37,7 @@ CROSSING_RAD = (math.radians(20.0), math.radians(160.0))   # between the courses
 PORT_RAD = (math.radians(-45.0), math.radians(-95.0))
 
 
-def held_of(turn: Turn, vessel: Vessel) -> Held | None:
+def held_of(turn: Turn, vessel: Vessel) -> OngoingEncounter | None:
     """Return the encounter with a vessel."""
     key = (vessel.mmsi, vessel.branch)
     return next((h for h in turn.state.traffic.encounters if (h.mmsi, h.branch) == key), None)
@@ -102,7 +102,7 @@ def regions(
     return tuple(t for t in out if distance_m(start_en, (t.x_m, t.y_m)) > t.radius_m)
 
 
-def _apparent(turn: Turn, held: Held, start_en: PointEn) -> list[Target]:
+def _apparent(turn: Turn, held: OngoingEncounter, start_en: PointEn) -> list[Target]:
     """Return what stands before us until the change of course shows."""
     speed = max(turn.speed_mps, 1.0)
     ahead_m = min(max(APPARENT_S * speed, APPARENT_M[0]), APPARENT_M[1])

@@ -21,7 +21,7 @@ from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import LOST_MPS
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Conflict, Disc, Vessel, check_legs, path_distance_m, peril_m, planning_discs, predict
-from companion.traffic.encounters import expected
+from companion.traffic.colregs import expected
 from companion.traffic.occupancy import Keep
 from companion.traffic.plans import TimedLeg, pressing
 from companion.traffic.predict import tail_factor

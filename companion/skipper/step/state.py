@@ -22,7 +22,7 @@ from companion.skipper.way.gates import Approach
 from companion.skipper.way.integrity import PositionDoubt
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Assessment
-from companion.traffic.encounters import Held
+from companion.traffic.colregs import OngoingEncounter
 
 
 class Phase(enum.Enum):
@@ -357,7 +357,7 @@ class TrafficState:
     """The vessels about, as they are watched."""
 
     watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
-    encounters: tuple[Held, ...] = ()              # with vessels, under the policy "rules"
+    encounters: tuple[OngoingEncounter, ...] = ()              # with vessels, under the policy "rules"
 
 
 @dataclass(frozen=True, kw_only=True)

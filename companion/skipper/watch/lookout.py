@@ -3,7 +3,7 @@
 An alarm needs CPA and TCPA both under their limits. Of each vessel one line is said in half a minute, one vessel a
 step and the worst first: among many nobody can read more. The rules of the road are shown, and not relied upon: the
 boat keeps clear of everyone (``companion.traffic.colregs``). Under the policy "rules" encounters are followed to past
-and clear, and each is said when it begins and when what we do changes (``companion.traffic.encounters``).
+and clear, and each is said when it begins and when what we do changes (``companion.traffic.colregs``).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from companion.skipper.step.actions import Severity
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.turn import Turn
 from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, Policy, assess
-from companion.traffic.encounters import follow
+from companion.traffic.colregs import follow
 
 SHOWN = 8                # vessels kept in the state: the worst
 EVERY_S = 30.0           # between two lines of one vessel

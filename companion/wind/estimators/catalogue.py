@@ -8,13 +8,12 @@ from functools import partial
 from typing import Any
 
 from companion.errors import InputError
-from companion.wind.estimators.arma import Arma
 from companion.wind.estimators.estimator import Estimator
 from companion.wind.estimators.forecaster import Forecaster
-from companion.wind.estimators.garch import Garch
 from companion.wind.estimators.kalman import AdaptiveKalman
 from companion.wind.estimators.means import RollingMean
 from companion.wind.estimators.ou import OrnsteinUhlenbeck
+from companion.wind.estimators.time_series import Arma, Garch
 
 __all__ = ["NAMES", "Forecaster", "make"]
 

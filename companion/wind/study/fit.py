@@ -23,9 +23,9 @@ from scipy.optimize import minimize
 from scipy.special import erf
 
 from companion.errors import InputError
-from companion.wind.estimators import kernel
+from companion.wind.estimators import forecaster_kernels as kernel
 from companion.wind.estimators.estimator import SIGMA_MAX_RAD, normal_half_width
-from companion.wind.estimators.prior import CONSTANTS
+from companion.wind.estimators.forecaster import CONSTANTS
 from companion.wind.study.records import Record, equation_17, parse_csv
 from companion.wind.study.score import FEWEST, HORIZONS_S, SCORED_LEVELS, asked_rows, targets
 

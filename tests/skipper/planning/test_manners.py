@@ -17,7 +17,7 @@ from companion.skipper.step.turn import Turn
 from companion.skipper.watch.lookout import look_out
 from companion.skipper.way.geometry import distance_m
 from companion.traffic import Policy, Role, TrafficPicture
-from companion.traffic.encounters import APPARENT_RAD
+from companion.traffic.colregs import APPARENT_RAD
 from tests.skipper.planning.test_traffic import Ship, asked, for_traffic, make, sail
 from tests.skipper.world import with_parts
 from tests.traffic.conftest import vessel

@@ -1,11 +1,10 @@
 """The arithmetic of the default forecaster, compiled; ``forecaster.py`` says what it means.
 
-All directions are on a line about the first reading (``Base``), all times are seconds since it. ``State`` is a
-bundle of arrays of fixed size that the functions change in place: memory does not grow. The numbers in brackets are
+All directions are on a line about the first reading (``Base``), all times are seconds since it. ``ForecasterState`` is
+a bundle of arrays of fixed size that the functions change in place: memory does not grow. The numbers in brackets are
 the equations of ``forecaster.py``.
 """
 
-# mypy: disable-error-code="no-any-return"
 from __future__ import annotations
 
 import math
@@ -15,6 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.kernels.jit import kernel
+
+# mypy: disable-error-code="no-any-return"
+
+
+
 
 Array = NDArray[np.float64]
 
@@ -47,7 +51,7 @@ RING_T, RING_FAST, RING_LONG = range(3)
 B_TREND, B_MEAN, B_SIGMA, B_SPEED, B_RETURN = (3 + i * J for i in range(5))
 
 
-class State(NamedTuple):
+class ForecasterState(NamedTuple):
     """Everything a forecaster knows."""
 
     now: Array        # (14,) scalars
@@ -87,9 +91,9 @@ def prior_quantile(constants: Constants) -> Array:
     return np.asarray(log_q + constants.tail[0] * np.maximum(0.0, z - 1.0) * log_h[:, None], dtype=np.float64)
 
 
-def new_state(constants: Constants) -> State:
+def new_state(constants: Constants) -> ForecasterState:
     """Return the state before the first reading."""
-    return State(
+    return ForecasterState(
         now=np.zeros(14), sums=np.zeros((SCALE_S.size, 2)), mean=np.zeros(SCALE_S.size),
         speed=np.zeros((SPEED_SCALE_S.size, 2)), knot=np.zeros((J, 12)),
         quantile=prior_quantile(constants), ring=np.zeros((ROWS, 3 + 5 * J)), pointer=np.zeros(J),
@@ -114,7 +118,7 @@ def _interpolation(h: float) -> tuple[int, float]:
 
 
 @kernel
-def _trend(st: State, con: Constants, h: float) -> float:
+def _trend(st: ForecasterState, con: Constants, h: float) -> float:
     """Multi-scale mean (1)."""
     k = SCALE_S.size - 1
     m = st.mean[k]
@@ -124,7 +128,7 @@ def _trend(st: State, con: Constants, h: float) -> float:
 
 
 @kernel
-def _speed(st: State, con: Constants, h: float) -> float:
+def _speed(st: ForecasterState, con: Constants, h: float) -> float:
     """Multi-scale mean speed, as (1)."""
     k = SPEED_SCALE_S.size - 1
     m = st.speed[k, 0] / st.speed[k, 1]
@@ -136,7 +140,7 @@ def _speed(st: State, con: Constants, h: float) -> float:
 
 
 @kernel
-def _shown(st: State, con: Constants, m: float, h: float) -> float:
+def _shown(st: ForecasterState, con: Constants, m: float, h: float) -> float:
     """Rms of the last hours' readings about ``m`` [rad], larger while less than ``h`` has been seen (4c)."""
     about = wrap(m - st.mean[SCALE_S.size - 1]) ** 2
     spread = math.sqrt((st.now[CLIMATE] + _YOUNG_S * _YOUNG_RAD2) / (st.now[CLIMATE_N] + _YOUNG_S) + about)
@@ -144,19 +148,19 @@ def _shown(st: State, con: Constants, m: float, h: float) -> float:
 
 
 @kernel
-def _rough(st: State) -> float:
+def _rough(st: ForecasterState) -> float:
     """Log of the mean departure from the 90 s mean in the last minute."""
     return math.log((st.now[ROUGH] + 0.1) / (st.now[ROUGH_N] + 1.0))
 
 
 @kernel
-def _wind(st: State) -> float:
+def _wind(st: ForecasterState) -> float:
     """Log of the wind speed of the last seconds."""
     return math.log(max(WIND_MIN_MPS, st.now[WIND] / max(1e-9, st.now[WIND_N])))
 
 
 @kernel
-def _refresh(st: State, con: Constants) -> None:
+def _refresh(st: ForecasterState, con: Constants) -> None:
     """Turn the sums of every knot into what ``predict`` reads."""
     m = st.mean[SCALE_S.size - 1]
     wind = max(2.0, st.speed[_SPEED_SCALE, 0] / max(1e-9, st.speed[_SPEED_SCALE, 1]))
@@ -176,7 +180,7 @@ def _refresh(st: State, con: Constants) -> None:
 
 
 @kernel
-def predict(st: State, con: Constants, h: float) -> tuple[float, float, float, float, float, float]:
+def predict(st: ForecasterState, con: Constants, h: float) -> tuple[float, float, float, float, float, float]:
     """Return mean x, sigma, mean speed, its sigma, and the two parts of the mean (trend, return)."""
     j, f = _interpolation(h)
     a, b = st.knot[j], st.knot[j + 1]
@@ -199,7 +203,7 @@ def predict(st: State, con: Constants, h: float) -> tuple[float, float, float, f
 
 
 @kernel
-def half_width_ratio(st: State, h: float, z: Array, zp: float) -> float:
+def half_width_ratio(st: ForecasterState, h: float, z: Array, zp: float) -> float:
     """Return the half width in sigmas at the normal quantile ``zp``; ``z`` holds the normal quantiles of QUANTILE_P."""
     j, f = _interpolation(h)
     i = 1
@@ -214,7 +218,7 @@ def half_width_ratio(st: State, h: float, z: Array, zp: float) -> float:
 
 
 @kernel
-def table(st: State, con: Constants, h: Array, z: Array, zp: Array) -> tuple[Array, Array]:
+def table(st: ForecasterState, con: Constants, h: Array, z: Array, zp: Array) -> tuple[Array, Array]:
     """Return the first four of ``predict`` (n, 4) and ``half_width_ratio`` (n, m), for horizons ``h`` and levels."""
     rows, ratio = np.empty((h.size, 4)), np.empty((h.size, zp.size))
     for i in range(h.size):
@@ -225,7 +229,7 @@ def table(st: State, con: Constants, h: Array, z: Array, zp: Array) -> tuple[Arr
 
 
 @kernel
-def correlation_time(st: State) -> float:
+def correlation_time(st: ForecasterState) -> float:
     """Return where phi(h) / phi(shortest) falls to 1/e [s]; beyond 600 s by its slope so far, at most an hour."""
     top = max(0.05, st.knot[0, PHI])
     h0, p0 = KNOT_S[0], 1.0
@@ -239,7 +243,7 @@ def correlation_time(st: State) -> float:
 
 
 @kernel
-def _learn(st: State, con: Constants, prior: Array, j: int, row: int, x: float, speed: float) -> None:
+def _learn(st: ForecasterState, con: Constants, prior: Array, j: int, row: int, x: float, speed: float) -> None:
     """Score a kept forecast against the reading that it was for."""
     r, kn, mem, h = st.ring[row], st.knot[j], con.memory, KNOT_S[j]
     error = wrap(x - r[B_MEAN + j])
@@ -272,7 +276,7 @@ def _learn(st: State, con: Constants, prior: Array, j: int, row: int, x: float, 
 
 
 @kernel
-def _speeds(st: State, step: float, speed: float, weight: float) -> None:
+def _speeds(st: ForecasterState, step: float, speed: float, weight: float) -> None:
     """Move every running mean of the speed by a reading that stands for ``step`` seconds."""
     now = st.now
     for k in range(SPEED_SCALE_S.size):
@@ -285,7 +289,7 @@ def _speeds(st: State, step: float, speed: float, weight: float) -> None:
 
 
 @kernel
-def _directions(st: State, con: Constants, step: float, x: float, speed: float, weight: float) -> None:
+def _directions(st: ForecasterState, con: Constants, step: float, x: float, speed: float, weight: float) -> None:
     """Move every running mean of the direction by a reading that stands for ``step`` seconds."""
     now, mem = st.now, con.memory
     # Means of the air's motion: light air weighs little.
@@ -308,7 +312,7 @@ def _directions(st: State, con: Constants, step: float, x: float, speed: float, 
 
 
 @kernel
-def _remember(st: State, con: Constants) -> None:
+def _remember(st: ForecasterState, con: Constants) -> None:
     """Keep a forecast for every knot, to be scored when its time comes."""
     now = st.now
     now[LAST_ROW_S] = now[CLOCK]
@@ -332,7 +336,8 @@ def _remember(st: State, con: Constants) -> None:
 
 @kernel
 def update(
-    st: State, con: Constants, prior: Array, dt: float, x: float, speed: float, weight: float, speed_weight: float,
+    st: ForecasterState, con: Constants, prior: Array, dt: float, x: float, speed: float, weight: float,
+    speed_weight: float,
 ) -> None:
     """Take a reading ``dt`` after the last; the first has ``dt`` 0, and a direction that is believed."""
     now = st.now
@@ -359,8 +364,8 @@ def update(
 
 @kernel
 def replay(
-    st: State, con: Constants, prior: Array, t: Array, x: Array, speed: Array, ask: NDArray[np.bool_], horizon: Array,
-    z: Array, zp: Array,
+    st: ForecasterState, con: Constants, prior: Array, t: Array, x: Array, speed: Array, ask: NDArray[np.bool_],
+    horizon: Array, z: Array, zp: Array,
 ) -> Array:
     """Feed a record; return (asked, horizons, 4 + levels): mean, sigma, speed, its sigma, half width ratios."""
     out = np.zeros((int(ask.sum()), horizon.size, 4 + zp.size))

@@ -17,17 +17,18 @@ from companion.messages import ApparentWind, VehicleState, WindForecast, WindQua
 from companion.wind.estimators.catalogue import Forecaster
 from companion.wind.estimators.estimator import SIGMA_MAX_RAD, Estimator, gain
 from companion.wind.parameters import VaneParameters
+from companion.wind.sensor_faults import WindStatus, WindVerdict, WindWatch
 from companion.wind.true_wind import LIGHT_MPS, true_wind
-from companion.wind.watch import Verdict, WindStatus, WindWatch
 
 SILENT_S = 5.0            # [s] without a sample before the wind counts as silent
 WIND_PREFERRED_S = 10.0   # [s] after a WIND message during which apparent wind is only listened to
 
 
 _QUALITY = {
-    Verdict.TURNING: WindQuality.TURNING, Verdict.CALM: WindQuality.LIGHT, Verdict.HELD: WindQuality.HELD,
-    Verdict.FROZEN: WindQuality.SUSPECT, Verdict.SPIKING: WindQuality.SUSPECT, Verdict.MISALIGNED: WindQuality.SUSPECT,
-    Verdict.TURNED: WindQuality.SUSPECT, Verdict.SYNTHESISED: WindQuality.INVALID,
+    WindVerdict.TURNING: WindQuality.TURNING, WindVerdict.CALM: WindQuality.LIGHT, WindVerdict.HELD: WindQuality.HELD,
+    WindVerdict.FROZEN: WindQuality.SUSPECT, WindVerdict.SPIKING: WindQuality.SUSPECT,
+    WindVerdict.MISALIGNED: WindQuality.SUSPECT,
+    WindVerdict.TURNED: WindQuality.SUSPECT, WindVerdict.SYNTHESISED: WindQuality.INVALID,
 }
 
 
@@ -38,7 +39,7 @@ def _quality(sample: WindSample, status: WindStatus) -> WindQuality:
     return max([sample.quality, *found], key=order.index)
 
 
-class WindRoom:
+class WindTracker:
     """Estimator, watch and parameters in one.
 
     ``update`` takes each message as it arrives: ``VehicleState``, ``ApparentWind`` (AppWnd*), ``WindSample`` (WIND,
@@ -136,7 +137,7 @@ class WindRoom:
         age_s = max(0.0, t_s - status.t_s)
         if age_s <= SILENT_S:
             return changed(status, age_s=age_s)
-        verdicts = (*(v for v in status.verdicts if v is not Verdict.GOOD), Verdict.SILENT)
+        verdicts = (*(v for v in status.verdicts if v is not WindVerdict.GOOD), WindVerdict.SILENT)
         return changed(status, age_s=age_s, verdicts=verdicts, reason=f"no wind for {age_s:.0f} s")
 
     def forecast_table(
