@@ -4,9 +4,9 @@
 
 The futures are drawn here from what is stated of vessels (``companion.traffic.predict.MotionUncertainty``: each error
 one draw for the whole future, the course followed as ``predict`` does) and of our own timing, without any code of the
-planner; the winds as in ``companion.planner.risk.wind.simulate_entries``. "Met" is a boat nearer to a ship's middle
-than both hulls and the clearance asked for. The share of voyages that are met, or forced into the no-go zone, must be
-at most what was promised, and where it binds (1 %) at least a third of it.
+planner; the winds as in ``companion.planner.risk.chance_constraint.simulate_entries``. "Met" is a boat nearer to a
+ship's middle than both hulls and the clearance asked for. The share of voyages that are met, or forced into the no-go
+zone, must be at most what was promised, and where it binds (1 %) at least a third of it.
 """
 
 from __future__ import annotations

@@ -7,11 +7,9 @@ from dataclasses import replace
 
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import PlanStatus
-from companion.planner.problem.beat import beaten
-from companion.planner.problem.defects import defect_of
-from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.evaluate import beaten, evaluate
 from companion.planner.problem.parts import Beat
-from companion.planner.problem.value import Problem
+from companion.planner.problem.value import Problem, defect_of
 from companion.planner.search.bound import cut_off, lower_bound_s
 from companion.planner.search.world import make_world
 

@@ -14,9 +14,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from companion.planner.effort import Effort, Outcome, Search
-from companion.planner.problem.defects import defect_of
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.value import Problem
+from companion.planner.problem.value import Problem, defect_of
 from companion.planner.risk.tacks import Tack, of_risky, tacks_at_risk
 
 DEARER = 1.10          # of the first path's time: what another may take

@@ -15,9 +15,9 @@ from companion.planner.courses import courses
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
 from companion.planner.risk.arrival import in_words, limits_in_words
+from companion.planner.risk.chance_constraint import path_risk, with_parts
 from companion.planner.risk.tacks import in_words as tacks_in_words
 from companion.planner.risk.tacks import tacks_at_risk
-from companion.planner.risk.wind import path_risk, with_parts
 from companion.planner.what_if import Replanner, decisive_side, other_side, what_would_help
 from companion.words import counted
 

@@ -39,7 +39,8 @@ class Leg:
     ``risk`` is the probability that the wind forces the leg into the no-go zone at some instant of it, and that the
     boat comes too near to an uncertain vessel (None: not
     computed). ``is_beat``: the autopilot beats it by itself, tacking about the line
-    (``companion.planner.problem.beat``); ``speed_mps`` is then what it makes good. ``manoeuvre`` is the turn into the
+    (``companion.planner.problem.evaluate``); ``speed_mps`` is then what it makes good. ``manoeuvre`` is the turn into
+    the
     leg: "tack", "gybe", or "" for one that goes through neither the wind's eye nor dead down wind.
     """
 

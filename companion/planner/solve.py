@@ -24,10 +24,8 @@ from companion.errors import InputError
 from companion.planner.contingency import CONTACT_S
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import Plan, PlanStatus, Why
-from companion.planner.problem.defects import defect_of
 from companion.planner.problem.evaluate import Evaluation, clearances, evaluate
-from companion.planner.problem.sharing import resolved
-from companion.planner.problem.value import Problem
+from companion.planner.problem.value import Problem, defect_of, resolved
 from companion.planner.settings import SETTINGS, Settings
 from companion.planner.warm import warm_problems
 
@@ -121,7 +119,7 @@ def _solved(
     module, name = ALGORITHMS[empty.algorithm]
     found = getattr(importlib.import_module(module), name)
     search: Search = found if settings is None else partial(found, settings=settings)
-    from companion.planner.risk.wind import keep_limit, search_within
+    from companion.planner.risk.chance_constraint import keep_limit, search_within
 
     if empty.algorithm == "rrtstar" and problem.is_shared:
         from companion.planner.reference.vessels import carried, judge_of, keep_share
@@ -163,7 +161,7 @@ class _Answers:
 
     def judge(self, waypoints_en: NDArray[np.float64]) -> float:
         """Judge a path that the search has come to; return when the next is to be judged [s]."""
-        from companion.planner.risk.wind import keep_limit
+        from companion.planner.risk.chance_constraint import keep_limit
 
         problem, effort = self._problem, self._effort
         began_s, spare_s, is_kept = effort.elapsed_s, 0.0, True

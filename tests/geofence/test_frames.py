@@ -11,7 +11,7 @@ from pyproj import Geod
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
-from companion.planner.reference.flat import flat_en_from_lonlat, flat_lonlat_from_en
+from companion.planner.reference.astar import flat_en_from_lonlat, flat_lonlat_from_en
 from tests.geofence.strategies import QUIET
 
 GEOD = Geod(ellps="WGS84")

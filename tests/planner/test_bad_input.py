@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
-from companion.planner.problem import shore as shores
+from companion.planner.problem import evaluate as shores
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.search.kernels import is_free
 from companion.planner.search.world import make_world

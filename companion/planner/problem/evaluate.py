@@ -13,18 +13,227 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.planner.plan import Leg
-from companion.planner.problem.beat import beat_s, is_clear
-from companion.planner.problem.parts import CLEAR_TURN_RAD, NO_GO_SLACK_RAD
-from companion.planner.problem.sharing import resolved
-from companion.planner.problem.shore import shore_of
-from companion.planner.problem.value import Problem
+from companion.planner.problem.parts import CLEAR_TURN_RAD, NO_CURRENT, NO_GO_SLACK_RAD, TOUCH_M, Beat
+from companion.planner.problem.value import Problem, resolved
+
+# Headings in a current: which way to point so that the track over the ground is the leg.
+
+_HEADINGS = 720
+
+
+def solve_heading(p: Problem, course_rad: float, t_s: float) -> tuple[float, float]:
+    """Return (heading [rad], speed over ground [m/s]) that makes ``course_rad`` good in the current.
+
+    All headings whose velocity over the ground lies along the course are found between 720 samples by bisection
+    on the cross product. The fastest that keeps clear of the no-go zone at ``t_s`` and of the deepest angle wins;
+    without such a one the fastest at all (its leg then fails the no-go check); (course, 0) when none makes way.
+    """
+    dx, dy = math.sin(course_rad), math.cos(course_rad)
+    cx = p.current.drift_mps * math.sin(p.current.set_rad)
+    cy = p.current.drift_mps * math.cos(p.current.set_rad)
+    twd, half = p.wind.twd_from_rad, p.no_go_half_rad(t_s)
+
+    def speed(h: float) -> float:
+        return p.boat.speed_mps(wrap_pi(h - twd))
+
+    def cross(h: float) -> float:
+        v = speed(h)
+        return (v * math.sin(h) + cx) * dy - (v * math.cos(h) + cy) * dx
+
+    grid = course_rad + np.linspace(-math.pi, math.pi, _HEADINGS + 1)
+    v = np.interp(np.abs((grid - twd + math.pi) % (2.0 * math.pi) - math.pi), p.boat.polar_twa_rad, p.boat.polar_mps)
+    side = (v * np.sin(grid) + cx) * dy - (v * np.cos(grid) + cy) * dx
+    best, best_any = (course_rad, 0.0), (course_rad, 0.0)
+    for i in np.nonzero(side[:-1] * side[1:] <= 0.0)[0]:
+        lo, hi = float(grid[i]), float(grid[i + 1])
+        low = cross(lo)
+        for _ in range(60):
+            mid = 0.5 * (lo + hi)
+            value = cross(mid)
+            lo, hi, low = (mid, hi, value) if (value > 0.0) == (low > 0.0) else (lo, mid, low)
+        h = 0.5 * (lo + hi)
+        made = speed(h)
+        along = (made * math.sin(h) + cx) * dx + (made * math.cos(h) + cy) * dy
+        twa = abs(wrap_pi(h - twd))
+        if along > best_any[1]:
+            best_any = (h, along)
+        if along > best[1] and twa >= half - 1e-9 and twa <= p.boat.max_twa_rad + 1e-9:
+            best = (h, along)
+    return best if best[1] > 0.0 else best_any
+
+
+# Legs that the autopilot beats by itself: straight to a point upwind, tacking within its corridor about the line.
+#
+# ArduRover sails a leg inside its no-go zone at exactly the zone's edge, follows each shift of the wind at once, and
+# tacks where it is a corridor off the line. A planned course cannot: it must keep clear of the zone by what the wind
+# may turn until it is sailed. Where the water is clear a corridor to either side, handing the beat over is faster the
+# more uncertain the wind is, and never closed by a shift. ``Problem.beat`` says what the autopilot does; a leg inside
+# the widened zone is then allowed if it is clear by ``clearance_m``, and takes ``beat_s``.
+
+ANGLES = 46   # nodes of the beaten speed inside the zone: a degree apart at 45 degrees
+
+
+def beat_s(problem: Problem, beat: Beat, dx_m: float, dy_m: float) -> tuple[float, float]:
+    """Return (time [s], tacks) of a leg (dx, dy) east, north that the autopilot beats; outside its zone it follows.
+
+    Both close-hauled courses in the share that makes the leg good; each tack costs ``tack_s``, and a corridor of
+    ``corridor_m`` to either side is crossed from edge to edge.
+    """
+    length = math.hypot(dx_m, dy_m)
+    if problem.current.drift_mps > 0.0:
+        return _in_a_current(problem, beat, length, math.atan2(dx_m, dy_m))
+    off = abs(wrap_pi(math.atan2(dx_m, dy_m) - problem.wind.twd_from_rad))
+    half = beat.no_go_half_rad
+    if off >= half:
+        speed = problem.boat.speed_mps(off)
+        return (length / speed if speed > 0.0 else math.inf), 0.0
+    speed = problem.boat.speed_mps(half)
+    if speed <= 0.0:
+        return math.inf, 0.0
+    across = length * math.sin(half + off) * math.sin(half - off) / math.sin(2.0 * half)  # on each tack, off the line
+    tacks = across / beat.corridor_m
+    return length * math.cos(off) / (speed * math.cos(half)) + tacks * beat.tack_s, tacks
+
+
+def _in_a_current(problem: Problem, beat: Beat, length_m: float, course_rad: float) -> tuple[float, float]:
+    """Return (time [s], tacks) over the ground: what beating makes good through the water, carried along by it.
+
+    The autopilot beats about the wind over the ground and this about that over the water, a few degrees off: the speed
+    made good to windward is flat there. A tack takes its time in place, over the ground, as every turn of a plan does.
+    """
+    heading, speed = solve_heading(beaten(problem, beat), course_rad, 0.0)
+    if speed <= 0.0:
+        return math.inf, 0.0
+    sailed_s, still = length_m / speed, replace(problem, current=NO_CURRENT)
+    through_m = sailed_s * beaten_mps(still, replace(beat, tack_s=0.0), wrap_pi(heading - problem.wind.twd_from_rad))
+    _, tacks = beat_s(still, beat, through_m * math.sin(heading), through_m * math.cos(heading))
+    return sailed_s + tacks * beat.tack_s, tacks
+
+
+def beaten_mps(still: Problem, beat: Beat, off_rad: float) -> float:
+    """Return the speed made good through the water at an angle to the wind, beating where that is in the zone [m/s]."""
+    course = still.wind.twd_from_rad + off_rad
+    spent_s, _ = beat_s(still, beat, math.sin(course), math.cos(course))
+    return 1.0 / spent_s if spent_s > 0.0 and math.isfinite(spent_s) else 0.0
+
+
+def is_clear(problem: Problem, line: shapely.LineString) -> bool:
+    """Return whether the problem has a beat and the leg's corridor is clear: it may be left to the autopilot."""
+    if problem.beat is None:
+        return False
+    solid = problem.beat_solid
+    return solid.is_empty or not bool(shapely.intersects(solid, line))
+
+
+def beaten(problem: Problem, beat: Beat) -> Problem:
+    """Return the problem of a boat that goes straight everywhere, in water narrower by the corridor.
+
+    Its polar inside the zone is the speed made good by beating, in a current without the time of the tacks, which is
+    added to its paths when they are scored. Every path of it is a path of ``problem``.
+    """
+    boat = problem.boat
+    still, tacking = replace(problem, current=NO_CURRENT), beat
+    if problem.current.drift_mps > 0.0:
+        tacking = replace(beat, tack_s=0.0)   # while she tacks in place a share of her speed would be carried back
+    inside = [float(a) for a in np.linspace(0.0, beat.no_go_half_rad, ANGLES)]
+    made = [beaten_mps(still, tacking, angle) for angle in inside]
+    outside = [(a, v) for a, v in zip(boat.polar_twa_rad, boat.polar_mps, strict=True) if a > beat.no_go_half_rad]
+    clear = beat.clearance_m
+    targets = tuple(replace(t, radius_m=t.radius_m + beat.corridor_m) for t in problem.targets)
+    return replace(
+        problem, beat=None, risk=None,
+        zone=None if problem.zone is None else replace(
+            problem.zone, half_rad=max(0.0, problem.zone.half_rad - 2.0 * NO_GO_SLACK_RAD),
+            open_half_rad=min(problem.no_go_max_rad, math.pi)),
+        delta_s=0.5, targets=targets,
+        clearance_floor_m=problem.clearance_floor_m + clear,
+        wind=replace(problem.wind, sigma=type(problem.wind.sigma)()),
+        boat=replace(
+            boat, no_go_half_rad=0.0, polar_twa_rad=(*inside, *(a for a, _ in outside)),
+            polar_mps=(*made, *(v for _, v in outside))),
+    )
+
+
+# The exact test of a leg against everything solid, and its clearance.
+#
+# The definition is ``Problem.eval_solid``: the union of all obstacles and of what is outside the fence, shrunk by the
+# slack. To unite a hundred thousand vertices, or thousands of slivers that cross each other, takes longer than to plan
+# among them, and what is solid about a leg depends only on what is near it: in a large problem only that is united.
+
+LARGE = 1_000
+"""Vertices above which the union of everything is not made."""
+_REACH_M = 0.05
+_CORRIDOR_M = 0.5
+
+
+class Shore:
+    """Everything solid of a problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self.is_large = sum(shapely.get_num_coordinates(g) for g in problem.obstacles) > LARGE
+        self._parts = np.asarray(
+            [g if g.is_valid else shapely.make_valid(g) for g in problem.obstacles if not g.is_empty], dtype=object)
+        self._tree = shapely.STRtree(self._parts)
+        self._fence = problem.fence_polygon
+        self._line = None if self._fence is None else self._fence.boundary
+        for shape in (self._fence, self._line):
+            if shape is not None:
+                shapely.prepare(shape)
+
+    @cached_property
+    def tree(self) -> shapely.STRtree:
+        """Everything solid, the fence's line included, without the clearance floor."""
+        shapes = list(self._parts)
+        if self._problem.fence is not None:
+            shapes.append(self._problem.fence.boundary)
+        return shapely.STRtree(np.asarray(shapes, dtype=object))
+
+    def hits(self, shape: shapely.Geometry) -> bool:
+        """Does a leg or point collide: is it deeper than the slack in an obstacle or outside the fence?"""
+        if not self.is_large:
+            solid = self._problem.eval_solid
+            return not solid.is_empty and bool(solid.intersects(shape))
+        floor = self._problem.clearance_floor_m
+        near = self._tree.query(shape, predicate="dwithin", distance=floor + _REACH_M)
+        is_inside = self._fence is None or (
+            bool(self._fence.contains_properly(shape)) and not bool(shapely.dwithin(self._line, shape, _REACH_M)))
+        if len(near) == 0 and is_inside:
+            return False
+        corridor = shape.buffer(_CORRIDOR_M)
+        within = shape.buffer(_CORRIDOR_M + floor) if floor > 0.0 else corridor
+        pieces = list(shapely.intersection(self._parts[near], within))
+        if floor > 0.0:
+            pieces = [g.buffer(floor) for g in pieces]
+        if not is_inside:
+            pieces.append(corridor.difference(self._fence))
+        solid = shapely.union_all(pieces).buffer(-TOUCH_M, join_style="mitre", mitre_limit=5.0)
+        return bool(solid.intersects(shape))
+
+    def clearances_m(self, lines: NDArray[np.object_]) -> NDArray[np.float64] | None:
+        """Return each line's distance to the nearest obstacle or fence line; None where there is neither."""
+        nearest = np.full(len(lines), np.inf)
+        if len(self._parts):
+            (which, _), distance = self._tree.query_nearest(lines, return_distance=True, all_matches=False)
+            nearest[which] = np.maximum(0.0, distance - self._problem.clearance_floor_m)
+        if self._line is not None and not self._line.is_empty:
+            nearest = np.minimum(nearest, shapely.distance(self._line, lines))
+        return nearest if len(self._parts) or self._line is not None else None
+
+
+@lru_cache(maxsize=8)   # by identity; an index of thousands of shapes is made once for a search
+def shore_of(problem: Problem) -> Shore:
+    """Return the exact test of legs against all that is solid in the problem."""
+    return Shore(problem)
+
 
 START_SLACK_M = 0.01
 GOAL_SLACK_M = 1e-6
@@ -78,8 +287,6 @@ def ground_track(p: Problem, dx_m: float, dy_m: float, t_s: float = 0.0) -> tupl
     course = math.atan2(dx_m, dy_m)
     if p.current.drift_mps == 0.0:
         return course, p.boat.speed_mps(wrap_pi(course - p.wind.twd_from_rad))
-    from companion.planner.problem.current import solve_heading
-
     return solve_heading(p, course, t_s)
 
 

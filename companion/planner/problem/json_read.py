@@ -22,11 +22,12 @@ from companion.planner.problem.parts import (
     Current,
     RiskLimit,
     Sigma,
+    Speeds,
+    Strength,
     Target,
     Wind,
     Zone,
 )
-from companion.planner.problem.strength import Speeds, Strength
 
 if TYPE_CHECKING:
     from companion.planner.problem.tracking import Tracking

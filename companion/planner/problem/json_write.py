@@ -12,7 +12,7 @@ from companion.planner.problem.json_read import HELM_KEYS
 from companion.planner.problem.value import LEG_SAVING, Problem
 
 if TYPE_CHECKING:
-    from companion.planner.problem.strength import Strength
+    from companion.planner.problem.parts import Strength
     from companion.planner.problem.tracking import Tracking
     from companion.traffic.occupancy import Spread
 

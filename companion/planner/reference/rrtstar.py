@@ -37,7 +37,7 @@ from companion.planner.problem.value import Problem
 from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.reference.vessels import NO_VESSELS, TreeVessels
 from companion.planner.reference.world import World, bounds_of, world_of
-from companion.planner.risk.wind import PROMISE_FACTOR, process_of
+from companion.planner.risk.chance_constraint import PROMISE_FACTOR, process_of
 from companion.planner.settings import RrtstarSettings
 
 REACH_SHARE = 0.2      # of the search box's diagonal: OMPL's default range

@@ -1,6 +1,6 @@
 """Uncertain vessels under the bound of RRT*'s own tree, in place of the closed discs that other algorithms are given.
 
-The promise is shared as the problem says (``companion.planner.problem.sharing``): the wind has its own delta_s, and
+The promise is shared as the problem says (``companion.planner.problem.value``): the wind has its own delta_s, and
 each of n vessels a part ``vessels_share / n`` at each instant. A disc that keeps the part is sized by the larger of the
 vessel's two standard deviations and by a half plane. Here the part itself is the constraint: at every instant of every
 edge, the chance to be nearer than hulls and clearance, of the Gaussian with both its axes, is the part at most. With a
@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem.evaluate import Evaluation, evaluate
 from companion.planner.problem.parts import Target
-from companion.planner.problem.sharing import sigmas_for, uncertain, vessel_count
-from companion.planner.problem.value import Problem
-from companion.planner.reference import vessel_kernels as kernels
-from companion.planner.risk.vessel_kernels import LEAST_SIGMA_M, inside, spread_at
-from companion.planner.risk.vessels import vessel_risk
+from companion.planner.problem.value import Problem, sigmas_for, uncertain, vessel_count
+from companion.planner.reference import rrtstar_kernels as kernels
+from companion.planner.risk.chance_constraint import vessel_risk
+from companion.planner.risk.kernels import LEAST_SIGMA_M, inside, spread_at
 from companion.traffic.occupancy import Spread
 
 KEPT = 1.0 - 1e-6    # of its part that the tree uses: the judge's times differ by the last digits
@@ -33,13 +32,13 @@ ABOVE = "the path found is at some instant likelier to be too near to a vessel t
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TreeVessels:
-    """The vessels as the tree's arrays: windows (n, ``vessel_kernels.COLUMNS``), and regions as targets (n, 8)."""
+    """The vessels as the tree's arrays: windows (n, ``VESSEL_COLUMNS``), and regions as targets (n, 8)."""
 
     window: NDArray[np.float64]
     disc: NDArray[np.float64]
 
 
-NO_VESSELS = TreeVessels(window=np.zeros((0, kernels.COLUMNS)), disc=np.zeros((0, 8)))
+NO_VESSELS = TreeVessels(window=np.zeros((0, kernels.VESSEL_COLUMNS)), disc=np.zeros((0, 8)))
 
 
 def carried(problem: Problem) -> tuple[Problem, TreeVessels] | None:

@@ -142,7 +142,7 @@ def _buckets(edge: Floats) -> tuple[Ints, Ints, Floats, Ints]:
 def _courses(p: Problem) -> Floats:
     if p.current.drift_mps == 0.0:
         return np.zeros((3, 0))
-    from companion.planner.problem.current import solve_heading
+    from companion.planner.problem.evaluate import solve_heading
 
     out = np.zeros((3, _COURSES))
     for i, course in enumerate(np.linspace(-math.pi, math.pi, _COURSES)):

@@ -2,8 +2,8 @@
 
 from companion.planner.risk.arrival import arrival, limits_in_words
 from companion.planner.risk.arrival import in_words as arrival_in_words
+from companion.planner.risk.chance_constraint import path_risk, simulate_entries, with_risk
 from companion.planner.risk.tacks import of_risky, tacks_at_risk
-from companion.planner.risk.wind import path_risk, simulate_entries, with_risk
 
 __all__ = [
     "arrival", "arrival_in_words", "limits_in_words", "of_risky", "path_risk", "simulate_entries", "tacks_at_risk",

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from companion.boat.failed_tack import IRONS_S
 from companion.kernels.jit import kernel
 from companion.planner.plan import Arrival, Leg
-from companion.planner.problem.beat import beat_s
-from companion.planner.problem.strength import Speeds, Strength
+from companion.planner.problem.evaluate import beat_s
+from companion.planner.problem.parts import Speeds, Strength
 from companion.planner.problem.value import Problem
 
 WINDS = 200

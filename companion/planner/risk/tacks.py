@@ -21,8 +21,7 @@ from companion.boat.failed_tack import AGAIN_SHARE, RISKY, TRIES, failed_tack, l
 from companion.boat.tracking import stated_error_m
 from companion.geo.angles import wrap_pi
 from companion.planner.plan import Leg
-from companion.planner.problem.beat import beat_s
-from companion.planner.problem.shore import shore_of
+from companion.planner.problem.evaluate import beat_s, shore_of
 from companion.planner.problem.value import Problem
 
 MOST_FAILURES = 5      # in a row that are looked at

@@ -15,8 +15,7 @@ import shapely
 
 from companion.planner.effort import Effort, Outcome
 from companion.planner.plan import PlanStatus
-from companion.planner.problem.evaluate import target_hit
-from companion.planner.problem.shore import shore_of
+from companion.planner.problem.evaluate import shore_of, target_hit
 from companion.planner.problem.value import Problem
 from companion.planner.search.bound import Bound, cut_off, no_course
 from companion.planner.search.gauge import make_gauge

@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 
 from companion.kernels.xorshift import uniform
 from companion.planner.effort import Effort
-from companion.planner.search.anneal import anneal, timetable
+from companion.planner.search.annealing import MOST_POINTS, anneal, timetable
 from companion.planner.search.bound import Bound
-from companion.planner.search.drifting import run_drift
 from companion.planner.search.gauge import Gauge
 from companion.planner.search.kernels import Floats, is_free
-from companion.planner.search.lattice import run_lattice
-from companion.planner.search.proposals import MOST_POINTS
-from companion.planner.search.rounds import fitted, rounded
-from companion.planner.search.tacks import check_path, follow, zigzag
+from companion.planner.search.lattice import run_drift, run_lattice
+from companion.planner.search.moves import check_path, fitted, follow, rounded, zigzag
 from companion.planner.search.visibility import crossings, geodesics, graph_nodes, least_through
 from companion.planner.search.world import World
 

@@ -22,10 +22,8 @@ from companion.boat.tracking import SHORT_S
 from companion.geo.angles import wrap_pi
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import PlanStatus
-from companion.planner.problem.evaluate import Evaluation, evaluate
-from companion.planner.problem.sharing import resolved
-from companion.planner.problem.shore import shore_of
-from companion.planner.problem.value import Problem
+from companion.planner.problem.evaluate import Evaluation, evaluate, shore_of
+from companion.planner.problem.value import Problem, resolved
 from companion.planner.track.expected import Expected, curve_mps, expected
 
 Path = list[tuple[float, float]]

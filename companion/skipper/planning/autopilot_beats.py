@@ -1,4 +1,4 @@
-"""Beats that are left to the autopilot: whether, and how much room each needs (``companion.planner.problem.beat``)."""
+"""Beats that are left to the autopilot: whether, and how much room each needs (``problem.evaluate``)."""
 
 from __future__ import annotations
 

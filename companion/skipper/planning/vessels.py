@@ -1,9 +1,9 @@
 """Other vessels under way: what plans are told of them, and the route being sailed held against them.
 
 A plan gets the vessels as predictions with their spread, and their part of its promise
-(``companion.planner.risk.vessels``): on the ladder's first step that is within 1 - delta_s, later steps risk more for
-them and the promise says so. A plan keeps farther away than where the active route is given up, so that it is not made
-again for the next report.
+(``companion.planner.risk.chance_constraint``): on the ladder's first step that is within 1 - delta_s, later steps risk
+more for them and the promise says so. A plan keeps farther away than where the active route is given up, so that it is
+not made again for the next report.
 """
 
 from __future__ import annotations

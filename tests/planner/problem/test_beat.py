@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 
 from companion.errors import InputError
 from companion.planner import Plan, PlanStatus, Problem, plan
-from companion.planner.problem.beat import beat_s, beaten
-from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.evaluate import beat_s, beaten, evaluate
 from companion.planner.problem.json_write import to_dict
-from companion.planner.risk.wind import path_risk, simulate_entries
+from companion.planner.risk.chance_constraint import path_risk, simulate_entries
 
 BEAT = {"no_go_half_deg": 45.0, "corridor_m": 10.0, "clearance_m": 8.0, "tack_s": 1.8}
 BLOCK = "POLYGON ((-60 150, 60 150, 60 210, -60 210, -60 150))"

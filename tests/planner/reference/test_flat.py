@@ -12,7 +12,7 @@ from companion.messages import GeoPoint
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.parts import Target
-from companion.planner.reference.flat import FlatPlane, flat_en_from_lonlat
+from companion.planner.reference.astar import FlatPlane, flat_en_from_lonlat
 from companion.planner.settings import AUTO, AstarSettings, Choice, RrtstarSettings
 from tests.planner.problems import box, simple
 

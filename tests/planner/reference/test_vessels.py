@@ -14,13 +14,12 @@ from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.json_write import to_dict
 from companion.planner.problem.parts import Current, RiskLimit, Sigma, Target
-from companion.planner.problem.sharing import resolved, uncertain
+from companion.planner.problem.value import resolved, uncertain
 from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.reference.rrtstar import Tree, search
 from companion.planner.reference.vessels import carried, is_kept, keep_share
 from companion.planner.reference.world import world_of
-from companion.planner.risk.vessels import vessel_risk
-from companion.planner.risk.wind import path_risk
+from companion.planner.risk.chance_constraint import path_risk, vessel_risk
 from companion.planner.settings import RrtstarSettings
 
 EFFORT = 1200

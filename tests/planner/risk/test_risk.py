@@ -9,8 +9,15 @@ from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.plan import Leg
-from companion.planner.risk import wind_kernels as kernels
-from companion.planner.risk.wind import PROMISE_FACTOR, path_risk, process_of, simulate_entries, widened, with_risk
+from companion.planner.risk import kernels
+from companion.planner.risk.chance_constraint import (
+    PROMISE_FACTOR,
+    path_risk,
+    process_of,
+    simulate_entries,
+    widened,
+    with_risk,
+)
 
 AR1 = {"model": "ar1", "sigma0_deg": 2.0, "sigma_inf_deg": 8.0, "rho_hz": 0.036}
 STILL = {"model": "ar1", "sigma0_deg": 8.0, "sigma_inf_deg": 8.0, "rho_hz": 0.02}

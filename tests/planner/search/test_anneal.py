@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from companion.planner import Problem
-from companion.planner.search.anneal import shared, time_after, timetable
+from companion.planner.search.annealing import shared, time_after, timetable
 from companion.planner.search.kernels import walk
 from companion.planner.search.world import make_world
 from tests.planner.problems import POLAR, simple

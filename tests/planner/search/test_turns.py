@@ -14,12 +14,11 @@ from companion.planner import Problem, plan
 from companion.planner.explain import explain, turns
 from companion.planner.problem.evaluate import evaluate, manoeuvre
 from companion.planner.problem.json_write import to_dict
-from companion.planner.search.anneal import anneal
+from companion.planner.search.annealing import anneal
 from companion.planner.search.bound import Bound
 from companion.planner.search.gauge import make_gauge
 from companion.planner.search.kernels import turn_guess, turn_time
-from companion.planner.search.rounds import WAYS, overshoot, round_vector, rounded
-from companion.planner.search.tacks import check_path
+from companion.planner.search.moves import WAYS, check_path, overshoot, round_vector, rounded
 from companion.planner.search.world import make_world
 from tests.planner.problems import FOLDER, box, load, random_problems, simple
 

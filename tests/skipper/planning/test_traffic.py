@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from companion.planner import plan
-from companion.planner.problem.sharing import sigmas_for, sized, vessel_count
+from companion.planner.problem.value import sigmas_for, sized, vessel_count
 from companion.planner.worker import failed
 from companion.skipper.planning.vessels import HORIZON_S, NEAREST, UNKNOWN_S, meetings, near, shares
 from companion.skipper.step import actions as act

@@ -10,7 +10,7 @@ from shapely.geometry import box
 
 from companion.boat import Boat, ardurover_sitl
 from companion.planner import Problem, plan
-from companion.planner.problem.defects import defect_of
+from companion.planner.problem.value import defect_of
 from companion.planner.settings import AUTO, AstarSettings, Choice
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired, wind_part
