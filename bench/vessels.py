@@ -20,7 +20,7 @@ import numpy as np
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from companion.planner import Problem, plan
-from companion.planner.problem import BoatLimits, RiskLimit, Sigma, Target, Wind, evaluate
+from companion.planner.problem import BoatLimits, ProblemWind, RiskLimit, Sigma, Target, evaluate
 from companion.planner.risk import path_risk, simulate_entries
 from companion.traffic import Vessel
 from companion.traffic.occupancy import Keep, planning_discs
@@ -65,7 +65,7 @@ def problem(ships, keep, delta_s=0.7, **change):
         from_s=d.from_s, until_s=d.until_s, name=d.name, spread=d.spread) for d in planning_discs(ships, 0.0, keep))
     values = {
         "start_en": (0.0, 0.0), "start_heading_rad": math.pi / 2, "goal_en": (900.0, 0.0), "goal_radius_m": 10.0,
-        "wind": Wind(twd_from_rad=0.0, tws_mps=5.0, sigma=Sigma(
+        "wind": ProblemWind(twd_from_rad=0.0, tws_mps=5.0, sigma=Sigma(
             model="ar1", sigma0_rad=0.05, sigma_inf_rad=0.1, rho_hz=0.03)),
         "boat": BoatLimits(no_go_half_rad=math.radians(45.0), turn_rate_radps=0.5, polar_twa_rad=(0.0, math.pi),
                            polar_mps=(2.0, 2.0)),

@@ -60,7 +60,7 @@ from companion.geofence.mission import (
 from companion.geofence.shapes import polygon_en
 from companion.messages import GeoPoint
 from companion.orders import ALL, Verb, unknown
-from companion.planner.settings import AUTO, SETTINGS, Choice
+from companion.planner.settings import AUTO, SETTINGS, PlannerChoice
 from companion.skipper.step import (
     CHOICES,
     SHORE,
@@ -139,7 +139,7 @@ _NUMBERS = {"tunnel": "is_tunnel_abrupt", "heuristic_kn": "heuristic_mps", "min_
             "max_twa_deg": "max_twa_rad", "max_turn_deg": "max_turn_rad", "rewiring": "is_rewired"}
 
 
-def planner_of(mission: Mission) -> Choice:
+def planner_of(mission: Mission) -> PlannerChoice:
     """Return the mission's planner and its numbers.
 
     Raises:
@@ -170,7 +170,7 @@ def planner_of(mission: Mission) -> Choice:
         numbers["heuristic_mps"] = numbers["heuristic_mps"] * MPS_PER_KNOT or None
     if "is_tunnel_abrupt" in numbers:
         numbers["is_tunnel_abrupt"] = numbers["is_tunnel_abrupt"] == "abrupt"
-    return Choice(algorithm=algorithm, settings=SETTINGS[algorithm](**numbers), expansions=expansions)
+    return PlannerChoice(algorithm=algorithm, settings=SETTINGS[algorithm](**numbers), expansions=expansions)
 
 
 LEAST_LINE_M = 1.0

@@ -73,7 +73,8 @@ SETTLED_S = 20.0
 # A spiking vane is not among them: its spikes are not fed, and what is left is widened.
 _UNTRUSTED = frozenset({
     WindVerdict.FROZEN, WindVerdict.SILENT, WindVerdict.HELD, WindVerdict.SYNTHESISED, WindVerdict.NO_SPEED_SENSOR,
-    WindVerdict.TURNED })
+    WindVerdict.TURNED,
+})
 
 
 class StepWind:

@@ -6,23 +6,7 @@ from companion.current.prior import DEFAULT_SIGMA_MPS, STILL, ExpectedCurrent, P
 from companion.current.water_current import STILL_WATER, WaterCurrent, forecast_over_water, over_ground, over_water
 
 __all__ = [
-    "DEFAULT_SIGMA_MPS",
-    "FITS_S",
-    "STILL",
-    "STILL_WATER",
-    "UNTOLD_MPS",
-    "CurrentEstimator",
-    "ExpectedCurrent",
-    "MotionCheck",
-    "MotionSample",
-    "Prior",
-    "Sailing",
-    "TableRow",
-    "WaterCurrent",
-    "WindAngleUncertainty",
-    "forecast_over_water",
-    "over_ground",
-    "over_water",
-    "plain",
-    "read_table",
+    "DEFAULT_SIGMA_MPS", "FITS_S", "STILL", "STILL_WATER", "UNTOLD_MPS", "CurrentEstimator", "ExpectedCurrent",
+    "MotionCheck", "MotionSample", "Prior", "Sailing", "TableRow", "WaterCurrent", "WindAngleUncertainty",
+    "forecast_over_water", "over_ground", "over_water", "plain", "read_table",
 ]

@@ -16,7 +16,7 @@ from dataclasses import replace
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.value import Problem, defect_of
-from companion.planner.risk.tacks import Tack, of_risky, tacks_at_risk
+from companion.planner.risk.tacks import TackAtRisk, of_risky, tacks_at_risk
 
 DEARER = 1.10          # of the first path's time: what another may take
 CONTACT_S = 1800.0     # what a contact counts as
@@ -66,7 +66,7 @@ def _counted_s(key: tuple[float, float]) -> float:
     return time_s + CONTACT_S * risk
 
 
-def _others(problem: Problem, tacks: tuple[Tack, ...]) -> Iterator[Problem]:
+def _others(problem: Problem, tacks: tuple[TackAtRisk, ...]) -> Iterator[Problem]:
     """Yield the problem with more room about its tacks, and without tacks."""
     lack = max(tack.lack_m for tack in tacks if tack.is_risky) + SPARE_M
     for share in NARROWER:

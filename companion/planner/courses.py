@@ -16,7 +16,7 @@ CORNER_M = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Course:
+class Board:
     """Consecutive legs of a plan on one tack; ``first`` counts from 0."""
 
     first: int
@@ -47,18 +47,18 @@ class Course:
         return [leg for leg in self.legs if leg.length_m >= CORNER_M] or self.legs
 
 
-def courses(legs: Sequence[Leg]) -> tuple[Course, ...]:
+def courses(legs: Sequence[Leg]) -> tuple[Board, ...]:
     """Return the legs merged into courses, in order; every leg is in one of them."""
-    out: list[Course] = []
+    out: list[Board] = []
     for number, leg in enumerate(legs):
         if out and _goes_on(out[-1], leg):
-            out[-1] = Course(first=out[-1].first, legs=(*out[-1].legs, leg))
+            out[-1] = Board(first=out[-1].first, legs=(*out[-1].legs, leg))
         else:
-            out.append(Course(first=number, legs=(leg,)))
+            out.append(Board(first=number, legs=(leg,)))
     return tuple(out)
 
 
-def _goes_on(course: Course, leg: Leg) -> bool:
+def _goes_on(course: Board, leg: Leg) -> bool:
     """Return whether a leg belongs to the course before it: no turn that the crew would notice lies between."""
     if leg.manoeuvre:
         return False

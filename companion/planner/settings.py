@@ -30,7 +30,7 @@ class AstarSettings:
         ship_match_s: Tolerance of eq. 4.7 [s].
         memory_bytes: What the grid may take.
         projection: ``local``: planned in the problem's metres; ``flat``: in those of eq. 4.2 (docs/frames.md).
-        origin: Where the problem's metres count from; the flat projection needs it (``Choice.about``).
+        origin: Where the problem's metres count from; the flat projection needs it (``PlannerChoice.about``).
 
     """
 
@@ -78,18 +78,18 @@ SETTINGS: dict[str, type[Settings]] = {"astar": AstarSettings, "rrtstar": Rrtsta
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class PlannerChoice:
     """An algorithm by name, its numbers (None: its defaults), and its effort in its own steps (None: the voyage's)."""
 
     algorithm: str = "auto"
     settings: Settings | None = None
     expansions: int | None = None
 
-    def about(self, origin: GeoPoint) -> Choice:
+    def about(self, origin: GeoPoint) -> PlannerChoice:
         """Return the same for a problem whose metres count from there: a projection of somebody's choice needs it."""
         if not isinstance(self.settings, AstarSettings) or self.settings.projection == "local":
             return self
         return replace(self, settings=replace(self.settings, origin=origin))
 
 
-AUTO = Choice()
+AUTO = PlannerChoice()

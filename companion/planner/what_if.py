@@ -25,7 +25,7 @@ _SHARE = 1.0 / 30.0                # of the budget for one replan: both sides of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Side:
+class ObstacleSide:
     """The place where a plan chooses: its anchor, the way to the path and how it is said."""
 
     anchor_en: tuple[float, float]
@@ -59,7 +59,7 @@ class Replanner:
                     algorithm=self._plan.algorithm)
 
 
-def decisive_side(problem: Problem, plan: Plan) -> Side | None:
+def decisive_side(problem: Problem, plan: Plan) -> ObstacleSide | None:
     """Return where the path leaves the straight line most: at an obstacle there, else about the line itself."""
     way = np.asarray(plan.waypoints_en, dtype=np.float64)
     start, goal = np.array(problem.start_en), np.array(problem.goal_en)
@@ -83,11 +83,11 @@ def decisive_side(problem: Problem, plan: Plan) -> Side | None:
         on_path = _nearest_on_path(way, inside)
         outward = on_path - inside
         if float(np.hypot(*outward)) > 1e-9:
-            return Side(anchor_en=_pair(inside), outward_en=_pair(outward / np.hypot(*outward)),
+            return ObstacleSide(anchor_en=_pair(inside), outward_en=_pair(outward / np.hypot(*outward)),
                          obstacle=nearest, words=f"{_compass(outward)} of {problem.obstacle_name(nearest)}")
     foot = start + line * float(np.clip(np.dot(corner - start, line) / length**2, 0.02, 0.98))
     across = np.array([line[1], -line[0]]) / length * math.copysign(1.0, float(off[i]))
-    return Side(anchor_en=_pair(foot), outward_en=_pair(across), obstacle=None,
+    return ObstacleSide(anchor_en=_pair(foot), outward_en=_pair(across), obstacle=None,
                  words=f"{_compass(across)} of the straight line")
 
 
@@ -105,7 +105,7 @@ def _compass(v: NDArray[np.float64]) -> str:
     return names[round(math.degrees(math.atan2(v[0], v[1])) / 45.0) % 8]
 
 
-def walled(problem: Problem, side: Side, *, sign: float) -> Problem:
+def walled(problem: Problem, side: ObstacleSide, *, sign: float) -> Problem:
     """Return the problem with a thin wall from the anchor outwards (sign 1) or the other way (-1)."""
     size = math.dist(problem.start_en, problem.goal_en)
     far = 4.0 * size + 1000.0
@@ -123,7 +123,7 @@ def walled(problem: Problem, side: Side, *, sign: float) -> Problem:
     return replace(problem, obstacles=(*problem.obstacles, wall))
 
 
-def other_side(problem: Problem, plan: Plan, side: Side, again: Replanner) -> tuple[str, dict[str, Any]]:
+def other_side(problem: Problem, plan: Plan, side: ObstacleSide, again: Replanner) -> tuple[str, dict[str, Any]]:
     """Return what the other side costs, and the shift of the wind that would make it the faster one."""
     other = again(walled(problem, side, sign=1.0))
     data: dict[str, Any] = {"chosen": side.words, "obstacle": side.obstacle, "cost_s": None, "shift_deg": None}
@@ -148,7 +148,7 @@ def shifted(problem: Problem, shift_rad: float) -> Problem:
     return replace(problem, wind=replace(problem.wind, twd_from_rad=problem.wind.twd_from_rad + shift_rad))
 
 
-def _deciding_shift(problem: Problem, side: Side, again: Replanner) -> float | None:
+def _deciding_shift(problem: Problem, side: ObstacleSide, again: Replanner) -> float | None:
     """Return the smaller shift (veer or back) at which the other side becomes the faster; None when none is found."""
     def prefers_other(shift_rad: float) -> bool:
         turned = shifted(problem, shift_rad)

@@ -26,9 +26,9 @@ from companion.traffic.targets import TargetChange, TargetLimits, Targets, Traff
 from companion.traffic.vessel import Vessel, VesselDimensions
 
 __all__ = [
-    "LAKE", "SEA", "Alarm", "AlarmLimits", "Approach", "Assessment", "Change", "Conflict", "Decision", "DecodeCounts",
-    "Disc", "Encounter", "Hull", "Motion", "NmeaDecoder", "OwnShip", "Policy", "Prediction", "Role", "Rule",
-    "TargetLimits", "Targets", "TimedLeg", "TrafficCounts", "TrafficPicture", "Vessel", "assess", "check_legs",
-    "classify", "cpa", "decide", "decode_json", "decode_nmea", "motion_of", "path_distance_m", "peril_m",
+    "LAKE", "SEA", "Alarm", "AlarmLimits", "Approach", "Assessment", "Conflict", "Decision", "DecodeCounts", "Disc",
+    "Encounter", "MotionUncertainty", "NmeaDecoder", "OwnShip", "Policy", "Prediction", "Role", "Rule", "TargetChange",
+    "TargetLimits", "Targets", "TimedLeg", "TrafficCounts", "TrafficPicture", "Vessel", "VesselDimensions", "assess",
+    "check_legs", "classify", "cpa", "decide", "decode_json", "decode_nmea", "motion_of", "path_distance_m", "peril_m",
     "planning_discs", "predict", "time_matched_discs",
 ]

@@ -14,17 +14,6 @@ from companion.wind.tracker import WindTracker
 from companion.wind.true_wind import apparent_wind, true_wind
 
 __all__ = [
-    "HORIZONS_S",
-    "LEVELS",
-    "NAMES",
-    "Estimator",
-    "Forecaster",
-    "VaneParameters",
-    "WindStatus",
-    "WindTracker",
-    "WindVerdict",
-    "WindWatch",
-    "apparent_wind",
-    "make",
-    "true_wind",
+    "HORIZONS_S", "LEVELS", "NAMES", "Estimator", "Forecaster", "VaneParameters", "WindStatus", "WindTracker",
+    "WindVerdict", "WindWatch", "apparent_wind", "make", "true_wind",
 ]

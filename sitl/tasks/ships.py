@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from companion.geo.frame import LocalFrame
 from companion.messages import AisReport, GeoPoint
 from companion.planner import Plan, Problem, plan
-from companion.planner.problem import VESSELS_SHARE, BoatLimits, Sigma, Wind, evaluate
+from companion.planner.problem import VESSELS_SHARE, BoatLimits, ProblemWind, Sigma, evaluate
 from companion.skipper.planning import (
     ALIKE_S,
     GIVE_UP_RISK,
@@ -195,7 +195,7 @@ class Voyage:
         twa, speed = polar_at(self._scene.tws_mps)
         return Problem(
             start_en=self._en, start_heading_rad=self._heading, goal_en=self._scene.goal_en, goal_radius_m=30.0,
-            wind=Wind(twd_from_rad=math.radians(self._scene.twd_deg), tws_mps=self._scene.tws_mps,
+            wind=ProblemWind(twd_from_rad=math.radians(self._scene.twd_deg), tws_mps=self._scene.tws_mps,
                       sigma=Sigma(model="ar1", sigma0_rad=0.05, sigma_inf_rad=0.15, rho_hz=0.036)),
             boat=BoatLimits(no_go_half_rad=math.radians(47.0), turn_rate_radps=0.2, polar_twa_rad=twa, polar_mps=speed,
                             tack_loss_s=7.0),

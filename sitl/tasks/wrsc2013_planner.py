@@ -14,7 +14,7 @@ from companion.field.guidance import LastResort, helm
 from companion.field.values import GuidanceSettings, GuidanceState, Situation
 from companion.geo.frame import LocalFrame
 from companion.planner import Problem, plan
-from companion.planner.problem import BoatLimits, Sigma, Target, Wind, evaluate
+from companion.planner.problem import BoatLimits, ProblemWind, Sigma, Target, evaluate
 from companion.traffic import Vessel, check_legs, decide, planning_discs
 from companion.traffic.occupancy import Disc
 from companion.traffic.plans import Conflict, Decision
@@ -41,7 +41,7 @@ def problem_for(
     assert seen.twd_from_rad is not None
     return Problem(
         start_en=seen.en_m, start_heading_rad=seen.heading_rad, goal_en=goal_en, goal_radius_m=goal_radius_m,
-        wind=Wind(twd_from_rad=seen.twd_from_rad, tws_mps=seen.tws_mps, sigma=WIND_SIGMA),
+        wind=ProblemWind(twd_from_rad=seen.twd_from_rad, tws_mps=seen.tws_mps, sigma=WIND_SIGMA),
         boat=BoatLimits(
             no_go_half_rad=habits.no_go_half_rad, turn_rate_radps=habits.turn_rate_radps,
             polar_twa_rad=habits.polar_twa_rad, polar_mps=habits.polar_mps, tack_loss_s=habits.tack_s,

@@ -19,7 +19,7 @@ from companion.geofence.shapes import unwrapped
 from companion.messages import GeoPoint
 from tests.geofence.strategies import QUIET
 
-MISSIONS = sorted((pathlib.Path(__file__).parents[3] / "missions").glob("*.toml"))
+MISSIONS = sorted((pathlib.Path(__file__).parents[2] / "missions").glob("*.toml"))
 
 
 def ground(shape, frame: LocalFrame, sides: int = 360) -> Polygon:

@@ -7,7 +7,7 @@ import pytest
 
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.explain import explain, leg_bounds, with_clearance
-from companion.planner.what_if import Side, shifted, walled
+from companion.planner.what_if import ObstacleSide, shifted, walled
 
 BLOCK = "POLYGON((-90 150,60 150,60 220,-90 220,-90 150))"
 NONE = {"model": "none"}
@@ -58,7 +58,7 @@ def test_the_deciding_shift_is_where_the_two_sides_cost_the_same():
     assert shift is not None
     again = shifted(p, math.radians(shift))
     assert again.wind.twd_from_rad == pytest.approx(p.wind.twd_from_rad + math.radians(shift))
-    side = Side(anchor_en=(-15.0, 185.0), outward_en=(1.0, 0.0), obstacle=0, words="")
+    side = ObstacleSide(anchor_en=(-15.0, 185.0), outward_en=(1.0, 0.0), obstacle=0, words="")
     east, west = (plan(walled(again, side, sign=s), expansions=EFFORT) for s in (-1.0, 1.0))
     assert west.cost_s == pytest.approx(east.cost_s, rel=0.03)
 

@@ -43,12 +43,11 @@ from companion.geofence.mission.text import parse_options, read_options, without
 
 __all__ = [
     "NO_NAME", "PERMITS", "AreaOptions", "AtomOptions", "Box", "BoxOptions", "ByField", "CircleAtomOptions",
-    "DrawnMission",
-    "FieldOptions", "Gate", "GateOptions", "GoalOptions", "HeadingAtomOptions", "Latitude", "LeaveAtomOptions",
-    "LineAtomOptions", "Longitude", "MarkOptions", "MissionFiles", "MissionOptions", "PointAtomOptions",
-    "PointOptions", "RefugeOptions", "RepulsiveLineAtomOptions", "RepulsivePointAtomOptions", "SearchOptions",
-    "StartOptions", "StationAtomOptions", "WindOptions", "document_of", "drawing_of", "drawn_mission", "free_water",
-    "goal_losses", "hindrance", "is_file", "kept", "kind_of", "load_area", "load_mission", "load_settings",
-    "mission_files", "offer", "parse_options", "place_troubles", "read_kept", "read_mission", "read_options",
-    "without_defaults", "zones_only",
+    "DrawnMission", "FieldOptions", "Gate", "GateOptions", "GoalOptions", "HeadingAtomOptions", "Latitude",
+    "LeaveAtomOptions", "LineAtomOptions", "Longitude", "MarkOptions", "MissionFiles", "MissionOptions",
+    "PointAtomOptions", "PointOptions", "RefugeOptions", "RepulsiveLineAtomOptions", "RepulsivePointAtomOptions",
+    "SearchOptions", "StartOptions", "StationAtomOptions", "WindOptions", "document_of", "drawing_of", "drawn_mission",
+    "free_water", "goal_losses", "hindrance", "is_file", "kept", "kind_of", "load_area", "load_mission",
+    "load_settings", "mission_files", "offer", "parse_options", "place_troubles", "read_kept", "read_mission",
+    "read_options", "without_defaults", "zones_only",
 ]

@@ -174,7 +174,7 @@ _REACH_M = 0.05
 _CORRIDOR_M = 0.5
 
 
-class Shore:
+class SolidObstacles:
     """Everything solid of a problem."""
 
     def __init__(self, problem: Problem) -> None:
@@ -230,9 +230,9 @@ class Shore:
 
 
 @lru_cache(maxsize=8)   # by identity; an index of thousands of shapes is made once for a search
-def shore_of(problem: Problem) -> Shore:
+def shore_of(problem: Problem) -> SolidObstacles:
     """Return the exact test of legs against all that is solid in the problem."""
-    return Shore(problem)
+    return SolidObstacles(problem)
 
 
 START_SLACK_M = 0.01
@@ -291,7 +291,7 @@ def ground_track(p: Problem, dx_m: float, dy_m: float, t_s: float = 0.0) -> tupl
 
 
 def is_zoned(p: Problem, dx_m: float, dy_m: float) -> bool:
-    """Return whether the autopilot does not follow a leg of this ground direction as a line: see ``Zone``."""
+    """Return whether the autopilot does not follow a leg of this ground direction as a line (``AutopilotBeatZone``)."""
     if p.zone is None or p.current.drift_mps == 0.0:
         return False
     return abs(wrap_pi(math.atan2(dx_m, dy_m) - p.zone.from_rad)) < p.zone.half_rad - NO_GO_SLACK_RAD

@@ -17,16 +17,16 @@ from companion.disk import read_regular
 from companion.errors import InputError
 from companion.planner.problem.parts import (
     SIGMA_MODELS,
+    AutopilotBeatZone,
     Beat,
     BoatLimits,
     Current,
+    ProblemWind,
     RiskLimit,
     Sigma,
     Speeds,
     Strength,
     Target,
-    Wind,
-    Zone,
 )
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ HELM_KEYS = ("wp_radius_m", "turn_radius_m", "wp_speed_mps", "accel_mps2", "jerk
 _NAN = re.compile(r"\bnan\b", re.IGNORECASE)
 
 
-class _Reader:
+class _JsonReader:
     """Typed access to one JSON object that names the place of what is wrong."""
 
     def __init__(self, raw: Any, source: str, place: str) -> None:
@@ -89,12 +89,12 @@ class _Reader:
         """Return a string."""
         return self._get(key, default, str)
 
-    def child(self, key: str) -> _Reader:
+    def child(self, key: str) -> _JsonReader:
         """Return the object under ``key``."""
         where = f"{self.place}.{key}" if self.place else key
         if key not in self.raw:
             raise InputError(self.source, where, "is missing", "see docs/problem-format.md")
-        return _Reader(self.raw[key], self.source, where)
+        return _JsonReader(self.raw[key], self.source, where)
 
 
 def _as_float(value: Any) -> float:
@@ -163,7 +163,7 @@ def read_fields(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
-    top = _Reader(raw, source, "")
+    top = _JsonReader(raw, source, "")
     start, goal, wind, boat = (top.child(k) for k in ("start", "goal", "wind", "boat"))
     obstacles = raw.get("obstacles") or []
     if not isinstance(obstacles, (list, tuple)):
@@ -190,7 +190,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         obstacles=tuple(_polygon(w, source, f"obstacles[{i}]") for i, w in enumerate(obstacles)),
         obstacle_names=tuple(str(name) for name in names),
         fence=None if fence is None else _polygon(fence, source, "fence"),
-        wind=Wind(
+        wind=ProblemWind(
             twd_from_rad=math.radians(wind.number("from_deg")),
             tws_mps=wind.maybe("speed_mps"),
             sigma=_parse_sigma(wind.child("sigma")) if wind.raw.get("sigma") is not None else Sigma(),
@@ -214,11 +214,11 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
             lee_mps=boat.numbers("lee_mps", (0.0, 0.0)),
         ),
         delta_s=top.number("delta_s"),
-        current=_parse_current(_Reader(raw.get("current") or {}, source, "current")),
-        adrift=_parse_current(_Reader(raw.get("adrift") or {}, source, "adrift")),
-        targets=tuple(_parse_target(_Reader(t, source, f"targets[{i}]")) for i, t in enumerate(targets)),
+        current=_parse_current(_JsonReader(raw.get("current") or {}, source, "current")),
+        adrift=_parse_current(_JsonReader(raw.get("adrift") or {}, source, "adrift")),
+        targets=tuple(_parse_target(_JsonReader(t, source, f"targets[{i}]")) for i, t in enumerate(targets)),
         vessels_part=_parse_allocation(top.child("allocation")) if raw.get("allocation") is not None else None,
-        risk=_parse_risk(_Reader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,
+        risk=_parse_risk(_JsonReader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,
         clearance_floor_m=top.number("clearance_floor_m", 0.0),
         beat=_parse_beat(top.child("beat")) if raw.get("beat") is not None else None,
         tracking=_parse_tracking(top.child("tracking")) if raw.get("tracking") is not None else None,
@@ -228,7 +228,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
     return fields | ({"leg_saving": top.number("leg_saving")} if "leg_saving" in raw else {})
 
 
-def _parse_speed(speed: _Reader) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _parse_speed(speed: _JsonReader) -> tuple[tuple[float, ...], tuple[float, ...]]:
     model = speed.text("model")
     if model == "constant":
         v_mps = speed.number("v_mps")
@@ -249,7 +249,7 @@ def _spread(deg: float) -> float:
     return 0.0 if abs(deg) < 1e-12 else math.radians(deg)
 
 
-def _parse_sigma(sigma: _Reader) -> Sigma:
+def _parse_sigma(sigma: _JsonReader) -> Sigma:
     model = sigma.text("model")
     if model == "none":
         return Sigma()
@@ -270,14 +270,14 @@ def _parse_sigma(sigma: _Reader) -> Sigma:
                  half_width_rad=None if half is None else tuple(map(_spread, half)))
 
 
-def _parse_strength(strength: _Reader) -> Strength:
+def _parse_strength(strength: _JsonReader) -> Strength:
     horizon, mean, sigma = (strength.numbers(key) for key in ("horizon_s", "mean_mps", "sigma_mps"))
     _require_table(strength, "horizon_s", horizon, mean, sigma)
     return Strength(horizon_s=horizon, mean_mps=mean, sigma_mps=sigma,
                     correlation_s=strength.number("correlation_s", 60.0), is_known=strength.flag("known", True))
 
 
-def _parse_speeds(speeds: _Reader) -> Speeds:
+def _parse_speeds(speeds: _JsonReader) -> Speeds:
     tws, twa = speeds.numbers("tws_mps"), speeds.numbers("twa_deg")
     rows = speeds.rows("v_mps")
     _require_table(speeds, "tws_mps", tws, rows)
@@ -285,7 +285,7 @@ def _parse_speeds(speeds: _Reader) -> Speeds:
     return Speeds(tws_mps=tws, twa_rad=tuple(math.radians(a) for a in twa), v_mps=rows)
 
 
-def _require_table(table: _Reader, key: str, nodes: Sequence[float], *columns: Sequence[Any]) -> None:
+def _require_table(table: _JsonReader, key: str, nodes: Sequence[float], *columns: Sequence[Any]) -> None:
     if not nodes or any(len(column) != len(nodes) for column in columns):
         raise InputError(table.source, table.place, "the columns differ in length or are empty",
                          f"give one value for each of {key}")
@@ -293,7 +293,7 @@ def _require_table(table: _Reader, key: str, nodes: Sequence[float], *columns: S
         raise InputError(table.source, f"{table.place}.{key}", "does not increase", "sort the table by it")
 
 
-def _parse_target(target: _Reader) -> Target:
+def _parse_target(target: _JsonReader) -> Target:
     return Target(
         x_m=target.number("x"), y_m=target.number("y"), vx_mps=target.number("vx", 0.0),
         vy_mps=target.number("vy", 0.0), radius_m=target.number("radius_m"),
@@ -303,7 +303,7 @@ def _parse_target(target: _Reader) -> Target:
     )
 
 
-def _parse_spread(spread: _Reader) -> Spread:
+def _parse_spread(spread: _JsonReader) -> Spread:
     from companion.traffic.occupancy import Spread
 
     return Spread(
@@ -316,30 +316,31 @@ def _parse_spread(spread: _Reader) -> Spread:
     )
 
 
-def _parse_allocation(allocation: _Reader) -> float:
+def _parse_allocation(allocation: _JsonReader) -> float:
     return allocation.number("vessels")
 
 
-def _parse_risk(risk: _Reader) -> RiskLimit:
+def _parse_risk(risk: _JsonReader) -> RiskLimit:
     return RiskLimit(max_path_risk=risk.number("max_path_risk"),
                      correlation_time_s=risk.number("correlation_time_s", 60.0))
 
 
-def _parse_current(current: _Reader) -> Current:
+def _parse_current(current: _JsonReader) -> Current:
     return Current(set_rad=math.radians(current.number("set_deg", 0.0)), drift_mps=current.number("drift_mps", 0.0))
 
 
-def _parse_zone(zone: _Reader) -> Zone:
-    return Zone(from_rad=math.radians(zone.number("from_deg")), half_rad=math.radians(zone.number("half_deg")))
+def _parse_zone(zone: _JsonReader) -> AutopilotBeatZone:
+    return AutopilotBeatZone(from_rad=math.radians(zone.number("from_deg")),
+                             half_rad=math.radians(zone.number("half_deg")))
 
 
-def _parse_beat(beat: _Reader) -> Beat:
+def _parse_beat(beat: _JsonReader) -> Beat:
     return Beat(
         no_go_half_rad=math.radians(beat.number("no_go_half_deg")), corridor_m=beat.number("corridor_m"),
         clearance_m=beat.number("clearance_m"), tack_s=beat.number("tack_s", 0.0))
 
 
-def _parse_tracking(track: _Reader) -> Tracking:
+def _parse_tracking(track: _JsonReader) -> Tracking:
     from companion.boat.tracking import GuidanceModel
     from companion.planner.problem.tracking import Tracking
 

@@ -79,7 +79,7 @@ class Sigma:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wind:
+class ProblemWind:
     """The wind: from where [rad, true], how fast [m/s or None], how sure. A polar is already at this speed.
 
     ``strength``: how sure that speed is; None: nothing is said of it.
@@ -160,7 +160,7 @@ NO_CURRENT = Current()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Zone:
+class AutopilotBeatZone:
     """In a current: courses over the ground within ``half_rad`` of ``from_rad`` the autopilot does not follow as lines.
 
     ArduRover knows the wind over the ground alone. A leg whose course lies within its no-go angle of that it beats, and

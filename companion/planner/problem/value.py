@@ -25,13 +25,13 @@ from companion.planner.problem.parts import (
     LEAST_MPS,
     NO_CURRENT,
     TOUCH_M,
+    AutopilotBeatZone,
     Beat,
     BoatLimits,
     Current,
+    ProblemWind,
     RiskLimit,
     Target,
-    Wind,
-    Zone,
     interpolated,
 )
 
@@ -64,12 +64,12 @@ class Problem:
     obstacles: tuple[shapely.Geometry, ...] = ()
     obstacle_names: tuple[str, ...] = ()
     fence: shapely.Geometry | None = None
-    wind: Wind
+    wind: ProblemWind
     boat: BoatLimits
     delta_s: float = 0.5
     current: Current = NO_CURRENT
     adrift: Current = NO_CURRENT
-    zone: Zone | None = None
+    zone: AutopilotBeatZone | None = None
     targets: tuple[Target, ...] = ()
     vessels_part: float | None = None
     risk: RiskLimit | None = None

@@ -167,7 +167,7 @@ DEFAULTS = AstarSettings()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Grid:
+class NodeGrid:
     """Where the nodes are: (column, row) lies at (x0 + column dx, y0 + row dy)."""
 
     x0_m: float
@@ -189,7 +189,7 @@ class Grid:
         return self.x0_m + (node % self.columns) * self.dx_m, self.y0_m + (node // self.columns) * self.dy_m
 
 
-def grid_of(problem: Problem, grid_m: float) -> Grid:
+def grid_of(problem: Problem, grid_m: float) -> NodeGrid:
     """Return the grid of about that spacing [m] on which start and goal are nodes."""
     x0, y0, x1, y1 = bounds_of(problem)
     (sx, sy), (gx, gy) = problem.start_en, problem.goal_en
@@ -206,11 +206,11 @@ def grid_of(problem: Problem, grid_m: float) -> Grid:
 
     x, dx, columns, start_column, goal_column = fit(x0, x1, sx, gx)
     y, dy, rows, start_row, goal_row = fit(y0, y1, sy, gy)
-    return Grid(x0_m=x, y0_m=y, dx_m=dx, dy_m=dy, columns=columns, rows=rows,
+    return NodeGrid(x0_m=x, y0_m=y, dx_m=dx, dy_m=dy, columns=columns, rows=rows,
                 start=start_row * columns + start_column, goal=goal_row * columns + goal_column)
 
 
-def steps_of(grid: Grid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def steps_of(grid: NodeGrid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the 24 steps (columns, rows, heading number, length) and the 16 courses [rad] that they make."""
     offsets = [(i, j) for j in range(-2, 3) for i in range(-2, 3) if (i, j) != (0, 0)]
     courses = sorted({_course(i, j, grid) for i, j in offsets})
@@ -221,7 +221,7 @@ def steps_of(grid: Grid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.array(rows, dtype=np.float64), np.array(courses)
 
 
-def _course(i: int, j: int, grid: Grid) -> float:
+def _course(i: int, j: int, grid: NodeGrid) -> float:
     divisor = math.gcd(i, j)  # (2, 2) is the same course as (1, 1), to the last bit
     return heading_of(i // divisor * grid.dx_m, j // divisor * grid.dy_m)
 
@@ -315,7 +315,7 @@ def _by_flat(problem: Problem, effort: Effort, settings: AstarSettings) -> Outco
                    trace={**outcome.trace, "flat_en": outcome.waypoints_en})
 
 
-def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: Grid, trace: dict[str, Any]) -> Outcome:
+def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGrid, trace: dict[str, Any]) -> Outcome:
     step, courses = steps_of(grid)
     way = np.zeros((kernels.HEADINGS, 3))
     deepest = min(settings.max_twa_rad, problem.boat.max_twa_rad)
@@ -372,7 +372,7 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: Grid, 
     return Outcome(waypoints_en=way_en, lower_bound_s=simple_bound_s(problem), trace=trace)
 
 
-def _path(problem: Problem, grid: Grid, parent: NDArray[np.int32], state: int) -> NDArray[np.float64]:
+def _path(problem: Problem, grid: NodeGrid, parent: NDArray[np.int32], state: int) -> NDArray[np.float64]:
     """Return the places where the heading changes, start and goal included, (n, 2)."""
     first = grid.columns * grid.rows * kernels.HEADINGS
     states = [state]

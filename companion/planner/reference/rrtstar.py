@@ -36,7 +36,7 @@ from companion.planner.problem.evaluate import endpoint_error
 from companion.planner.problem.value import Problem
 from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.reference.vessels import NO_VESSELS, TreeVessels
-from companion.planner.reference.world import World, bounds_of, world_of
+from companion.planner.reference.world import ReferenceWorld, bounds_of, world_of
 from companion.planner.risk.chance_constraint import PROMISE_FACTOR, process_of
 from companion.planner.settings import RrtstarSettings
 
@@ -47,11 +47,11 @@ FIRST_CAPACITY = 20_000
 MOST_NODES = 2_000_000  # 200 bytes each
 
 
-class Tree:
+class RrtTree:
     """The growing tree: the kernel's arrays and nothing else."""
 
     def __init__(
-        self, problem: Problem, world: World, seed: int, settings: RrtstarSettings = DEFAULTS,
+        self, problem: Problem, world: ReferenceWorld, seed: int, settings: RrtstarSettings = DEFAULTS,
         vessels: TreeVessels = NO_VESSELS,
     ) -> None:
         self.world = world
@@ -142,7 +142,7 @@ def search(
     if math.dist(problem.start_en, problem.goal_en) <= problem.goal_radius_m:
         effort.found()
         return Outcome(waypoints_en=np.array([problem.start_en]))
-    tree = Tree(problem, world_of(problem), seed, settings, vessels)
+    tree = RrtTree(problem, world_of(problem), seed, settings, vessels)
     judged = math.inf
     while not effort.is_over and tree.size < MOST_NODES:
         samples = effort.remaining(CHUNK)

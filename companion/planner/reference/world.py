@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class World(NamedTuple):
+class ReferenceWorld(NamedTuple):
     """Arrays for kernels. Angles [rad], metres, seconds.
 
     ``edge`` (m, 4) x0 y0 x1 y1; ``cell_first`` (nx ny + 1,) and ``cell_edge`` index edges by cell, row by row;
@@ -65,7 +65,7 @@ def bounds_of(p: Problem) -> tuple[float, float, float, float]:
     return min(x) - margin, min(y) - margin, max(x) + margin, max(y) + margin
 
 
-def world_of(p: Problem) -> World:
+def world_of(p: Problem) -> ReferenceWorld:
     """Return the problem's arrays."""
     edge = _edges(p)
     cell_first, cell_edge, grid, shape = _buckets(edge)
@@ -88,7 +88,7 @@ def world_of(p: Problem) -> World:
     target = np.array([
         [t.x_m, t.y_m, t.vx_mps, t.vy_mps, t.radius_m, t.growth_mps, t.from_s, min(t.until_s, 1e15)] for t in p.targets
     ], dtype=np.float64).reshape(-1, 8)
-    return World(
+    return ReferenceWorld(
         edge=edge, cell_first=cell_first, cell_edge=cell_edge, grid=grid, shape=shape, number=number,
         no_go_model=model, table=table, polar=np.array([b.polar_twa_rad, b.polar_mps], dtype=np.float64),
         course=_courses(p), target=target,

@@ -38,7 +38,7 @@ from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.parts import Target
 from companion.planner.problem.value import LEAST_PART, Problem, sigmas_for, uncertain, vessel_count
 from companion.planner.risk import kernels
-from companion.planner.risk.tacks import Tack, tack_risks, tacks_at_risk
+from companion.planner.risk.tacks import TackAtRisk, tack_risks, tacks_at_risk
 
 # A path's risk from uncertain vessels: how often it is expected to enter the disc of hulls and clearance of any.
 #
@@ -195,7 +195,7 @@ class PathRisk:
     computed: float
     wind: float
     vessels: VesselRisk
-    tacks: tuple[Tack, ...]
+    tacks: tuple[TackAtRisk, ...]
     total: float
     boole: float
     assumption: str

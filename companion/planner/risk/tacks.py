@@ -30,7 +30,7 @@ Place = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tack:
+class TackAtRisk:
     """A planned tack near something solid.
 
     Attributes:
@@ -54,7 +54,7 @@ class Tack:
         return self.failures == 1 or self.risk > RISKY
 
 
-def tacks_at_risk(problem: Problem, legs: Sequence[Leg]) -> tuple[Tack, ...]:
+def tacks_at_risk(problem: Problem, legs: Sequence[Leg]) -> tuple[TackAtRisk, ...]:
     """Return the tacks of a path whose failures would bring her onto something, the riskiest of each leg."""
     if problem.boat.tack_fails <= 0.0 or not problem.boat.can_tack or not legs:
         return ()
@@ -62,7 +62,7 @@ def tacks_at_risk(problem: Problem, legs: Sequence[Leg]) -> tuple[Tack, ...]:
 
 
 @lru_cache(maxsize=16)   # by identity and value: the search asks of its best path, and who writes the plan again
-def _at_risk(problem: Problem, legs: tuple[Leg, ...]) -> tuple[Tack, ...]:
+def _at_risk(problem: Problem, legs: tuple[Leg, ...]) -> tuple[TackAtRisk, ...]:
     chance = problem.boat.tack_fails
     solids = _Solids(problem)
     found = []
@@ -81,12 +81,12 @@ def _at_risk(problem: Problem, legs: tuple[Leg, ...]) -> tuple[Tack, ...]:
     return tuple(found)
 
 
-def of_risky(tacks: Sequence[Tack]) -> float:
+def of_risky(tacks: Sequence[TackAtRisk]) -> float:
     """Return what a path's risky tacks add to its risk."""
     return round(sum(tack.risk for tack in tacks if tack.is_risky), 6)
 
 
-def tack_risks(legs: Sequence[Leg], tacks: Sequence[Tack]) -> tuple[float, ...]:
+def tack_risks(legs: Sequence[Leg], tacks: Sequence[TackAtRisk]) -> tuple[float, ...]:
     """Return what tacks that fail add to the risk of each leg."""
     out = [0.0] * len(legs)
     for tack in tacks:
@@ -94,7 +94,7 @@ def tack_risks(legs: Sequence[Leg], tacks: Sequence[Tack]) -> tuple[float, ...]:
     return tuple(out)
 
 
-def _beaten(problem: Problem, solids: _Solids, n: int, leg: Leg, chance: float) -> Tack | None:
+def _beaten(problem: Problem, solids: _Solids, n: int, leg: Leg, chance: float) -> TackAtRisk | None:
     """Return the worst of a beaten leg's tacks, with the risk of all of them: each is as likely anywhere."""
     beat = problem.beat
     if beat is None:
@@ -115,7 +115,7 @@ def _beaten(problem: Problem, solids: _Solids, n: int, leg: Leg, chance: float) 
             sides.append(side)
             places.append((leg.from_en[0] + along * ux + side * beat.corridor_m * uy,
                            leg.from_en[1] + along * uy - side * beat.corridor_m * ux))
-    worst: Tack | None = None
+    worst: TackAtRisk | None = None
     risk = 0.0
     for side, at, distance_m in zip(sides, places, solids.distances_m(shapely.points(places)), strict=True):
         # to the right of the line she comes on port tack, whose course is to the right of the wind
@@ -127,7 +127,8 @@ def _beaten(problem: Problem, solids: _Solids, n: int, leg: Leg, chance: float) 
                 tack.failures == worst.failures and tack.lack_m > worst.lack_m) else worst
     if worst is None:
         return None
-    return Tack(leg=n, at_en=worst.at_en, failures=worst.failures, risk=min(1.0, tacks * risk), lack_m=worst.lack_m)
+    return TackAtRisk(leg=n, at_en=worst.at_en, failures=worst.failures, risk=min(1.0, tacks * risk),
+                      lack_m=worst.lack_m)
 
 
 class _Solids:
@@ -170,7 +171,7 @@ class _Solids:
     def tack(
         self, problem: Problem, leg: int, at: Place, course_rad: float, speed_mps: float, chance: float,
         distance_m: float | None = None,
-    ) -> Tack | None:
+    ) -> TackAtRisk | None:
         """Return what a tack there comes to when it fails, None: she has room for what she does then.
 
         ``distance_m`` of the place from everything solid; None: it is asked for.
@@ -193,7 +194,7 @@ class _Solids:
             room = min(self.distances_m(shapely.linestrings(np.array(tracks)))) - self.need_m
             if room <= 0.0:
                 lack = max(-room, self._lack_m(at, np.concatenate(tracks)))
-                return Tack(leg=leg, at_en=at, failures=failures, risk=chance**failures, lack_m=lack)
+                return TackAtRisk(leg=leg, at_en=at, failures=failures, risk=chance**failures, lack_m=lack)
             speed, place = AGAIN_SHARE * speed_mps, _point(tracks)
             if failures == TRIES and self._may_gybe(problem, place, course_rad, speed_mps):
                 return None
@@ -223,7 +224,7 @@ def _point(tracks: Sequence[NDArray[np.float64]]) -> Place:
     return float(tracks[-1][-1][0]), float(tracks[-1][-1][1])
 
 
-def in_words(problem: Problem, tacks: Sequence[Tack]) -> Iterator[str]:
+def in_words(problem: Problem, tacks: Sequence[TackAtRisk]) -> Iterator[str]:
     """Yield a sentence for each tack that may bring her onto something."""
     for tack in tacks:
         where = f"{tack.at_en[0]:.0f} E, {tack.at_en[1]:.0f} N"

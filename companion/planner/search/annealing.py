@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from companion.kernels.jit import kernel
 from companion.kernels.xorshift import uniform
 from companion.planner.search.kernels import (
-    Boat,
+    BoatModel,
     Floats,
-    Grid,
+    SegmentGrid,
     is_free,
     track,
     turn_guess,
@@ -39,7 +39,7 @@ MOST_POINTS = 1200
 
 
 @kernel
-def arrive(b: Boat, ax: float, ay: float, ex: float, ey: float, t: float, h: float) -> tuple[float, float]:
+def arrive(b: BoatModel, ax: float, ay: float, ex: float, ey: float, t: float, h: float) -> tuple[float, float]:
     """Return (time, TWA) on arrival at e from a, where the boat is at time t with TWA h."""
     dx, dy = ex - ax, ey - ay
     length = math.hypot(dx, dy)
@@ -88,7 +88,7 @@ def _pair(r: float, low: bool) -> tuple[int, int]:
 
 
 @kernel
-def go_round(b: Boat, xs: Floats, ys: Floats, n: int, i: int, at: Floats, course: Floats, way: int) -> int:
+def go_round(b: BoatModel, xs: Floats, ys: Floats, n: int, i: int, at: Floats, course: Floats, way: int) -> int:
     """Turn corner ``i`` the long way round, the lines of its two legs kept; return the number of points, 0: cannot."""
     h, a = course[i], course[i + 1]
     if not h * a < 0.0 or n + 2 >= MOST_POINTS:
@@ -125,7 +125,7 @@ def straighten(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
 
 @kernel
 def propose(
-    b: Boat, xs: Floats, ys: Floats, n: int, h0: float, goal: Floats, size: float, spots: Floats,
+    b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float, goal: Floats, size: float, spots: Floats,
     at: Floats, course: Floats, rng: NDArray[np.uint64],
 ) -> int:
     """Change the path in place by one random move and return its new number of points (0: no such move).
@@ -312,7 +312,7 @@ def shared(xs: Floats, ys: Floats, n: int, ox: Floats, oy: Floats, on: int) -> t
 
 
 @kernel
-def timetable(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, at: Floats, course: Floats) -> None:
+def timetable(b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float, at: Floats, course: Floats) -> None:
     """Fill in when the boat is at each point and the TWA that it arrives there with."""
     t, h = 0.0, h0
     at[0], course[0] = t, h
@@ -328,7 +328,7 @@ def timetable(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, at: Floats, co
 
 @kernel
 def time_after(
-    b: Boat, xs: Floats, ys: Floats, n: int, head: int, tail: int, at: Floats, course: Floats, on: int
+    b: BoatModel, xs: Floats, ys: Floats, n: int, head: int, tail: int, at: Floats, course: Floats, on: int
 ) -> float:
     """Return the time of a path that shares ``head`` and ``tail`` points with one whose timetable is known.
 
@@ -353,7 +353,7 @@ def time_after(
 
 
 @kernel
-def collides(g: Grid, xs: Floats, ys: Floats, n: int, head: int, tail: int) -> bool:
+def collides(g: SegmentGrid, xs: Floats, ys: Floats, n: int, head: int, tail: int) -> bool:
     """Does one of the legs that are not shared collide?"""
     for i in range(max(0, head - 1), min(n - 1, n - tail)):
         if not is_free(g, xs[i], ys[i], xs[i + 1], ys[i + 1]):
@@ -363,7 +363,7 @@ def collides(g: Grid, xs: Floats, ys: Floats, n: int, head: int, tail: int) -> b
 
 @kernel
 def anneal(
-    g: Grid, b: Boat, points: Floats, h0: float, goal: Floats, size: float, spots: Floats, rounds: int,
+    g: SegmentGrid, b: BoatModel, points: Floats, h0: float, goal: Floats, size: float, spots: Floats, rounds: int,
     hot: float, cold: float, price: float, rng: NDArray[np.uint64],
 ) -> tuple[float, Floats, float, Floats]:
     """Anneal for ``rounds`` moves from temperature ``hot`` to ``cold`` [s]; the path must be feasible.

@@ -20,7 +20,7 @@ from companion.planner.problem.value import Problem
 from companion.planner.search.bound import Bound, cut_off, no_course
 from companion.planner.search.gauge import make_gauge
 from companion.planner.search.searcher import FINE_FROM, Searcher
-from companion.planner.search.world import World, make_world
+from companion.planner.search.world import SearchWorld, make_world
 
 _LADDER = ((400, 2), (1_600, 2), (6_000, 2), (24_000, 2), (100_000, 2), (400_000, 2), (1_600_000, 2))
 _LATTICES = ((6_000, 3), (2_500, 3), (24_000, 2), (12_000, 3), (40_000, 3), (100_000, 2), (60_000, 3), (160_000, 2),
@@ -66,7 +66,7 @@ def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
                           "paths": tuple(world.to_en(c.points) for c in searcher.pool)})
 
 
-def _endpoint_in_solid(world: World) -> str | None:
+def _endpoint_in_solid(world: SearchWorld) -> str | None:
     """Return which endpoint no path can have, or None."""
     p = world.problem
     for name, en in (("start", p.start_en), ("goal", p.goal_en)):

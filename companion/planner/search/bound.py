@@ -20,7 +20,7 @@ from companion.planner.problem.value import Problem
 from companion.planner.search.gauge import Courses, Gauge, make_gauge, velocities
 from companion.planner.search.kernels import Floats
 from companion.planner.search.visibility import circle_cuts, geodesics, graph_nodes, least_through
-from companion.planner.search.world import World, make_world, polygons
+from companion.planner.search.world import SearchWorld, make_world, polygons
 
 # How often a path must turn: a lower bound on the time in turns among obstacles, to windward.
 #
@@ -48,7 +48,7 @@ _EDGES = 20_000
 class Boards:
     """The water of a fenced problem in strips, and how high a board climbs across each."""
 
-    def __init__(self, world: World, gauge: Gauge, grows: bool) -> None:
+    def __init__(self, world: SearchWorld, gauge: Gauge, grows: bool) -> None:
         boat, box = world.boat, world.box
         self.world, self.gauge = world, gauge
         self._least_rad = max(0.0, world.problem.no_go_min_rad - NO_GO_SLACK_RAD)
@@ -180,7 +180,7 @@ class Boards:
         return least_s
 
 
-def make_boards(world: World, gauge: Gauge, grows: bool) -> Boards | None:
+def make_boards(world: SearchWorld, gauge: Gauge, grows: bool) -> Boards | None:
     """Return the boards of a problem with a fence; None where they say nothing."""
     boat, problem = world.boat, world.problem
     still = boat.cx == 0.0 and boat.cy == 0.0
@@ -190,7 +190,7 @@ def make_boards(world: World, gauge: Gauge, grows: bool) -> Boards | None:
     return Boards(world, gauge, grows) if _LEAST_RAD < least < 0.5 * math.pi else None
 
 
-def _cuts(world: World) -> Floats:
+def _cuts(world: SearchWorld) -> Floats:
     """Return where the strips begin and end, across the wind: evenly, and close about the ends of the longest walls."""
     edges = world.grid.edges
     x0, x1 = world.box[0] - 2.0 * _PAD_M, world.box[2] + 2.0 * _PAD_M
@@ -201,7 +201,7 @@ def _cuts(world: World) -> Floats:
     return np.asarray(cuts[(cuts >= x0) & (cuts <= x1)], np.float64)
 
 
-def _solid(world: World, cuts: Floats) -> list[tuple[list[float], list[float]]]:
+def _solid(world: SearchWorld, cuts: Floats) -> list[tuple[list[float], list[float]]]:
     """Return for each strip the heights that are solid all across it: from, to.
 
     Between heights at which a boundary runs somewhere in the strip it is solid everywhere or nowhere: one point tells.
@@ -251,7 +251,7 @@ LATE = 0.9
 MOST_LATE_RAD = math.radians(86.0)
 
 
-def turning_s(world: World) -> float:
+def turning_s(world: SearchWorld) -> float:
     """Return the least time [s] that any path spends turning, tacks and gybes included.
 
     All courses sailed lie in the arc of headings swept, which holds the start heading; the displacement to some
@@ -365,7 +365,7 @@ def late_s(problem: Problem, late: Gauge, metric_s: float, at_s: float) -> float
 class Bound:
     """The best lower bound so far, and the geodesic that gave it (points (n, 2) in the wind frame, or None)."""
 
-    def __init__(self, world: World, gauge: Gauge) -> None:
+    def __init__(self, world: SearchWorld, gauge: Gauge) -> None:
         self.world, self.gauge = world, gauge
         gx, gy = world.goal
         self.turning_s = turning_s(world)
@@ -453,7 +453,7 @@ def lower_bound_s(problem: Problem, *, tests: int = 0) -> float:
     return bound.value_s
 
 
-def cut_off(world: World) -> str | None:
+def cut_off(world: SearchWorld) -> str | None:
     """Return why the goal's disc cannot be reached through free water at all, or None: exact, within TOUCH_M."""
     problem = world.problem
     start, goal = shapely.Point(problem.start_en), shapely.Point(problem.goal_en)

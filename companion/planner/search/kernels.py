@@ -1,8 +1,8 @@
 """Compiled basics of the search: is a segment free, how wide is the no-go zone, how long does a leg take.
 
 Everything here is in the *wind frame*: origin at the start, +y where the wind comes from, so the compass angle
-atan2(x, y) of a direction is its true wind angle. ``Grid`` holds the obstacles' boundary as segments in a uniform
-grid, ``Boat`` the boat, the wind's uncertainty and the moving targets; ``world.py`` makes both.
+atan2(x, y) of a direction is its true wind angle. ``SegmentGrid`` holds the obstacles' boundary as segments in a
+uniform grid, ``BoatModel`` the boat, the wind's uncertainty and the moving targets; ``world.py`` makes both.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SLACK_RAD = 1e-6
 """How much deeper than the no-go zone's edge a leg may be [rad]: rounding only (the scorer allows 1.7e-4)."""
 
 
-class Grid(NamedTuple):
+class SegmentGrid(NamedTuple):
     """Boundary segments (m, 4) in cells: those of cell c are ``item[start[c]:start[c + 1]]``."""
 
     x0: float
@@ -36,10 +36,11 @@ class Grid(NamedTuple):
     edges: Floats
 
 
-class Boat(NamedTuple):
+class BoatModel(NamedTuple):
     """Speed by |TWA|, turning, no-go zone in time, losses, current, targets (m, 9), what gybing round takes.
 
-    ``zone_half`` above 0: in a current, courses over the ground that the autopilot does not follow (``parts.Zone``).
+    ``zone_half`` above 0: in a current, courses over the ground that the autopilot does not follow
+    (``AutopilotBeatZone``).
     """
 
     twa: Floats
@@ -82,7 +83,7 @@ def wrap(a: float) -> float:
 
 
 @kernel
-def half_at(b: Boat, t: float) -> float:
+def half_at(b: BoatModel, t: float) -> float:
     """Return the no-go half angle at time t [rad]."""
     if b.kind == 0:
         return b.base
@@ -103,7 +104,7 @@ def half_at(b: Boat, t: float) -> float:
 
 
 @kernel
-def worst_half(b: Boat, t0: float, t1: float) -> float:
+def worst_half(b: BoatModel, t0: float, t1: float) -> float:
     """Return the largest no-go half angle over [t0, t1] [rad]."""
     if b.kind == 0:
         return b.base
@@ -116,7 +117,7 @@ def worst_half(b: Boat, t0: float, t1: float) -> float:
 
 
 @kernel
-def speed_at(b: Boat, a: float) -> float:
+def speed_at(b: BoatModel, a: float) -> float:
     """Return the speed [m/s] at |TWA| a [rad]."""
     a = abs(a)
     n = b.twa.shape[0]
@@ -135,13 +136,13 @@ def speed_at(b: Boat, a: float) -> float:
 
 
 @kernel
-def _cross_track(b: Boat, h: float, dx: float, dy: float) -> float:
+def _cross_track(b: BoatModel, h: float, dx: float, dy: float) -> float:
     v = speed_at(b, wrap(h))
     return (v * math.sin(h) + b.cx) * dy - (v * math.cos(h) + b.cy) * dx
 
 
 @kernel
-def _root(b: Boat, lo: float, hi: float, low: float, high: float, dx: float, dy: float) -> float:
+def _root(b: BoatModel, lo: float, hi: float, low: float, high: float, dx: float, dy: float) -> float:
     """Return the heading between two of opposite sides that makes the direction good (Illinois' false position)."""
     side = 0
     for _ in range(60):
@@ -163,14 +164,14 @@ def _root(b: Boat, lo: float, hi: float, low: float, high: float, dx: float, dy:
 
 
 @kernel
-def is_zoned(b: Boat, course: float) -> bool:
+def is_zoned(b: BoatModel, course: float) -> bool:
     """Is a course over the ground one that the autopilot does not follow?"""
     return b.zone_half > 0.0 and abs(wrap(wrap(course) - b.zone_from)) < b.zone_half
 
 
 @kernel
-def is_refused(b: Boat, a: float, vx: float, vy: float) -> bool:
-    """Is a heading that makes this velocity over the ground good none that the autopilot sails (``parts.Zone``)?"""
+def is_refused(b: BoatModel, a: float, vx: float, vy: float) -> bool:
+    """Return whether no heading that the autopilot sails makes this ground velocity good (``AutopilotBeatZone``)."""
     if b.zone_half <= 0.0:
         return False
     zoned = is_zoned(b, math.atan2(vx, vy))
@@ -178,7 +179,7 @@ def is_refused(b: Boat, a: float, vx: float, vy: float) -> bool:
 
 
 @kernel
-def track(b: Boat, dx: float, dy: float, t: float) -> tuple[float, float]:
+def track(b: BoatModel, dx: float, dy: float, t: float) -> tuple[float, float]:
     """Return (TWA of the heading, speed over ground) that makes the ground direction (dx, dy) good."""
     course = wrap(math.atan2(dx, dy))   # dead down wind is -π, as everywhere
     if b.cx == 0.0 and b.cy == 0.0:
@@ -213,7 +214,7 @@ def track(b: Boat, dx: float, dy: float, t: float) -> tuple[float, float]:
 
 
 @kernel
-def turn_time(b: Boat, h0: float, h1: float) -> float:
+def turn_time(b: BoatModel, h0: float, h1: float) -> float:
     """Return the time [s] to turn from TWA h0 to h1 the shorter way, losses included; inf for a tack it cannot do."""
     t = abs(wrap(h1 - h0)) / b.omega
     if h0 * h1 < 0.0:
@@ -225,7 +226,7 @@ def turn_time(b: Boat, h0: float, h1: float) -> float:
 
 
 @kernel
-def turn_guess(b: Boat, h0: float, h1: float) -> float:
+def turn_guess(b: BoatModel, h0: float, h1: float) -> float:
     """Return ``turn_time``, or about what it takes to turn the other way, through a leg of its own, if that is less."""
     t = turn_time(b, h0, h1)
     if b.room > 0.0 and h0 * h1 < 0.0:
@@ -238,7 +239,7 @@ def turn_guess(b: Boat, h0: float, h1: float) -> float:
 
 
 @kernel
-def wound_at(b: Boat, xs: Floats, ys: Floats, course: Floats, i: int) -> float:
+def wound_at(b: BoatModel, xs: Floats, ys: Floats, course: Floats, i: int) -> float:
     """Return how far the boat has turned [rad, signed] at point ``i``, before its turn there, since its last long leg.
 
     ``course`` is the TWA of arrival at each point.
@@ -251,7 +252,7 @@ def wound_at(b: Boat, xs: Floats, ys: Floats, course: Floats, i: int) -> float:
 
 
 @kernel
-def meets_target(b: Boat, ax: float, ay: float, bx: float, by: float, t0: float, t1: float) -> bool:
+def meets_target(b: BoatModel, ax: float, ay: float, bx: float, by: float, t0: float, t1: float) -> bool:
     """Does the boat, at a at t0 and at b at t1, enter a target's disc?"""
     span = t1 - t0
     for i in range(b.targets.shape[0]):
@@ -276,7 +277,7 @@ def meets_target(b: Boat, ax: float, ay: float, bx: float, by: float, t0: float,
 
 
 @kernel
-def is_free(g: Grid, ax: float, ay: float, bx: float, by: float) -> bool:
+def is_free(g: SegmentGrid, ax: float, ay: float, bx: float, by: float) -> bool:
     """Is the segment clear of every boundary segment? Exact; walks the grid's rows that it crosses."""
     if g.edges.shape[0] == 0:
         return True
@@ -356,7 +357,7 @@ def rasterise(edges: Floats, x0: float, y0: float, inv: float, nx: int, ny: int)
 
 
 @kernel
-def walk_on(b: Boat, xs: Floats, ys: Floats, first: int, last: int, t: float, h: float, wound: float) -> float:
+def walk_on(b: BoatModel, xs: Floats, ys: Floats, first: int, last: int, t: float, h: float, wound: float) -> float:
     """Return when the boat is at point ``last``, having come to ``first`` at ``t`` on TWA ``h``; inf as ``walk``.
 
     ``wound`` is what it has turned since it last had room to settle [rad].
@@ -389,6 +390,6 @@ def walk_on(b: Boat, xs: Floats, ys: Floats, first: int, last: int, t: float, h:
 
 
 @kernel
-def walk(b: Boat, xs: Floats, ys: Floats, n: int, h0: float) -> float:
+def walk(b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float) -> float:
     """Return the time [s] of the path of n points; inf where it breaks a limit of angles or turns or meets a target."""
     return walk_on(b, xs, ys, 0, n - 1, 0.0, h0, 0.0)

@@ -20,10 +20,10 @@ from companion.kernels.jit import kernel
 from companion.planner.search.gauge import Gauge
 from companion.planner.search.kernels import (
     SLACK_RAD,
-    Boat,
+    BoatModel,
     Floats,
-    Grid,
     Ints,
+    SegmentGrid,
     is_free,
     is_refused,
     meets_target,
@@ -35,7 +35,7 @@ from companion.planner.search.kernels import (
     wrap,
 )
 from companion.planner.search.moves import corner, edge_angle
-from companion.planner.search.world import World
+from companion.planner.search.world import SearchWorld
 
 LEAST_SINE = 0.1   # of the angle between a lattice's axes
 _START, _CLOCKWISE, _COUNTER, _MOVE, _ROUND = 1, 2, 3, 4, 5
@@ -43,7 +43,7 @@ _START, _CLOCKWISE, _COUNTER, _MOVE, _ROUND = 1, 2, 3, 4, 5
 
 @kernel
 def _misses(
-    b: Boat, x: float, y: float, h: float, t: float, mx: float, my: float, ex: float, ey: float
+    b: BoatModel, x: float, y: float, h: float, t: float, mx: float, my: float, ex: float, ey: float
 ) -> bool:
     """Do the two legs by way of (mx, my) keep clear of every target?"""
     for leg in range(2):
@@ -59,7 +59,7 @@ def _misses(
 
 @kernel
 def _wound(
-    b: Boat, came: NDArray[np.uint8], s: int, nj: int, steps: Ints, angle: Floats, lengths: Floats, h0: float,
+    b: BoatModel, came: NDArray[np.uint8], s: int, nj: int, steps: Ints, angle: Floats, lengths: Floats, h0: float,
     deep: float,
 ) -> float:
     """Return how far the boat has turned [rad, signed] in state ``s`` since its last leg as long as ``b.room``.
@@ -90,7 +90,7 @@ def _wound(
 
 @kernel
 def lattice_search(
-    g: Grid, b: Boat, origin: Floats, axes: Floats, shape: Ints, steps: Ints, goal: Floats, box: Floats,
+    g: SegmentGrid, b: BoatModel, origin: Floats, axes: Floats, shape: Ints, steps: Ints, goal: Floats, box: Floats,
     gauge: Floats, slack: float, bound: float, max_pops: int, shot_m: float, side: int,
 ) -> tuple[float, Floats, int, bool]:
     """Search; return (arrival time, points (n, 2), states expanded, exhausted).
@@ -308,7 +308,7 @@ def _steps(reach: int) -> list[tuple[int, int]]:
     return [(i, j) for i in span for j in span if math.gcd(i, j) == 1]
 
 
-def _leeward(b: Boat, axes: Floats) -> tuple[int, int]:
+def _leeward(b: BoatModel, axes: Floats) -> tuple[int, int]:
     """Return the shortest lattice step that turns the boat from either close-hauled course to the other by a gybe."""
     if b.room == 0.0:
         return 0, 0
@@ -327,7 +327,7 @@ def _leeward(b: Boat, axes: Floats) -> tuple[int, int]:
     return 0, 0
 
 
-def _over_ground(b: Boat, u: Floats, half_rad: float) -> Floats:
+def _over_ground(b: BoatModel, u: Floats, half_rad: float) -> Floats:
     """Return the directions over the ground of the headings ``u``; themselves where these are no axes of a lattice."""
     moved = speed_at(b, half_rad if u[0, 1] > 0.0 else math.pi - half_rad) * u + np.array([b.cx, b.cy])
     size = np.hypot(moved[:, 0], moved[:, 1])
@@ -339,7 +339,8 @@ def _over_ground(b: Boat, u: Floats, half_rad: float) -> Floats:
 
 
 def run_lattice(
-    world: World, gauge: Gauge, *, cells: int, reach: int, half_rad: float, box: tuple[float, float, float, float],
+    world: SearchWorld, gauge: Gauge, *, cells: int, reach: int, half_rad: float,
+    box: tuple[float, float, float, float],
     bound_s: float = math.inf, max_pops: int = 1 << 60, downwind: bool = False, stretch: float = 1.0,
     origin: tuple[float, float, float, float] | None = None, goal: tuple[float, float, float] | None = None,
     side: int = 0,
@@ -402,8 +403,8 @@ _FIXED = 16
 
 @kernel
 def drift_search(
-    g: Grid, b: Boat, h0: float, goal: Floats, box: Floats, shape: Ints, step: float, gauge: Floats, slack: float,
-    bound: float, max_pops: int, side: int,
+    g: SegmentGrid, b: BoatModel, h0: float, goal: Floats, box: Floats, shape: Ints, step: float, gauge: Floats,
+    slack: float, bound: float, max_pops: int, side: int,
 ) -> tuple[float, Floats, int]:
     """Search from the origin; return (time, points (n, 2), states expanded). Arguments as ``lattice_search``."""
     nx, ny = shape[0], shape[1]
@@ -537,8 +538,8 @@ def drift_search(
 
 
 def run_drift(
-    world: World, gauge: Gauge, *, cells: int, box: tuple[float, float, float, float], bound_s: float, max_pops: int,
-    stride: float = 1.45, side: int = 0,
+    world: SearchWorld, gauge: Gauge, *, cells: int, box: tuple[float, float, float, float], bound_s: float,
+    max_pops: int, stride: float = 1.45, side: int = 0,
 ) -> LatticeResult:
     """Search a grid of about ``cells`` cells within ``box``, with steps ``stride`` cells long."""
     width, height = max(box[2] - box[0], 1e-3), max(box[3] - box[1], 1e-3)

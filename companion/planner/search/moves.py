@@ -9,9 +9,9 @@ import numpy as np
 from companion.kernels.jit import kernel
 from companion.planner.search.kernels import (
     SLACK_RAD,
-    Boat,
+    BoatModel,
     Floats,
-    Grid,
+    SegmentGrid,
     half_at,
     is_free,
     is_refused,
@@ -29,7 +29,7 @@ UP_STARBOARD, UP_PORT, DOWN_STARBOARD, DOWN_PORT = 0, 1, 2, 3
 
 
 @kernel
-def edge_angle(b: Boat, kind: int, t0: float, t1: float) -> float:
+def edge_angle(b: BoatModel, kind: int, t0: float, t1: float) -> float:
     """Return the TWA [rad] of an edge course sailed from t0 to t1; NaN where there is none."""
     half = worst_half(b, t0, t1)
     a = max(half, b.up) if kind < 2 else b.down
@@ -40,7 +40,7 @@ def edge_angle(b: Boat, kind: int, t0: float, t1: float) -> float:
 
 @kernel
 def corner(
-    b: Boat, px: float, py: float, h: float, t: float, qx: float, qy: float, k1: int, k2: int
+    b: BoatModel, px: float, py: float, h: float, t: float, qx: float, qy: float, k1: int, k2: int
 ) -> tuple[float, float, float, bool]:
     """Return (x, y, arrival time, ok): the corner of the two edge courses k1, k2 that lead from p to q.
 
@@ -88,7 +88,7 @@ def kind_of(a: float) -> int:
 
 
 @kernel
-def fit_corners(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, first: int, force: bool) -> None:
+def fit_corners(b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float, first: int, force: bool) -> None:
     """Re-solve corners from point ``first`` on so that their courses fit the times they are sailed at.
 
     With ``force`` every corner of two close-hauled legs, otherwise only where a leg is inside the no-go zone.
@@ -126,7 +126,7 @@ def fit_corners(b: Boat, xs: Floats, ys: Floats, n: int, h0: float, first: int, 
 
 
 @kernel
-def _laid(b: Boat, kind: int, t: float, h: float, length: float) -> tuple[float, float]:
+def _laid(b: BoatModel, kind: int, t: float, h: float, length: float) -> tuple[float, float]:
     """Return (TWA, end time) of an edge course of this length begun from TWA h at time t."""
     a = edge_angle(b, kind, t, t)
     t2 = t
@@ -141,7 +141,7 @@ def _laid(b: Boat, kind: int, t: float, h: float, length: float) -> tuple[float,
 
 @kernel
 def relay(
-    b: Boat, xs: Floats, ys: Floats, n: int, h0: float, i: int, j: int, longer: int, by: float
+    b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float, i: int, j: int, longer: int, by: float
 ) -> bool:
     """Lay the close-hauled legs between points i and j again, each at the edge of the no-go zone of its own time.
 
@@ -236,7 +236,7 @@ _LONGEST = 8.0
 
 
 @kernel
-def round_vector(b: Boat, a0: float, a1: float, t: float, way: int) -> tuple[float, float, float, float, bool]:
+def round_vector(b: BoatModel, a0: float, a1: float, t: float, way: int) -> tuple[float, float, float, float, bool]:
     """Return (x1, y1, x2, y2, ok): the leg or legs [m] from TWA a0 round to a1 the long way; (x2, y2) 0 for one leg."""
     side = 1.0 if a0 > 0.0 else -1.0
     if abs(a0) + abs(a1) < math.pi:
@@ -285,7 +285,7 @@ def cross(
 
 
 @kernel
-def _sailed(b: Boat, xs: Floats, ys: Floats, n: int, t: float, h: float) -> tuple[float, float]:
+def _sailed(b: BoatModel, xs: Floats, ys: Floats, n: int, t: float, h: float) -> tuple[float, float]:
     for i in range(n - 1):
         dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
         length = math.hypot(dx, dy)
@@ -297,7 +297,7 @@ def _sailed(b: Boat, xs: Floats, ys: Floats, n: int, t: float, h: float) -> tupl
 
 
 @kernel
-def _free(g: Grid, xs: Floats, ys: Floats, n: int) -> bool:
+def _free(g: SegmentGrid, xs: Floats, ys: Floats, n: int) -> bool:
     for i in range(n - 1):  # noqa: SIM110 - compiled
         if not is_free(g, xs[i], ys[i], xs[i + 1], ys[i + 1]):
             return False
@@ -305,7 +305,7 @@ def _free(g: Grid, xs: Floats, ys: Floats, n: int) -> bool:
 
 
 @kernel
-def rounded(g: Grid, b: Boat, points: Floats, h0: float) -> Floats:
+def rounded(g: SegmentGrid, b: BoatModel, points: Floats, h0: float) -> Floats:
     """Return the path with each turn that cannot be done, or is dearer, made the long way round; (0, 2): no room.
 
     Each corner takes the
@@ -387,7 +387,7 @@ def rounded(g: Grid, b: Boat, points: Floats, h0: float) -> Floats:
 
 
 @kernel
-def fitted(b: Boat, points: Floats, h0: float) -> Floats:
+def fitted(b: BoatModel, points: Floats, h0: float) -> Floats:
     """Return the path with its close-hauled corners moved to the courses of the times at which they are now sailed."""
     n = points.shape[0]
     xs, ys = points[:, 0].copy(), points[:, 1].copy()
@@ -401,7 +401,7 @@ def fitted(b: Boat, points: Floats, h0: float) -> Floats:
 # Guides made sailable: a straight segment as the direct leg, as equal tacks, or as tacks that fit the room.
 
 @kernel
-def check_path(g: Grid, b: Boat, points: Floats, h0: float) -> float:
+def check_path(g: SegmentGrid, b: BoatModel, points: Floats, h0: float) -> float:
     """Return the time of a path, inf where it collides or breaks an angle limit."""
     n = points.shape[0]
     for i in range(n - 1):
@@ -412,7 +412,7 @@ def check_path(g: Grid, b: Boat, points: Floats, h0: float) -> float:
 
 @kernel
 def zigzag(
-    g: Grid, b: Boat, ax: float, ay: float, h: float, t: float, ex: float, ey: float, most: int
+    g: SegmentGrid, b: BoatModel, ax: float, ay: float, h: float, t: float, ex: float, ey: float, most: int
 ) -> tuple[Floats, float, float, bool]:
     """Return (points after a, arrival time, TWA on arrival, ok): the fewest equal tacks or gybes from a to e.
 
@@ -456,7 +456,7 @@ def zigzag(
 
 @kernel
 def follow(
-    g: Grid, b: Boat, ax: float, ay: float, h: float, t: float, ex: float, ey: float, deepest: int
+    g: SegmentGrid, b: BoatModel, ax: float, ay: float, h: float, t: float, ex: float, ey: float, deepest: int
 ) -> tuple[Floats, float, float, bool]:
     """Return (points after a, arrival time, TWA on arrival, ok): a sailable path close along the segment a to e.
 

@@ -17,7 +17,7 @@ from companion.planner.search.kernels import Floats, is_free
 from companion.planner.search.lattice import run_drift, run_lattice
 from companion.planner.search.moves import check_path, fitted, follow, rounded, zigzag
 from companion.planner.search.visibility import crossings, geodesics, graph_nodes, least_through
-from companion.planner.search.world import World
+from companion.planner.search.world import SearchWorld
 
 LEG_PRICE = 8e-5
 """What a leg must save, as a share of the path's time, while ways are compared; at the end the problem's share counts.
@@ -71,7 +71,7 @@ class Candidate:
 class Searcher:
     """The state of one search."""
 
-    def __init__(self, world: World, gauge: Gauge, bound: Bound, effort: Effort, seed: int) -> None:
+    def __init__(self, world: SearchWorld, gauge: Gauge, bound: Bound, effort: Effort, seed: int) -> None:
         self.world, self.gauge, self.bound, self.effort = world, gauge, bound, effort
         self.goal = np.array([*world.goal, world.goal_radius])
         self.rng: NDArray[np.uint64] = np.array([(seed * 2 + 1) * 0x9E3779B97F4A7C15 % 2**64 or 1], np.uint64)
@@ -474,7 +474,7 @@ class Searcher:
         return candidate.spots
 
 
-def _tidy(world: World, points: Floats) -> Floats:
+def _tidy(world: SearchWorld, points: Floats) -> Floats:
     """Drop points that are not needed: doubles, and those on a straight line."""
     keep = [points[0]]
     for i in range(1, len(points)):

@@ -14,7 +14,7 @@ import numpy as np
 
 from companion.kernels.jit import kernel
 from companion.planner.search.gauge import Gauge, disc_time
-from companion.planner.search.kernels import Floats, Grid, Ints, is_free
+from companion.planner.search.kernels import Floats, Ints, SegmentGrid, is_free
 
 _EXACT = 5_000
 """Corners up to which each one's least time is worked out to the last digit; of more, from the gauge's table."""
@@ -30,7 +30,7 @@ def _time(normals: Floats, dx: float, dy: float) -> float:
 
 @kernel
 def geodesics(
-    g: Grid, nodes: Floats, normals: Floats, blocked: Floats, table: Floats, goal: Floats, mode: int,
+    g: SegmentGrid, nodes: Floats, normals: Floats, blocked: Floats, table: Floats, goal: Floats, mode: int,
     bound: float, budget: int, ends: Floats,
 ) -> tuple[Floats, Ints, float, int, int]:
     """Search the visibility graph over ``nodes`` (node 0 is the start) with the gauge as the cost.
@@ -123,7 +123,7 @@ def geodesics(
 
 
 @kernel
-def _entry_free(g: Grid, x: float, y: float, px: float, py: float, goal: Floats) -> bool:
+def _entry_free(g: SegmentGrid, x: float, y: float, px: float, py: float, goal: Floats) -> bool:
     """Is the segment from (x, y) to p free up to where it enters the goal's disc?"""
     dx, dy = px - x, py - y
     a = dx * dx + dy * dy
@@ -137,7 +137,7 @@ def _entry_free(g: Grid, x: float, y: float, px: float, py: float, goal: Floats)
 
 
 @kernel
-def disc_open(g: Grid, x: float, y: float, goal: Floats, ends: Floats) -> bool:
+def disc_open(g: SegmentGrid, x: float, y: float, goal: Floats, ends: Floats) -> bool:
     """Can any part of the goal's disc be seen from (x, y)?
 
     A sight line can be turned until it touches a corner (then that corner sees the disc too and takes its place),

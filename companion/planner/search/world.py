@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from companion.geo.angles import wrap_pi
 from companion.planner.problem.parts import TOUCH_M
 from companion.planner.problem.value import Problem
-from companion.planner.search.kernels import Boat, Floats, Grid, rasterise
+from companion.planner.search.kernels import BoatModel, Floats, SegmentGrid, rasterise
 
 SKIN_M = 3e-4
 """Boundaries are moved this far into the solid [m], so that a path may touch them; the scorer allows 1e-3."""
@@ -25,7 +25,7 @@ SIGMA_KINDS = {"none": 0, "kalman": 1, "ar1": 2, "forecast": 3}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class World:
+class SearchWorld:
     """The problem in the wind frame (see kernels.py).
 
     ``corners`` are the solid's convex vertices (m, 2), ``outward`` their
@@ -33,8 +33,8 @@ class World:
     """
 
     problem: Problem
-    grid: Grid
-    boat: Boat
+    grid: SegmentGrid
+    boat: BoatModel
     corners: Floats
     outward: Floats
     marks: Floats
@@ -222,10 +222,10 @@ def _rings(
     return to_wind(p, points.take(inner, axis=0)), owner.take(inner)
 
 
-def make_grid(edges: Floats) -> Grid:
+def make_grid(edges: Floats) -> SegmentGrid:
     """Return the segments in a uniform grid of about two cells a segment, a million at most."""
     if len(edges) == 0:
-        return Grid(0.0, 0.0, 1.0, 1, 1, np.zeros(2, np.int32), np.empty(0, np.int32), edges)
+        return SegmentGrid(0.0, 0.0, 1.0, 1, 1, np.zeros(2, np.int32), np.empty(0, np.int32), edges)
     x, y = edges[:, 0], edges[:, 1]                             # each end of a segment begins another
     x0, x1, y0, y1 = float(x.min()), float(x.max()), float(y.min()), float(y.max())
     width, height = max(x1 - x0, 1e-3), max(y1 - y0, 1e-3)
@@ -233,7 +233,7 @@ def make_grid(edges: Floats) -> Grid:
     size = max(math.sqrt(width * height / cells), max(width, height) / 4096.0)
     nx, ny = int(width / size) + 1, int(height / size) + 1
     start, item = rasterise(edges, x0, y0, 1.0 / size, nx, ny)
-    return Grid(x0, y0, 1.0 / size, nx, ny, start, item, edges)
+    return SegmentGrid(x0, y0, 1.0 / size, nx, ny, start, item, edges)
 
 
 def _best_angles(p: Problem) -> tuple[float, float]:
@@ -249,7 +249,7 @@ def _best_angles(p: Problem) -> tuple[float, float]:
     return best_up, min(best_down, b.max_twa_rad)
 
 
-def make_boat(p: Problem) -> Boat:
+def make_boat(p: Problem) -> BoatModel:
     """Return the boat, the no-go zone in time and the targets in the wind frame."""
     b, s = p.boat, p.wind.sigma
     horizon = np.asarray(s.horizon_s or (0.0,), np.float64)
@@ -262,7 +262,7 @@ def make_boat(p: Problem) -> Boat:
         v = to_wind(p, origin + np.array([[t.vx_mps, t.vy_mps]]))[0]
         rows.append([xy[0], xy[1], v[0], v[1], t.radius_m, t.growth_mps, t.from_s, t.until_s, 0.0])
     up, down = _best_angles(p)
-    return Boat(
+    return BoatModel(
         np.asarray(b.polar_twa_rad, np.float64), np.asarray(b.polar_mps, np.float64), b.turn_rate_radps,
         b.no_go_half_rad, b.max_twa_rad, SIGMA_KINDS[s.model] if p.is_time_varying or s.model == "forecast" else 0,
         s.sigma0_rad, s.growth_rad_per_sqrt_s, s.sigma_inf_rad, s.rho_hz, p.k_delta, horizon, width,
@@ -292,7 +292,7 @@ def _constant_base(p: Problem) -> float:
     return p.boat.no_go_half_rad + (p.widening_rad(0.0) if constant else 0.0)
 
 
-def make_world(p: Problem) -> World:
+def make_world(p: Problem) -> SearchWorld:
     """Return ``p`` ready for the search. ``p.defect`` must be None."""
     solids, fence, tangled = merged_solids(p)
     # What is not united must not be moved apart either, and its corners may lie inside its neighbours.
@@ -303,7 +303,7 @@ def make_world(p: Problem) -> World:
     marks = shapely.get_coordinates(shapely.point_on_surface(np.asarray(solids, dtype=object))).reshape(-1, 2)
     gx, gy = to_wind(p, np.asarray([p.goal_en]))[0].tolist()
     x, y = np.append(edges[:, 0], (0.0, gx)), np.append(edges[:, 1], (0.0, gy))
-    return World(
+    return SearchWorld(
         problem=p, grid=make_grid(edges), boat=make_boat(p), corners=corners, outward=outward,
         marks=np.ascontiguousarray(to_wind(p, marks)), goal=(gx, gy),
         goal_radius=p.goal_radius_m,

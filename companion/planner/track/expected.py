@@ -38,7 +38,7 @@ STRIDE = 10          # places of a track, a fifth of a second apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Expected:
+class ExpectedTrack:
     """What is expected of a path.
 
     Attributes:
@@ -79,7 +79,7 @@ def curve_mps(problem: Problem) -> NDArray[np.float64]:
 
 def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray[np.float64],
              legs: Sequence[Leg] | None = None, *, has_boards: bool = True, has_loops: bool = True,
-             part: slice | None = None, sailed_m: float = 0.0) -> Expected:
+             part: slice | None = None, sailed_m: float = 0.0) -> ExpectedTrack:
     """Return what is expected of a path of a problem that has ``tracking``.
 
     Args:
@@ -97,7 +97,7 @@ def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray
     path = np.asarray(waypoints_en, dtype=np.float64).reshape(-1, 2)
     path = path[np.concatenate([[True], np.hypot(*np.diff(path, axis=0).T) > 1e-6])]
     if len(path) < 2 or len(tracking.tree.geometries) == 0:
-        return Expected()
+        return ExpectedTrack()
     if legs is None:
         legs = evaluate(problem, path).legs
     beats = tuple(leg.is_beat for leg in legs) if len(legs) == len(path) - 1 else (False,) * (len(path) - 1)
@@ -112,7 +112,7 @@ def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray
 def _expected(
     problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...], before_en: tuple[float, float] | None,
     has_boards: bool, has_loops: bool, sailed_m: float,
-) -> Expected:
+) -> ExpectedTrack:
     tracking = problem.tracking
     assert tracking is not None
     path, beats = np.frombuffer(path_bytes).reshape(-1, 2), np.array(is_beat)
@@ -141,7 +141,7 @@ def _expected(
     judged = np.where(is_beaten, math.inf, room)
     lack = np.where(is_beaten, 0.0, np.maximum(0.0, need - room))
     worst, least = int(np.argmax(lack)), int(np.argmin(judged))
-    found = Expected(
+    found = ExpectedTrack(
         clearance_m=float(judged[least]), at_en=_point(en[least]), leg=int(leg[least]), is_kept=not lack[worst] > 0.0,
         lack_m=float(lack[worst]), error_m=min(float(error[worst]), stated_m), worst_en=_point(en[worst]),
         near_en=_nearest(tracking, en[worst]),
@@ -164,8 +164,8 @@ def _with_run_up(
 
 def _with_boards(
     problem: Problem, tracking: Tracking, whole: NDArray[np.float64], first: int, beats: NDArray[np.bool_],
-    found: Expected,
-) -> Expected:
+    found: ExpectedTrack,
+) -> ExpectedTrack:
     """Return what is expected with the legs that are beaten: at each board, with probability delta_s."""
     sigma = problem.wind.sigma.at(SIGMA_AT_S)
     curve = curve_mps(problem)
@@ -243,5 +243,5 @@ def _point(en: NDArray[np.float64]) -> tuple[float, float]:
     return float(en[0]), float(en[1])
 
 
-def _changed(value: Expected, **changes: object) -> Expected:
+def _changed(value: ExpectedTrack, **changes: object) -> ExpectedTrack:
     return replace(value, **changes)  # type: ignore[arg-type]

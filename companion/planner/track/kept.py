@@ -24,7 +24,7 @@ from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import PlanStatus
 from companion.planner.problem.evaluate import Evaluation, evaluate, shore_of
 from companion.planner.problem.value import Problem, resolved
-from companion.planner.track.expected import Expected, curve_mps, expected
+from companion.planner.track.expected import ExpectedTrack, curve_mps, expected
 
 Path = list[tuple[float, float]]
 Judge = Callable[[Path], Evaluation]
@@ -73,7 +73,7 @@ def with_track(search: Search, judge: Judge | None = None) -> Search:
     return tracked
 
 
-def lacking(problem: Problem, seen: Expected) -> str:
+def lacking(problem: Problem, seen: ExpectedTrack) -> str:
     """Return in words how near the track would come."""
     assert problem.tracking is not None
     floor = problem.tracking.floor_m
@@ -85,7 +85,7 @@ def lacking(problem: Problem, seen: Expected) -> str:
 
 def laid(
     problem: Problem, path: Path, judge: Judge | None = None, effort: Effort | None = None,
-) -> tuple[Path, Expected]:
+) -> tuple[Path, ExpectedTrack]:
     """Return the path with few corners, all of which can be followed and keep the floor, as far as that is possible.
 
     Of an ``effort`` in seconds changes are tried while there is time.
@@ -204,12 +204,12 @@ def _lengths_m(path: Path) -> list[float]:
 
 
 def _pushed(
-    problem: Problem, judge: Judge, path: Path, seen: Expected, effort: Effort,
-) -> tuple[Path, Expected]:
+    problem: Problem, judge: Judge, path: Path, seen: ExpectedTrack, effort: Effort,
+) -> tuple[Path, ExpectedTrack]:
     """Push corners away from what the track comes too near to, until it keeps the floor or nothing helps."""
     count = 0
     while not seen.is_kept and count < AT_MOST:
-        best: tuple[float, float, Path, Expected] | None = None
+        best: tuple[float, float, Path, ExpectedTrack] | None = None
         for option in _pushes(problem, path, seen):
             if not effort.has_time(0.0):
                 break
@@ -227,7 +227,7 @@ def _pushed(
     return path, seen
 
 
-def _pushes(problem: Problem, path: Path, seen: Expected) -> Iterator[Path]:
+def _pushes(problem: Problem, path: Path, seen: ExpectedTrack) -> Iterator[Path]:
     if seen.worst_en is None or seen.near_en is None:
         return
     away: NDArray[np.float64] = np.asarray(seen.worst_en) - np.asarray(seen.near_en)

@@ -30,7 +30,7 @@ from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
 from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.state import ByField
-from companion.skipper.step.state import StationPhase as Doing
+from companion.skipper.step.state import Phase as Doing
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import marks_of
 from companion.skipper.way.geometry import distance_m

@@ -21,7 +21,7 @@ import numpy as np
 from companion.planner import Problem
 from companion.planner.problem import evaluate, resolved
 from companion.planner.risk import of_risky, path_risk, tacks_at_risk
-from companion.planner.track import Expected
+from companion.planner.track import ExpectedTrack
 from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
 from companion.skipper.planning.track import of_way
 from companion.skipper.planning.vessels import meetings
@@ -57,7 +57,7 @@ def refusal(turn: Turn, route: Route, set_current: int | None, pending: PendingP
     new = [begins, *route.points_en_m[first:-1]]
     old, ahead, leg = [boat, *turn.ahead()], turn.ahead(), turn.leg()
     sailed_m = 0.0 if leg is None else distance_m(leg[0], boat)
-    before = Expected() if not ahead else of_way(
+    before = ExpectedTrack() if not ahead else of_way(
         problem, old, heading_rad=vehicle.heading_rad, before_en=None, sailed_m=sailed_m, has_loops=has_loops)
     seen = of_way(problem, new, heading_rad=heading_rad, before_en=None, has_loops=has_loops,
                   sailed_m=sailed_m if set_current is None else 0.0)
@@ -67,7 +67,7 @@ def refusal(turn: Turn, route: Route, set_current: int | None, pending: PendingP
     return _less(turn, pending, new, old, heading_rad=heading_rad)
 
 
-def _below_floor(problem: Problem, new: Expected, old: Expected | None, *, here_m: float) -> str:
+def _below_floor(problem: Problem, new: ExpectedTrack, old: ExpectedTrack | None, *, here_m: float) -> str:
     """Return how a new way breaks the first rule, empty: it does not."""
     floor_m = 0.0 if problem.tracking is None else problem.tracking.floor_m
     if new.lack_m <= 0.0:
@@ -79,7 +79,7 @@ def _below_floor(problem: Problem, new: Expected, old: Expected | None, *, here_
     return "" if new.clearance_m >= least_m - SPARE_M else f"{says}, and the boat is {here_m:.1f} m clear"
 
 
-def is_open(turn: Turn, pending: PendingPlan, seen: Expected) -> bool:
+def is_open(turn: Turn, pending: PendingPlan, seen: ExpectedTrack) -> bool:
     """Return whether the way on board leads where the new one does, keeps the floor and can be sailed."""
     return leads_there(turn, pending) and seen.is_within_error and not meetings(turn) and is_on_board_sound(turn)
 

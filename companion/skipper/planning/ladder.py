@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from companion.planner.settings import AUTO, Choice
+from companion.planner.settings import AUTO, PlannerChoice
 from companion.skipper.step.config import SkipperConfig
 
 PINCHES = "closer to the wind than the autopilot keeps to a line"
@@ -25,7 +25,7 @@ class Rung:
     delta_s: float
     max_path_risk: float | None = None
     nearer_goal: bool = False
-    planner: Choice = AUTO
+    planner: PlannerChoice = AUTO
     pinches: bool = False
 
 

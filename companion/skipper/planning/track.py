@@ -12,7 +12,7 @@ from companion.boat import AutopilotLimits
 from companion.boat.tracking import GuidanceModel, stated_error_m
 from companion.messages import WindForecast
 from companion.planner import Problem
-from companion.planner.track import Expected, expected
+from companion.planner.track import ExpectedTrack, expected
 from companion.skipper.planning.ladder import Rung, rungs
 from companion.skipper.planning.statement import Start
 from companion.skipper.step.turn import Turn
@@ -65,7 +65,7 @@ def _is_known(turn: Turn) -> bool:
 def of_way(
     problem: Problem, way: Sequence[PointEn], *, heading_rad: float, before_en: PointEn | None, sailed_m: float = 0.0,
     has_loops: bool = True,
-) -> Expected:
+) -> ExpectedTrack:
     """Return what is expected of a way that begins elsewhere than the problem, its beats left aside.
 
     ``before_en``: where the leg begins that ends at its start; or its start is on its first leg, ``sailed_m`` along.
@@ -73,7 +73,7 @@ def of_way(
     """
     tracking = problem.tracking
     if tracking is None or len(way) < 2:
-        return Expected()
+        return ExpectedTrack()
     from_here = replace(problem, start_en=way[0], start_heading_rad=heading_rad,
                         tracking=replace(tracking, before_en=before_en))
     return expected(from_here, np.asarray(way), has_boards=False, has_loops=has_loops, sailed_m=sailed_m)

@@ -8,7 +8,7 @@ from typing import Any
 
 from companion.messages import MissionItem, Mode
 from companion.orders import Result
-from companion.planner.settings import AUTO, Choice
+from companion.planner.settings import AUTO, PlannerChoice
 
 
 class ReplanReason(enum.Enum):
@@ -60,7 +60,7 @@ class RequestPlan:
     budget_s: float
     seed: int
     from_seq: int | None
-    planner: Choice = AUTO
+    planner: PlannerChoice = AUTO
     rung: str = ""
     text: str = ""
 

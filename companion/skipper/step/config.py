@@ -10,7 +10,7 @@ import enum
 from dataclasses import dataclass
 
 from companion.orders import ALL
-from companion.planner.settings import AUTO, Choice
+from companion.planner.settings import AUTO, PlannerChoice
 from companion.skipper.step.causes import BY_NAME, Answer
 from companion.traffic import Policy
 
@@ -102,7 +102,7 @@ class SkipperConfig:
     margin_m: float = 15.0             # >= 15 m at 3 m/s: a breach coasts 6 to 10 m (ardurover notes, fence)
     margin_floor_m: float = 8.0        # never planned closer than this, whatever the ladder
     margin_ladder: tuple[float, ...] = (0.75, 0.5)          # share of margin - floor that is left
-    planner: Choice = AUTO             # by which algorithm; what it does not find is planned by ``auto``
+    planner: PlannerChoice = AUTO             # by which algorithm; what it does not find is planned by ``auto``
     plan_budget_s: float = 1.0
     first_plan_budget_s: float = 2.0
     plan_timeout_s: float = 20.0       # no answer from the planner: the request is counted as failed

@@ -39,8 +39,7 @@ from companion.telemetry.folder.records import (
 
 __all__ = [
     "DECISIONS", "DEFAULT_BUDGET_BYTES", "PICTURE", "STATE", "TLOG", "TRACK", "VERDICT", "VOYAGE", "Logbook",
-    "RecordedChart",
-    "RecordedPlan", "Recorder", "VoyageArchive", "VoyageFigures", "VoyageRecord", "action_record", "ais_of",
-    "ais_record", "believed", "fence_record", "is_from_the_start", "jsonable", "order_record", "outcome_record",
-    "parts", "read_decisions", "read_description", "read_rows", "read_voyage", "require_files",
+    "RecordedChart", "RecordedPlan", "Recorder", "VoyageArchive", "VoyageFigures", "VoyageRecord", "action_record",
+    "ais_of", "ais_record", "believed", "fence_record", "is_from_the_start", "jsonable", "order_record",
+    "outcome_record", "parts", "read_decisions", "read_description", "read_rows", "read_voyage", "require_files",
 ]

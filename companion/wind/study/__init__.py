@@ -14,17 +14,6 @@ from companion.wind.study.score import (
 )
 
 __all__ = [
-    "SCORED_LEVELS",
-    "Ar1Fit",
-    "Characterisation",
-    "FilterScore",
-    "HorizonScore",
-    "Record",
-    "Score",
-    "average",
-    "characterise",
-    "fit_ar1",
-    "parse_csv",
-    "runs",
-    "score",
+    "SCORED_LEVELS", "Ar1Fit", "Characterisation", "FilterScore", "HorizonScore", "Record", "Score", "average",
+    "characterise", "fit_ar1", "parse_csv", "runs", "score",
 ]

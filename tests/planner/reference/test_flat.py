@@ -13,7 +13,7 @@ from companion.planner import PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.parts import Target
 from companion.planner.reference.astar import FlatPlane, flat_en_from_lonlat
-from companion.planner.settings import AUTO, AstarSettings, Choice, RrtstarSettings
+from companion.planner.settings import AUTO, AstarSettings, PlannerChoice, RrtstarSettings
 from tests.planner.problems import box, simple
 
 # How far places [m] and courses [deg] of his plane are off the frame, up to 70 degrees of latitude (docs/frames.md).
@@ -99,8 +99,8 @@ def test_without_an_origin_there_is_no_plan_and_it_says_so():
 
 def test_only_a_choice_of_his_plane_is_told_of_the_origin():
     origin = GeoPoint(lat_deg=50.0, lon_deg=1.0)
-    flat = Choice(algorithm="astar", settings=AstarSettings(projection="flat"))
+    flat = PlannerChoice(algorithm="astar", settings=AstarSettings(projection="flat"))
     assert flat.about(origin).settings.origin == origin
-    for other in (AUTO, Choice(algorithm="astar", settings=AstarSettings()),
-                  Choice(algorithm="rrtstar", settings=RrtstarSettings())):
+    for other in (AUTO, PlannerChoice(algorithm="astar", settings=AstarSettings()),
+                  PlannerChoice(algorithm="rrtstar", settings=RrtstarSettings())):
         assert other.about(origin) is other

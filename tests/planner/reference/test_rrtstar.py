@@ -13,7 +13,7 @@ from companion.planner.problem.evaluate import evaluate
 from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.reference.kernels import first_hit, turn_time, wrap
 from companion.planner.reference.kernels import steer as steer_kernel
-from companion.planner.reference.rrtstar import Tree, search
+from companion.planner.reference.rrtstar import RrtTree, search
 from companion.planner.reference.world import bounds_of, world_of
 from companion.planner.settings import RrtstarSettings
 
@@ -100,7 +100,7 @@ def test_the_deepest_angle_bounds_the_steering_too():
 ])
 def test_every_state_s_time_is_the_scorer_s_time_of_its_path(change):
     p = problem(**change)
-    tree = Tree(p, world_of(p), seed=3)
+    tree = RrtTree(p, world_of(p), seed=3)
     tree.grow(1500)
     n = tree.size
     assert n > 300
@@ -140,7 +140,7 @@ def _children(tree, i):
 
 def test_more_samples_never_cost_more_and_no_state_gets_slower():
     p = problem()
-    tree = Tree(p, world_of(p), seed=1)
+    tree = RrtTree(p, world_of(p), seed=1)
     tree.grow(800)
     before, n = tree.node[: tree.size, kernels.C].copy(), tree.size
     tree.grow(3000)
@@ -165,7 +165,7 @@ def test_one_seed_is_one_plan_and_chunks_do_not_matter():
     c = plan(p, algorithm="rrtstar", expansions=3000, seed=6)
     assert np.array_equal(a.waypoints_en, b.waypoints_en)
     assert not np.array_equal(a.waypoints_en, c.waypoints_en)
-    one, many = Tree(p, world_of(p), 5), Tree(p, world_of(p), 5)
+    one, many = RrtTree(p, world_of(p), 5), RrtTree(p, world_of(p), 5)
     one.grow(3000)
     for _ in range(30):
         many.grow(100)
@@ -176,10 +176,10 @@ def test_the_tree_grows_past_its_first_arrays(monkeypatch):
     import companion.planner.reference.rrtstar as module
 
     p = problem()
-    whole = Tree(p, world_of(p), 2)
+    whole = RrtTree(p, world_of(p), 2)
     whole.grow(2000)
     monkeypatch.setattr(module, "FIRST_CAPACITY", 300)
-    pieces = Tree(p, world_of(p), 2)
+    pieces = RrtTree(p, world_of(p), 2)
     for _ in range(20):
         pieces.grow(100)
     assert np.array_equal(whole.node[: whole.size], pieces.node[: pieces.size])
@@ -250,7 +250,7 @@ def test_the_weight_of_the_worst_state_buys_angle_to_the_wind():
 def test_a_state_s_cost_is_its_time_and_its_two_risks():
     p = problem(risk={"max_path_risk": 0.5})
     settings = RrtstarSettings(risk_weight_s=7.0, state_risk_weight_s=11.0)
-    tree = Tree(p, world_of(p), 2, settings)
+    tree = RrtTree(p, world_of(p), 2, settings)
     tree.grow(1500)
     node = tree.node[:tree.size]
     time_s, risk, most = (node[:, k] for k in (kernels.T, kernels.R, kernels.M))
@@ -262,7 +262,7 @@ def test_a_state_s_cost_is_its_time_and_its_two_risks():
 
 def test_without_rewiring_no_state_is_given_another_parent_and_the_path_is_no_better():
     p = problem()
-    plain, star = (Tree(p, world_of(p), 1, RrtstarSettings(is_rewired=rewired)) for rewired in (False, True))
+    plain, star = (RrtTree(p, world_of(p), 1, RrtstarSettings(is_rewired=rewired)) for rewired in (False, True))
     plain.grow(3000)
     star.grow(3000)
     assert plain.count[kernels.REWIRED] == 0
@@ -271,11 +271,11 @@ def test_without_rewiring_no_state_is_given_another_parent_and_the_path_is_no_be
 
 def test_no_branch_is_longer_than_the_range_and_the_goal_bias_draws_the_goal():
     p = problem()
-    tree = Tree(p, world_of(p), 1, RrtstarSettings(range_m=25.0, is_rewired=False))
+    tree = RrtTree(p, world_of(p), 1, RrtstarSettings(range_m=25.0, is_rewired=False))
     tree.grow(1500)
-    eager = Tree(p, world_of(p), 1, RrtstarSettings(goal_bias=0.9))
+    eager = RrtTree(p, world_of(p), 1, RrtstarSettings(goal_bias=0.9))
     eager.grow(300)
-    lazy = Tree(p, world_of(p), 1, RrtstarSettings(goal_bias=0.0))
+    lazy = RrtTree(p, world_of(p), 1, RrtstarSettings(goal_bias=0.0))
     lazy.grow(300)
     # A state is grown from the nearest; it may then hang on one of its neighbours, which is farther off.
     for n in range(1, tree.size):
@@ -289,7 +289,7 @@ def test_no_branch_is_longer_than_the_range_and_the_goal_bias_draws_the_goal():
 
 def test_no_state_of_the_tree_is_above_the_limit():
     p = problem(risk={"max_path_risk": 0.1})
-    tree = Tree(p, world_of(p), seed=0)
+    tree = RrtTree(p, world_of(p), seed=0)
     tree.grow(2000)
     assert tree.size > 200
     assert tree.node[: tree.size, kernels.R].max() <= 0.1

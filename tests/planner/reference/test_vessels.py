@@ -16,7 +16,7 @@ from companion.planner.problem.json_write import to_dict
 from companion.planner.problem.parts import Current, RiskLimit, Sigma, Target
 from companion.planner.problem.value import resolved, uncertain
 from companion.planner.reference import rrtstar_kernels as kernels
-from companion.planner.reference.rrtstar import Tree, search
+from companion.planner.reference.rrtstar import RrtTree, search
 from companion.planner.reference.vessels import carried, is_kept, keep_share
 from companion.planner.reference.world import world_of
 from companion.planner.risk.chance_constraint import path_risk, vessel_risk
@@ -104,7 +104,7 @@ def test_every_state_carries_what_the_judge_counts_of_its_path(current):
     p = of("two", risk=RiskLimit(max_path_risk=0.1), current=current)
     p = replace(p, wind=replace(p.wind, sigma=Sigma()))
     free, vessels = carried(p)
-    tree = Tree(free, world_of(free), 1, RrtstarSettings(), vessels)
+    tree = RrtTree(free, world_of(free), 1, RrtstarSettings(), vessels)
     tree.grow(800)
     assert tree.count[kernels.REWIRED] > 0
     some = 0

@@ -11,7 +11,7 @@ from shapely.geometry import box
 from companion.boat import Boat, ardurover_sitl
 from companion.planner import Problem, plan
 from companion.planner.problem.value import defect_of
-from companion.planner.settings import AUTO, AstarSettings, Choice
+from companion.planner.settings import AUTO, AstarSettings, PlannerChoice
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired, wind_part
 from companion.skipper.step.config import SkipperConfig
@@ -155,7 +155,7 @@ def test_the_ladder_never_goes_below_the_floor_and_never_repeats_itself():
 
 
 def test_a_planner_of_somebodys_choice_is_the_first_thing_to_be_given_up():
-    chosen = Choice(algorithm="astar", settings=AstarSettings(grid_m=5.0))
+    chosen = PlannerChoice(algorithm="astar", settings=AstarSettings(grid_m=5.0))
     steps, plain = rungs(SkipperConfig(planner=chosen)), rungs(SkipperConfig())
     assert [s.planner for s in steps] == [chosen, *[AUTO] * (len(steps) - 1)]
     assert steps[1].name == "planner auto"
