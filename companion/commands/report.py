@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.commands.output import force_option, patience, write_out
+from companion.errors import InputError, JobError
 from companion.program.arguments import out_file, picture
+from companion.program.commands import missing
 from companion.words import counted
 
 TRACKS = (".gpx", ".kml", ".kmz", ".geojson")   # the formats that hold a track
@@ -22,9 +25,11 @@ def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "report", help=summary, description="Tell a recorded voyage in words, draw it, and write its track.",
-        epilog="Example: companion report voyages/20260714T101500Z-archipelago --track day.gpx",
+        epilog="Examples: companion report voyages/*; companion report voyages/20260714T101500Z-archipelago --track "
+        "day.gpx",
     )
-    parser.add_argument("voyage", type=Path, metavar="VOYAGE_DIR", help="the folder that `companion run` left")
+    parser.add_argument("voyage", type=Path, nargs="+", metavar="VOYAGE_DIR",
+                        help="a folder that `companion run` left; of several, files among them are passed over")
     parser.add_argument("--out", type=picture, metavar="FILE", help="the picture (default: voyage.png in the folder)")
     parser.add_argument("--track", type=out_file, action="append", default=[], metavar="FILE",
                         help=f"write the track as {', '.join(TRACKS)}; may be given more than once")
@@ -34,25 +39,54 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
+    """Run the command: tell each voyage that can be read, and return the worst exit code."""
+    voyages = args.voyage
+    if len(voyages) > 1:
+        voyages = [path for path in voyages if not path.is_file()]   # the state for a restart lies among them
+        for option, given in (("--out", args.out), ("--track", args.track), ("--json", args.json)):
+            if given:
+                raise InputError(option, "", f"is of one voyage, and {len(args.voyage)} are named", "name one")
+        if not voyages:
+            raise InputError(str(args.voyage[0]), "", "is no voyage", "name a folder that `companion run` left")
+    code = 0
+    for number, folder in enumerate(voyages):
+        try:
+            print(end="\n" if number else "")
+            _tell(folder, args)
+        except (InputError, JobError) as error:
+            if len(voyages) == 1:
+                raise
+            sys.stdout.flush()
+            sys.stderr.write(f"companion report: {error}\n")
+            code = max(code, error.exit_code)
+    return code
+
+
+def _tell(folder: Path, args: argparse.Namespace) -> None:
+    """Tell and draw one voyage. Raises InputError or JobError: it cannot be read, or not be drawn."""
     from companion.geofence.formats import format_of, write
-    from companion.plots.voyage import plot_voyage
     from companion.telemetry.folder import PICTURE, read_voyage
 
     for path in args.track:
         format_of(path, TRACKS)
-    record = read_voyage(args.voyage)
+    record = read_voyage(folder)
     for path in args.track:
         write_out(write(track_of(record), path), str(path), lossy=False, force=args.force,
                   remedy=f"write {', '.join(TRACKS)}")
     if args.json:
         print(json.dumps(record.figures, indent=1))
-        return 0
-    out = args.out or args.voyage / PICTURE
+        return
+    # what is told needs no library that a boat does not have
+    print("\n".join([*in_words(record), *(f"Track: {path}" for path in args.track)]), flush=True)
+    try:
+        from companion.plots.voyage import plot_voyage
+    except ModuleNotFoundError as error:
+        raise missing(error) or error from None
+
+    out = args.out or folder / PICTURE
     with patience("drawing"):
         plot_voyage(record, out)
-    print("\n".join([*in_words(record), *(f"Track: {path}" for path in args.track), f"Picture: {out}"]))
-    return 0
+    print(f"Picture: {out}")
 
 
 def track_of(record: VoyageRecord) -> Document:

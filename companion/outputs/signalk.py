@@ -24,6 +24,7 @@ from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.outputs.nmea import UNTRUSTED, course_of, is_fresh, place_of
 from companion.outputs.outlet import Outlet, Say
+from companion.program.commands import install
 from companion.view.values import AlarmView, PointEn, View
 
 # As $source: into a source with a label a server puts a label of its own.
@@ -287,7 +288,7 @@ def require_websockets() -> None:
         import websockets  # noqa: F401 - looked for, not used
     except ImportError:
         raise InputError("--signalk", "", "ws:// needs a library that is not installed",
-                         "pip install 'sailboat-companion[signalk]', or name the server's TCP port") from None
+                         f"{install('signalk')}, or name the server's TCP port") from None
 
 
 async def _drain(reader: asyncio.StreamReader) -> None:

@@ -83,7 +83,6 @@ def safe_streams() -> Iterator[None]:
         sys.stdout, sys.stderr = before
 
 
-NAME = "sailboat-companion"
 # By the library that is missed when it is loaded.
 EXTRAS = {
     "matplotlib": "plots",
@@ -95,7 +94,7 @@ EXTRAS = {
     "distributed": "cluster",
     "bokeh": "cluster",
     "pyarrow": "results",
-    "filterpy": "papers",
+    "filterpy": "shore",
 }
 
 
@@ -105,7 +104,16 @@ def missing(error: ModuleNotFoundError) -> JobError | None:
     extra = EXTRAS.get(library)
     if extra is None:
         return None
-    return JobError(f"{library} is not installed, which this needs; pip install '{NAME}[{extra}]'")
+    return JobError(f"{library} is not installed, which this needs; {install(extra)}")
+
+
+def install(extra: str) -> str:
+    """Return what brings an extra: there is no package of this project on an index, so it is the clone's.
+
+    >>> install("plots")
+    "in the clone of this project: pip install '.[plots]'"
+    """
+    return f"in the clone of this project: pip install '.[{extra}]'"
 
 
 INTERRUPTED = 130

@@ -272,7 +272,7 @@ def test_without_its_library_a_websocket_is_left_out_in_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "websockets", None)
     whom = chosen((), ["ws://h", "tcp:h:8375"], None, guard)
     assert [name.text for name in whom.signalk] == ["tcp:h:8375"]
-    assert "pip install 'sailboat-companion[signalk]', or name the server's TCP port" in guard.gone["other displays"]
+    assert "pip install '.[signalk]', or name the server's TCP port" in guard.gone["other displays"]
     assert "\n" not in guard.gone["other displays"]
     assert chosen((), ["tcp:h:8375"]).signalk
 

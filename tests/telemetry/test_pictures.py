@@ -140,6 +140,23 @@ def test_the_report_tells_the_voyage_and_writes_its_track(sailed, tmp_path, caps
     assert cli.main(["report", str(sailed), "--track", str(tmp_path / "t.wkt")]) == 2
 
 
+def test_all_voyages_are_reported_and_what_lies_among_them_is_passed_over(sailed, tmp_path, capsys):
+    """`companion report voyages/*`, as the guide has it, failed on the state file that lies among the voyages."""
+    (tmp_path / "2-a").symlink_to(sailed)
+    (tmp_path / "1-torn").mkdir()
+    (tmp_path / "a.state.json").write_text("{}")
+    assert cli.main(["report", *map(str, sorted(tmp_path.iterdir()))]) == 2
+    out, err = capsys.readouterr()
+    assert f"Picture: {tmp_path}/2-a/voyage.png" in out
+    assert err.startswith(f"companion report: {tmp_path}/1-torn: track.csv: is missing")
+    (tmp_path / "1-torn").rmdir()
+    assert cli.main(["report", *map(str, sorted(tmp_path.iterdir()))]) == 0
+    assert cli.main(["report", str(tmp_path / "a.state.json")]) == 2
+    capsys.readouterr()
+    assert cli.main(["report", *map(str, sorted(tmp_path.iterdir())), "--json"]) == 2
+    assert "--json: is of one voyage, and 2 are named" in capsys.readouterr().err
+
+
 def test_what_takes_long_says_why(monkeypatch, capsys):
     monkeypatch.setattr(output, "PATIENCE_S", 0.02)
     with output.patience("drawing"):
