@@ -47,6 +47,7 @@ the computer that is slow."""
 REFERENCE_PER_S = 400_000.0
 """Expansions of ``auto`` in a second of the reference core: one of an AMD EPYC server's, on which the figures of the
 docs were measured. ``speed`` is held against it."""
+STARTS = 3            # of a child that dies while it gets ready, at the beginning of a voyage
 SPEED_EXPANSIONS = 5_000
 SPEED_TRIES = 3
 LEAST_RUN_S = 0.05    # a shorter plan does not tell how much of the processor there was
@@ -165,15 +166,26 @@ class PlannerWorker:
     async def ready(self, say: Callable[[str], None] = lambda _: None) -> None:
         """Wait until the child's kernels are loaded (compiled, the first time on a machine), however long that takes.
 
-        ``say`` is told once a second what it does.
+        ``say`` is told once a second what it does. A child that dies meanwhile is replaced, ``STARTS`` times in all.
 
         Raises:
-            TimeoutError: it has fallen silent; EOFError or OSError: it died.
+            TimeoutError: it has fallen silent; EOFError or OSError: it died each time.
         """
         async with self._lock:
-            if not self.is_alive:
-                await self._replace()
-            await self._warm(say)
+            for left in reversed(range(STARTS)):
+                if not self.is_alive:
+                    await self._replace()
+                try:
+                    await self._warm(say)
+                except TimeoutError:
+                    raise   # which is an OSError, too
+                except (EOFError, OSError) as error:
+                    if left == 0:
+                        raise
+                    _LOG.warning("the planner's worker died while it got ready (%r); it is replaced", error)
+                    await self._replace()
+                else:
+                    return
 
     async def plan(
         self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,

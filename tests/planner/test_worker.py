@@ -140,6 +140,25 @@ def test_a_child_that_compiles_is_alive_however_long_it_takes(monkeypatch):
     run(main())
 
 
+@pytest.mark.parametrize(("deaths", "is_ready"), [(2, True), (99, False)])
+def test_a_child_that_is_killed_while_it_gets_ready_is_started_again(tmp_path, deaths, is_ready):
+    """A kill in the first seconds was the end of the voyage: "the planner's process did not start", exit 1."""
+    dies = ("import pathlib, sys; lives = pathlib.Path(sys.argv[1]); n = len(list(lives.iterdir())); "
+            "(lives / str(n)).touch(); n < int(sys.argv[2]) and sys.exit(9); "
+            "from companion.planner.worker import serve; serve()")
+
+    async def main():
+        async with PlannerWorker(command=[sys.executable, "-c", dies, str(tmp_path), str(deaths)]) as planner:
+            if is_ready:
+                await planner.ready()
+                assert planner.restarts == deaths
+                return
+            with pytest.raises(EOFError):
+                await planner.ready()
+
+    run(main())
+
+
 def test_a_child_that_falls_silent_while_it_compiles_is_replaced(monkeypatch):
     monkeypatch.setattr(worker, "_SILENCE_S", 1.0)
 
