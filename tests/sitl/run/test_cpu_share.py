@@ -7,10 +7,14 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from bench.shares import plans_of
 from sitl.run.cpu_share import CpuShare, cpu_share, family_of
+from sitl.run.live import run_live
+from sitl.scene import load_scenario
 
 # A child of a child that turns for a second, and says which part of a core it had.
 BUSY = """
@@ -58,3 +62,13 @@ def test_the_family_of_a_process_are_those_that_live():
         assert process.pid in family_of(os.getpid())
         process.kill()
     assert family_of(process.pid) == []
+
+
+def test_with_a_tenth_of_a_core_she_arrives_clean(tmp_path):
+    """Three times as fast as time, with three tenths. How fast she is is not asked: what else this machine does is."""
+    path = Path("sitl/scenarios/walls-ends.toml")
+    verdict = run_live(load_scenario(path), path, 0, tmp_path, autopilot="embedded", program=None, speedup=3.0, cpu=0.3)
+    assert verdict.figures["arrived"]
+    assert verdict.figures["contacts"] == 0
+    assert verdict.figures["min_clearance_m"] >= 6.0   # the floor of its margin
+    assert plans_of(tmp_path / "decisions.jsonl").first_s is not None
