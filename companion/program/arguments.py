@@ -6,6 +6,7 @@ everything a command is given is believed before it begins to work.
 
 from __future__ import annotations
 
+import datetime as dt
 import ipaddress
 import math
 import os
@@ -69,6 +70,21 @@ def duration(text: str) -> float:
     if not 60.0 <= seconds <= 7 * units["d"]:
         raise ArgumentTypeError(f"{text[:40]} is out of range; from 1m to 7d")
     return seconds
+
+
+def moment(text: str) -> dt.datetime:
+    """Return a time with its zone, in UTC.
+
+    >>> moment("2026-11-24T08:00Z")
+    datetime.datetime(2026, 11, 24, 8, 0, tzinfo=datetime.timezone.utc)
+    """
+    try:
+        when = dt.datetime.fromisoformat(text)
+    except ValueError:
+        raise ArgumentTypeError(f"{text[:40]!r} is no time; write 2026-11-24T08:00Z") from None
+    if when.tzinfo is None:
+        raise ArgumentTypeError(f"{text} has no zone; write {text}Z for UTC")
+    return when.astimezone(dt.UTC)
 
 
 def system_id(text: str) -> int:

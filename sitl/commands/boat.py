@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import datetime as dt
 import math
 import sys
 from pathlib import Path
 
 from companion.errors import InputError
-from companion.program.arguments import number, place, whole
+from companion.program.arguments import moment, number, place, whole
 
 _EXAMPLE = """examples:
   sitl boat                                  TCP on 5760 (as SITL's SERIAL0), UDP on 14555; real time
@@ -40,7 +41,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
                         help="of the bow at power-up")
     parser.add_argument("--seed", type=whole(), default=0, help="of the wind and of faults (default 0)")
     parser.add_argument("--warm", action="store_true", help="powered up long ago: no EKF wait of 42 s")
-    parser.add_argument("--moored", action="store_true", help="lies still until it is armed")
+    parser.add_argument("--moored", action=argparse.BooleanOptionalAction, default=True,
+                        help="lies still until it is armed (default); --no-moored: drifts")
+    parser.add_argument("--at", type=moment, metavar="TIME",
+                        help="the time that its GPS tells, as 2026-11-24T08:00Z (default: now)")
     parser.add_argument("--sysid", type=whole(at_least=1, at_most=255), default=1, help="MAVLink system id (default 1)")
     parser.add_argument("--param", metavar="NAME=VALUE", action="append", default=[], help="set a parameter")
     parser.add_argument("--polar", type=Path, metavar="FILE", help="a boat that sails by this polar")
@@ -76,10 +80,11 @@ def run(args: argparse.Namespace) -> int:
         if not sign or not name:
             raise InputError("--param", text, "is not a parameter", "write NAME=VALUE")
     check_parameters(parameters)
+    begins = args.at or dt.datetime.now(dt.UTC).replace(microsecond=0)
     config = AutopilotConfig(
         home=args.home, heading_rad=math.radians(args.heading), is_warm=args.warm,
         is_moored=args.moored, sysid=args.sysid, parameters=parameters,
-        polar=None if args.polar is None else read_polar(args.polar).polar,
+        polar=None if args.polar is None else read_polar(args.polar).polar, epoch_s=begins.timestamp(),
     )
     autopilot = Autopilot(config, parse_wind(args.wind, seed=args.seed), args.seed)
     endpoints = [f"tcpin:{args.host}:{args.port}"] if args.port else []
@@ -96,7 +101,8 @@ def run(args: argparse.Namespace) -> int:
     async def sail() -> None:
         try:
             async with serve(autopilot, endpoints) as server:
-                sys.stdout.write(f"sitl boat: {', '.join(endpoints)}, {args.speedup:g}x; Ctrl-C ends\n")
+                sys.stdout.write(f"sitl boat: {', '.join(endpoints)}, {args.speedup:g}x, it is "
+                                 f"{begins:%Y-%m-%d %H:%M} UTC there; Ctrl-C ends\n")
                 sys.stdout.flush()
                 await server.wait(args.for_s)
         except LinkError as error:

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from companion.program.arguments import chart_option, http_address, number, out_folder, whole
+from companion.program.arguments import chart_option, http_address, moment, number, out_folder, whole
 from companion.program.commands import missing
 from companion.words import counted, file_name
 
@@ -58,21 +58,26 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--http-token", type=Path, metavar="FILE", help="orders from the page, as of companion run")
     chart_option(parser)
     parser.add_argument("--seed", type=whole(), default=0)
+    parser.add_argument("--at", type=moment, metavar="TIME", help="when it begins, as 2026-11-24T08:00Z: what is dark, "
+                        "and the tide (default: a scenario's own time, of a mission file now)")
     parser.add_argument("--out", type=out_folder, metavar="DIR", help="the voyage folder")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    import msgspec
+
     from companion.clock import run_virtual
     from companion.errors import InputError
     from companion.telemetry.console import ProgressLine
     from companion.telemetry.folder import DECISIONS
     from sitl.run.compiled import compile_ahead
     from sitl.run.embedded import mission_of, run_embedded
-    from sitl.scene import load_scenario, own_polar, scenario_wind
+    from sitl.scene import beginning, load_scenario, own_polar, scenario_wind
 
     scenario = load_scenario(args.scenario)
+    scenario = msgspec.structs.replace(scenario, begins=beginning(scenario, args.scenario, args.at))
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{file_name(scenario.name)}"
     if (folder / DECISIONS).exists():
         raise InputError("--out", str(folder), "holds a voyage already, which this one would resume",
@@ -83,6 +88,8 @@ def run(args: argparse.Namespace) -> int:
     if own_polar(mission) is not None and args.autopilot == "ardurover":
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
     page = page_words(args)
+    print(f"{scenario.name} begins {scenario.begins:%Y-%m-%d %H:%M} UTC"
+          f"{'' if args.at else '; --at names another time'}", flush=True)
     compile_ahead(mission.skipper.planner)
     if is_live(args):
         from sitl.run.live import run_live

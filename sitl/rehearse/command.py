@@ -7,12 +7,11 @@ one is found by its entry point (pyproject.toml).
 from __future__ import annotations
 
 import argparse
-import datetime as dt
 from argparse import ArgumentTypeError
 from pathlib import Path
 from typing import Any
 
-from companion.program.arguments import duration, number, out_file, out_folder, whole
+from companion.program.arguments import duration, moment, number, out_file, out_folder, whole
 from companion.words import file_name
 from sitl.means import add_options, means_of
 
@@ -47,8 +46,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
                          "of a climate as CSV (default: the mission's preview wind)")
     weather.add_argument("--wind-error", type=_error, metavar="DEG,MPS", help="how far the mean wind that is given may "
                          "be off, standard deviations (default: 10,0.5; of a climate 0,0)")
-    weather.add_argument("--depart", type=_time, metavar="TIME", help="when she sets sail, as 2026-11-24T08:00Z: for a "
-                         "tide table and the dark")
+    weather.add_argument("--depart", type=moment, metavar="TIME", help="when she sets sail, as 2026-11-24T08:00Z: for "
+                         "a tide table and the dark (default: when the table begins, else now; of a scenario its own)")
     weather.add_argument("--doubt", type=number(at_least=0.0, at_most=3.0), default=1.0, metavar="X",
                          help="how far boat, sea and sensors may differ from the plan's: 0 not at all, 1 as a small "
                          "boat meets them (default: 1)")
@@ -92,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
         made.mission, tells_the_hour=made.tells_the_hour)
     planned_s = sum(plan.cost_s for plan in made.plans)
     print(f"{made.mission.name}: {made.doubts.wind.told}; doubt {args.doubt:g}{', with trouble' if args.faults else ''}"
+          f"; sets sail {made.scenario.begins:%Y-%m-%d %H:%M} UTC"
           f"{f'; planned {planned_s:.0f} s' if planned_s else ''}, called off after {made.scenario.limit_s:.0f} s; "
           f"results in {folder}", flush=True)
     return rehearse(made, folder, Limits(width=args.sure / 100.0, runs=args.runs, minutes=args.minutes), changes,
@@ -106,13 +106,3 @@ def _error(text: str) -> tuple[float, float]:
     if not (0.0 <= from_deg <= 180.0 and 0.0 <= tws_mps <= 20.0):
         raise ArgumentTypeError(f"{text[:40]} is out of range: 0..180 degrees, 0..20 m/s")
     return from_deg, tws_mps
-
-
-def _time(text: str) -> dt.datetime:
-    try:
-        when = dt.datetime.fromisoformat(text)
-    except ValueError:
-        raise ArgumentTypeError(f"{text[:40]!r} is no time; write 2026-11-24T08:00Z") from None
-    if when.tzinfo is None:
-        raise ArgumentTypeError(f"{text} has no zone; write {text}Z for UTC")
-    return when.astimezone(dt.UTC)

@@ -18,7 +18,7 @@ from companion.planner import Plan, Problem, plan
 from sitl.rehearse.draw import Doubts
 from sitl.rehearse.wind import given_wind
 from sitl.run.embedded import EXPANSIONS, mission_of
-from sitl.scene import Scenario, WindSpec, load_scenario, scenario_text
+from sitl.scene import Scenario, WindSpec, beginning, load_scenario, scenario_text
 
 SCENARIO = "rehearsal.toml"
 SLOWER = 3.0        # a voyage may take this much longer than planned ...
@@ -68,8 +68,9 @@ def prepared(
     voyage_s = mission.skipper.laps * sum(p.cost_s for p in plans) + mission.skipper.station_s
     needs_more = any(goal.field or goal.search or goal.box for goal in mission.goals)
     scenario = msgspec.structs.replace(
-        base, mission=os.path.relpath(mission.path, folder), wind=given.beside(folder).spec, begins=depart or _hour(
-            base, mission), limit_s=limit_s or round(max(SLOWER * voyage_s, AT_LEAST_S) + needs_more * BESIDE_S))
+        base, mission=os.path.relpath(mission.path, folder), wind=given.beside(folder).spec,
+        begins=depart or _hour(base, mission, path, folder / SCENARIO),
+        limit_s=limit_s or round(max(SLOWER * voyage_s, AT_LEAST_S) + needs_more * BESIDE_S))
     folder.mkdir(parents=True, exist_ok=True)
     source = folder / SCENARIO
     Disk().replace(source, scenario_text(scenario).encode())
@@ -86,10 +87,18 @@ def _mean(base: Scenario, mission: Mission) -> WindSpec:
     return WindSpec(from_deg=mission.wind.preview_from_deg, tws_mps=mission.wind.preview_speed_mps)
 
 
-def _hour(base: Scenario, mission: Mission) -> dt.datetime:
-    """Return when she sails where nobody says: when a tide table begins, else the hour of all scenarios."""
+def _hour(base: Scenario, mission: Mission, path: Path, written: Path) -> dt.datetime:
+    """Return when the boat sails where nobody says: when a tide table begins, a scenario does, or now.
+
+    A rehearsal that goes on keeps the hour at which it was begun: what was sailed is of that.
+    """
     rows = water_of(mission).rows
-    return dt.datetime.fromtimestamp(rows[0].utc_s, dt.UTC) if rows else base.begins
+    if rows:
+        return dt.datetime.fromtimestamp(rows[0].utc_s, dt.UTC)
+    try:
+        return beginning(base, path) if not written.is_file() else load_scenario(written).begins
+    except InputError:
+        return beginning(base, path)
 
 
 def _planned(mission: Mission, wind: AssumedWind) -> list[Plan]:

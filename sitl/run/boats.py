@@ -118,12 +118,15 @@ class SimulatedBoat:
 
     @classmethod
     @contextlib.asynccontextmanager
-    async def start(cls, source: Path, wind: Wind, seed: int, pace: float) -> AsyncIterator[SimulatedBoat]:
+    async def start(
+        cls, source: Path, wind: Wind, seed: int, pace: float, epoch_s: float,
+    ) -> AsyncIterator[SimulatedBoat]:
         """Run it while the block runs."""
         port, judge_port = free_port(), free_port()
         process = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "sitl.run.live_boat", str(source), "--seed", str(seed), "--speedup", f"{pace:g}",
-            "--endpoint", f"udpout:127.0.0.1:{port}", "--endpoint", f"udpin:127.0.0.1:{judge_port}",
+            "--epoch", f"{epoch_s:.0f}", "--endpoint", f"udpout:127.0.0.1:{port}",
+            "--endpoint", f"udpin:127.0.0.1:{judge_port}",
         )
         judge_url = f"udpout:127.0.0.1:{judge_port}"
         try:

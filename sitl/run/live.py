@@ -156,7 +156,7 @@ async def _run(
         if kind == "ardurover":
             boat = await stack.enter_async_context(RealBoat.start(scenario, mission, wind, program, pace, folder))
         else:
-            boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace))
+            boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace, scenario.epoch_s))
         relay, link = None, boat.link
         if any(e.kind in ON_THE_LINK for e in scenario.events):
             relay = await stack.enter_async_context(Relay(boat.link, seed=seed))

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from companion.clock import run
 from companion.geofence import load_mission
-from sitl.autopilot import Autopilot, AutopilotConfig, serve
+from sitl.autopilot import EPOCH_S, Autopilot, AutopilotConfig, serve
 from sitl.scene import load_scenario, own_polar, recentre_m, scenario_departures, scenario_waters, scenario_wind
 
 
@@ -25,6 +25,7 @@ def main() -> int:
     parser.add_argument("scenario", type=Path)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--speedup", type=float, default=1.0)
+    parser.add_argument("--epoch", type=float, default=EPOCH_S, metavar="UNIX_S")
     parser.add_argument("--endpoint", action="append", required=True, metavar="LINK")
     args = parser.parse_args()
     scenario = load_scenario(args.scenario)
@@ -33,7 +34,7 @@ def main() -> int:
     home, wind = mission.start or mission.origin, scenario_wind(scenario, args.scenario, args.seed)
     autopilot = Autopilot(
         AutopilotConfig(home=home, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
-                        parameters=scenario.parameters, polar=own_polar(mission),
+                        parameters=scenario.parameters, polar=own_polar(mission), epoch_s=args.epoch,
                          is_motorboat=mission.autopilot.frame == "motor", departures=scenario_departures(scenario),
                          waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(home)),
                          recentre_m=recentre_m(mission)),

@@ -13,6 +13,7 @@ from sitl.scene.scenario import (
     SatelliteSpec,
     Scenario,
     WindSpec,
+    beginning,
     is_all_ordinary,
     load_scenario,
 )
@@ -26,7 +27,8 @@ from sitl.scene.written import scenario_text
 __all__ = [
     "CALL_HOLDS_S", "CLOSE_HAULED_DEG", "TASK_S", "TRAFFIC", "Craft", "CurrentSpec", "EventSpec", "ExpectSpec",
     "HullSpec", "HullTrack", "LeeSpec", "Manner", "Motion", "Mover", "Others", "Outlet", "SatelliteSpec", "Scenario",
-    "SensorsSpec", "StationScore", "Tasks", "Truth", "Verdict", "WavesSpec", "WindSpec", "count_tacks", "duty",
+    "SensorsSpec", "StationScore", "Tasks", "Truth", "Verdict", "WavesSpec", "WindSpec", "beginning",
+    "count_tacks", "duty",
     "free_port", "is_all_ordinary", "judge", "load_scenario", "met_by", "own_polar", "recentre_m",
     "scenario_departures", "scenario_text", "scenario_waters", "scenario_wind", "station_score", "tasks_of",
 ]

@@ -293,6 +293,18 @@ def load_scenario(path: Path) -> Scenario:
     return scenario
 
 
+def beginning(scenario: Scenario, source: Path, at: dt.datetime | None = None) -> dt.datetime:
+    """Return when a simulation begins: ``at``, else as a scenario says, and of a plain mission file now, to the minute.
+
+    What is dark there is then dark here, too; only who names the time repeats a voyage of a mission bit for bit.
+    """
+    if at is not None:
+        return at
+    if scenario.mission_path(source) == source.resolve():
+        return dt.datetime.now(dt.UTC).replace(second=0, microsecond=0)
+    return scenario.begins
+
+
 def _place(error: msgspec.ValidationError) -> str:
     _, _, place = str(error).partition(" - at `$")
     return place.rstrip("`").lstrip(".")

@@ -1,5 +1,6 @@
 """Scenario files: bad ones are one line that names file, place and remedy; all of ours load."""
 
+import datetime as dt
 import socket
 from itertools import chain, count
 from pathlib import Path
@@ -7,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from companion.errors import InputError
-from sitl.scene.scenario import load_scenario
+from sitl.autopilot import EPOCH_S
+from sitl.scene.scenario import beginning, load_scenario
 from sitl.scene.ships import PORTS, free_port
 from sitl.scene.weather import scenario_wind
 
@@ -66,3 +68,14 @@ def test_a_free_port_is_nobodys_of_udp_and_of_tcp_and_none_that_the_system_gives
             assert free_port() != taken
         assert next(drawn) != taken - PORTS.start     # that one was drawn
     assert PORTS.stop <= 32_768
+
+
+def test_a_mission_begins_now_a_scenario_when_it_says_and_either_when_it_is_told(tmp_path):
+    """It was 9 June 2026 everywhere: dark at noon in Canberra."""
+    mission = Path("missions/lake.toml")
+    now = dt.datetime.now(dt.UTC)
+    assert abs((beginning(load_scenario(mission), mission) - now).total_seconds()) < 61.0
+    named = Path("sitl/scenarios/demo.toml")
+    assert beginning(load_scenario(named), named).timestamp() == EPOCH_S
+    at = dt.datetime(2026, 12, 24, 3, 0, tzinfo=dt.UTC)
+    assert beginning(load_scenario(mission), mission, at) == beginning(load_scenario(named), named, at) == at
