@@ -1,7 +1,7 @@
 """The skipper: ``step(state, snapshot) -> (state, actions)``, a pure fold over a voyage's snapshots.
 
 The order of a step: see whose autopilot it is, take in what happened, find the boat on its route, look at the
-watchdogs, then act by who has the boat: nobody yet (start), somebody else (operator), we (sail).
+watchdogs, take orders, then let the first behavior act that has something to do (``companion.skipper.priorities``).
 """
 
 from __future__ import annotations
@@ -9,26 +9,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.frozen import changed
 from companion.geo.shift import Shift
-from companion.messages import GeoPoint, Mode
+from companion.messages import GeoPoint
 from companion.orders import Wanted
-from companion.skipper.board.custody import judge, stand_by
-from companion.skipper.board.on_board import mission_is_known
+from companion.skipper.board.custody import judge
 from companion.skipper.composed import follow_field
 from companion.skipper.deeds.adrift import follow_ground
-from companion.skipper.deeds.brake import brakes
 from companion.skipper.deeds.doubt import follow
-from companion.skipper.deeds.failsafe import follow_answer, follow_stops, keeps_off, take_over
-from companion.skipper.deeds.helm import is_busy
-from companion.skipper.deeds.launch import finished, launch, start
-from companion.skipper.deeds.ordered import holds_ashore, leaves_alone, take_orders
+from companion.skipper.deeds.failsafe import begin_again, follow_answer, follow_stops
+from companion.skipper.deeds.ordered import take_orders
 from companion.skipper.deeds.preview import preview
-from companion.skipper.deeds.sailing import sail
 from companion.skipper.intake import (
     count_time,
     locate,
-    notice_truncation,
     remember_fix,
     take_events,
     take_outcomes,
@@ -36,21 +29,16 @@ from companion.skipper.intake import (
 from companion.skipper.planning.errands import speak_of_fence
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.track import TRACKS_M
-from companion.skipper.step.actions import Action, CancelPlan, RequestPlan, Severity
-from companion.skipper.step.causes import PERSON
+from companion.skipper.priorities import act
+from companion.skipper.step.actions import Action, RequestPlan
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import Snapshot
 from companion.skipper.step.state import (
-    PATIENT,
-    Adrift,
-    ByField,
     LoadedMission,
     Orders,
-    Phase,
     Planning,
     PositionState,
-    Signs,
     SkipperState,
     VehicleIdentity,
     VoyageState,
@@ -68,8 +56,6 @@ from companion.skipper.watch.watch import watch
 from companion.skipper.watch.water import watch_water
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.voyage import Voyage
-
-REBOOT_RACE_S = 15.0     # a mode change this long before a reboot shows was the reboot, not the operator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,23 +98,8 @@ class Skipper:
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
         turn = Turn(self.voyage, self.config, state, snapshot)
-        judge(turn)
-        take_events(turn)
-        follow(turn)
-        take_outcomes(turn)
-        follow_stops(turn)
-        follow_answer(turn)
-        follow_ground(turn)
-        follow_field(turn)
-        locate(turn)
-        look_out(turn)
-        count_time(turn)
-        follow_charge(turn)
-        watch_water(turn)
-        watch_tacks(turn)
-        fresh = watch(turn)
-        take_orders(turn)
-        _decide(turn, fresh)
+        observe(turn)
+        act(turn)
         speak_of_stop(turn)
         speak_of_fence(turn)
         remember_fix(turn)
@@ -176,95 +147,23 @@ class Skipper:
         return replace(self, voyage=voyage), in_water(state, Shift(self.voyage.frame, voyage.frame))
 
 
-def _decide(turn: Turn, fresh: tuple[str, ...]) -> None:
-    state = turn.state
-    if state.vehicle.rebooted:
-        _rebooted(turn)
-    if turn.autopilot is None:
-        age = turn.snapshot.heartbeat_age_s
-        heard = "nothing yet" if age is None else f"silent for {age:.0f} s; what it has on board sails on"
-        phase = Phase.WAITING if not state.voyage.sailing else turn.state.phase
-        turn.phase(phase, f"waiting to hear the autopilot: {heard}")
-        return
-    if stand_by(turn) or leaves_alone(turn) or keeps_off(turn) or _operator_has_it(turn):
-        return
-    notice_truncation(turn)
-    if not mission_is_known(turn):
-        if turn.state.operator.is_back and not turn.state.mission.foreign:
-            brakes(turn)   # a mode changes no mission, and a step may be all that is left of the water
-        return
-    if holds_ashore(turn):
-        return
-    if turn.gate is None and not turn.state.voyage.sailing:
-        finished(turn)
-    elif turn.state.mission.route is None:
-        start(turn)
-    elif not turn.state.voyage.sailing:
-        launch(turn)
-    else:
-        sail(turn, fresh)
-
-
-def _rebooted(turn: Turn) -> None:
-    """Begin again after the autopilot's reboot: the mission is compared, mode and arming are gone."""
-    since = turn.state.operator.since_s
-    keeps = turn.state.phase is Phase.OPERATOR and since is not None and turn.t_s - since > REBOOT_RACE_S
-    turn.set(
-        mission=changed(turn.state.mission, checked=False, read_since_s=turn.t_s),
-        steering=changed(turn.state.steering, own_mode=None, until_s=None),
-        pending=changed(turn.state.pending, command=None),
-        by_field=ByField(),
-        operator=changed(turn.state.operator, answering="", stop=None, signs=Signs()),
-        adrift=Adrift())
-    if not keeps:
-        turn.set(voyage=changed(turn.state.voyage, sailing=False), operator=changed(turn.state.operator, since_s=None))
-        turn.phase(Phase.WAITING, "the autopilot rebooted: waiting for its mission to be read")
-
-
-def _operator_has_it(turn: Turn) -> bool:
-    """Notice that somebody else has the boat, and that it is given back. Nothing is asked of it meanwhile."""
-    status, state = turn.autopilot, turn.state
-    if status is None or not state.voyage.sailing or state.mission.foreign:
-        return False  # a stranger's mission is not an operator's mode: ``mission_is_known`` stands by it
-    gone = turn.is_taken
-    if state.phase is not Phase.OPERATOR:
-        if not gone:
-            held = state.steering.until_s is not None or state.by_field.resort.engaged or turn.steers or (
-                state.steering.own_mode is Mode.LOITER and is_busy(turn, Mode.LOITER.name))
-            if status.mode is Mode.AUTO and state.steering.own_mode is not None and not held:
-                turn.set(steering=changed(turn.state.steering, own_mode=None))
-            return False
-        if state.pending.plan is not None:
-            turn.act(CancelPlan(request_id=state.pending.plan.request_id))
-        turn.set(
-            operator=changed(turn.state.operator, since_s=turn.t_s),
-            pending=changed(turn.state.pending, plan=None, command=None),
-            steering=changed(turn.state.steering, own_mode=None, until_s=None),
-            by_field=ByField())
-        if take_over(turn):
-            return False
-        turn.phase(Phase.OPERATOR, f"{_taken(turn)}, not by us: the companion does nothing until AUTO comes back")
-        turn.say(Severity.NOTICE, "operator", turn.state.why, every_s=0.0)
-        return True
-    if gone or status.mode is not Mode.AUTO:
-        if gone and take_over(turn):   # its sign came later than the change of mode
-            return False
-        turn.phase(Phase.OPERATOR, f"{_taken(turn)}: waiting for AUTO")
-        return True
-    since = state.operator.since_s if state.operator.since_s is not None else turn.t_s
-    turn.set(
-        operator=changed(turn.state.operator, since_s=None, is_back=True, answering="", given_back_s=turn.t_s),
-        mission=changed(turn.state.mission, checked=False, read_since_s=turn.t_s),
-        plans=changed(turn.state.plans, retry=PATIENT),
-        progress=changed(turn.state.progress, history=()))
-    turn.phase(Phase.WAITING, "AUTO is back: waiting for the mission on board to be compared")
-    turn.say(Severity.NOTICE, "operator back", f"AUTO is back after {turn.t_s - since:.0f} s", every_s=0.0)
-    return False
-
-
-def _taken(turn: Turn) -> str:
-    """Return in words what she was put into, and by which failsafe if by one."""
-    status, stop = turn.autopilot, turn.state.operator.stop
-    mode = status.mode.name if status is not None and status.mode is not None else "unknown"
-    what = f"mode {mode}" if status is None or status.is_armed else f"mode {mode}, disarmed"
-    return what if stop is None or stop.cause == PERSON else f"{what} by the {stop.cause} failsafe"
+def observe(turn: Turn) -> None:
+    """Take in what happened since the last step, all that is watched, and what is ordered."""
+    judge(turn)
+    take_events(turn)
+    follow(turn)
+    take_outcomes(turn)
+    follow_stops(turn)
+    follow_answer(turn)
+    follow_ground(turn)
+    follow_field(turn)
+    locate(turn)
+    look_out(turn)
+    count_time(turn)
+    follow_charge(turn)
+    watch_water(turn)
+    watch_tacks(turn)
+    watch(turn)
+    take_orders(turn)
+    if turn.state.vehicle.rebooted:
+        begin_again(turn)

@@ -14,8 +14,8 @@ from dataclasses import replace
 from companion.boat import AutopilotLimits
 from companion.frozen import changed
 from companion.messages import AutopilotStatus, Command, Mode, StatusText
-from companion.skipper.deeds.helm import set_mode
-from companion.skipper.step.actions import Severity
+from companion.skipper.deeds.helm import is_busy, set_mode
+from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.causes import (
     CRITICAL,
     EMPTY,
@@ -29,7 +29,7 @@ from companion.skipper.step.causes import (
     standing,
     told_by,
 )
-from companion.skipper.step.state import PATIENT, Phase, Signs, Stop
+from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, Stop
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.voyage import PointEn
@@ -44,6 +44,7 @@ CLOSER_M = 1.0        # what leads away from something is let be
 KEPT_OFF, KEPT_OFF_S = "kept off", 1800.0
 _SAILED_TO = frozenset(
     {Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TIME, Command.NAV_LOITER_TURNS})
+REBOOT_RACE_S = 15.0  # a mode change this long before a reboot shows was the reboot, not the operator
 MOVED_US = 100        # a stick or switch that is moved moves by more than this; at rest it trembles by a few
 SAILED = frozenset({Mode.AUTO, Mode.GUIDED, *STOPPING}) - {Mode.HOLD}
 
@@ -259,3 +260,68 @@ def _has_asked_for_auto(turn: Turn) -> bool:
     accepted = state.pending.accepted is not None and state.pending.accepted[0] == Mode.AUTO.name and (
         turn.t_s - state.pending.accepted[1] <= ASKED_S)
     return pending or accepted
+
+
+def begin_again(turn: Turn) -> None:
+    """Begin again after the autopilot's reboot: the mission is compared, mode and arming are gone."""
+    since = turn.state.operator.since_s
+    keeps = turn.state.phase is Phase.OPERATOR and since is not None and turn.t_s - since > REBOOT_RACE_S
+    turn.set(
+        mission=changed(turn.state.mission, checked=False, read_since_s=turn.t_s),
+        steering=changed(turn.state.steering, own_mode=None, until_s=None),
+        pending=changed(turn.state.pending, command=None),
+        by_field=ByField(),
+        operator=changed(turn.state.operator, answering="", stop=None, signs=Signs()),
+        adrift=Adrift())
+    if not keeps:
+        turn.set(voyage=changed(turn.state.voyage, sailing=False), operator=changed(turn.state.operator, since_s=None))
+        turn.phase(Phase.WAITING, "the autopilot rebooted: waiting for its mission to be read")
+
+
+def operator_has_it(turn: Turn) -> bool:
+    """Notice that somebody else has the boat, and that it is given back. Nothing is asked of it meanwhile."""
+    status, state = turn.autopilot, turn.state
+    if status is None or not state.voyage.sailing or state.mission.foreign:
+        return False  # a stranger's mission is not an operator's mode: ``mission_is_known`` stands by it
+    gone = turn.is_taken
+    if state.phase is not Phase.OPERATOR:
+        if not gone:
+            held = state.steering.until_s is not None or state.by_field.resort.engaged or turn.steers or (
+                state.steering.own_mode is Mode.LOITER and is_busy(turn, Mode.LOITER.name))
+            if status.mode is Mode.AUTO and state.steering.own_mode is not None and not held:
+                turn.set(steering=changed(turn.state.steering, own_mode=None))
+            return False
+        if state.pending.plan is not None:
+            turn.act(CancelPlan(request_id=state.pending.plan.request_id))
+        turn.set(
+            operator=changed(turn.state.operator, since_s=turn.t_s),
+            pending=changed(turn.state.pending, plan=None, command=None),
+            steering=changed(turn.state.steering, own_mode=None, until_s=None),
+            by_field=ByField())
+        if take_over(turn):
+            return False
+        turn.phase(Phase.OPERATOR, f"{_taken(turn)}, not by us: the companion does nothing until AUTO comes back")
+        turn.say(Severity.NOTICE, "operator", turn.state.why, every_s=0.0)
+        return True
+    if gone or status.mode is not Mode.AUTO:
+        if gone and take_over(turn):   # its sign came later than the change of mode
+            return False
+        turn.phase(Phase.OPERATOR, f"{_taken(turn)}: waiting for AUTO")
+        return True
+    since = state.operator.since_s if state.operator.since_s is not None else turn.t_s
+    turn.set(
+        operator=changed(turn.state.operator, since_s=None, is_back=True, answering="", given_back_s=turn.t_s),
+        mission=changed(turn.state.mission, checked=False, read_since_s=turn.t_s),
+        plans=changed(turn.state.plans, retry=PATIENT),
+        progress=changed(turn.state.progress, history=()))
+    turn.phase(Phase.WAITING, "AUTO is back: waiting for the mission on board to be compared")
+    turn.say(Severity.NOTICE, "operator back", f"AUTO is back after {turn.t_s - since:.0f} s", every_s=0.0)
+    return False
+
+
+def _taken(turn: Turn) -> str:
+    """Return in words what she was put into, and by which failsafe if by one."""
+    status, stop = turn.autopilot, turn.state.operator.stop
+    mode = status.mode.name if status is not None and status.mode is not None else "unknown"
+    what = f"mode {mode}" if status is None or status.is_armed else f"mode {mode}, disarmed"
+    return what if stop is None or stop.cause == PERSON else f"{what} by the {stop.cause} failsafe"

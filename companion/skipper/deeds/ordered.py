@@ -16,10 +16,11 @@ from companion.orders import FAR, LOCAL, MAVLINK, Answer, Order, Result, Verb, l
 from companion.skipper.board.adoption import adopt
 from companion.skipper.deeds.ordered_places import goal_place, home_place, refuge_place
 from companion.skipper.deeds.rest import UNTIL_TOLD
-from companion.skipper.planning.errands import Kind, errand, is_at_rest, pressing
+from companion.skipper.planning.errands import errand, is_at_rest, pressing
 from companion.skipper.planning.next_tack import next_tack_s
 from companion.skipper.planning.not_found import hold
 from companion.skipper.step.actions import Acknowledge, CancelPlan, Severity, StopOrders
+from companion.skipper.step.route import Kind
 from companion.skipper.step.standing import Standing
 from companion.skipper.step.state import PATIENT, Answered, ByField, Phase
 from companion.skipper.step.turn import Turn

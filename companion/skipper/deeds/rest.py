@@ -12,10 +12,11 @@ from companion.skipper.deeds.by_field import keeps_station
 from companion.skipper.deeds.failsafe import waits_for
 from companion.skipper.deeds.helm import hand_back, repair
 from companion.skipper.planning.ends import HOW_LONG, OUT_OF_TIME, end_of
-from companion.skipper.planning.errands import Errand, Kind, home_trouble, is_at_rest, pressing
+from companion.skipper.planning.errands import home_trouble, is_at_rest, pressing
 from companion.skipper.step.actions import CancelPlan, Severity
 from companion.skipper.step.causes import SHORE, STOPPING
 from companion.skipper.step.config import End, SafeEnd
+from companion.skipper.step.route import Errand, Kind
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 

@@ -8,10 +8,8 @@ from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.deeds.adrift import stops_drift
-from companion.skipper.deeds.brake import brakes
 from companion.skipper.deeds.by_field import heading as by_field_heading
-from companion.skipper.deeds.by_field import last_resort
-from companion.skipper.deeds.doubt import holds, stands_off
+from companion.skipper.deeds.doubt import stands_off
 from companion.skipper.deeds.failsafe import waits_for
 from companion.skipper.deeds.headings import desired_heading_rad
 from companion.skipper.deeds.helm import check_current, hand_back, is_busy, leave_passed, make_current, repair, set_mode
@@ -20,7 +18,7 @@ from companion.skipper.deeds.shift_tack import shift_tack
 from companion.skipper.deeds.short_tack import short_tack
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S
-from companion.skipper.planning.errands import Errand, errand, is_at_rest, is_composed
+from companion.skipper.planning.errands import errand, is_at_rest, is_composed
 from companion.skipper.planning.manners import stands_on
 from companion.skipper.planning.not_found import hold
 from companion.skipper.planning.triggers import find_trigger, is_buoy
@@ -29,6 +27,7 @@ from companion.skipper.planning.waits import stay_left_s
 from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
 from companion.skipper.step.causes import HOMEWARD, STOPPING
 from companion.skipper.step.config import Guidance
+from companion.skipper.step.route import Errand
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import distance_m
@@ -45,36 +44,60 @@ ROUTINE = frozenset({
     ReplanReason.WAYPOINT, ReplanReason.FORECAST, ReplanReason.WIND_SHIFT, ReplanReason.PLAN_AGE, ReplanReason.OFF_LEG})
 
 
-def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
-    """Act for one step under way."""
-    bound = errand(turn)
-    if bound is None and (turn.gate is None or turn.state.voyage.over):
-        if not (stands_off(turn) or (turn.state.voyage.over and stops_drift(turn))):
-            rest(turn)
-        return
-    if stands_off(turn):
-        if turn.state.position.doubt is None and turn.state.pending.upload is None:
-            _consider(turn, fresh)   # from where she is known to be, while her loiter is begun anew
-        return
-    if stops_drift(turn) or holds(turn) or brakes(turn):
-        return
+def is_at_end(turn: Turn) -> bool:
+    """Return whether nothing is left to sail to: the voyage is over or its goals are passed, and no errand is on."""
+    return errand(turn) is None and (turn.gate is None or bool(turn.state.voyage.over))
+
+
+def stand_off(turn: Turn) -> bool:
+    """Keep off what a doubted position may hide."""
+    if not stands_off(turn):
+        return False
+    if not is_at_end(turn) and turn.state.position.doubt is None and turn.state.pending.upload is None:
+        _consider(turn)   # from where she is known to be, while her loiter is begun anew
+    return True
+
+
+def stop_drift(turn: Turn) -> bool:
+    """Stop a boat that drifts and does not sail."""
+    return (bool(turn.state.voyage.over) or not is_at_end(turn)) and stops_drift(turn)
+
+
+def rest_at_end(turn: Turn) -> bool:
+    """Loiter at the voyage's end."""
+    if not is_at_end(turn):
+        return False
+    rest(turn)
+    return True
+
+
+def sail_on(turn: Turn) -> bool:
+    """Sail on out of a stop that the boat shows and that was asked for."""
     stopped = turn.state.steering.own_mode in STOPPING
-    if stopped and turn.autopilot is not None and turn.autopilot.mode is turn.state.steering.own_mode:
-        _sail_on(turn, fresh)
-        return
-    if last_resort(turn):
-        return
-    if bound is not None and comes_to_rest(turn, bound):
-        return
-    if _steer(turn, fresh):
-        return
+    if not stopped or turn.autopilot is None or turn.autopilot.mode is not turn.state.steering.own_mode:
+        return False
+    _sail_on(turn)
+    return True
+
+
+def lie_at_diversion(turn: Turn) -> bool:
+    """Lie at the end of a diversion."""
+    bound = errand(turn)
+    return bound is not None and comes_to_rest(turn, bound)
+
+
+def give_back_helm(turn: Turn) -> bool:
+    """Give the helm back to AUTO after steering."""
     own = turn.state.steering.own_mode
-    if own is not None and turn.autopilot is not None and turn.autopilot.mode is own and not turn.steers:
-        hand_back(turn)
-        turn.phase(turn.state.phase, "waiting for AUTO after steering")
-        return
-    if repair(turn):
-        return
+    if own is None or turn.autopilot is None or turn.autopilot.mode is not own or turn.steers:
+        return False
+    hand_back(turn)
+    turn.phase(turn.state.phase, "waiting for AUTO after steering")
+    return True
+
+
+def follow_route(turn: Turn) -> bool:
+    """Sail the mission on board, and plan anew when there is a reason to."""
     if turn.steers:
         _send_heading(turn)
     elif turn.guidance is not Guidance.PLAN:
@@ -88,15 +111,17 @@ def sail(turn: Turn, fresh: tuple[str, ...]) -> None:
         shift_tack(turn)
     if turn.is_raised("stuck waypoint") and turn.state.mission.own_index > turn.state.mission.index:
         make_current(turn, turn.state.mission.own_index + 1)
+    bound = errand(turn)
     if bound is not None and not bound.has_place:
         _stay(turn, bound)
-        return
+        return True
     if turn.state.pending.upload is None:
-        _consider(turn, fresh)
+        _consider(turn)
     _name(turn)
+    return True
 
 
-def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
+def _sail_on(turn: Turn) -> None:
     """Out of a stop that nobody asked for, or a LOITER of ours: plan from where the boat is now, then AUTO."""
     why = waits_for(turn)
     if why or repair(turn):
@@ -111,7 +136,7 @@ def _sail_on(turn: Turn, fresh: tuple[str, ...]) -> None:
     if bound is not None and stays and not (is_at_rest(turn) and (_is_outside(turn) or _is_way_clear(turn))):
         _stay(turn, bound, anew=True)
     elif turn.state.pending.upload is None:
-        _consider(turn, fresh)
+        _consider(turn)
     if turn.state.pending.plan is not None or turn.state.pending.upload is not None:
         turn.phase(Phase.HOLDING, "waiting for the plan from where the boat has drifted to, and for its upload")
     elif turn.state.operator.is_back and not stays and (turn.is_way_shut or _is_outside(turn)):
@@ -184,8 +209,8 @@ def _send_heading(turn: Turn) -> None:
         make_current(turn, turn.state.mission.index + 1)
 
 
-def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
-    trigger = find_trigger(turn, fresh)
+def _consider(turn: Turn) -> None:
+    trigger = find_trigger(turn, turn.fresh)
     if trigger is None:
         return
     state = turn.state
@@ -207,12 +232,12 @@ def _consider(turn: Turn, fresh: tuple[str, ...]) -> None:
             plans=changed(turn.state.plans, asked="", replanned_index=at))
 
 
-def _steer(turn: Turn, fresh: tuple[str, ...]) -> bool:
+def bear_away(turn: Turn) -> bool:
     """Bear away out of irons under GUIDED; True while the helm is ours."""
     state, status, vehicle, boat, wind = (
         turn.state, turn.autopilot, turn.snapshot.vehicle, turn.boat_en, turn.wind_now)
     if state.steering.until_s is None:
-        if "in irons" not in fresh or boat is None or vehicle is None or wind is None:
+        if "in irons" not in turn.fresh or boat is None or vehicle is None or wind is None:
             return False
         recent = tuple(t for t in state.steering.irons_s if turn.t_s - t < IRONS_MEMORY_S)
         turn.set(steering=changed(turn.state.steering, irons_s=(*recent, turn.t_s)))

@@ -1,6 +1,5 @@
 """Planning under way: why, from where, with which step of the ladder, and what is done with the answer."""
 
-from companion.skipper.planning.errands import HOME_RADIUS_M
 from companion.skipper.planning.next_tack import NextTack, next_tack, next_tack_s
 from companion.skipper.planning.vessels import (
     ALIKE_S,
@@ -11,6 +10,7 @@ from companion.skipper.planning.vessels import (
     SETTLED_M,
     soon,
 )
+from companion.skipper.step.route import HOME_RADIUS_M
 
 __all__ = [
     "ALIKE_S", "GIVE_UP_RISK", "HOME_RADIUS_M", "HORIZON_S", "OWN_TIMING_MPS", "PART_BY_RUNG", "SETTLED_M",

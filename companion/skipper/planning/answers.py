@@ -16,14 +16,14 @@ from companion.planner.problem import evaluate, resolved
 from companion.planner.risk import arrival, path_risk
 from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
-from companion.skipper.planning.errands import Kind, errand
+from companion.skipper.planning.errands import errand
 from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.track import of_way, said
 from companion.skipper.planning.uploads import upload
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step.actions import Change, ReplanReason, Severity
 from companion.skipper.step.missions import Tail, splice
-from companion.skipper.step.route import Route
+from companion.skipper.step.route import Kind, Route
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import PendingPlan, Phase, Retry
 from companion.skipper.step.turn import Turn

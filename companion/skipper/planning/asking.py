@@ -13,13 +13,14 @@ from companion.frozen import changed
 from companion.messages import Mode
 from companion.planner import Problem
 from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
-from companion.skipper.planning.errands import Errand, errand, gate_for, homeward
+from companion.skipper.planning.errands import errand, gate_for, homeward
 from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.planning.track import problem_tracking, steps
 from companion.skipper.planning.vessels import shares
 from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan, Severity
 from companion.skipper.step.missions import path_length_m
+from companion.skipper.step.route import Errand
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.state import PendingPlan
 from companion.skipper.step.turn import Turn

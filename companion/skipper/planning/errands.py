@@ -6,9 +6,8 @@ end serves. It is planned like any leg and ends in a loiter, so that nothing is 
 
 from __future__ import annotations
 
-import enum
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from companion.orders import Verb
 from companion.skipper.planning.ends import (
@@ -26,6 +25,7 @@ from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, 
 from companion.skipper.step.actions import Severity
 from companion.skipper.step.causes import SHORE, Answer
 from companion.skipper.step.config import End, SafeEnd
+from companion.skipper.step.route import HOME_RADIUS_M, Errand, Kind
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.barriers import disc_wkt
 from companion.skipper.way.circle import Circle, Drawn
@@ -36,49 +36,23 @@ from companion.skipper.way.voyage import PointEn, Refuge
 DRAGGED = "dragged off"   # a watchdog
 HOME, REST = "home", "the place to rest"
 GOAL_RADIUS_M = 10.0     # a place that is named under way: there within this
-HOME_RADIUS_M = 15.0     # home is where she was armed: a place in the water or at its edge, not a mark
 FENCE_SAID_S = 600.0     # between two words on a fence that is drawn
 
 
-class Kind(enum.Enum):
-    """What kind of errand."""
-
-    REFUGE = "refuge"
-    HOME = "home"
-    REST = "rest"            # back to where she loitered
-    GOAL = "goal"            # a place that somebody named
-    INSIDE = "inside"        # back into the autopilot's own fence
-    START = "start"          # before a start line, until the gun
-    BOX = "box"              # water to stay in
-    FIELD = "field"          # where she waits while a goal's field cannot be sailed
-    STAY = "stay"            # where there is room near by
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Errand:
-    """Where to, and why. ``name`` is what a route is bound for; a STAY has no place."""
-
-    kind: Kind
-    name: str
-    why: str
-    en_m: PointEn = (0.0, 0.0)
-    radius_m: float = HOME_RADIUS_M
-    is_ordered: bool = False     # it lasts until she is told to go on
-    until: str = ""              # what it lasts for, where that is known
-
-    @property
-    def has_place(self) -> bool:
-        """Whether there is a place to plan for."""
-        return self.kind is not Kind.STAY
-
-    @property
-    def sentence(self) -> str:
-        """Where to and why."""
-        return f"{'staying near by' if self.kind is Kind.STAY else f'to {self.name}'}: {self.why}"
-
-
 def errand(turn: Turn) -> Errand | None:
-    """Return where she is bound for instead of the next goal, None: nowhere."""
+    """Return where she is bound for instead of the next goal, None: nowhere.
+
+    It is found once, and anew only when a part of the state that it is made of has been replaced.
+    """
+    state = turn.state
+    parts = (state.mission, state.operator, state.alarms, state.orders, state.voyage, state.plans, state.progress,
+             state.by_field, state.steering, state.position)
+    if turn.found is None or any(new is not old for new, old in zip(parts, turn.found[0], strict=True)):
+        turn.found = parts, _find(turn)
+    return turn.found[1]
+
+
+def _find(turn: Turn) -> Errand | None:
     return pressing(turn) or _ordered(turn) or _at_the_end(turn) or _kept_in(turn) or _before_start(turn) or (
         _in_box(turn) or _off_field(turn))
 

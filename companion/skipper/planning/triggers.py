@@ -10,13 +10,13 @@ from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
-from companion.skipper.planning.errands import HOME, Errand, Kind, errand, homeward, is_composed
+from companion.skipper.planning.errands import HOME, errand, homeward, is_composed
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import Guidance, ReplanPolicy
 from companion.skipper.step.missions import NO_PLAN, path_length_m
-from companion.skipper.step.route import Route
+from companion.skipper.step.route import Errand, Kind, Route
 from companion.skipper.step.state import Phase
 from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate

@@ -1,11 +1,14 @@
-"""The route: the mission that is sailed, point by point, and what was promised when it was planned."""
+"""The route that is sailed, point by point, with what was promised of it; and the errand that takes a goal's place."""
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 
 from companion.messages import MissionItem
 from companion.skipper.way.voyage import PointEn
+
+HOME_RADIUS_M = 15.0     # home is where she was armed: a place in the water or at its edge, not a mark
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,3 +42,40 @@ class Route:
     late_s: float | None = None                 # ... and nine of ten; None: not told, or not in any time
     why: str = ""
     bound_for: str = ""                # the errand that its end serves; empty: the goals
+
+
+class Kind(enum.Enum):
+    """What kind of errand."""
+
+    REFUGE = "refuge"
+    HOME = "home"
+    REST = "rest"            # back to where she loitered
+    GOAL = "goal"            # a place that somebody named
+    INSIDE = "inside"        # back into the autopilot's own fence
+    START = "start"          # before a start line, until the gun
+    BOX = "box"              # water to stay in
+    FIELD = "field"          # where she waits while a goal's field cannot be sailed
+    STAY = "stay"            # where there is room near by
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Errand:
+    """Where to, and why. ``name`` is what a route is bound for; a STAY has no place."""
+
+    kind: Kind
+    name: str
+    why: str
+    en_m: PointEn = (0.0, 0.0)
+    radius_m: float = HOME_RADIUS_M
+    is_ordered: bool = False     # it lasts until she is told to go on
+    until: str = ""              # what it lasts for, where that is known
+
+    @property
+    def has_place(self) -> bool:
+        """Whether there is a place to plan for."""
+        return self.kind is not Kind.STAY
+
+    @property
+    def sentence(self) -> str:
+        """Where to and why."""
+        return f"{'staying near by' if self.kind is Kind.STAY else f'to {self.name}'}: {self.why}"

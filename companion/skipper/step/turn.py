@@ -29,7 +29,7 @@ from companion.skipper.step.actions import (
 from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.config import Guidance, Permissions, SkipperConfig
 from companion.skipper.step.missions import ends_safely
-from companion.skipper.step.route import Route
+from companion.skipper.step.route import Errand, Route
 from companion.skipper.step.snapshot import Snapshot, wind_mean, wind_now
 from companion.skipper.step.state import (
     Adrift,
@@ -115,6 +115,8 @@ class Turn:
         self.state = state
         self.snapshot = snapshot if config.sails else replace(snapshot, wind=still_air(snapshot.t_s))
         self.actions: list[Action] = []
+        self.found: tuple[tuple[object, ...], Errand | None] | None = None   # the errand, and what it was found from
+        self.fresh: tuple[str, ...] = ()   # watchdogs that were raised in this step
         self._gates: tuple[tuple[Approach, ...], tuple[Gate, ...]] | None = None
 
     # ------------------------------------------------------------------------------------- changing

@@ -10,8 +10,9 @@ from companion.geo.sun import sun_height_rad
 from companion.skipper.deeds.adrift import meets_in_s, sails
 from companion.skipper.deeds.by_field import meets_in
 from companion.skipper.planning.autopilot_beats import beaten_within_m
-from companion.skipper.planning.errands import Kind, errand, is_composed
+from companion.skipper.planning.errands import errand, is_composed
 from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.route import Kind
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.turn import JUMP_M, Turn
 from companion.skipper.step.wind_limits import too_light, too_strong

@@ -15,8 +15,8 @@ from companion.skipper.watch.measures import measure
 from companion.skipper.watch.watchdogs import BY_NAME, TABLE, Response, Watchdog
 
 
-def watch(turn: Turn) -> tuple[str, ...]:
-    """Raise and clear watchdogs; return the names raised in this very step."""
+def watch(turn: Turn) -> None:
+    """Raise and clear watchdogs; those raised in this very step are ``turn.fresh``."""
     raised = {r.name: r for r in turn.state.alarms.raised}
     entering = dict(turn.state.alarms.entering)
     fresh: list[str] = []
@@ -56,7 +56,7 @@ def watch(turn: Turn) -> tuple[str, ...]:
         value = measure(turn, name)
         figure = "" if value is None or not dog.unit else f" ({value:.1f} {dog.unit})"
         turn.say(dog.severity, name, f"{name}{figure}: {_done_about(turn, dog)}", every_s=0.0)
-    return tuple(fresh)
+    turn.fresh = tuple(fresh)
 
 
 def _patience_s(turn: Turn, dog: Watchdog) -> float:

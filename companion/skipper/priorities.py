@@ -1,0 +1,149 @@
+"""What the boat does when several things want doing: behaviors in one order, of which the first that acts has the step.
+
+``python -m companion.skipper.priorities`` prints the list as it stands in docs/skipper.md.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from companion.skipper.board.custody import stand_by
+from companion.skipper.board.on_board import mission_is_known
+from companion.skipper.deeds.brake import brakes
+from companion.skipper.deeds.by_field import last_resort
+from companion.skipper.deeds.doubt import holds
+from companion.skipper.deeds.failsafe import keeps_off, operator_has_it
+from companion.skipper.deeds.helm import repair
+from companion.skipper.deeds.launch import finished, launch, start
+from companion.skipper.deeds.ordered import holds_ashore, leaves_alone
+from companion.skipper.deeds.sailing import (
+    bear_away,
+    follow_route,
+    give_back_helm,
+    lie_at_diversion,
+    rest_at_end,
+    sail_on,
+    stand_off,
+    stop_drift,
+)
+from companion.skipper.intake import notice_truncation
+from companion.skipper.step.state import Phase
+from companion.skipper.step.turn import Turn
+
+MADE_BY = "<!-- made by python -m companion.skipper.priorities -->"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Behavior:
+    """One thing to do: ``act`` returns whether it has the step, and nothing behind it is asked then."""
+
+    name: str
+    when: str
+    does: str
+    act: Callable[[Turn], bool]
+
+
+def _await_autopilot(turn: Turn) -> bool:
+    """Wait until the autopilot is heard."""
+    if turn.autopilot is not None:
+        return False
+    age = turn.snapshot.heartbeat_age_s
+    heard = "nothing yet" if age is None else f"silent for {age:.0f} s; what it has on board sails on"
+    phase = Phase.WAITING if not turn.state.voyage.sailing else turn.state.phase
+    turn.phase(phase, f"waiting to hear the autopilot: {heard}")
+    return True
+
+
+def _await_mission(turn: Turn) -> bool:
+    """Change nothing on a mission that is not known to be ours; stop the boat where there is no time for that."""
+    notice_truncation(turn)
+    if mission_is_known(turn):
+        return False
+    if turn.state.operator.is_back and not turn.state.mission.foreign:
+        brakes(turn)   # a mode changes no mission, and a step may be all that is left of the water
+    return True
+
+
+def _await_next_start(turn: Turn) -> bool:
+    """Stay where all goals were reached before this start."""
+    if turn.gate is not None or turn.state.voyage.sailing:
+        return False
+    finished(turn)
+    return True
+
+
+def _get_first_plan(turn: Turn) -> bool:
+    """Get a first plan on board."""
+    if turn.state.mission.route is not None:
+        return False
+    start(turn)
+    return True
+
+
+def _set_sail(turn: Turn) -> bool:
+    """Set AUTO and arm."""
+    if turn.state.voyage.sailing:
+        return False
+    launch(turn)
+    return True
+
+
+BEHAVIORS: tuple[Behavior, ...] = (
+    Behavior(name="await autopilot", act=_await_autopilot, when="the autopilot is not heard",
+             does="waits; what is on board sails on"),
+    Behavior(name="stand by", act=stand_by, when="the autopilot is not known to be this boat's",
+             does="asks nothing of it"),
+    Behavior(name="given up", act=leaves_alone, when="the order `stop` stands", does="asks nothing of the boat"),
+    Behavior(name="keep off", act=keeps_off, when="a way that is not ours to plan leads over something near by",
+             does="asks for LOITER"),
+    Behavior(name="operator", act=operator_has_it, when="a person, or a failsafe that is not answered, has the boat",
+             does="does nothing until AUTO comes back; takes over from a failsafe that is"),
+    Behavior(name="await mission", act=_await_mission, when="the mission on board is not known to be ours",
+             does="reads it, and changes nothing before; stops a boat that is given back too near to something"),
+    Behavior(name="held ashore", act=holds_ashore, when="the order `hold` stands and she has not set sail",
+             does="waits to be told to go on"),
+    Behavior(name="await start", act=_await_next_start, when="all goals were reached before this start",
+             does="watches"),
+    Behavior(name="first plan", act=_get_first_plan, when="no mission of ours is on board",
+             does="plans and uploads one, once position, wind and permissions are there"),
+    Behavior(name="set sail", act=_set_sail, when="she is not under way", does="sets AUTO and arms, as permitted"),
+    Behavior(name="stand off", act=stand_off, when="the position is doubted and the place reckoned is not clear, or "
+             "a LOITER's point jumped with it", does="asks for LOITER, and keeps it until the position is believed"),
+    Behavior(name="stop a drift", act=stop_drift, when="she does not sail and drifts onto something, or in a calm",
+             does="motor, LOITER, the call to the anchor"),
+    Behavior(name="rest", act=rest_at_end, when="the voyage is over, or no goal is left and nothing else to sail to",
+             does="loiters, and is watched"),
+    Behavior(name="hold", act=holds, when="the wind cannot be planned with", does="asks for LOITER until it is known"),
+    Behavior(name="brake", act=brakes, when="the leg meets something within 8 s", does="asks for LOITER, then plans"),
+    Behavior(name="sail on", act=sail_on, when="she shows a stop that is ours to end",
+             does="plans from where she is, and gives AUTO back"),
+    Behavior(name="last resort", act=last_resort, when="a vessel is too near to plan for", does="steers by field"),
+    Behavior(name="lie at diversion", act=lie_at_diversion, when="she is at the end of a diversion",
+             does="loiters while its reason lasts"),
+    Behavior(name="bear away", act=bear_away, when="she is in irons", does="steers out of them in GUIDED"),
+    Behavior(name="give back helm", act=give_back_helm, when="GUIDED that we asked for is over",
+             does="gives AUTO back at the item that she has come to"),
+    Behavior(name="repair", act=repair, when="the mission on board is a mixture of two of ours",
+             does="uploads the whole one"),
+    Behavior(name="follow route", act=follow_route, when="otherwise",
+             does="sails the mission on board, and plans for the [first reason](#reasons-to-plan) that there is"),
+)
+
+
+def act(turn: Turn) -> None:
+    """Let the first behavior that has something to do do it."""
+    for behavior in BEHAVIORS:
+        if behavior.act(turn):
+            return
+
+
+def markdown() -> str:
+    """Return the list as it stands in docs/skipper.md."""
+    rows = [f"| {n} | {b.name} | {b.when} | {b.does} |" for n, b in enumerate(BEHAVIORS, start=1)]
+    return "\n".join([MADE_BY, "", "| | behavior | when | does |", "|--:|---|---|---|", *rows, ""])
+
+
+if __name__ == "__main__":
+    sys.stdout.write(markdown())

@@ -1,0 +1,141 @@
+"""Behaviors in their order: the page tells it, and where two neighbours would act, the first does."""
+
+import copy
+import math
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import shapely
+
+from companion.messages import Mode
+from companion.orders import Verb
+from companion.skipper.priorities import BEHAVIORS, act, markdown
+from companion.skipper.step.standing import Standing
+from companion.skipper.step.state import PositionDoubt, Raised, Stop
+from companion.skipper.step.turn import Turn
+from tests.skipper.test_voyage import ISLANDS
+from tests.skipper.test_walk import on_collision_course, states
+from tests.skipper.world import with_parts
+
+PAGE = Path(__file__).parents[2] / "docs" / "skipper.md"
+NAMES = [behavior.name for behavior in BEHAVIORS]
+PAIRS = list(pairwise(NAMES))
+
+STRANGE = {"vehicle": {"is_ours": False}}
+HELD = {"orders": {"standing": Standing(verb=Verb.HOLD, by="crew", name="here", since_s=0.0)}}
+NOTHING_LEFT = {"progress": {"gate": 99}}
+ASHORE = {"mission": {"checked": True, "route": None}, "voyage": {"sailing": False}}
+DOUBT = {"position": {"doubt": PositionDoubt(
+    since_s=0.0, t_s=0.0, settled_s=0.0, reckoned_en_m=(0.0, 0.0), why="it jumped")}}
+DRIFTS = {"alarms": {"raised": (Raised(name="drifting", since_s=0.0),)}}
+IN_LOITER, IN_GUIDED = {"steering": {"own_mode": Mode.LOITER}}, {"steering": {"own_mode": Mode.GUIDED}}
+IN_IRONS = {"steering": {"until_s": 1e9, "heading_rad": 0.0, "own_mode": Mode.GUIDED}}
+
+
+def showing(**status):
+    return lambda s, state: replace(s, autopilot=replace(s.autopilot, **status))
+
+
+def silent(s, state):
+    return replace(s, heartbeat_age_s=None)
+
+
+def unsure(s, state):
+    return replace(s, unsure="the wind's direction leapt")
+
+
+def mixed(state):
+    return {"mission": {"repair": True, "unsure_route": state.mission.route}}
+
+
+def before_island(s, state):
+    """Put the boat 8 m off an island that lies between her and her waypoint, under way to it, the wind not known."""
+    there = state.mission.route.points_en_m[state.mission.index]
+    island = min(ISLANDS, key=lambda p: p.distance(shapely.Point(there)))
+    east, north = island.centroid.x - there[0], island.centroid.y - there[1]
+    far_m = math.hypot(east, north)
+    off_m = next(m for m in range(500) if island.distance(
+        shapely.Point(there[0] + east * (1.0 + m / far_m), there[1] + north * (1.0 + m / far_m))) > 8.0 and m > 5)
+    here = (there[0] + east * (1.0 + off_m / far_m), there[1] + north * (1.0 + off_m / far_m))
+    return replace(unsure(s, state), position_en_m=here, vehicle=replace(s.vehicle, velocity_en_mps=(0.0, 3.0)))
+
+
+def homeward_over_island(s, state):
+    here = s.position_en_m
+    island = min(ISLANDS, key=lambda p: p.distance(shapely.Point(here)))
+    bearing = math.atan2(island.centroid.x - here[0], island.centroid.y - here[1])
+    way = showing(mode=Mode.RTL, waypoint_distance_m=2000.0, target_bearing_rad=bearing)(s, state)
+    return replace(way, permissions=replace(s.permissions, may_upload=False), vehicle=replace(
+        s.vehicle, velocity_en_mps=(9.0, 9.0)))
+
+
+# (first, second) -> the state of tests.skipper.test_walk, the parts that are changed in it, what is seen
+SITUATIONS = {
+    ("await autopilot", "stand by"): ("standard", STRANGE, silent),
+    ("stand by", "given up"): ("given up", STRANGE, None),
+    ("keep off", "operator"): ("operator", {"operator": {"stop": Stop(
+        t_s=0.0, before_s=0.0, mode=Mode.RTL, is_armed=True, cause="battery")}}, homeward_over_island),
+    ("operator", "await mission"): ("operator", {"mission": {"checked": False, "read_since_s": 1e9}}, None),
+    ("await mission", "held ashore"): ("waiting", HELD | {"mission": {"checked": False, "read_since_s": 1e9}}, None),
+    ("held ashore", "await start"): ("waiting", HELD | NOTHING_LEFT | ASHORE, None),
+    ("await start", "first plan"): ("waiting", NOTHING_LEFT | ASHORE, None),
+    ("first plan", "set sail"): ("waiting", ASHORE, None),
+    ("set sail", "stand off"): ("standard", DOUBT | IN_LOITER | {"voyage": {"sailing": False}},
+                                showing(mode=Mode.LOITER)),
+    ("stand off", "stop a drift"): ("standard", DOUBT | IN_LOITER | DRIFTS, showing(mode=Mode.LOITER)),
+    ("stop a drift", "rest"): ("done", IN_LOITER | DRIFTS, showing(mode=Mode.LOITER)),
+    ("rest", "hold"): ("done", {}, unsure),
+    ("hold", "brake"): ("standard", {"position": {"last_seen": None}}, before_island),
+    ("sail on", "last resort"): ("last resort", IN_LOITER, showing(mode=Mode.LOITER)),
+    ("last resort", "lie at diversion"): ("holding", {"alarms": {"raised": (
+        Raised(name="vessel too near", since_s=0.0),)}}, lambda s, state: replace(s, traffic=on_collision_course(s))),
+    ("lie at diversion", "bear away"): ("holding", IN_IRONS, showing(mode=Mode.GUIDED)),
+    ("bear away", "give back helm"): ("standard", IN_IRONS, showing(mode=Mode.GUIDED)),
+    ("give back helm", "repair"): ("standard", lambda state: IN_GUIDED | mixed(state), showing(mode=Mode.GUIDED)),
+    ("repair", "follow route"): ("standard", mixed, None),
+}
+# Neighbours that never both have something to do.
+NEVER_BOTH = {
+    ("given up", "keep off"): "nothing is asked of a boat that was given up",
+    ("brake", "sail on"): "one is for a boat that is sailed, the other for one that shows a stop",
+}
+
+
+def situation(pair):
+    name, parts, seen = SITUATIONS[pair]
+    skipper, state, snapshot = states()[name]
+    state = with_parts(state, **(parts(state) if callable(parts) else parts))
+    return Turn(skipper.voyage, skipper.config, state, snapshot if seen is None else seen(snapshot, state))
+
+
+def after(turn, do):
+    """Return whether something acts, and what comes of it; the turn stays as it is."""
+    trial = copy.copy(turn)
+    trial.actions = list(turn.actions)
+    return do(trial), (trial.state.phase, trial.state.why, [type(action) for action in trial.actions])
+
+
+def test_the_page_tells_the_order():
+    assert markdown() in PAGE.read_text(), "python -m companion.skipper.priorities"
+
+
+def test_of_every_two_neighbours_it_is_known_whether_their_order_matters():
+    assert sorted(PAIRS) == sorted([*SITUATIONS, *NEVER_BOTH])
+    assert len(set(NAMES)) == len(NAMES)
+
+
+@pytest.mark.parametrize("pair", SITUATIONS, ids=" before ".join)
+def test_of_two_neighbours_that_would_act_the_first_does(pair):
+    turn, by_name = situation(pair), {behavior.name: behavior for behavior in BEHAVIORS}
+    (does_first, first), (does_second, second) = (after(turn, by_name[name].act) for name in pair)
+    assert does_first
+    assert does_second
+    assert first != second
+    assert after(turn, act)[1] == first
+
+
+def test_the_last_always_acts():
+    turn = situation(("repair", "follow route"))
+    assert BEHAVIORS[-1].act(turn)
