@@ -23,10 +23,9 @@ import numpy as np
 
 from companion.boat.polar import ardurover_sitl
 from companion.geo.angles import difference_rad, mean_direction_rad
-from companion.skipper.deeds.shift_tack import LAST_S, TURNING
-from companion.skipper.deeds.short_tack import LEAST_MPS
+from companion.skipper.behaviors.tacks import LAST_S, LEAST_MPS, TURNING
 from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.shifting import shifts_of
+from companion.skipper.step.wind_shifts import shifts_of
 from companion.wind import Forecaster
 from sitl.autopilot.boat.kernel import LOOP_S, S_TACKING, S_TACKS, S_TWD_COS, S_TWD_SIN, S_TWS, S_V, S_YAW
 from sitl.autopilot.boat.parameters import Parameters

@@ -9,16 +9,14 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from companion.skipper.board.custody import stand_by
-from companion.skipper.board.on_board import mission_is_known
-from companion.skipper.deeds.brake import brakes
-from companion.skipper.deeds.by_field import last_resort
-from companion.skipper.deeds.doubt import holds
-from companion.skipper.deeds.failsafe import keeps_off, operator_has_it
-from companion.skipper.deeds.helm import repair
-from companion.skipper.deeds.launch import finished, launch, start
-from companion.skipper.deeds.ordered import holds_ashore, leaves_alone
-from companion.skipper.deeds.sailing import (
+from companion.skipper.behaviors.brake import brakes
+from companion.skipper.behaviors.failsafe import keeps_off, operator_has_it
+from companion.skipper.behaviors.field_guidance import last_resort
+from companion.skipper.behaviors.helm import repair
+from companion.skipper.behaviors.launch import finished, launch, start
+from companion.skipper.behaviors.operator_orders import holds_ashore, leaves_alone
+from companion.skipper.behaviors.position_doubt import holds
+from companion.skipper.behaviors.sailing import (
     bear_away,
     follow_route,
     give_back_helm,
@@ -28,9 +26,11 @@ from companion.skipper.deeds.sailing import (
     stand_off,
     stop_drift,
 )
+from companion.skipper.board.on_board import mission_is_known
+from companion.skipper.board.vehicle_identity import stand_by
 from companion.skipper.intake import notice_truncation
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Phase
-from companion.skipper.step.turn import Turn
 
 MADE_BY = "<!-- made by python -m companion.skipper.priorities -->"
 
@@ -42,51 +42,51 @@ class Behavior:
     name: str
     when: str
     does: str
-    act: Callable[[Turn], bool]
+    act: Callable[[StepContext], bool]
 
 
-def _await_autopilot(turn: Turn) -> bool:
+def _await_autopilot(ctx: StepContext) -> bool:
     """Wait until the autopilot is heard."""
-    if turn.autopilot is not None:
+    if ctx.autopilot is not None:
         return False
-    age = turn.snapshot.heartbeat_age_s
+    age = ctx.snapshot.heartbeat_age_s
     heard = "nothing yet" if age is None else f"silent for {age:.0f} s; what it has on board sails on"
-    phase = Phase.WAITING if not turn.state.voyage.sailing else turn.state.phase
-    turn.phase(phase, f"waiting to hear the autopilot: {heard}")
+    phase = Phase.WAITING if not ctx.state.voyage.sailing else ctx.state.phase
+    ctx.phase(phase, f"waiting to hear the autopilot: {heard}")
     return True
 
 
-def _await_mission(turn: Turn) -> bool:
+def _await_mission(ctx: StepContext) -> bool:
     """Change nothing on a mission that is not known to be ours; stop the boat where there is no time for that."""
-    notice_truncation(turn)
-    if mission_is_known(turn):
+    notice_truncation(ctx)
+    if mission_is_known(ctx):
         return False
-    if turn.state.operator.is_back and not turn.state.mission.foreign:
-        brakes(turn)   # a mode changes no mission, and a step may be all that is left of the water
+    if ctx.state.operator.is_back and not ctx.state.mission.foreign:
+        brakes(ctx)   # a mode changes no mission, and a step may be all that is left of the water
     return True
 
 
-def _await_next_start(turn: Turn) -> bool:
+def _await_next_start(ctx: StepContext) -> bool:
     """Stay where all goals were reached before this start."""
-    if turn.gate is not None or turn.state.voyage.sailing:
+    if ctx.gate is not None or ctx.state.voyage.sailing:
         return False
-    finished(turn)
+    finished(ctx)
     return True
 
 
-def _get_first_plan(turn: Turn) -> bool:
+def _get_first_plan(ctx: StepContext) -> bool:
     """Get a first plan on board."""
-    if turn.state.mission.route is not None:
+    if ctx.state.mission.route is not None:
         return False
-    start(turn)
+    start(ctx)
     return True
 
 
-def _set_sail(turn: Turn) -> bool:
+def _set_sail(ctx: StepContext) -> bool:
     """Set AUTO and arm."""
-    if turn.state.voyage.sailing:
+    if ctx.state.voyage.sailing:
         return False
-    launch(turn)
+    launch(ctx)
     return True
 
 
@@ -132,10 +132,10 @@ BEHAVIORS: tuple[Behavior, ...] = (
 )
 
 
-def act(turn: Turn) -> None:
+def act(ctx: StepContext) -> None:
     """Let the first behavior that has something to do do it."""
     for behavior in BEHAVIORS:
-        if behavior.act(turn):
+        if behavior.act(ctx):
             return
 
 

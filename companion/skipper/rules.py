@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 from companion.geo.shift import Shift
 from companion.messages import GeoPoint
 from companion.orders import Wanted
-from companion.skipper.board.custody import judge
-from companion.skipper.composed import follow_field
-from companion.skipper.deeds.adrift import follow_ground
-from companion.skipper.deeds.doubt import follow
-from companion.skipper.deeds.failsafe import begin_again, follow_answer, follow_stops
-from companion.skipper.deeds.ordered import take_orders
-from companion.skipper.deeds.preview import preview
+from companion.skipper.behaviors.drifting import follow_ground
+from companion.skipper.behaviors.failsafe import begin_again, follow_answer, follow_stops
+from companion.skipper.behaviors.field_guidance import follow_field
+from companion.skipper.behaviors.operator_orders import preview, take_orders
+from companion.skipper.behaviors.position_doubt import follow
+from companion.skipper.board.vehicle_identity import judge
 from companion.skipper.intake import (
     count_time,
     locate,
@@ -26,12 +25,13 @@ from companion.skipper.intake import (
     take_events,
     take_outcomes,
 )
-from companion.skipper.planning.errands import speak_of_fence
+from companion.skipper.planning.diversions import speak_of_fence
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.priorities import act
 from companion.skipper.step.actions import Action, RequestPlan
 from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import Snapshot
 from companion.skipper.step.state import (
@@ -40,20 +40,18 @@ from companion.skipper.step.state import (
     Planning,
     PositionState,
     SkipperState,
+    Tacking,
     VehicleIdentity,
     VoyageState,
+    in_water,
     saved_of,
     standing_saved,
 )
-from companion.skipper.step.tacking import Tacking
-from companion.skipper.step.turn import Turn
-from companion.skipper.step.water import in_water
-from companion.skipper.watch.charge import follow_charge
-from companion.skipper.watch.lookout import look_out
-from companion.skipper.watch.stopped import speak_of_stop
+from companion.skipper.watch.measures import follow_charge
+from companion.skipper.watch.notices import speak_of_stop, watch_water
 from companion.skipper.watch.tacks import watch_tacks
+from companion.skipper.watch.traffic_watch import look_out
 from companion.skipper.watch.watch import watch
-from companion.skipper.watch.water import watch_water
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.voyage import Voyage
 
@@ -97,17 +95,17 @@ class Skipper:
 
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
-        turn = Turn(self.voyage, self.config, state, snapshot)
-        observe(turn)
-        act(turn)
-        speak_of_stop(turn)
-        speak_of_fence(turn)
-        remember_fix(turn)
-        return turn.state, tuple(turn.actions)
+        ctx = StepContext(self.voyage, self.config, state, snapshot)
+        observe(ctx)
+        act(ctx)
+        speak_of_stop(ctx)
+        speak_of_fence(ctx)
+        remember_fix(ctx)
+        return ctx.state, tuple(ctx.actions)
 
     def preview(self, state: SkipperState, snapshot: Snapshot, wanted: Wanted) -> RequestPlan | str:
         """Return the plan that an order to sail somewhere would ask for, or why it would ask for none."""
-        return preview(Turn(self.voyage, self.config, state, snapshot), wanted)
+        return preview(StepContext(self.voyage, self.config, state, snapshot), wanted)
 
     def prepare(self) -> None:
         """Grow the obstacles by the margins once, before sailing; on a coast of thousands of points it takes long.
@@ -147,23 +145,23 @@ class Skipper:
         return replace(self, voyage=voyage), in_water(state, Shift(self.voyage.frame, voyage.frame))
 
 
-def observe(turn: Turn) -> None:
+def observe(ctx: StepContext) -> None:
     """Take in what happened since the last step, all that is watched, and what is ordered."""
-    judge(turn)
-    take_events(turn)
-    follow(turn)
-    take_outcomes(turn)
-    follow_stops(turn)
-    follow_answer(turn)
-    follow_ground(turn)
-    follow_field(turn)
-    locate(turn)
-    look_out(turn)
-    count_time(turn)
-    follow_charge(turn)
-    watch_water(turn)
-    watch_tacks(turn)
-    watch(turn)
-    take_orders(turn)
-    if turn.state.vehicle.rebooted:
-        begin_again(turn)
+    judge(ctx)
+    take_events(ctx)
+    follow(ctx)
+    take_outcomes(ctx)
+    follow_stops(ctx)
+    follow_answer(ctx)
+    follow_ground(ctx)
+    follow_field(ctx)
+    locate(ctx)
+    look_out(ctx)
+    count_time(ctx)
+    follow_charge(ctx)
+    watch_water(ctx)
+    watch_tacks(ctx)
+    watch(ctx)
+    take_orders(ctx)
+    if ctx.state.vehicle.rebooted:
+        begin_again(ctx)

@@ -52,7 +52,7 @@ from companion.boat import Hull
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.messages import Command, Mode
-from companion.skipper.deeds import CALL
+from companion.skipper.behaviors import CALL
 from companion.skipper.step import Announce, UploadMission
 from sitl.autopilot import Autopilot, MemoryLink
 from sitl.campaigns.counterfactual import Reach

@@ -32,7 +32,7 @@ from companion.guard import Auxiliary, Guard
 from companion.messages import CompanionStatus, Mode
 from companion.mission_check import require_sailable
 from companion.page import Address
-from companion.skipper.deeds import CALL
+from companion.skipper.behaviors import CALL
 from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT
 from companion.wind import Estimator, WindTracker

@@ -24,7 +24,7 @@ from companion.geofence import load_mission
 from companion.mavlink.reads import READS
 from companion.mavlink.signing import SigningStore
 from companion.messages import GeoPoint
-from companion.skipper.deeds import TOLD_S
+from companion.skipper.behaviors import TOLD_S
 from companion.skipper.step import Phase
 from companion.skipper.step import actions as act
 from sitl.autopilot import EPOCH_S, Autopilot, AutopilotConfig, MemoryLink, serve

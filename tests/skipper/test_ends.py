@@ -12,7 +12,7 @@ from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
-from tests.skipper.deeds.test_failsafe import text
+from tests.skipper.behaviors.test_failsafe import text
 from tests.skipper.test_voyage import is_done, make, said
 from tests.skipper.world import FRAME, restarted, with_parts
 

@@ -12,9 +12,9 @@ import shapely
 from companion.messages import Mode
 from companion.orders import Verb
 from companion.skipper.priorities import BEHAVIORS, act, markdown
-from companion.skipper.step.standing import Standing
+from companion.skipper.step.context import StepContext
+from companion.skipper.step.saved import Standing
 from companion.skipper.step.state import PositionDoubt, Raised, Stop
-from companion.skipper.step.turn import Turn
 from tests.skipper.test_voyage import ISLANDS
 from tests.skipper.test_walk import on_collision_course, states
 from tests.skipper.world import with_parts
@@ -107,13 +107,13 @@ def situation(pair):
     name, parts, seen = SITUATIONS[pair]
     skipper, state, snapshot = states()[name]
     state = with_parts(state, **(parts(state) if callable(parts) else parts))
-    return Turn(skipper.voyage, skipper.config, state, snapshot if seen is None else seen(snapshot, state))
+    return StepContext(skipper.voyage, skipper.config, state, snapshot if seen is None else seen(snapshot, state))
 
 
-def after(turn, do):
+def after(ctx, do):
     """Return whether something acts, and what comes of it; the turn stays as it is."""
-    trial = copy.copy(turn)
-    trial.actions = list(turn.actions)
+    trial = copy.copy(ctx)
+    trial.actions = list(ctx.actions)
     return do(trial), (trial.state.phase, trial.state.why, [type(action) for action in trial.actions])
 
 
@@ -128,14 +128,14 @@ def test_of_every_two_neighbours_it_is_known_whether_their_order_matters():
 
 @pytest.mark.parametrize("pair", SITUATIONS, ids=" before ".join)
 def test_of_two_neighbours_that_would_act_the_first_does(pair):
-    turn, by_name = situation(pair), {behavior.name: behavior for behavior in BEHAVIORS}
-    (does_first, first), (does_second, second) = (after(turn, by_name[name].act) for name in pair)
+    ctx, by_name = situation(pair), {behavior.name: behavior for behavior in BEHAVIORS}
+    (does_first, first), (does_second, second) = (after(ctx, by_name[name].act) for name in pair)
     assert does_first
     assert does_second
     assert first != second
-    assert after(turn, act)[1] == first
+    assert after(ctx, act)[1] == first
 
 
 def test_the_last_always_acts():
-    turn = situation(("repair", "follow route"))
-    assert BEHAVIORS[-1].act(turn)
+    ctx = situation(("repair", "follow route"))
+    assert BEHAVIORS[-1].act(ctx)

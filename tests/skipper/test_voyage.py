@@ -17,12 +17,11 @@ from companion.planner.worker import failed
 from companion.skipper.planning.triggers import board_end
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import effective, ends_safely, is_same_mission
 from companion.skipper.step.snapshot import AutopilotRebooted, UploadResult, WindHealth
 from companion.skipper.step.state import Phase
-from companion.skipper.step.turn import Turn
-from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from companion.skipper.way.manoeuvre import is_tack
+from companion.skipper.way.geometry import bearing_rad, distance_m, is_tack, moved
 from companion.skipper.way.voyage import Goal, Side
 from tests.skipper.world import World, restarted, skipper, voyage, with_parts
 
@@ -180,8 +179,8 @@ def test_a_board_of_short_legs_is_watched_as_one(step_m):
         route, items=(item,) * len(points), points_en_m=(*points[1:], route.points_en_m[-1]),
         leg_from_en_m=tuple(points), gate_of=(-1,) * len(points))
     state = with_parts(world.state, mission={"route": chain, "index": 0})
-    turn = Turn(world.skipper.voyage, world.skipper.config, state, world.snapshot())
-    assert board_end(turn, (points[0], points[1])) == points[-2]
+    ctx = StepContext(world.skipper.voyage, world.skipper.config, state, world.snapshot())
+    assert board_end(ctx, (points[0], points[1])) == points[-2]
 
 
 def test_speed_is_not_lost_by_replanning():

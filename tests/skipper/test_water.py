@@ -12,12 +12,10 @@ from companion.geo.shift import Shift, is_place, is_velocity
 from companion.messages import GeoPoint
 from companion.orders import Verb
 from companion.skipper import Skipper, SkipperConfig
-from companion.skipper.step.saved import Persisted
-from companion.skipper.step.standing import Standing
-from companion.skipper.step.state import Adrift, Fix, PendingPlan, SkipperState
-from companion.skipper.step.water import in_water
+from companion.skipper.step.saved import Persisted, Standing
+from companion.skipper.step.state import Adrift, Fix, PendingPlan, SkipperState, in_water
 from companion.skipper.way.gates import Approach
-from companion.skipper.way.integrity import PositionDoubt
+from companion.skipper.way.position_plausibility import PositionDoubt
 from companion.traffic.vessel import Vessel
 from tests.skipper.world import World, voyage, with_parts
 

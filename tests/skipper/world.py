@@ -372,9 +372,9 @@ class World:
 
 def check_invariants(before, after, snapshot, actions) -> None:
     """What must hold in every step of every test."""
+    from companion.skipper.step.context import permitted
     from companion.skipper.step.missions import ends_safely
     from companion.skipper.step.state import Phase
-    from companion.skipper.step.turn import permitted
 
     for action in actions:
         assert permitted(action, snapshot.permissions), action

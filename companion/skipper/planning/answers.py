@@ -16,20 +16,18 @@ from companion.planner.problem import evaluate, resolved
 from companion.planner.risk import arrival, path_risk
 from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
-from companion.skipper.planning.errands import errand
+from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.track import of_way, said
-from companion.skipper.planning.uploads import upload
+from companion.skipper.planning.uploads import is_begun_risky, is_riskier, upload
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step.actions import Change, ReplanReason, Severity
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import Tail, splice
 from companion.skipper.step.route import Kind, Route
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import PendingPlan, Phase, Retry
-from companion.skipper.step.turn import Turn
-from companion.skipper.way.geometry import distance_m, moved
-from companion.skipper.way.manoeuvre import gybe_round
-from companion.skipper.way.rejudged import is_begun_risky, is_riskier
+from companion.skipper.way.geometry import distance_m, gybe_round, moved
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
 
@@ -40,43 +38,43 @@ AT_WAYPOINT = frozenset({ReplanReason.WAYPOINT, ReplanReason.FORECAST})
 GYBE_RADIUS_M = 8.0      # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
 
 
-def take_plan(turn: Turn, outcome: PlanOutcome) -> None:
+def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
     """Take the planner's answer: splice and upload it, keep the old plan, or climb down the ladder."""
-    pending = turn.state.pending.plan
+    pending = ctx.state.pending.plan
     if pending is None or pending.request_id != outcome.request_id:
         return
-    turn.set(pending=changed(turn.state.pending, plan=None))
-    _note_latency(turn, pending, outcome)
-    if turn.state.phase is Phase.OPERATOR or turn.is_taken:
+    ctx.set(pending=changed(ctx.state.pending, plan=None))
+    _note_latency(ctx, pending, outcome)
+    if ctx.state.phase is Phase.OPERATOR or ctx.is_taken:
         return   # the operator may have taken the boat in this very step
-    if turn.state.voyage.sailing and not turn.state.mission.checked:
+    if ctx.state.voyage.sailing and not ctx.state.mission.checked:
         return
     plan = outcome.plan
     if plan is None or not plan.has_path:
         reason = outcome.text or (plan.reason if plan is not None else "the planner died")
-        if (plan is None or plan.status is PlanStatus.UNANSWERED) and asks_again(turn, pending, reason):
+        if (plan is None or plan.status is PlanStatus.UNANSWERED) and asks_again(ctx, pending, reason):
             return
-        not_found(turn, pending, reason)
+        not_found(ctx, pending, reason)
         return
-    turn.set(plans=changed(
-        turn.state.plans, unanswered=0, effort=min(1.0, MORE * turn.state.plans.effort), rung=0, ladder_reason=None,
-        retry=turn.failed(turn.state.plans.retry) if pending.rung > 0 else Retry()))
-    keep, set_current = _place(turn, pending)
+    ctx.set(plans=changed(
+        ctx.state.plans, unanswered=0, effort=min(1.0, MORE * ctx.state.plans.effort), rung=0, ladder_reason=None,
+        retry=ctx.failed(ctx.state.plans.retry) if pending.rung > 0 else Retry()))
+    keep, set_current = _place(ctx, pending)
     if keep is None:
-        turn.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
+        ctx.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
         return
-    if pending.reason in AT_WAYPOINT and is_begun_risky(pending.problem, plan.legs) and may_restart_leg(turn) and (
-            pending.from_index is not None and _may_still_turn_before(turn, pending.start_en_m)
-            and request(turn, pending.reason, text="the tack at the next waypoint may touch when it fails")):
+    if pending.reason in AT_WAYPOINT and is_begun_risky(pending.problem, plan.legs) and may_restart_leg(ctx) and (
+            pending.from_index is not None and _may_still_turn_before(ctx, pending.start_en_m)
+            and request(ctx, pending.reason, text="the tack at the next waypoint may touch when it fails")):
         return   # no plan from that waypoint takes its tack away
-    if _keep_old(turn, pending, plan):
+    if _keep_old(ctx, pending, plan):
         return
-    refused = put_in_place(turn, pending, plan, keep, set_current)
+    refused = put_in_place(ctx, pending, plan, keep, set_current)
     if refused:
-        not_found(turn, pending, refused)
+        not_found(ctx, pending, refused)
 
 
-def _note_latency(turn: Turn, pending: PendingPlan, outcome: PlanOutcome) -> None:
+def _note_latency(ctx: StepContext, pending: PendingPlan, outcome: PlanOutcome) -> None:
     """Note how long an answer took, or one that was given up; say once what plans of such water take here.
 
     A worker that died or hung says nothing of how fast this computer is.
@@ -84,50 +82,50 @@ def _note_latency(turn: Turn, pending: PendingPlan, outcome: PlanOutcome) -> Non
     plan = outcome.plan
     if plan is not None and plan.status is PlanStatus.UNANSWERED:
         return
-    latency = turn.state.plans.latency.with_answer(
-        turn.t_s - pending.t_s, turn.config.plan_budget_s, None if plan is None else plan.speed)
-    turn.set(plans=changed(turn.state.plans, latency=latency))
+    latency = ctx.state.plans.latency.with_answer(
+        ctx.t_s - pending.t_s, ctx.config.plan_budget_s, None if plan is None else plan.speed)
+    ctx.set(plans=changed(ctx.state.plans, latency=latency))
     if latency.is_slow:
-        earlier = f"; it is asked {turn.late_s:.0f} s earlier" if turn.late_s > 0.0 else ""
-        turn.say(Severity.NOTICE, SLOW, f"a slow computer plans such water: {latency.words}{earlier}", every_s=math.inf)
+        earlier = f"; it is asked {ctx.late_s:.0f} s earlier" if ctx.late_s > 0.0 else ""
+        ctx.say(Severity.NOTICE, SLOW, f"a slow computer plans such water: {latency.words}{earlier}", every_s=math.inf)
     elif latency.speed is not None:   # measured: in real time
-        turn.say(Severity.INFO, "planner", f"this computer plans such water: {latency.words}", every_s=math.inf)
+        ctx.say(Severity.INFO, "planner", f"this computer plans such water: {latency.words}", every_s=math.inf)
 
 
-def _may_still_turn_before(turn: Turn, waypoint_en: PointEn) -> bool:
+def _may_still_turn_before(ctx: StepContext, waypoint_en: PointEn) -> bool:
     """Return whether a plan from the boat begins well before a waypoint: else she would turn beyond it."""
-    boat = turn.boat_en
-    begins_m = turn.speed_mps * (turn.plan_lead_s + UPLOAD_LATENCY_S)
+    boat = ctx.boat_en
+    begins_m = ctx.speed_mps * (ctx.plan_lead_s + UPLOAD_LATENCY_S)
     return boat is not None and distance_m(boat, waypoint_en) > 2.0 * begins_m
 
 
-def _place(turn: Turn, pending: PendingPlan) -> tuple[int | None, int | None]:
+def _place(ctx: StepContext, pending: PendingPlan) -> tuple[int | None, int | None]:
     """Return how many items stay and which seq must be made current (None: none; keep None: too late)."""
-    state, k = turn.state, pending.from_index
+    state, k = ctx.state, pending.from_index
     if state.mission.route is None or state.mission.foreign:
         return 0, 1
     if k is None:
         return state.mission.index, state.mission.index + 1
-    boat = turn.boat_en
+    boat = ctx.boat_en
     if state.mission.index <= k:
         if pending.reason in AT_WAYPOINT and boat is not None and (
-                distance_m(boat, state.mission.route.points_en_m[state.mission.index]) < SHORT_S * turn.speed_mps):
+                distance_m(boat, state.mission.route.points_en_m[state.mission.index]) < SHORT_S * ctx.speed_mps):
             return None, None   # an upload begins the leg anew, and what is left of it is too short to be followed
         return k + 1, None
     if state.mission.index == k + 1 and boat is not None and (
-            distance_m(boat, pending.start_en_m) < turn.config.grid_size_m):
+            distance_m(boat, pending.start_en_m) < ctx.config.grid_size_m):
         return k + 1, k + 2
     return None, None
 
 
-def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
+def _keep_old(ctx: StepContext, pending: PendingPlan, plan: Plan) -> bool:
     """Keep the old plan when it is sound under the new forecast and the new one is not clearly better."""
-    route = turn.state.mission.route
-    if tacks_fail(turn):
+    route = ctx.state.mission.route
+    if tacks_fail(ctx):
         return False
     if route is None or pending.reason in {ReplanReason.START, ReplanReason.OPERATOR_BACK, ReplanReason.RETRY}:
         return False
-    first = turn.state.mission.index if pending.from_index is None else pending.from_index + 1
+    first = ctx.state.mission.index if pending.from_index is None else pending.from_index + 1
     points = route.points_en_m[first:-1]
     ends = [n for n in range(first, len(route.items) - 1) if route.gate_of[n] == pending.gate]
     if not points or not ends or pending.lead_in or route.bound_for != pending.facts.bound_for:
@@ -151,20 +149,20 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
         return False
     if problem.targets:
         tail = [(float(e), float(n)) for e, n in plan.waypoints_en]
-        way = [*route.points_en_m[turn.state.mission.index:first], *tail]
-        verdict = decide(meetings(turn), since_replan_s=0.0, active_cost_s=old.time_s, new_cost_s=plan.cost_s,
-                         apart_m=apart_m(turn, way))
+        way = [*route.points_en_m[ctx.state.mission.index:first], *tail]
+        verdict = decide(meetings(ctx), since_replan_s=0.0, active_cost_s=old.time_s, new_cost_s=plan.cost_s,
+                         apart_m=apart_m(ctx, way))
         if verdict is not Decision.KEEP:
             return False
-    elif gain > max(turn.config.keep_gain_s, turn.config.keep_gain * old.time_s):
+    elif gain > max(ctx.config.keep_gain_s, ctx.config.keep_gain * old.time_s):
         return False
     facts, when, told = pending.facts, arrival(problem, old.legs), path_risk(problem, old.legs)
-    turn.set(mission=changed(turn.state.mission, route=replace(
+    ctx.set(mission=changed(ctx.state.mission, route=replace(
         route, plan_t_s=facts.plan_t_s, plan_twd_from_rad=facts.plan_twd_from_rad, plan_tws_mps=facts.plan_tws_mps,
         plan_half_width_rad=facts.plan_half_width_rad, risk=told.total, vessel_risk=told.vessels.total,
         cost_s=old.time_s, median_s=_time(when, "median_s"), late_s=_time(when, "late_s"),
     )))
-    turn.say(
+    ctx.say(
         Severity.INFO, "plan kept",
         f"{pending.reason.value}: the old plan stays ({old.time_s:.0f} s; a new one gains {max(0.0, gain):.1f} s)",
         every_s=0.0,
@@ -172,25 +170,25 @@ def _keep_old(turn: Turn, pending: PendingPlan, plan: Plan) -> bool:
     return True
 
 
-def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> str:
+def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, set_current: int | None) -> str:
     """Splice a plan into the route and ask for its upload; return why it may not be, in words; empty: it may."""
     planned = _apart([(float(e), float(n)) for e, n in plan.waypoints_en])
     points = [*pending.lead_in, *planned[1:]]
     start = pending.start_en_m
-    if pending.lead_in and turn.boat_en is not None:
-        start = turn.boat_en
+    if pending.lead_in and ctx.boat_en is not None:
+        start = ctx.boat_en
     expected_m = plan.expected_clearance_m
-    if tacks_fail(turn):
+    if tacks_fail(ctx):
         # Tacks have failed: turn the other way round where there is room.
-        points = list(_gybed_round(turn, pending, start, points))
+        points = list(_gybed_round(ctx, pending, start, points))
         seen = of_way(pending.problem, [start, *points], heading_rad=pending.problem.start_heading_rad, before_en=None,
                       has_loops=False)
         if not seen.is_kept:
             points = [*pending.lead_in, *planned[1:]]   # rather a tack that may fail than a loop onto something
         elif expected_m is not None:
             expected_m = min(expected_m, seen.clearance_m)
-        turn.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
-    bound = errand(turn)
+        ctx.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
+    bound = diversion(ctx)
     tail = Tail(
         start_en=start, points_en=tuple(points), gate=pending.gate,
         is_place=bound is not None and bound.kind is Kind.BOX and bound.name == pending.facts.bound_for)
@@ -198,54 +196,54 @@ def put_in_place(turn: Turn, pending: PendingPlan, plan: Plan, keep: int, set_cu
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
         median_s=_time(plan.arrival, "median_s"), late_s=_time(plan.arrival, "late_s"),
         expected_clearance_m=expected_m, why=plan.why.text or plan.reason)
-    old = turn.state.mission.route
-    if keep + len(tail.points_en) + 1 > turn.config.max_items and old is not None:
+    old = ctx.state.mission.route
+    if keep + len(tail.points_en) + 1 > ctx.config.max_items and old is not None:
         # Start the numbering again with what is still ahead of the boat.
-        ahead = slice(turn.state.mission.index, keep)
+        ahead = slice(ctx.state.mission.index, keep)
         old = replace(old, items=old.items[ahead], points_en_m=old.points_en_m[ahead],
                       leg_from_en_m=old.leg_from_en_m[ahead], gate_of=old.gate_of[ahead])
         keep, set_current = len(old.items), 1
     route = splice(
-        turn.voyage, turn.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts)
-    if turn.state.mission.route is not None and _is_same(turn.state.mission.route, route):
-        turn.set(
-            progress=changed(turn.state.progress, missed_s=None),
+        ctx.voyage, ctx.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts)
+    if ctx.state.mission.route is not None and _is_same(ctx.state.mission.route, route):
+        ctx.set(
+            progress=changed(ctx.state.progress, missed_s=None),
             mission=changed(
-                turn.state.mission,
+                ctx.state.mission,
                 route=replace(
-                    route, items=turn.state.mission.route.items, points_en_m=turn.state.mission.route.points_en_m)))
-        turn.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
+                    route, items=ctx.state.mission.route.items, points_en_m=ctx.state.mission.route.points_en_m)))
+        ctx.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
         return ""
-    way = route.points_en_m[turn.state.mission.index if set_current is None else set_current - 1:-1]
-    met = meetings(turn)
+    way = route.points_en_m[ctx.state.mission.index if set_current is None else set_current - 1:-1]
+    met = meetings(ctx)
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
-    change = Change(apart_m=apart_m(turn, way), unsafe=unsafe) if turn.state.mission.route is not None else Change()
-    _look_at_time(turn, route)
-    clear = said(expected_m, turn.config.margin_floor_m)
+    change = Change(apart_m=apart_m(ctx, way), unsafe=unsafe) if ctx.state.mission.route is not None else Change()
+    _look_at_time(ctx, route)
+    clear = said(expected_m, ctx.config.margin_floor_m)
     return upload(
-        turn, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change, planned=pending)
+        ctx, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change, planned=pending)
 
 
-def _gybed_round(turn: Turn, pending: PendingPlan, start: PointEn, points: list[PointEn]) -> tuple[PointEn, ...]:
+def _gybed_round(ctx: StepContext, pending: PendingPlan, start: PointEn, points: list[PointEn]) -> tuple[PointEn, ...]:
     """Return the waypoints behind the start with their tacks gybed round, the one that begins them, too."""
-    vehicle, heading = turn.snapshot.vehicle, pending.problem.start_heading_rad
+    vehicle, heading = ctx.snapshot.vehicle, pending.problem.start_heading_rad
     if pending.lead_in and vehicle is not None:
         heading = vehicle.heading_rad
     return gybe_round(
         moved(start, heading, -1.0), [start, *points], twd_from_rad=pending.facts.plan_twd_from_rad,
-        radius_m=GYBE_RADIUS_M, area=turn.voyage.area,
-        floor_m=min(turn.config.margin_floor_m, pending.facts.margin_m))[1:]
+        radius_m=GYBE_RADIUS_M, area=ctx.voyage.area,
+        floor_m=min(ctx.config.margin_floor_m, pending.facts.margin_m))[1:]
 
 
-def _look_at_time(turn: Turn, route: Route) -> None:
+def _look_at_time(ctx: StepContext, route: Route) -> None:
     """Say so when the time that the voyage has may be over before the plan is sailed."""
-    limit_s = turn.config.voyage_timeout_s
-    if limit_s is None or errand(turn) is not None or route.cost_s is None:
+    limit_s = ctx.config.voyage_timeout_s
+    if limit_s is None or diversion(ctx) is not None or route.cost_s is None:
         return
-    left_s = limit_s - turn.state.voyage.under_way_s
+    left_s = limit_s - ctx.state.voyage.under_way_s
     if route.late_s is None or route.late_s > left_s:
         late = "not told" if route.late_s is None else f"{route.late_s:.0f} s"
-        turn.say(Severity.WARNING, "may be late",
+        ctx.say(Severity.WARNING, "may be late",
                  f"{left_s:.0f} s are left of the voyage's time, and she is there in {route.cost_s:.0f} s; in nine "
                  f"winds of ten: {late}")
 

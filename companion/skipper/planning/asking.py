@@ -13,21 +13,21 @@ from companion.frozen import changed
 from companion.messages import Mode
 from companion.planner import Problem
 from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
-from companion.skipper.planning.errands import errand, gate_for, homeward
+from companion.skipper.planning.diversions import diversion, gate_for, homeward
 from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.planning.track import problem_tracking, steps
 from companion.skipper.planning.vessels import shares
 from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan, Severity
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import path_length_m
-from companion.skipper.step.route import Errand
+from companion.skipper.step.route import Diversion
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.state import PendingPlan
-from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from companion.skipper.way.integrity import is_impossible
 from companion.skipper.way.judge import half_width_rad
+from companion.skipper.way.position_plausibility import is_impossible
 from companion.skipper.way.stemming import waiting_place
 
 UPLOAD_LATENCY_S = 1.5   # item protocol, a few dozen items, and the read-back
@@ -36,75 +36,75 @@ WIDTH_AHEAD_S = 60.0     # how far ahead the interval is taken that a plan remem
 
 
 def request(
-    turn: Turn, reason: ReplanReason, *, from_index: int | None = None, rung: int = 0, text: str = "",
+    ctx: StepContext, reason: ReplanReason, *, from_index: int | None = None, rung: int = 0, text: str = "",
 ) -> bool:
     """Ask for a plan from item ``from_index`` of the route or, with None, from the boat; False when it cannot be.
 
-    It is planned for where she is bound for on an errand, else for the gate after the one that item ``from_index``
+    It is planned for where she is bound for on a diversion, else for the gate after the one that item ``from_index``
     completes or leads to, and behind the last one home where the mission ends there. ``lacks`` says why not.
     """
-    current, ladder = turn.snapshot.current, steps(turn)
+    current, ladder = ctx.snapshot.current, steps(ctx)
     step = ladder[min(rung, len(ladder) - 1)]
-    forecast, start, aimed = turn.snapshot.wind.forecast, _start(turn, from_index), _target(turn, from_index)
+    forecast, start, aimed = ctx.snapshot.wind.forecast, _start(ctx, from_index), _target(ctx, from_index)
     if forecast is None or start is None or aimed is None:
         return False
     target, gate, bound = aimed
-    wind = turn.wind_mean
-    floor_m = min(turn.config.margin_floor_m, step.margin_m)
+    wind = ctx.wind_mean
+    floor_m = min(ctx.config.margin_floor_m, step.margin_m)
     start = repaired(
-        turn.voyage, start, margin_m=step.margin_m, floor_m=floor_m, twd_from_rad=wind[0] if wind else None)
-    aim = _aim(turn, target, gate, start, step)
-    number = turn.new_id()
-    shared = shares(turn, start.en_m, start.after_s, rung, step.delta_s)
+        ctx.voyage, start, margin_m=step.margin_m, floor_m=floor_m, twd_from_rad=wind[0] if wind else None)
+    aim = _aim(ctx, target, gate, start, step)
+    number = ctx.new_id()
+    shared = shares(ctx, start.en_m, start.after_s, rung, step.delta_s)
     name = ", ".join(part for part in (step.name, "start repaired" if start.text else "") if part)
     try:
         problem = Problem.from_json(problem_dict(
-            turn.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
-            delta_s=shared.wind_delta_s, no_go_half_rad=turn.planned_no_go_rad, floor_m=floor_m, title=reason.value,
-            beat=problem_beat(turn, step.margin_m), max_path_risk=step.max_path_risk, current=current,
-            failing=_failing(turn),
-            is_wind_known=turn.snapshot.wind.health is not WindHealth.UNTRUSTED,
-            doubt=turn.snapshot.doubt if turn.config.sails else None,
-            zone_half_rad=turn.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
+            ctx.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
+            delta_s=shared.wind_delta_s, no_go_half_rad=ctx.planned_no_go_rad, floor_m=floor_m, title=reason.value,
+            beat=problem_beat(ctx, step.margin_m), max_path_risk=step.max_path_risk, current=current,
+            failing=_failing(ctx),
+            is_wind_known=ctx.snapshot.wind.health is not WindHealth.UNTRUSTED,
+            doubt=ctx.snapshot.doubt if ctx.config.sails else None,
+            zone_half_rad=ctx.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
             tracking=problem_tracking(
-                turn, start, from_index, floor_m=min(turn.config.margin_floor_m, turn.config.margin_m),
+                ctx, start, from_index, floor_m=min(ctx.config.margin_floor_m, ctx.config.margin_m),
                 forecast=forecast),
         ))
     except (ValueError, InputError) as error:
-        turn.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
-        turn.set(plans=changed(turn.state.plans, retry=turn.failed(turn.state.plans.retry)))
+        ctx.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
+        ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(ctx.state.plans.retry)))
         return False
     problem = replace(problem, delta_s=shared.delta_s, targets=shared.targets, vessels_part=shared.part)
     facts = replace(
-        turn.blank_facts(number, step.margin_m, shared.delta_s, name),
+        ctx.blank_facts(number, step.margin_m, shared.delta_s, name),
         plan_twd_from_rad=over_ground(
             problem.wind.twd_from_rad, problem.wind.tws_mps or 0.0, current.planned_en_mps)[0],
-        plan_half_width_rad=half_width_rad(forecast, start.after_s + WIDTH_AHEAD_S, turn.config.wind_change_level),
+        plan_half_width_rad=half_width_rad(forecast, start.after_s + WIDTH_AHEAD_S, ctx.config.wind_change_level),
         vessels_part=shared.part or 0.0, bound_for=bound.name if bound is not None and not step.nearer_goal else "",
     )
-    if turn.state.pending.plan is not None:
-        turn.act(CancelPlan(request_id=turn.state.pending.plan.request_id))
+    if ctx.state.pending.plan is not None:
+        ctx.act(CancelPlan(request_id=ctx.state.pending.plan.request_id))
     pending = PendingPlan(
-        request_id=number, t_s=turn.t_s, reason=reason, from_index=from_index, rung=rung, gate=aim.gate,
+        request_id=number, t_s=ctx.t_s, reason=reason, from_index=from_index, rung=rung, gate=aim.gate,
         lead_in=start.lead_in, start_en_m=start.en_m, facts=facts, problem=problem,
     )
-    turn.set(
-        pending=changed(turn.state.pending, plan=pending),
+    ctx.set(
+        pending=changed(ctx.state.pending, plan=pending),
         plans=changed(
-            turn.state.plans, last_s=turn.t_s, rung=rung, ladder_reason=reason, replans=turn.state.plans.replans + 1))
-    budget = turn.config.first_plan_budget_s if reason is ReplanReason.START else turn.config.plan_budget_s
+            ctx.state.plans, last_s=ctx.t_s, rung=rung, ladder_reason=reason, replans=ctx.state.plans.replans + 1))
+    budget = ctx.config.first_plan_budget_s if reason is ReplanReason.START else ctx.config.plan_budget_s
     why = "; ".join(part for part in (text, start.text, f"step: {name}" if name else "") if part)
-    turn.act(RequestPlan(
-        request_id=number, problem=problem, reason=reason, budget_s=turn.state.plans.effort * budget, seed=number,
+    ctx.act(RequestPlan(
+        request_id=number, problem=problem, reason=reason, budget_s=ctx.state.plans.effort * budget, seed=number,
         from_seq=None if from_index is None else from_index + 1,
-        planner=step.planner.about(turn.voyage.frame.origin), rung=name, text=why,
+        planner=step.planner.about(ctx.voyage.frame.origin), rung=name, text=why,
     ))
     return True
 
 
-def _failing(turn: Turn) -> dict[str, Any]:
+def _failing(ctx: StepContext) -> dict[str, Any]:
     """Return what is known of tacks that fail, as a problem's boat has it: before the first, the chance alone."""
-    tacking, given = turn.state.tacking, turn.voyage.boat.tack_fails
+    tacking, given = ctx.state.tacking, ctx.voyage.boat.tack_fails
     failing: dict[str, Any] = {"tack_fails": tacking.chance(given)}
     if given > 0.0 and tacking.failed:
         failing |= {"irons_s": max(IRONS_S, tacking.irons_s),
@@ -112,26 +112,26 @@ def _failing(turn: Turn) -> dict[str, Any]:
     return failing
 
 
-def _start(turn: Turn, from_index: int | None) -> Start | None:
-    boat, vehicle, route = turn.boat_en, turn.snapshot.vehicle, turn.state.mission.route
-    if boat is None or vehicle is None or is_impossible(turn.voyage.area, boat, margin_m=turn.config.margin_m):
+def _start(ctx: StepContext, from_index: int | None) -> Start | None:
+    boat, vehicle, route = ctx.boat_en, ctx.snapshot.vehicle, ctx.state.mission.route
+    if boat is None or vehicle is None or is_impossible(ctx.voyage.area, boat, margin_m=ctx.config.margin_m):
         return None
     if from_index is None:
         # Stopped, or turning in circles, she is where she is.
-        stopped = turn.state.steering.own_mode in {Mode.HOLD, Mode.LOITER}
-        sailing = turn.state.voyage.sailing and vehicle.speed_mps > SLOW_MPS and not stopped
-        ahead = turn.plan_lead_s + UPLOAD_LATENCY_S if sailing else 0.0
+        stopped = ctx.state.steering.own_mode in {Mode.HOLD, Mode.LOITER}
+        sailing = ctx.state.voyage.sailing and vehicle.speed_mps > SLOW_MPS and not stopped
+        ahead = ctx.plan_lead_s + UPLOAD_LATENCY_S if sailing else 0.0
         heading = math.atan2(*vehicle.velocity_en_mps) if sailing else vehicle.heading_rad
         place = moved(boat, heading, vehicle.speed_mps * ahead)
         # In a current a plan's headings are through the water.
-        bow = vehicle.heading_rad if turn.snapshot.current.is_significant else heading
-        tacking = turn.state.tacking
+        bow = vehicle.heading_rad if ctx.snapshot.current.is_significant else heading
+        tacking = ctx.state.tacking
         if tacking.is_counted:
             bow = tacking.settled_rad   # she lies in irons, and falls off to her old tack
         return Start(en_m=place, heading_rad=bow, after_s=ahead)
-    if route is None or not turn.state.mission.index <= from_index < len(route.items):
+    if route is None or not ctx.state.mission.index <= from_index < len(route.items):
         return None
-    way = [boat, *route.points_en_m[turn.state.mission.index:from_index + 1]]
+    way = [boat, *route.points_en_m[ctx.state.mission.index:from_index + 1]]
     speed = max(vehicle.speed_mps, SLOW_MPS)
     return Start(
         en_m=route.points_en_m[from_index],
@@ -140,57 +140,57 @@ def _start(turn: Turn, from_index: int | None) -> Start | None:
     )
 
 
-def lacks(turn: Turn, from_index: int | None = None) -> str:
+def lacks(ctx: StepContext, from_index: int | None = None) -> str:
     """Return what is missing for a plan in words; empty: nothing, or what ``request`` says itself."""
-    if turn.snapshot.wind.forecast is None:
+    if ctx.snapshot.wind.forecast is None:
         return "a wind forecast"
-    if _start(turn, from_index) is None:
-        doubt = turn.state.position.doubt
+    if _start(ctx, from_index) is None:
+        doubt = ctx.state.position.doubt
         return "a position to plan from" + (f": {doubt.why}" if doubt is not None else "")
-    if _target(turn, from_index) is None:
+    if _target(ctx, from_index) is None:
         return "a goal: none is left"
     return ""
 
 
-def _target(turn: Turn, from_index: int | None) -> tuple[Gate, int, Errand | None] | None:
-    """Return what to plan for: the gate, its number (-1: it completes none), and the errand that it is for."""
-    bound = errand(turn)
-    number = None if bound is not None else _gate_after(turn, from_index)
+def _target(ctx: StepContext, from_index: int | None) -> tuple[Gate, int, Diversion | None] | None:
+    """Return what to plan for: the gate, its number (-1: it completes none), and the diversion that it is for."""
+    bound = diversion(ctx)
+    number = None if bound is not None else _gate_after(ctx, from_index)
     if bound is None and number is None:
-        bound = homeward(turn)
+        bound = homeward(ctx)
     if bound is not None:
-        return (gate_for(turn, bound), -1, bound) if bound.has_place else None
-    return None if number is None else (turn.gates[number], number, None)
+        return (gate_for(ctx, bound), -1, bound) if bound.has_place else None
+    return None if number is None else (ctx.gates[number], number, None)
 
 
-def _gate_after(turn: Turn, from_index: int | None) -> int | None:
+def _gate_after(ctx: StepContext, from_index: int | None) -> int | None:
     """Return the gate that a plan from there is for: the first not completed before or at that item."""
-    gate, route = turn.state.progress.gate, turn.state.mission.route
+    gate, route = ctx.state.progress.gate, ctx.state.mission.route
     if from_index is not None and route is not None:
-        done = [g for g in route.gate_of[turn.state.mission.index:from_index + 1] if g >= 0]
+        done = [g for g in route.gate_of[ctx.state.mission.index:from_index + 1] if g >= 0]
         gate = max([gate, *(g + 1 for g in done)])
-    return gate if gate < len(turn.gates) else None
+    return gate if gate < len(ctx.gates) else None
 
 
-def _aim(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
+def _aim(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
     if step.nearer_goal:
-        return _nearer(turn, target, gate, start, step)
-    aim = aim_at(turn.voyage, turn.config, (target,), 0, start.en_m)
+        return _nearer(ctx, target, gate, start, step)
+    aim = aim_at(ctx.voyage, ctx.config, (target,), 0, start.en_m)
     return replace(aim, gate=gate if aim.gate == 0 else -1)
 
 
-def _nearer(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
+def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
     """Return a safe place that is nearer than the goal: a refuge, or a roomy place on the way."""
-    water, floor_m = turn.water, min(turn.config.margin_floor_m, turn.config.margin_m)
+    water, floor_m = ctx.water, min(ctx.config.margin_floor_m, ctx.config.margin_m)
     if water is not None and water.trouble(start.en_m, target.en_m):
-        place = waiting_place(water, turn.voyage.area, start.en_m, floor_m)
+        place = waiting_place(water, ctx.voyage.area, start.en_m, floor_m)
         if place is not None and place != start.en_m:
-            return Aim(en_m=place, radius_m=turn.config.loiter_radius_m, gate=-1)
+            return Aim(en_m=place, radius_m=ctx.config.loiter_radius_m, gate=-1)
     left = distance_m(start.en_m, target.en_m)
-    if turn.voyage.is_passage:
-        left = min(left, turn.config.horizon_m)
+    if ctx.voyage.is_passage:
+        left = min(left, ctx.config.horizon_m)
     course = bearing_rad(start.en_m, target.en_m)
-    refuges = [r.en_m for r in turn.voyage.refuges]
+    refuges = [r.en_m for r in ctx.voyage.refuges]
     candidates = [p for p in refuges if p != target.en_m and distance_m(start.en_m, p) < left]
     candidates.sort(key=lambda p: distance_m(p, target.en_m))
     candidates += [
@@ -198,6 +198,6 @@ def _nearer(turn: Turn, target: Gate, gate: int, start: Start, step: Rung) -> Ai
         for share in (0.75, 0.5, 0.35, 0.2) for side in (0.0, 0.35, -0.35, 0.8, -0.8)
     ]
     for place in candidates:
-        if float(turn.voyage.area.clearance_m([place])[0]) >= step.margin_m + turn.config.loiter_radius_m:
-            return Aim(en_m=place, radius_m=turn.config.loiter_radius_m, gate=-1)
+        if float(ctx.voyage.area.clearance_m([place])[0]) >= step.margin_m + ctx.config.loiter_radius_m:
+            return Aim(en_m=place, radius_m=ctx.config.loiter_radius_m, gate=-1)
     return Aim(en_m=target.en_m, radius_m=target.radius_m, gate=gate)

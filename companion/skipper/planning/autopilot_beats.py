@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
-from companion.boat import AutopilotLimits
+from companion.boat import AutopilotLimits, Polar
 from companion.boat.failed_tack import TRIES
 from companion.boat.tracking import GuidanceModel, beat_band_m
-from companion.geo.angles import difference_rad
-from companion.skipper.step.shifting import shifting
-from companion.skipper.step.turn import Turn
-from companion.skipper.way.geometry import bearing_rad, cross_track_m
+from companion.geo.angles import difference_rad, heading_of
+from companion.messages import Command, Mode
+from companion.skipper.step.context import StepContext
+from companion.skipper.step.snapshot import Snapshot
+from companion.skipper.step.state import SkipperState
+from companion.skipper.step.wind_shifts import shifting
+from companion.skipper.way.geometry import bearing_rad, cross_track_m, moved
 from companion.skipper.way.voyage import PointEn
 
 IRONS_MEMORY_S = 600.0
@@ -22,93 +25,195 @@ WIDEST_BY_SHIFTS_M = 200.0   # ... but where she tacks on the shifts: then its e
 CARRIED_S = 2.5         # of a tack, at the corridor's edge: where the water takes her meanwhile
 OFF_LINE_M = 2.0        # so near the line a leg that begins anew is the same leg
 FOLLOWS_RAD = math.radians(10.0)   # this far outside its no-go zone the autopilot keeps to the line
+# A tack takes this long: who should have tacked a moment ago is tacking [s].
+TACKING_S = 4.0
+# Below this speed the time to a waypoint says nothing [m/s].
+MIN_SPEED_MPS = 0.2
+# A boat that makes less than this part of her polar's speed is gathering way, out of a tack: she will soon make it.
+GATHERING_WAY = 0.8
 
 
-def tacks_fail(turn: Turn) -> bool:
+def tacks_fail(ctx: StepContext) -> bool:
     """Return whether tacks failed, or she was in irons, so often of late that they are not tried."""
-    recent = [t for t in turn.state.steering.irons_s if turn.t_s - t < IRONS_MEMORY_S]
-    tacking, given = turn.state.tacking, turn.voyage.boat.tack_fails
-    in_a_row = tacking.in_a_row if given > 0.0 and turn.t_s - tacking.failed_s < IRONS_MEMORY_S else 0
+    recent = [t for t in ctx.state.steering.irons_s if ctx.t_s - t < IRONS_MEMORY_S]
+    tacking, given = ctx.state.tacking, ctx.voyage.boat.tack_fails
+    in_a_row = tacking.in_a_row if given > 0.0 and ctx.t_s - tacking.failed_s < IRONS_MEMORY_S else 0
     return max(len(recent), in_a_row) >= TACKS_FAIL_AFTER
 
 
-def boards_within_m(turn: Turn) -> float | None:
+def boards_within_m(ctx: StepContext) -> float | None:
     """Return what the boards of the autopilot's beat keep within, to either side of the leg [m].
 
     The overshoot of a tack at the corridor's edge is in it, and where the current sets her meanwhile. None without a
     corridor: the autopilot then sails to the layline, wherever that is.
     """
-    corridor, wind = turn.tack_corridor_m, turn.wind_mean
-    widest = WIDEST_BY_SHIFTS_M if turn.config.shifts else WIDEST_M
-    if wind is None or not 0.0 < corridor <= widest or not turn.config.sails:
+    corridor, wind = ctx.tack_corridor_m, ctx.wind_mean
+    widest = WIDEST_BY_SHIFTS_M if ctx.config.shifts else WIDEST_M
+    if wind is None or not 0.0 < corridor <= widest or not ctx.config.sails:
         return None
-    boat = turn.voyage.boat
-    limits = turn.snapshot.limits or AutopilotLimits(sail_xtrack_max_m=corridor)
-    helm = replace(GuidanceModel.of(limits), corridor_m=corridor, no_go_half_rad=turn.no_go_half_rad)
-    return beat_band_m(helm, boat.polar, tws_mps=wind[1]) + CARRIED_S * math.hypot(*turn.current_en_mps)
+    boat = ctx.voyage.boat
+    limits = ctx.snapshot.limits or AutopilotLimits(sail_xtrack_max_m=corridor)
+    helm = replace(GuidanceModel.of(limits), corridor_m=corridor, no_go_half_rad=ctx.no_go_half_rad)
+    return beat_band_m(helm, boat.polar, tws_mps=wind[1]) + CARRIED_S * math.hypot(*ctx.current_en_mps)
 
 
-def corridor_room_m(turn: Turn) -> float | None:
+def corridor_room_m(ctx: StepContext) -> float | None:
     """Return how far from everything solid a closed leg must be for the autopilot's beat about it [m].
 
     What its boards keep within, the hull's reach, and the margin's floor beyond that; None where that is none. Whether
     each board keeps the floor in the wind's spread is the planner's to say (``companion.planner.track``).
     """
-    within_m = boards_within_m(turn)
+    within_m = boards_within_m(ctx)
     if within_m is None:
         return None
-    return within_m + turn.voyage.boat.hull.reach_m + turn.config.margin_floor_m
+    return within_m + ctx.voyage.boat.hull.reach_m + ctx.config.margin_floor_m
 
 
-def room_m(turn: Turn) -> float | None:
+def room_m(ctx: StepContext) -> float | None:
     """Return ``corridor_room_m`` where beats may be planned for the autopilot, None where not."""
-    if not turn.config.autopilot_beats or turn.snapshot.limits is None or tacks_fail(turn):
+    if not ctx.config.autopilot_beats or ctx.snapshot.limits is None or tacks_fail(ctx):
         return None
-    return corridor_room_m(turn)
+    return corridor_room_m(ctx)
 
 
-def problem_beat(turn: Turn, margin_m: float) -> dict[str, Any] | None:
+def problem_beat(ctx: StepContext, margin_m: float) -> dict[str, Any] | None:
     """Return the ``beat`` of a problem whose obstacles are grown by ``margin_m``, None without one."""
-    room = room_m(turn)
+    room = room_m(ctx)
     if room is None:
         return None
-    boat, by_shifts = turn.voyage.boat, shifting(turn)
-    tack_s = 2.0 * turn.no_go_half_rad / boat.turn_rate_radps + boat.tack_loss_s
+    boat, by_shifts = ctx.voyage.boat, shifting(ctx)
+    tack_s = 2.0 * ctx.no_go_half_rad / boat.turn_rate_radps + boat.tack_loss_s
     return {
         # the angle that her bow is held at, with leeway too: a leg at her course's angle she would be held below
-        "no_go_half_deg": math.degrees(turn.no_go_half_rad),
-        "corridor_m": turn.tack_corridor_m,
+        "no_go_half_deg": math.degrees(ctx.no_go_half_rad),
+        "corridor_m": ctx.tack_corridor_m,
         "clearance_m": max(0.0, room - margin_m),
         "tack_s": tack_s if by_shifts is None else min(tack_s, by_shifts.tack_s),
     }
 
 
-def may_restart_leg(turn: Turn) -> bool:
+def may_restart_leg(ctx: StepContext) -> bool:
     """Return whether an upload may come now: it makes the present leg begin at the boat, and its corridor with it.
 
     On a beat the boat may be the corridor's width off the line already; from there it could get as far off again.
     """
-    boat, leg, wind = turn.boat_en, turn.leg(), turn.wind_now
+    boat, leg, wind = ctx.boat_en, ctx.leg(), ctx.wind_now
     if boat is None or leg is None or wind is None or abs(cross_track_m(boat, *leg)) <= OFF_LINE_M:
         return True
-    room = corridor_room_m(turn)
-    if room is None or abs(difference_rad(wind[0], bearing_rad(boat, leg[1]))) > turn.no_go_half_rad + FOLLOWS_RAD:
+    room = corridor_room_m(ctx)
+    if room is None or abs(difference_rad(wind[0], bearing_rad(boat, leg[1]))) > ctx.no_go_half_rad + FOLLOWS_RAD:
         return True
-    return turn.voyage.area.path_clearance_m([boat, leg[1]]) >= room
+    return ctx.voyage.area.path_clearance_m([boat, leg[1]]) >= room
 
 
-def is_left_to_beat(turn: Turn, a: PointEn, b: PointEn) -> bool:
+def is_left_to_beat(ctx: StepContext, a: PointEn, b: PointEn) -> bool:
     """Return whether the autopilot may beat from a to b: the water is clear by ``room_m``."""
-    room = room_m(turn)
-    return room is not None and turn.voyage.area.path_clearance_m([a, b]) >= room
+    room = room_m(ctx)
+    return room is not None and ctx.voyage.area.path_clearance_m([a, b]) >= room
 
 
-def beaten_within_m(turn: Turn) -> float:
+def beaten_within_m(ctx: StepContext) -> float:
     """Return how far off the present leg the autopilot's own beat takes her [m]; 0 where it does not beat.
 
     It beats where the leg lies in the no-go zone, by the wind that there is or by its mean: a lift does not end a beat.
     """
-    leg = turn.leg()
-    if leg is None or not any(turn.is_closed(*leg, wind) for wind in (turn.wind_now, turn.wind_mean)):
+    leg = ctx.leg()
+    if leg is None or not any(ctx.is_closed(*leg, wind) for wind in (ctx.wind_now, ctx.wind_mean)):
         return 0.0
-    return (boards_within_m(turn) or 0.0) if is_left_to_beat(turn, *leg) else 0.0
+    return (boards_within_m(ctx) or 0.0) if is_left_to_beat(ctx, *leg) else 0.0
+
+
+# ---------------------- When she tacks next: planned, or the autopilot's own on a leg that it beats.
+
+
+class Seen(Protocol):
+    """A step, being made or made: what was seen and what is remembered."""
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """What was seen."""
+        ...
+
+    @property
+    def state(self) -> SkipperState:
+        """What is remembered."""
+        ...
+
+
+class NextTack(NamedTuple):
+    """The next tack: when [s], and whether the plan has it; else it is the autopilot's own."""
+
+    in_s: float
+    is_planned: bool
+
+
+def next_tack_s(seen: Seen, polar: Polar) -> float | None:
+    """Return the time until the next tack [s]; None: there is none, or no way on."""
+    found = next_tack(seen, polar)
+    return None if found is None else found.in_s
+
+
+def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
+    """Return the next tack, planned or the autopilot's own; None: there is none, or no way on.
+
+    On a leg inside its no-go zone the autopilot beats: it keeps the tack that it comes on until the edge of its
+    corridor, or until the other tack fetches the waypoint; in GUIDED it does not beat, and such a leg is planned anew.
+    The end of a mission, a loiter, is no course. Legs ahead are sailed at the polar's speed, this one at the boat's
+    own, once she has way on.
+    """
+    route, snapshot = seen.state.mission.route, seen.snapshot
+    vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
+    wind_rad = wind.mean_twd_from_rad if wind.present_twd_from_rad is None else wind.present_twd_from_rad
+    tws_mps = wind.mean_tws_mps if wind.present_tws_mps is None else wind.present_tws_mps
+    if route is None or wind_rad is None or tws_mps is None or vehicle is None or here is None or (
+            vehicle.speed_mps < MIN_SPEED_MPS):
+        return None
+    limits = snapshot.limits or AutopilotLimits()
+    no_go_rad, begin = limits.sail_no_go_angle_rad, seen.state.mission.index
+    legs = [
+        (start, end) for item, start, end in zip(
+            route.items[begin:], route.leg_from_en_m[begin:], route.points_en_m[begin:], strict=True)
+        if item.command == Command.NAV_WAYPOINT
+    ]
+    side = difference_rad(wind_rad, vehicle.heading_rad) > 0.0
+    time_s = 0.0
+    for number, leg in enumerate(legs):
+        start, end = (here, leg[1]) if number == 0 else leg
+        off_rad = difference_rad(wind_rad, heading_of(end[0] - start[0], end[1] - start[1]))
+        is_closed = abs(off_rad) < no_go_rad
+        if number and not is_closed and (off_rad > 0.0) != side and abs(off_rad) < math.pi / 2.0:
+            return NextTack(time_s, is_planned=True)
+        speed_mps = max(MIN_SPEED_MPS, polar.speed_mps(max(abs(off_rad), no_go_rad), tws_mps))
+        has_way = number == 0 and vehicle.speed_mps > GATHERING_WAY * speed_mps
+        if is_closed:
+            if snapshot.autopilot is not None and snapshot.autopilot.mode is Mode.GUIDED:
+                return None
+            close_rad = wind_rad - no_go_rad if side else wind_rad + no_go_rad
+            velocity_en = vehicle.velocity_en_mps if has_way else moved((0.0, 0.0), close_rad, speed_mps)
+            own_s = _own_tack_s(start, velocity_en, leg, wind_rad, side=side, limits=limits)
+            return None if own_s is None else NextTack(time_s + own_s, is_planned=False)
+        side = off_rad > 0.0
+        time_s += math.dist(start, end) / (vehicle.speed_mps if has_way else speed_mps)
+    return None
+
+
+def _own_tack_s(
+    here: PointEn, velocity_en: PointEn, leg: tuple[PointEn, PointEn], wind_rad: float, *, side: bool,
+    limits: AutopilotLimits,
+) -> float | None:
+    """Return when a boat that beats along a leg meets its corridor's edge or the layline [s]; ``side``: as off_rad."""
+    times = []
+    in_a_second = (here[0] + velocity_en[0], here[1] + velocity_en[1])
+    off_m = cross_track_m(here, *leg)
+    out_mps = cross_track_m(in_a_second, *leg) - off_m
+    if limits.sail_xtrack_max_m > 0.0 and abs(out_mps) > MIN_SPEED_MPS / 2.0:
+        times.append((math.copysign(limits.sail_xtrack_max_m, out_mps) - off_m) / out_mps)
+    # The course of the other tack that leads to the waypoint, and how soon the boat is on it.
+    other_rad = wind_rad + (limits.sail_no_go_angle_rad if side else -limits.sail_no_go_angle_rad)
+    layline = (moved(leg[1], other_rad, -1.0), leg[1])
+    gap_m = cross_track_m(here, *layline)
+    closing_mps = gap_m - cross_track_m(in_a_second, *layline)
+    if abs(closing_mps) > MIN_SPEED_MPS / 2.0:
+        times.append(gap_m / closing_mps)
+    ahead = [max(0.0, t) for t in times if t > -TACKING_S]
+    return min(ahead, default=None)

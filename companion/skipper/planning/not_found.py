@@ -7,17 +7,15 @@ from dataclasses import replace
 from companion.frozen import changed
 from companion.messages import Command, waypoint
 from companion.planner.settings import AUTO
-from companion.skipper.planning.admission import is_on_board_sound, is_sound, leads_there
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.track import of_way, steps
-from companion.skipper.planning.uploads import upload
+from companion.skipper.planning.uploads import is_on_board_sound, is_sound, leads_there, too_risky, upload
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step.actions import Severity
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import loiter_place
 from companion.skipper.step.state import PendingPlan, Phase
-from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import distance_m
-from companion.skipper.way.rejudged import too_risky
 from companion.skipper.way.stemming import waiting_place
 
 FOUL = "current too strong"   # the code under which it is said
@@ -27,142 +25,142 @@ MORE = 1.2             # ... and after each that was
 HOLD_ROOM = 2.0   # times the loiter's radius: she may lie here for hours, and a HOLD carries her off before help comes
 
 
-def asks_again(turn: Turn, pending: PendingPlan, reason: str) -> bool:
+def asks_again(ctx: StepContext, pending: PendingPlan, reason: str) -> bool:
     """Ask again, with less effort, of a planner that did not answer; False where the ladder is to be climbed.
 
     Want of a processor is no want of a way: it costs effort and time, neither margin nor promise, and what is on board
     and sound is sailed on meanwhile. The ladder is climbed where what is on board is not sound or meets a vessel, for a
     problem may be what the planner dies of; and for its first step where that is another planner.
     """
-    state = turn.state
-    turn.set(plans=changed(
-        turn.state.plans, unanswered=state.plans.unanswered + 1,
+    state = ctx.state
+    ctx.set(plans=changed(
+        ctx.state.plans, unanswered=state.plans.unanswered + 1,
         effort=max(LEAST_EFFORT, LESS * state.plans.effort)))
-    if turn.state.plans.unanswered < TRIES and request(
-            turn, pending.reason, from_index=pending.from_index, rung=pending.rung, text=reason):
-        turn.say(Severity.WARNING, "no answer", f"{reason}: asked again, with less effort", every_s=0.0)
+    if ctx.state.plans.unanswered < TRIES and request(
+            ctx, pending.reason, from_index=pending.from_index, rung=pending.rung, text=reason):
+        ctx.say(Severity.WARNING, "no answer", f"{reason}: asked again, with less effort", every_s=0.0)
         return True
-    turn.set(plans=changed(turn.state.plans, unanswered=0))
+    ctx.set(plans=changed(ctx.state.plans, unanswered=0))
     sails = state.voyage.sailing and state.mission.route is not None
-    if pending.rung == 0 and turn.config.planner.algorithm != AUTO.algorithm:
+    if pending.rung == 0 and ctx.config.planner.algorithm != AUTO.algorithm:
         return False
-    if sails and (meetings(turn) or not is_on_board_sound(turn)):
+    if sails and (meetings(ctx) or not is_on_board_sound(ctx)):
         return False
-    turn.set(plans=changed(turn.state.plans, retry=turn.failed(state.plans.retry), rung=0))
-    wait_s = turn.state.plans.retry.not_before_s - turn.t_s
+    ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(state.plans.retry), rung=0))
+    wait_s = ctx.state.plans.retry.not_before_s - ctx.t_s
     stays = "what is on board is sound and stays; " if sails else ""
-    turn.say(Severity.WARNING, "no answer", f"{reason}: {stays}asked again in {wait_s:.0f} s, with less effort",
+    ctx.say(Severity.WARNING, "no answer", f"{reason}: {stays}asked again in {wait_s:.0f} s, with less effort",
              every_s=0.0)
     return True
 
 
-def _keeps_floor(turn: Turn, pending: PendingPlan) -> bool:
+def _keeps_floor(ctx: StepContext, pending: PendingPlan) -> bool:
     """Return whether the track of what is left of the mission keeps the floor, within the prediction's own error."""
-    boat, vehicle, leg, ahead = turn.boat_en, turn.snapshot.vehicle, turn.leg(), turn.ahead()
+    boat, vehicle, leg, ahead = ctx.boat_en, ctx.snapshot.vehicle, ctx.leg(), ctx.ahead()
     if boat is None or vehicle is None or leg is None or not ahead:
         return True
     return of_way(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad, before_en=None,
                   sailed_m=distance_m(leg[0], boat)).is_within_error
 
 
-def _risk_of_old(turn: Turn, pending: PendingPlan) -> str:
+def _risk_of_old(ctx: StepContext, pending: PendingPlan) -> str:
     """Return what of the mission sailed now is a greater risk than is allowed, by today's knowledge; empty: nothing."""
-    boat, vehicle, ahead = turn.boat_en, turn.snapshot.vehicle, turn.ahead()
+    boat, vehicle, ahead = ctx.boat_en, ctx.snapshot.vehicle, ctx.ahead()
     if boat is None or vehicle is None or not ahead:
         return ""
     return too_risky(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad)
 
 
-def not_found(turn: Turn, pending: PendingPlan, reason: str) -> None:
+def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
     """Keep the old plan while it is sound, else take the next step of the ladder, at last hold."""
-    ladder = steps(turn)
-    state = turn.state
+    ladder = steps(ctx)
+    state = ctx.state
     where = ladder[min(pending.rung, len(ladder) - 1)].name or "as configured"
-    met = meetings(turn) if state.mission.route is not None else ()
+    met = meetings(ctx) if state.mission.route is not None else ()
     if (
-        (pending.rung == 0 or leads_there(turn, pending)) and state.mission.route is not None and not met
-        and is_on_board_sound(turn) and _keeps_floor(turn, pending) and not _risk_of_old(turn, pending)
+        (pending.rung == 0 or leads_there(ctx, pending)) and state.mission.route is not None and not met
+        and is_on_board_sound(ctx) and _keeps_floor(ctx, pending) and not _risk_of_old(ctx, pending)
     ):
-        turn.set(plans=changed(turn.state.plans, retry=turn.failed(state.plans.retry), rung=0))
-        turn.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
+        ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(state.plans.retry), rung=0))
+        ctx.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
         return
-    foul = _foul(turn, pending)
+    foul = _foul(ctx, pending)
     if foul:
-        _wait_against(turn, pending, foul, count=len(ladder))
+        _wait_against(ctx, pending, foul, count=len(ladder))
         return
     # Only the boat's own place helps when the way from a waypoint ahead is closed: the rungs start at the boat.
-    keeps = pending.rung == 0 and state.mission.route is not None and _tail_only(turn)
+    keeps = pending.rung == 0 and state.mission.route is not None and _tail_only(ctx)
     from_index = pending.from_index if keeps else None
     if pending.rung + 1 < len(ladder):
         following = ladder[pending.rung + 1].name
         text = f"no plan {where} ({reason}): trying {following}"
-        turn.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
-        if request(turn, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
+        ctx.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
+        if request(ctx, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
             return
-    turn.set(plans=changed(turn.state.plans, retry=turn.failed(state.plans.retry), rung=0))
-    risk = _risk_of_old(turn, pending)
-    if risk and state.mission.route is not None and not met and is_on_board_sound(turn) and _keeps_floor(turn, pending):
-        turn.say(Severity.WARNING, "no plan",
+    ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(state.plans.retry), rung=0))
+    risk = _risk_of_old(ctx, pending)
+    if risk and state.mission.route is not None and not met and is_on_board_sound(ctx) and _keeps_floor(ctx, pending):
+        ctx.say(Severity.WARNING, "no plan",
                  f"no plan on any step of the ladder ({reason}): the old one stays; {risk}", every_s=0.0)
         return
-    if met and is_on_board_sound(turn):
+    if met and is_on_board_sound(ctx):
         # Loitering in a vessel's way is no better than sailing on through it: the operator must know.
-        turn.say(
+        ctx.say(
             Severity.CRITICAL, "no way clear",
             f"no plan keeps clear of {met[0].name}, met in {met[0].time_s:.0f} s: the old plan stays", every_s=0.0)
         return
-    wait = turn.state.plans.retry.not_before_s - turn.t_s
-    turn.say(
+    wait = ctx.state.plans.retry.not_before_s - ctx.t_s
+    ctx.say(
         Severity.CRITICAL, "no plan at all",
         f"no plan on any step of the ladder ({reason}): holding, trying again in {wait:.0f} s", every_s=0.0)
-    hold(turn, f"no plan found: {reason}")
+    hold(ctx, f"no plan found: {reason}")
 
 
-def _foul(turn: Turn, pending: PendingPlan) -> str:
+def _foul(ctx: StepContext, pending: PendingPlan) -> str:
     """Return why the current keeps her from where the plan leads, empty: it does not."""
-    water = turn.water
+    water = ctx.water
     return "" if water is None else water.trouble(pending.start_en_m, pending.problem.goal_en)
 
 
-def _wait_against(turn: Turn, pending: PendingPlan, foul: str, *, count: int) -> None:
+def _wait_against(ctx: StepContext, pending: PendingPlan, foul: str, *, count: int) -> None:
     """Wait for a weaker current: here where she is carried clear, else where she will be (the ladder's last step).
 
     No margin and no promise given up makes way against a current: the steps between are left out.
     """
-    water, boat = turn.water, turn.boat_en
-    floor_m = min(turn.config.margin_floor_m, turn.config.margin_m)
-    place = None if water is None or boat is None else waiting_place(water, turn.voyage.area, boat, floor_m)
+    water, boat = ctx.water, ctx.boat_en
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
+    place = None if water is None or boat is None else waiting_place(water, ctx.voyage.area, boat, floor_m)
     is_here = place is None or place == boat
     where = "first to water where she is carried clear" if not is_here else "waiting against it"
     if place is None:
         where = f"nowhere near is she carried clear, {where}"
-    turn.say(Severity.CRITICAL, FOUL, f"{foul}: {where}")
+    ctx.say(Severity.CRITICAL, FOUL, f"{foul}: {where}")
     if not is_here and pending.rung + 1 < count and request(
-            turn, pending.reason, rung=count - 1, text=foul):
+            ctx, pending.reason, rung=count - 1, text=foul):
         return
-    turn.set(plans=changed(turn.state.plans, retry=turn.failed(turn.state.plans.retry), rung=0))
-    hold(turn, foul)
+    ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(ctx.state.plans.retry), rung=0))
+    hold(ctx, foul)
 
 
-def _tail_only(turn: Turn) -> bool:
+def _tail_only(ctx: StepContext) -> bool:
     """Return whether the way to the present target is sound by itself, so that only the tail needs a plan."""
-    boat, leg = turn.boat_en, turn.leg()
-    return boat is not None and leg is not None and is_sound(turn, [boat, leg[1]])
+    boat, leg = ctx.boat_en, ctx.leg()
+    return boat is not None and leg is not None and is_sound(ctx, [boat, leg[1]])
 
 
-def hold(turn: Turn, why: str, *, anew: bool = False) -> None:
+def hold(ctx: StepContext, why: str, *, anew: bool = False) -> None:
     """Loiter in the roomiest place near by, in a mission that ends there at once; ``anew``: out of another loiter."""
-    boat, wind, state = turn.boat_en, turn.wind_mean, turn.state
-    turn.phase(Phase.HOLDING if state.voyage.sailing else Phase.WAITING, f"waiting for a plan: {why}")
+    boat, wind, state = ctx.boat_en, ctx.wind_mean, ctx.state
+    ctx.phase(Phase.HOLDING if state.voyage.sailing else Phase.WAITING, f"waiting for a plan: {why}")
     if boat is None or not state.voyage.sailing or state.mission.route is None:
         return   # not under way
     if state.mission.index >= len(state.mission.route.items) - 1 and not anew:
         return   # already in the safe end of the mission
-    config = turn.known_config
+    config = ctx.known_config
     place, room = loiter_place(
-        turn.voyage, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m)
+        ctx.voyage, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m)
     keep = state.mission.index
-    end = waypoint(turn.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
+    end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
     route = replace(
         state.mission.route, items=(*state.mission.route.items[:keep], end),
         points_en_m=(*state.mission.route.points_en_m[:keep], place),
@@ -171,4 +169,4 @@ def hold(turn: Turn, why: str, *, anew: bool = False) -> None:
         rung="hold", risk=None, cost_s=None, median_s=None, late_s=None,
         bound_for="", why=f"{why}; loitering with {room:.0f} m of room",
     )
-    upload(turn, route, keep + 1, route.why)
+    upload(ctx, route, keep + 1, route.why)

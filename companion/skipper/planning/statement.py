@@ -13,10 +13,12 @@ from typing import Any
 
 import numpy as np
 import shapely
+from pyproj import Geod
 from shapely.geometry import LineString, Polygon
 
 from companion.current import STILL_WATER, WaterCurrent, WindAngleUncertainty, forecast_over_water
 from companion.geo.angles import difference_rad, wrap_two_pi
+from companion.geo.frame import LocalFrame
 from companion.messages import WindForecast
 from companion.planner.problem import strength_dict
 from companion.skipper.step.config import SkipperConfig
@@ -24,7 +26,6 @@ from companion.skipper.step.wind_limits import strength_of
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.judge import half_width_rad, mean_twd_rad
-from companion.skipper.way.passage import along, leg_line
 from companion.skipper.way.voyage import PointEn, Voyage
 
 # The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
@@ -34,6 +35,8 @@ REPAIR_DIRECTIONS = 24
 NOTCH = 2.0     # radius of the notch as a multiple of what the start lacks: room to turn out of it
 LEG_SAVING = 8e-5   # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
 HAIR_M = 0.2    # a repaired point stands this far clear of the margin it was repaired for
+PIECE_M = 2000.0   # a geodesic is off a chord of this length by 8 cm at most, at 75 degrees of latitude too
+_EARTH = Geod(ellps="WGS84")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -275,3 +278,36 @@ def _notched(
             here = shapely.points(start.en_m)
             fence = shapely.to_wkt(min(pieces, key=lambda p: (float(p.distance(here)), -p.area)), rounding_precision=4)
     return open_obstacles, fence
+
+
+# -------- A leg of a passage: the line between two global waypoints that are farther apart than any frame is flat.
+# The line is the geodesic between them, the same one in every frame. Büsser 2009, section 4.2: a bandwidth bounds the
+# way about it, and the local plan covers the next miles of it only.
+
+
+def leg_line(frame: LocalFrame, from_en: PointEn, to_en: PointEn, near_en: PointEn, reach_m: float) -> LineString:
+    """Return what of the leg lies within ``reach_m`` along it of the place that is nearest to ``near_en``.
+
+    It is cut into pieces of ``PIECE_M``; both ends of the leg are in it where they are near enough.
+    """
+    a, b, here = (frame.geo_from_en(*en) for en in (from_en, to_en, near_en))
+    azimuth_deg, _, length_m = _EARTH.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)
+    to_here_deg, _, far_m = _EARTH.inv(a.lon_deg, a.lat_deg, here.lon_deg, here.lat_deg)
+    along_m = min(max(far_m * float(np.cos(np.radians(to_here_deg - azimuth_deg))), 0.0), length_m)
+    begin_m, end_m = max(0.0, along_m - reach_m), min(length_m, along_m + reach_m)
+    if length_m < 1.0 or end_m - begin_m < 1.0:
+        return LineString([from_en, to_en])
+    stations_m = np.linspace(begin_m, end_m, max(2, 1 + int(np.ceil((end_m - begin_m) / PIECE_M))))
+    count = len(stations_m)
+    lon_deg, lat_deg, _ = _EARTH.fwd(
+        np.full(count, a.lon_deg), np.full(count, a.lat_deg), np.full(count, azimuth_deg), stations_m)
+    return LineString(frame.array_en_from_lonlat(np.column_stack([lon_deg, lat_deg])))
+
+
+def along(line: LineString, near_en: PointEn, ahead_m: float, aside_m: float = 0.0) -> PointEn:
+    """Return the place ``ahead_m`` along the line from where it is nearest to ``near_en``, ``aside_m`` to its right."""
+    at_m = float(line.project(shapely.points(near_en))) + ahead_m
+    place, before = line.interpolate(at_m), line.interpolate(max(0.0, at_m - 1.0))
+    east, north = place.x - before.x, place.y - before.y
+    length = max(distance_m((0.0, 0.0), (east, north)), 1e-9)
+    return float(place.x + aside_m * north / length), float(place.y - aside_m * east / length)

@@ -15,7 +15,7 @@ from companion.planner import Problem
 from companion.planner.track import ExpectedTrack, expected
 from companion.skipper.planning.ladder import Rung, rungs
 from companion.skipper.planning.statement import Start
-from companion.skipper.step.turn import Turn
+from companion.skipper.step.context import StepContext
 from companion.skipper.way.voyage import PointEn
 
 # What a straight leg's track may need, in steps: water that is grown by a margin is kept, and made before sailing.
@@ -23,42 +23,42 @@ TRACKS_M = (2.0, 2.5, 4.0, 8.0)
 
 
 def problem_tracking(
-    turn: Turn, start: Start, from_index: int | None, *, floor_m: float, forecast: WindForecast,
+    ctx: StepContext, start: Start, from_index: int | None, *, floor_m: float, forecast: WindForecast,
 ) -> dict[str, Any]:
     """Return the ``tracking`` of a problem: the autopilot's parameters, the hull, and what is solid as it is."""
-    limits, area, route = turn.snapshot.limits, turn.voyage.area, turn.state.mission.route
-    helm = GuidanceModel.of(limits or AutopilotLimits(sail_xtrack_max_m=turn.tack_corridor_m))
+    limits, area, route = ctx.snapshot.limits, ctx.voyage.area, ctx.state.mission.route
+    helm = GuidanceModel.of(limits or AutopilotLimits(sail_xtrack_max_m=ctx.tack_corridor_m))
     before = None
     if from_index is not None and route is not None:
         before = route.leg_from_en_m[from_index]
     elif start.lead_in:
-        before = turn.boat_en
+        before = ctx.boat_en
     return {
         "wp_radius_m": helm.wp_radius_m, "turn_radius_m": helm.turn_radius_m, "wp_speed_mps": helm.wp_speed_mps,
         "accel_mps2": helm.accel_mps2, "jerk_mps3": helm.jerk_mps3, "corridor_m": helm.corridor_m,
-        "no_go_half_deg": float(np.degrees(turn.no_go_half_rad)),
-        "floor_m": floor_m, "reach_m": turn.voyage.boat.hull.reach_m,
+        "no_go_half_deg": float(np.degrees(ctx.no_go_half_rad)),
+        "floor_m": floor_m, "reach_m": ctx.voyage.boat.hull.reach_m,
         "solids": area.obstacles_wkt(0.0), "limits": area.fence_wkt(0.0, start.en_m),
         "before": None if before is None else {"x": before[0], "y": before[1]},
-        "correlation_s": forecast.correlation_time_s, "known": _is_known(turn),
+        "correlation_s": forecast.correlation_time_s, "known": _is_known(ctx),
     }
 
 
-def steps(turn: Turn) -> tuple[Rung, ...]:
+def steps(ctx: StepContext) -> tuple[Rung, ...]:
     """Return the ladder: its margins end where the floor is what is left beside a straight leg's track."""
-    wind, in_current = turn.wind_mean, turn.snapshot.current.is_significant
+    wind, in_current = ctx.wind_mean, ctx.snapshot.current.is_significant
     if wind is None:
-        return rungs(turn.config, in_current=in_current)
-    best = turn.voyage.boat.polar.max_speed_mps(wind[1])
-    error_m = stated_error_m(best, has_short=not _is_known(turn))
-    track_m = error_m + turn.voyage.boat.hull.reach_m
+        return rungs(ctx.config, in_current=in_current)
+    best = ctx.voyage.boat.polar.max_speed_mps(wind[1])
+    error_m = stated_error_m(best, has_short=not _is_known(ctx))
+    track_m = error_m + ctx.voyage.boat.hull.reach_m
     return rungs(
-        turn.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m), in_current=in_current)
+        ctx.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m), in_current=in_current)
 
 
-def _is_known(turn: Turn) -> bool:
+def _is_known(ctx: StepContext) -> bool:
     """Return whether the parameters that shape the track were read."""
-    limits = turn.snapshot.limits
+    limits = ctx.snapshot.limits
     return limits is not None and limits.wp_speed_mps is not None
 
 

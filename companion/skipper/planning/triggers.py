@@ -10,15 +10,15 @@ from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
-from companion.skipper.planning.errands import HOME, errand, homeward, is_composed
+from companion.skipper.planning.diversions import HOME, diversion, homeward, is_composed
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
 from companion.skipper.step.actions import ReplanReason, Severity
 from companion.skipper.step.config import Guidance, ReplanPolicy
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import NO_PLAN, path_length_m
-from companion.skipper.step.route import Errand, Kind, Route
+from companion.skipper.step.route import Diversion, Kind, Route
 from companion.skipper.step.state import Phase
-from companion.skipper.step.turn import Turn
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import half_width_rad, predicted_beat
@@ -50,14 +50,14 @@ class Trigger:
     urgent: bool = False
 
 
-def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
+def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
     """Return the most pressing reason to plan again, None when there is none."""
-    state, config = turn.state, turn.config
-    if turn.boat_en is None or turn.snapshot.wind.forecast is None or turn.is_raised("becalmed"):
+    state, config = ctx.state, ctx.config
+    if ctx.boat_en is None or ctx.snapshot.wind.forecast is None or ctx.is_raised("becalmed"):
         return None
-    if turn.snapshot.unsure:
+    if ctx.snapshot.unsure:
         return None
-    bound, route = errand(turn), turn.state.mission.route
+    bound, route = diversion(ctx), ctx.state.mission.route
     if state.voyage.over if bound is None else not bound.has_place:
         return None
     if state.operator.is_back:
@@ -66,32 +66,32 @@ def find_trigger(turn: Turn, fresh: tuple[str, ...]) -> Trigger | None:
         return Trigger(reason=ReplanReason.OPERATOR_BACK, text=text)
     if route is not None and route.plan_id == NO_PLAN:
         # It need not lead to our goals: nothing is planned but another way, and that as soon as the wind is known.
-        if turn.snapshot.wind.record_s < config.wind_settle_s:
+        if ctx.snapshot.wind.record_s < config.wind_settle_s:
             return None
         return Trigger(reason=ReplanReason.MISMATCH, text="the mission on board is of no plan that is known",
                        interval_s=config.min_replan_interval_s)
-    changed = _errand(turn, bound)
+    changed = _diversion(ctx, bound)
     if changed is not None:
         return changed
     if state.plans.asked:
         return Trigger(reason=ReplanReason.ORDER, text=state.plans.asked)
     if state.progress.missed_s is not None and bound is None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
-    boat = turn.boat_en
-    if turn.drawn is not None and turn.drawn.cuts([boat, *turn.ahead()]):
-        return Trigger(reason=ReplanReason.OBSTACLE, text=f"{turn.drawn.words} cuts the way", urgent=True,
+    boat = ctx.boat_en
+    if ctx.drawn is not None and ctx.drawn.cuts([boat, *ctx.ahead()]):
+        return Trigger(reason=ReplanReason.OBSTACLE, text=f"{ctx.drawn.words} cuts the way", urgent=True,
                        interval_s=config.no_go_replan_interval_s)
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
-    if turn.guidance is Guidance.FIELD and turn.steers:
-        if is_composed(turn) and route is not None and turn.state.progress.gate in route.gate_of:
+    if ctx.guidance is Guidance.FIELD and ctx.steers:
+        if is_composed(ctx) and route is not None and ctx.state.progress.gate in route.gate_of:
             return None   # what is on board leads to the goal's place: that is where she goes when she is not steered
-        return _at_end(turn) or _extension(turn, bound)   # the mission on board need not be the way that is sailed
-    trigger = _traffic(turn)
-    if trigger is None and not turn.is_raised("wind untrusted"):
-        trigger = _no_go(turn)
-    trigger = trigger or _position(turn)
-    return trigger or _extension(turn, bound) or _wind(turn) or _unsure(turn) or _waypoint(turn)
+        return _at_end(ctx) or _extension(ctx, bound)   # the mission on board need not be the way that is sailed
+    trigger = _traffic(ctx)
+    if trigger is None and not ctx.is_raised("wind untrusted"):
+        trigger = _no_go(ctx)
+    trigger = trigger or _position(ctx)
+    return trigger or _extension(ctx, bound) or _wind(ctx) or _unsure(ctx) or _waypoint(ctx)
 
 
 REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST,
@@ -100,112 +100,112 @@ REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.
            Kind.FIELD: ReplanReason.RETRY}
 
 
-def _errand(turn: Turn, bound: Errand | None) -> Trigger | None:
-    """She is bound for somewhere else than her route leads to: an errand that begins, or one that is over."""
-    route = turn.state.mission.route
+def _diversion(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
+    """She is bound for somewhere else than her route leads to: a diversion that begins, or one that is over."""
+    route = ctx.state.mission.route
     leads_to = route.bound_for if route is not None else ""
-    is_first = turn.state.plans.retry.failures == 0   # then the wait between two tries counts
-    interval_s = 0.0 if is_first else turn.config.min_replan_interval_s
+    is_first = ctx.state.plans.retry.failures == 0   # then the wait between two tries counts
+    interval_s = 0.0 if is_first else ctx.config.min_replan_interval_s
     if bound is not None and leads_to != bound.name:
         return Trigger(reason=REASONS[bound.kind], text=bound.sentence, urgent=is_first, interval_s=interval_s)
-    is_home = leads_to == HOME and homeward(turn) is not None
-    if bound is None and leads_to and not is_home and not turn.state.voyage.over:
+    is_home = leads_to == HOME and homeward(ctx) is not None
+    if bound is None and leads_to and not is_home and not ctx.state.voyage.over:
         return Trigger(reason=ReplanReason.NEXT_GOAL, text=f"no longer bound for {leads_to}: sailing on",
                        urgent=is_first, interval_s=interval_s)
     return None
 
 
-def _traffic(turn: Turn) -> Trigger | None:
+def _traffic(ctx: StepContext) -> Trigger | None:
     """The route meets another vessel (Büsser 5.2: planned again at most every 20 s)."""
-    met = meetings(turn)
+    met = meetings(ctx)
     if not met:
         return None
     first = met[0]
     text = f"{first.name}: in {first.time_s:.0f} s {first.depth_m:.0f} m inside the distance to keep"
-    turn.say(Severity.WARNING, "traffic", text)
-    since_s = turn.t_s - turn.state.plans.last_s
-    interval_s = max(MIN_INTERVAL_S, turn.config.min_replan_interval_s)
+    ctx.say(Severity.WARNING, "traffic", text)
+    since_s = ctx.t_s - ctx.state.plans.last_s
+    interval_s = max(MIN_INTERVAL_S, ctx.config.min_replan_interval_s)
     if since_s < interval_s or decide(met, since_replan_s=since_s, urgent_s=0.0) is not Decision.REPLAN:
         return None
     return Trigger(reason=ReplanReason.OBSTACLE, text=text, interval_s=interval_s, urgent=True)
 
 
-def board_end(turn: Turn, leg: tuple[PointEn, PointEn]) -> PointEn:
+def board_end(ctx: StepContext, leg: tuple[PointEn, PointEn]) -> PointEn:
     """Return where she turns next: a board is a chain of short legs where the zone that it keeps out of grows."""
     course, before, end = bearing_rad(*leg), *leg
-    for point in turn.ahead()[1:]:
+    for point in ctx.ahead()[1:]:
         before, end = end, point
         if distance_m(before, end) > 1e-6 and abs(difference_rad(course, bearing_rad(before, end))) > BENDS_RAD:
             return before
     return end
 
 
-def _no_go(turn: Turn) -> Trigger | None:
+def _no_go(ctx: StepContext) -> Trigger | None:
     """The present wind has closed the leg: the autopilot will beat in its corridor. How far, and is that clear?"""
-    boat, leg, wind, vehicle = turn.boat_en, turn.leg(), turn.wind_now, turn.snapshot.vehicle
-    if boat is None or leg is None or wind is None or vehicle is None or not turn.ahead():
-        turn.set(plans=changed(turn.state.plans, no_go_since_s=None))
+    boat, leg, wind, vehicle = ctx.boat_en, ctx.leg(), ctx.wind_now, ctx.snapshot.vehicle
+    if boat is None or leg is None or wind is None or vehicle is None or not ctx.ahead():
+        ctx.set(plans=changed(ctx.state.plans, no_go_since_s=None))
         return None
-    target = board_end(turn, leg)
+    target = board_end(ctx, leg)
     twa = abs(difference_rad(wind[0], bearing_rad(boat, target)))
-    is_near = distance_m(boat, target) < turn.config.announce_m + turn.speed_mps
-    if twa >= turn.no_go_half_rad or is_near or is_left_to_beat(turn, *leg):
-        turn.set(plans=changed(turn.state.plans, no_go_since_s=None))
+    is_near = distance_m(boat, target) < ctx.config.announce_m + ctx.speed_mps
+    if twa >= ctx.no_go_half_rad or is_near or is_left_to_beat(ctx, *leg):
+        ctx.set(plans=changed(ctx.state.plans, no_go_since_s=None))
         return None
-    since = turn.state.plans.no_go_since_s if turn.state.plans.no_go_since_s is not None else turn.t_s
-    turn.set(plans=changed(turn.state.plans, no_go_since_s=since))
+    since = ctx.state.plans.no_go_since_s if ctx.state.plans.no_go_since_s is not None else ctx.t_s
+    ctx.set(plans=changed(ctx.state.plans, no_go_since_s=since))
     drift = predicted_beat(
-        boat, vehicle.heading_rad, leg[0], target, twd_from_rad=wind[0], no_go_half_rad=turn.no_go_half_rad,
-        corridor_m=turn.tack_corridor_m, area=turn.voyage.area, current_en_mps=turn.current_en_mps,
-        speed_mps=turn.voyage.boat.polar.speed_mps(turn.no_go_half_rad, wind[1]))
-    floor = min(turn.config.margin_floor_m, turn.config.margin_m)
-    straight = turn.voyage.area.path_clearance_m([boat, target])
-    text = (f"TWA {math.degrees(twa):.0f}° to the waypoint is inside {math.degrees(turn.no_go_half_rad):.0f}°: "
+        boat, vehicle.heading_rad, leg[0], target, twd_from_rad=wind[0], no_go_half_rad=ctx.no_go_half_rad,
+        corridor_m=ctx.tack_corridor_m, area=ctx.voyage.area, current_en_mps=ctx.current_en_mps,
+        speed_mps=ctx.voyage.boat.polar.speed_mps(ctx.no_go_half_rad, wind[1]))
+    floor = min(ctx.config.margin_floor_m, ctx.config.margin_m)
+    straight = ctx.voyage.area.path_clearance_m([boat, target])
+    text = (f"TWA {math.degrees(twa):.0f}° to the waypoint is inside {math.degrees(ctx.no_go_half_rad):.0f}°: "
             f"{drift.off_leg_m:.0f} m off the leg, {drift.clearance_m:.0f} m clear")
-    if drift.clearance_m < floor and drift.clearance_m < straight - 1.0 and turn.t_s - since >= 1.0:
-        interval_s = turn.config.no_go_replan_interval_s
+    if drift.clearance_m < floor and drift.clearance_m < straight - 1.0 and ctx.t_s - since >= 1.0:
+        interval_s = ctx.config.no_go_replan_interval_s
         return Trigger(reason=ReplanReason.NO_GO, text=text, interval_s=interval_s, urgent=True)
-    if drift.off_leg_m > turn.config.no_go_off_leg_m and turn.t_s - since >= turn.config.no_go_patience_s:
-        return Trigger(reason=ReplanReason.NO_GO, text=text, interval_s=turn.config.min_replan_interval_s)
+    if drift.off_leg_m > ctx.config.no_go_off_leg_m and ctx.t_s - since >= ctx.config.no_go_patience_s:
+        return Trigger(reason=ReplanReason.NO_GO, text=text, interval_s=ctx.config.min_replan_interval_s)
     return None
 
 
-def _position(turn: Turn) -> Trigger | None:
+def _position(ctx: StepContext) -> Trigger | None:
     """The boat is not where the plan has it, or is nowhere on it."""
-    if turn.state.position.doubt is not None:   # with a position all the same: see Turn.plans_in_doubt
+    if ctx.state.position.doubt is not None:   # with a position all the same: see StepContext.plans_in_doubt
         return Trigger(reason=ReplanReason.OFF_LEG, text="the position jumped, and the way from there is not clear",
-                       interval_s=turn.config.no_go_replan_interval_s, urgent=True)
-    if turn.is_raised("off the corridor"):
-        return Trigger(reason=ReplanReason.OFF_LEG, text="off the leg", interval_s=_patience_off_leg_s(turn))
-    if turn.is_raised("no progress"):
+                       interval_s=ctx.config.no_go_replan_interval_s, urgent=True)
+    if ctx.is_raised("off the corridor"):
+        return Trigger(reason=ReplanReason.OFF_LEG, text="off the leg", interval_s=_patience_off_leg_s(ctx))
+    if ctx.is_raised("no progress"):
         return Trigger(reason=ReplanReason.NO_PROGRESS, text="no progress", interval_s=120.0)
-    return _at_end(turn)
+    return _at_end(ctx)
 
 
-def _at_end(turn: Turn) -> Trigger | None:
+def _at_end(ctx: StepContext) -> Trigger | None:
     """The mission on board is at its end and goals remain."""
-    if errand(turn) is not None or turn.state.voyage.over:
+    if diversion(ctx) is not None or ctx.state.voyage.over:
         return None
-    if turn.is_raised("mission ended") or not turn.ahead():
-        reason = ReplanReason.RETRY if turn.state.phase is Phase.HOLDING else ReplanReason.NEXT_GOAL
-        return Trigger(reason=reason, text="at the end of the mission with goals left", interval_s=turn.config.settle_s)
+    if ctx.is_raised("mission ended") or not ctx.ahead():
+        reason = ReplanReason.RETRY if ctx.state.phase is Phase.HOLDING else ReplanReason.NEXT_GOAL
+        return Trigger(reason=reason, text="at the end of the mission with goals left", interval_s=ctx.config.settle_s)
     return None
 
 
-def _patience_off_leg_s(turn: Turn) -> float:
+def _patience_off_leg_s(ctx: StepContext) -> float:
     """Return how long after the last plan the next may be made; less when something stands before the waypoint."""
-    boat, leg, config = turn.boat_en, turn.leg(), turn.config
+    boat, leg, config = ctx.boat_en, ctx.leg(), ctx.config
     blocked = boat is not None and leg is not None and (
-        turn.voyage.area.path_clearance_m([boat, leg[1]]) < config.margin_floor_m)
+        ctx.voyage.area.path_clearance_m([boat, leg[1]]) < config.margin_floor_m)
     if blocked:
         return config.no_go_replan_interval_s
     return config.min_replan_interval_s
 
 
-def _wind(turn: Turn) -> Trigger | None:
+def _wind(ctx: StepContext) -> Trigger | None:
     """Büsser's 20° against the wind that the plan used, outside the interval that it allowed for; and 60 minutes."""
-    route, mean, config = turn.state.mission.route, turn.wind_mean, turn.config
-    if route is None or mean is None or turn.is_raised("wind untrusted"):
+    route, mean, config = ctx.state.mission.route, ctx.wind_mean, ctx.config
+    if route is None or mean is None or ctx.is_raised("wind untrusted"):
         return None
     turned = abs(difference_rad(mean[0], route.plan_twd_from_rad))
     if turned > config.wind_change_rad and turned > route.plan_half_width_rad:
@@ -213,23 +213,23 @@ def _wind(turn: Turn) -> Trigger | None:
                 f"±{math.degrees(route.plan_half_width_rad):.0f}°")
         return Trigger(reason=ReplanReason.WIND_SHIFT, text=text, interval_s=config.min_replan_interval_s)
     planned = route.plan_current_east_mps, route.plan_current_north_mps
-    changed_mps = distance_m(turn.current_en_mps, planned)
+    changed_mps = distance_m(ctx.current_en_mps, planned)
     if changed_mps > max(CURRENT_MPS, CURRENT_SHARE * math.hypot(*planned)):
-        text = f"{turn.snapshot.current.sentence()}: {changed_mps:.2f} m/s off the plan's"
+        text = f"{ctx.snapshot.current.sentence()}: {changed_mps:.2f} m/s off the plan's"
         return Trigger(reason=ReplanReason.CURRENT, text=text, interval_s=max(
             CURRENT_INTERVAL_S, config.min_replan_interval_s))
-    if turn.t_s - route.plan_t_s > config.plan_age_s:
+    if ctx.t_s - route.plan_t_s > config.plan_age_s:
         return Trigger(
             reason=ReplanReason.PLAN_AGE, text="the plan is 60 minutes old", interval_s=config.min_replan_interval_s)
     return None
 
 
-def _unsure(turn: Turn) -> Trigger | None:
+def _unsure(ctx: StepContext) -> Trigger | None:
     """The wind has become less certain than the plan allowed for; that it became more so can wait for a waypoint."""
-    route, config = turn.state.mission.route, turn.config
-    if route is None or config.replan_policy is not ReplanPolicy.FORECAST or turn.is_raised("wind untrusted"):
+    route, config = ctx.state.mission.route, ctx.config
+    if route is None or config.replan_policy is not ReplanPolicy.FORECAST or ctx.is_raised("wind untrusted"):
         return None
-    width_rad = _width_rad(turn)
+    width_rad = _width_rad(ctx)
     if not _is_wider(width_rad, route.plan_half_width_rad):
         return None
     text = (f"the wind has become less certain: ±{math.degrees(width_rad):.0f}°, the plan allowed for "
@@ -237,9 +237,9 @@ def _unsure(turn: Turn) -> Trigger | None:
     return Trigger(reason=ReplanReason.FORECAST, text=text, interval_s=config.min_replan_interval_s)
 
 
-def _width_rad(turn: Turn) -> float:
+def _width_rad(ctx: StepContext) -> float:
     """Return the half width now of the interval that a plan remembers."""
-    return half_width_rad(turn.snapshot.wind.forecast, WIDTH_AHEAD_S, turn.config.wind_change_level)
+    return half_width_rad(ctx.snapshot.wind.forecast, WIDTH_AHEAD_S, ctx.config.wind_change_level)
 
 
 def _is_wider(now_rad: float, then_rad: float) -> bool:
@@ -247,52 +247,52 @@ def _is_wider(now_rad: float, then_rad: float) -> bool:
     return then_rad > 0.0 and now_rad > max(FORECAST_WIDTH * then_rad, then_rad + FORECAST_WIDTH_RAD)
 
 
-def _extension(turn: Turn, bound: Errand | None) -> Trigger | None:
-    """The mission ends soon and goals remain, or the rest of an errand's way: plan on from its last waypoint."""
-    route, boat, last = turn.state.mission.route, turn.boat_en, turn.last_waypoint()
-    if route is None or boat is None or last < turn.state.mission.index:
+def _extension(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
+    """The mission ends soon and goals remain, or the rest of a diversion's way: plan on from its last waypoint."""
+    route, boat, last = ctx.state.mission.route, ctx.boat_en, ctx.last_waypoint()
+    if route is None or boat is None or last < ctx.state.mission.index:
         return None
     ends = route.gate_of[last]
     if bound is not None or route.bound_for == HOME:
-        bound = bound or homeward(turn)
-        if bound is None or distance_m(route.points_en_m[last], bound.en_m) <= bound.radius_m + turn.config.announce_m:
+        bound = bound or homeward(ctx)
+        if bound is None or distance_m(route.points_en_m[last], bound.en_m) <= bound.radius_m + ctx.config.announce_m:
             return None
-    elif ends >= len(turn.gates) - 1 and homeward(turn) is None:
+    elif ends >= len(ctx.gates) - 1 and homeward(ctx) is None:
         return None
-    elif 0 <= ends < len(turn.gates) - 1 and waits_for_gun(turn, turn.gates[ends + 1]):
+    elif 0 <= ends < len(ctx.gates) - 1 and waits_for_gun(ctx, ctx.gates[ends + 1]):
         return None   # where she waits is planned for when it is next
-    left = path_length_m([boat, *turn.ahead()])
-    if left > (turn.config.look_ahead_s + turn.late_s) * max(turn.speed_mps, 1.0) or not may_restart_leg(turn):
+    left = path_length_m([boat, *ctx.ahead()])
+    if left > (ctx.config.look_ahead_s + ctx.late_s) * max(ctx.speed_mps, 1.0) or not may_restart_leg(ctx):
         return None
     return Trigger(
         reason=ReplanReason.NEXT_GOAL, text=f"the mission reaches {left:.0f} m ahead, there is more to sail",
         from_index=last,
-        interval_s=turn.config.settle_s)
+        interval_s=ctx.config.settle_s)
 
 
-def _waypoint(turn: Turn) -> Trigger | None:
+def _waypoint(ctx: StepContext) -> Trigger | None:
     """Wolsieffer's rule: near a waypoint, plan again from it with the wind measured since."""
-    state, route, boat, leg = turn.state, turn.state.mission.route, turn.boat_en, turn.leg()
+    state, route, boat, leg = ctx.state, ctx.state.mission.route, ctx.boat_en, ctx.leg()
     if route is None or boat is None or leg is None or state.plans.replanned_index >= state.mission.index:
         return None
-    last = turn.last_waypoint()
+    last = ctx.last_waypoint()
     passes = any(g >= 0 for g in route.gate_of[state.mission.index:last])
-    if state.mission.index >= last or passes or is_buoy(turn.gate):
+    if state.mission.index >= last or passes or is_buoy(ctx.gate):
         return None   # the tail to the next goal is there already: see _extension
-    left_s = distance_m(boat, leg[1]) / max(turn.speed_mps, 0.3)
-    if not TOO_LATE_S + turn.late_s < left_s <= turn.config.lead_s + turn.late_s or turn.is_raised("wind untrusted"):
+    left_s = distance_m(boat, leg[1]) / max(ctx.speed_mps, 0.3)
+    if not TOO_LATE_S + ctx.late_s < left_s <= ctx.config.lead_s + ctx.late_s or ctx.is_raised("wind untrusted"):
         return None
-    if not may_restart_leg(turn):
+    if not may_restart_leg(ctx):
         return None
-    if _is_bend(route, state.mission.index) and turn.t_s - state.plans.last_s < BEND_PLAN_AGE_S:
+    if _is_bend(route, state.mission.index) and ctx.t_s - state.plans.last_s < BEND_PLAN_AGE_S:
         return None
-    if turn.config.replan_policy is ReplanPolicy.FORECAST and not forecast_matters(turn):
-        turn.set(plans=changed(turn.state.plans, replanned_index=state.mission.index))
+    if ctx.config.replan_policy is ReplanPolicy.FORECAST and not forecast_matters(ctx):
+        ctx.set(plans=changed(ctx.state.plans, replanned_index=state.mission.index))
         return None
-    reason = (ReplanReason.WAYPOINT if turn.config.replan_policy is ReplanPolicy.WAYPOINT else ReplanReason.FORECAST)
+    reason = (ReplanReason.WAYPOINT if ctx.config.replan_policy is ReplanPolicy.WAYPOINT else ReplanReason.FORECAST)
     return Trigger(
         reason=reason, text=f"waypoint {state.mission.index + 1} in {left_s:.0f} s", from_index=state.mission.index,
-        interval_s=turn.config.min_replan_interval_s)
+        interval_s=ctx.config.min_replan_interval_s)
 
 
 def _is_bend(route: Route, index: int) -> bool:
@@ -304,15 +304,15 @@ def _is_bend(route: Route, index: int) -> bool:
     return abs(difference_rad(after, before)) < BEND_RAD
 
 
-def forecast_matters(turn: Turn) -> bool:
+def forecast_matters(ctx: StepContext) -> bool:
     """Return whether the wind, or its uncertainty, has changed enough against the plan's to be worth an upload."""
-    route, mean = turn.state.mission.route, turn.wind_mean
+    route, mean = ctx.state.mission.route, ctx.wind_mean
     if route is None or mean is None:
         return False
     turned = abs(difference_rad(mean[0], route.plan_twd_from_rad))
     if turned > max(FORECAST_RAD, FORECAST_SHARE * route.plan_half_width_rad):
         return True
-    width_rad, planned_rad = _width_rad(turn), route.plan_half_width_rad
+    width_rad, planned_rad = _width_rad(ctx), route.plan_half_width_rad
     if _is_wider(width_rad, planned_rad) or _is_wider(planned_rad, width_rad):
         return True
     return abs(mean[1] - route.plan_tws_mps) > FORECAST_SPEED * max(route.plan_tws_mps, 1.0)

@@ -15,8 +15,8 @@ from itertools import pairwise
 
 from companion.geo.angles import difference_rad
 from companion.planner.problem import VESSELS_SHARE, Target, sigmas_for, vessel_count
-from companion.skipper.planning.manners import MEET_SHARE, bow_discs, held_of, is_stood_on_to, regions
-from companion.skipper.step.turn import Turn
+from companion.skipper.planning.right_of_way import MEET_SHARE, bow_discs, held_of, is_stood_on_to, regions
+from companion.skipper.step.context import StepContext
 from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import LOST_MPS
 from companion.skipper.way.voyage import PointEn
@@ -51,46 +51,46 @@ class Leg:
     end_s: float
 
 
-def near(turn: Turn) -> tuple[Vessel, ...]:
+def near(ctx: StepContext) -> tuple[Vessel, ...]:
     """Return the vessels that could be met within the horizon, the soonest first; of too many those that matter most.
 
     Encounters that are held stay; then half of the places are of those that come nearest: a ship that comes straight at
     us is not left out for a dozen at their moorings near by.
     """
-    picture, boat = turn.snapshot.traffic, turn.boat_en
+    picture, boat = ctx.snapshot.traffic, ctx.boat_en
     if picture is None or boat is None:
         return ()
     soon = []
     for vessel in picture.vessels:
-        there = predict(vessel, turn.t_s)
+        there = predict(vessel, ctx.t_s)
         closing_mps = OWN_MPS + math.hypot(*there.velocity_en_mps)
-        gap_m = distance_m(boat, there.mean_en_m) - there.radius_m(FAR_RISK) - turn.config.traffic_clearance_m
+        gap_m = distance_m(boat, there.mean_en_m) - there.radius_m(FAR_RISK) - ctx.config.traffic_clearance_m
         if gap_m < closing_mps * HORIZON_S:
             soon.append((gap_m / closing_mps, vessel.mmsi, vessel.branch, vessel))
     soon.sort(key=lambda s: s[:3])
     if len(soon) > NEAREST:
-        own = turn.snapshot.vehicle
+        own = ctx.snapshot.vehicle
         velocities = ((0.0, 0.0), own.velocity_en_mps if own is not None else (0.0, 0.0))
-        held = {(h.mmsi, h.branch) for h in turn.state.traffic.encounters}
+        held = {(h.mmsi, h.branch) for h in ctx.state.traffic.encounters}
         by_peril = sorted(soon, key=lambda s: (
-            s[1:3] not in held, min(peril_m(boat, velocity, s[3], turn.t_s) for velocity in velocities), s[1:3]))
+            s[1:3] not in held, min(peril_m(boat, velocity, s[3], ctx.t_s) for velocity in velocities), s[1:3]))
         kept = {s[1:3] for s in by_peril[:NEAREST // 2]}
         kept.update(s[1:3] for s in [s for s in soon if s[1:3] not in kept][:NEAREST - len(kept)])
         soon = [s for s in soon if s[1:3] in kept]
     return tuple(vessel for *_, vessel in soon)
 
 
-def discs(turn: Turn, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Disc, ...]:
+def discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Disc, ...]:
     """Return where not to be because of ``vessels``, in times from ``t_s`` on [s], ``sigmas`` wide."""
-    hull = turn.voyage.boat.hull
+    hull = ctx.voyage.boat.hull
     keep = Keep(
-        sigmas=sigmas, clearance_m=turn.config.traffic_clearance_m, horizon_s=HORIZON_S, own_timing_mps=OWN_TIMING_MPS,
-        own_radius_m=hull.reach_m, ahead_m=turn.config.traffic_clearance_m,
+        sigmas=sigmas, clearance_m=ctx.config.traffic_clearance_m, horizon_s=HORIZON_S, own_timing_mps=OWN_TIMING_MPS,
+        own_radius_m=hull.reach_m, ahead_m=ctx.config.traffic_clearance_m,
         settled_m=SETTLED_M,
     )
     known = [v for v in vessels if v.is_moving_known]
     unknown = [v for v in vessels if not v.is_moving_known]
-    met = {(h.mmsi, h.branch) for h in turn.state.traffic.encounters}
+    met = {(h.mmsi, h.branch) for h in ctx.state.traffic.encounters}
     holding = [v for v in known if (v.mmsi, v.branch) in met]
     known = [v for v in known if (v.mmsi, v.branch) not in met]
     return (*(d for v in holding for d in planning_discs([v], t_s, keep, motion=expected(v))),
@@ -110,7 +110,7 @@ class Shares:
     part: float | None
 
 
-def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: float) -> Shares:
+def shares(ctx: StepContext, start_en: PointEn, after_s: float, rung: int, delta_s: float) -> Shares:
     """Return what a plan is told that starts at ``start_en`` in ``after_s``, on a rung of the ladder.
 
     The wind keeps its part on every rung. Where the start is within a vessel's disc already, its discs shrink to let
@@ -118,11 +118,11 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
     that keeps out of our way is left to do so, unless another has to be kept clear of: whoever alters course does it
     clear of all. One that we give way to adds regions on the first rung.
     """
-    vessels = near(turn)
-    is_met = bool(turn.state.traffic.encounters) and bool(meetings(turn))
+    vessels = near(ctx)
+    is_met = bool(ctx.state.traffic.encounters) and bool(meetings(ctx))
     if not is_met:
-        vessels = tuple(v for v in vessels if not ((held := held_of(turn, v)) is not None and held.stands_on))
-    found = discs(turn, vessels, turn.t_s + after_s, 0.0)
+        vessels = tuple(v for v in vessels if not ((held := held_of(ctx, v)) is not None and held.stands_on))
+    found = discs(ctx, vessels, ctx.t_s + after_s, 0.0)
     if not found:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
     of_wind = (1.0 - VESSELS_SHARE) * (1.0 - delta_s)
@@ -147,25 +147,25 @@ def shares(turn: Turn, start_en: PointEn, after_s: float, rung: int, delta_s: fl
             out.append(replace(target, radius_m=radius_m))
     if not out:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
-    if rung == 0 and turn.state.traffic.encounters:
-        out += regions(turn, vessels, start_en, after_s, is_met=is_met)
+    if rung == 0 and ctx.state.traffic.encounters:
+        out += regions(ctx, vessels, start_en, after_s, is_met=is_met)
     least = max(LEAST_DELTA_S, 1.0 - of_wind - part)   # a half and not the last digit below it
     return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)
 
 
-def timed_legs(turn: Turn, points: Sequence[PointEn] | None = None) -> tuple[Leg, ...]:
+def timed_legs(ctx: StepContext, points: Sequence[PointEn] | None = None) -> tuple[Leg, ...]:
     """Return a way from the boat through ``points``, or what is left of the route, timed by the polar in mean wind."""
-    boat, wind, vehicle = turn.boat_en, turn.wind_mean, turn.snapshot.vehicle
+    boat, wind, vehicle = ctx.boat_en, ctx.wind_mean, ctx.snapshot.vehicle
     if boat is None or wind is None or vehicle is None:
         return ()
-    model, legs, t_s, heading = turn.voyage.boat, [], 0.0, vehicle.heading_rad
-    for a, b in pairwise((boat, *(turn.ahead() if points is None else points))):
+    model, legs, t_s, heading = ctx.voyage.boat, [], 0.0, vehicle.heading_rad
+    for a, b in pairwise((boat, *(ctx.ahead() if points is None else points))):
         length = distance_m(a, b)
         if length < 1e-6:
             continue
         course = bearing_rad(a, b)
         twa = abs(difference_rad(wind[0], course))
-        closed = turn.no_go_half_rad
+        closed = ctx.no_go_half_rad
         speed = model.polar.speed_mps(max(twa, closed), wind[1])
         if twa < closed:
             speed *= math.cos(closed) / math.cos(twa)   # the autopilot will beat there
@@ -176,12 +176,12 @@ def timed_legs(turn: Turn, points: Sequence[PointEn] | None = None) -> tuple[Leg
     return tuple(legs)
 
 
-def apart_m(turn: Turn, points: Sequence[PointEn]) -> float | None:
+def apart_m(ctx: StepContext, points: Sequence[PointEn]) -> float | None:
     """Return how different a new way through ``points`` looks from what is left of the route [m].
 
     The discrete Fréchet distance of the next ``ALIKE_S`` of both; None without a route or a position.
     """
-    old, new = soon(timed_legs(turn), ALIKE_S), soon(timed_legs(turn, points), ALIKE_S)
+    old, new = soon(timed_legs(ctx), ALIKE_S), soon(timed_legs(ctx, points), ALIKE_S)
     if not old or not new:
         return None
     return path_distance_m(old, new)
@@ -199,11 +199,11 @@ def soon(legs: Sequence[TimedLeg], seconds: float) -> list[PointEn]:
     return points
 
 
-def meetings(turn: Turn) -> tuple[Conflict, ...]:
+def meetings(ctx: StepContext) -> tuple[Conflict, ...]:
     """Return where the route meets vessels soon enough to act, in order of time; empty when it is clear."""
-    vessels, boat = [v for v in near(turn) if not is_stood_on_to(turn, v)], turn.boat_en
+    vessels, boat = [v for v in near(ctx) if not is_stood_on_to(ctx, v)], ctx.boat_en
     if not vessels or boat is None:
         return ()
-    bows = (d for d in bow_discs(turn, vessels, turn.t_s, MEET_SHARE) if distance_m(boat, (d.x_m, d.y_m)) > d.radius_m)
-    found = (*discs(turn, vessels, turn.t_s, tail_factor(GIVE_UP_RISK)), *bows)
-    return pressing(check_legs(timed_legs(turn), found))
+    bows = (d for d in bow_discs(ctx, vessels, ctx.t_s, MEET_SHARE) if distance_m(boat, (d.x_m, d.y_m)) > d.radius_m)
+    found = (*discs(ctx, vessels, ctx.t_s, tail_factor(GIVE_UP_RISK)), *bows)
+    return pressing(check_legs(timed_legs(ctx), found))

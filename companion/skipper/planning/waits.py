@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from companion.geo.angles import difference_rad
-from companion.skipper.step.turn import Turn
+from companion.skipper.step.context import StepContext
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.line import ahead_m, course_rad
@@ -24,20 +24,20 @@ NEAR_M = 120.0        # from farther away the time is not foreseen so well: she 
 FAR_SHARE = 0.6
 
 
-def utc_s(turn: Turn) -> float | None:
+def utc_s(ctx: StepContext) -> float | None:
     """Return the Unix time by the autopilot's clock [s], None while that does not know it."""
-    status = turn.snapshot.autopilot
+    status = ctx.snapshot.autopilot
     if status is None or status.utc_at_boot_s is None or status.boot_s is None:
         return None
-    return status.utc_at_boot_s + status.boot_s + max(0.0, turn.t_s - status.t_s)
+    return status.utc_at_boot_s + status.boot_s + max(0.0, ctx.t_s - status.t_s)
 
 
-def gun_in_s(turn: Turn, line: Line) -> float | None:
+def gun_in_s(ctx: StepContext, line: Line) -> float | None:
     """Return how long it is to a start line's gun [s], negative after it; None while the time is not known.
 
     A line without one is open for ever.
     """
-    now_s, state = utc_s(turn), turn.state
+    now_s, state = utc_s(ctx), ctx.state
     if line.not_before_s is not None:
         return None if now_s is None else line.not_before_s - now_s
     if line.after_s is None:
@@ -47,24 +47,24 @@ def gun_in_s(turn: Turn, line: Line) -> float | None:
     return line.after_s - state.voyage.under_way_s
 
 
-def waits_for_gun(turn: Turn, gate: Gate) -> bool:
+def waits_for_gun(ctx: StepContext, gate: Gate) -> bool:
     """Return whether it is too early to sail for a gate's line: from where she is she would be there before the gun."""
     line = gate.line
-    if line is None or not line.is_start or turn.state.progress.released == gate.goal:
+    if line is None or not line.is_start or ctx.state.progress.released == gate.goal:
         return False
-    left_s = gun_in_s(turn, line)
-    return left_s is None or left_s > _to_line_s(turn, gate) - RESERVE_S
+    left_s = gun_in_s(ctx, line)
+    return left_s is None or left_s > _to_line_s(ctx, gate) - RESERVE_S
 
 
-def _to_line_s(turn: Turn, gate: Gate) -> float:
+def _to_line_s(ctx: StepContext, gate: Gate) -> float:
     """Return how long she sails to the line at the soonest [s]; the plan and its upload come on top of it."""
-    boat, wind, line = turn.boat_en, turn.wind_mean, gate.line
-    if boat is None or wind is None or line is None or turn.gate is not gate or ahead_m(line, boat) >= 0.0:
+    boat, wind, line = ctx.boat_en, ctx.wind_mean, gate.line
+    if boat is None or wind is None or line is None or ctx.gate is not gate or ahead_m(line, boat) >= 0.0:
         return 0.0
     cut = _cut(gate)
-    closed = turn.planned_no_go_rad
+    closed = ctx.planned_no_go_rad
     twa = abs(difference_rad(wind[0], bearing_rad(boat, cut)))
-    speed = turn.voyage.boat.polar.speed_mps(max(twa, closed), wind[1])
+    speed = ctx.voyage.boat.polar.speed_mps(max(twa, closed), wind[1])
     if twa < closed:   # the way of two boards
         speed *= math.cos(closed) / max(math.cos(twa), 0.1)
     time_s = distance_m(boat, cut) / max(speed, SLOWEST_MPS)
@@ -79,28 +79,28 @@ def _cut(gate: Gate) -> PointEn:
         gate.en_m, course_rad(gate.line), -back_m)
 
 
-def waiting_en(turn: Turn, gate: Gate) -> PointEn:
+def waiting_en(ctx: StepContext, gate: Gate) -> PointEn:
     """Return where to wait for the gun: near where the line is crossed, with room, and one board away from it."""
     assert gate.line is not None
-    cut, course, wind, config = _cut(gate), course_rad(gate.line), turn.wind_mean, turn.config
+    cut, course, wind, config = _cut(gate), course_rad(gate.line), ctx.wind_mean, ctx.config
     room_m = config.loiter_radius_m + min(config.margin_floor_m, config.margin_m)
     best, best_cost = moved(cut, course + math.pi, WAIT_M), math.inf
     for far_m in (WAIT_M, FARTHEST_M):
         for side in SIDES_DEG:
             heading = course + math.radians(side)
             place = moved(cut, heading + math.pi, far_m)
-            lacks_m = max(0.0, room_m - float(turn.voyage.area.clearance_m([place])[0]))
+            lacks_m = max(0.0, room_m - float(ctx.voyage.area.clearance_m([place])[0]))
             twa = math.pi if wind is None else abs(difference_rad(wind[0], heading))
-            is_closed = twa < turn.planned_no_go_rad + SAILABLE_RAD
+            is_closed = twa < ctx.planned_no_go_rad + SAILABLE_RAD
             cost = 10.0 * lacks_m + (20.0 if is_closed else 0.0) + far_m / 10.0 + abs(side) / 15.0
             if cost < best_cost:
                 best, best_cost = place, cost
     return best
 
 
-def stay_left_s(turn: Turn, gate: Gate) -> float:
+def stay_left_s(ctx: StepContext, gate: Gate) -> float:
     """Return how long she still stays in a gate's box, or sails by its field [s]; inf: until told, or not yet."""
-    inside, box = turn.state.progress.inside, gate.box or gate.field
+    inside, box = ctx.state.progress.inside, gate.box or gate.field
     if box is None or box.for_s is None or inside is None or inside.goal != gate.goal:
         return math.inf
-    return box.for_s - inside.age_s(turn.t_s, utc_s(turn))
+    return box.for_s - inside.age_s(ctx.t_s, utc_s(ctx))

@@ -23,7 +23,7 @@ from companion.skipper.step.causes import CHOICES, SHORE
 from companion.skipper.step.config import End, Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Route
-from companion.skipper.step.saved import Persisted
+from companion.skipper.step.saved import Persisted, Standing
 from companion.skipper.step.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
@@ -43,7 +43,6 @@ from companion.skipper.step.snapshot import (
     WindHealth,
     WindView,
 )
-from companion.skipper.step.standing import Standing
 from companion.skipper.step.state import Phase, SkipperState, is_given_up
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""The route that is sailed, point by point, with what was promised of it; and the errand that takes a goal's place."""
+"""The route that is sailed, point by point, what was promised of it, and the diversion that takes a goal's place."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ class Route:
     median_s: float | None = None               # when half the winds of the forecast's spread are there ...
     late_s: float | None = None                 # ... and nine of ten; None: not told, or not in any time
     why: str = ""
-    bound_for: str = ""                # the errand that its end serves; empty: the goals
+    bound_for: str = ""                # the diversion that its end serves; empty: the goals
 
 
 class Kind(enum.Enum):
-    """What kind of errand."""
+    """What kind of diversion."""
 
     REFUGE = "refuge"
     HOME = "home"
@@ -59,7 +59,7 @@ class Kind(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Errand:
+class Diversion:
     """Where to, and why. ``name`` is what a route is bound for; a STAY has no place."""
 
     kind: Kind

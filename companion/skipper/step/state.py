@@ -10,19 +10,77 @@ from typing import Any
 from companion.field.guidance import LastResort
 from companion.field.station import StationState
 from companion.field.values import GuidanceState
+from companion.frozen import changed
+from companion.geo.shift import Shift, carried
 from companion.messages import MissionItem, Mode
 from companion.orders import Answer, Order, Verb
 from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.latency import NO_ANSWERS, PlannerLatency
 from companion.skipper.step.route import Route
-from companion.skipper.step.saved import Persisted, SavedPlace
-from companion.skipper.step.standing import Standing
-from companion.skipper.step.tacking import NO_TACKS, Tacking
+from companion.skipper.step.saved import Persisted, SavedPlace, Standing
 from companion.skipper.way.gates import Approach
-from companion.skipper.way.integrity import PositionDoubt
+from companion.skipper.way.position_plausibility import PositionDoubt
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Assessment
 from companion.traffic.colregs import OngoingEncounter
+
+PRIOR_TACKS = 5.0    # so many of the voyage's own say as much as the mission
+
+
+# --------------------
+# What the voyage's own tacks tell: how many were tried, how many failed, and the chance that the next one does.
+# The mission's chance counts as ``PRIOR_TACKS`` tacks that were seen: a Beta distribution, to which each tack adds. Its
+# mean is the probability that the next tack fails.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tacking:
+    """Tacks seen, and the one that is under way.
+
+    Attributes:
+        tried, failed: of this voyage.
+        in_a_row: failures since the last that came off.
+        failed_s: when the last failed.
+        side: of the wind when she was last settled on a tack: 1 starboard, -1 port, 0 never.
+        settled_rad: her heading then, and ``settled_s`` when.
+        settled_mps: her speed then.
+        slowest_mps: the least since the tack that is being tried began.
+        began_s: since when a tack is being tried, None: none is.
+        is_counted: that one was counted as failed: she lies in irons.
+        began_en_m: where she was then, None: not known.
+        irons_s: the longest that she has lain.
+        starboard_lee_mps, port_lee_mps: the fastest that she was set then, abeam to the lee of that tack, beside the
+            current that is believed.
+
+    """
+
+    tried: int = 0
+    failed: int = 0
+    in_a_row: int = 0
+    failed_s: float = -math.inf
+    side: int = 0
+    settled_rad: float = 0.0
+    settled_s: float = -math.inf
+    settled_mps: float = 0.0
+    slowest_mps: float = math.inf
+    began_s: float | None = None
+    is_counted: bool = False
+    began_en_m: tuple[float, float] | None = None
+    irons_s: float = 0.0
+    starboard_lee_mps: float = 0.0
+    port_lee_mps: float = 0.0
+
+    def chance(self, given: float) -> float:
+        """Return the chance that the next tack fails; ``given`` is the mission's, and 0 asks for none."""
+        return 0.0 if given <= 0.0 else (given * PRIOR_TACKS + self.failed) / (PRIOR_TACKS + self.tried)
+
+    def spread(self, given: float) -> float:
+        """Return the standard deviation of that chance."""
+        mean = self.chance(given)
+        return math.sqrt(mean * (1.0 - mean) / (PRIOR_TACKS + self.tried + 1.0))
+
+
+NO_TACKS = Tacking()
 
 
 class Phase(enum.Enum):
@@ -124,7 +182,7 @@ class Signs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adrift:
-    """How the boat moves over ground, and what was done to stop a drift (``companion.skipper.deeds.adrift``)."""
+    """How the boat moves over ground, and what was done to stop a drift (``companion.skipper.behaviors.drifting``)."""
 
     ground_en_mps: tuple[float, float] | None = None   # mean velocity of the last seconds
     ground_t_s: float = float("-inf")
@@ -192,7 +250,7 @@ class Charge:
 # The parts have no slots: one of them changes a dozen times a step, and ``companion.frozen`` copies it in one piece.
 @dataclass(frozen=True, kw_only=True)
 class VehicleIdentity:
-    """Whose the autopilot is (``companion.skipper.board.custody``), and whether it has started anew."""
+    """Whose the autopilot is (``companion.skipper.board.vehicle_identity``), and whether it has started anew."""
 
     uid: str | None = None             # of the autopilot that this voyage began with, and ...
     system: int | None = None          # ... its system id
@@ -321,7 +379,7 @@ class SteeringState:
 
 @dataclass(frozen=True, kw_only=True)
 class PositionState:
-    """Whether the reported position is believed (``deeds.doubt``), and where the boat was last."""
+    """Whether the reported position is believed (``behaviors.position_doubt``), and where the boat was last."""
 
     last_seen: Fix | None = None       # the last position
     doubt: PositionDoubt | None = None  # it is not believed
@@ -374,7 +432,7 @@ class Announced:
 class SkipperState:
     """Everything that ``step`` needs from before, in parts that are replaced whole.
 
-    ``Skipper.initial`` makes the first; ``Turn.set`` replaces a part.
+    ``Skipper.initial`` makes the first; ``StepContext.set`` replaces a part.
     """
 
     phase: Phase = Phase.IDLE
@@ -427,3 +485,17 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         tacks=(state.tacking.tried, state.tacking.failed), place=state.position.place,
         latency=state.plans.latency,
     )
+
+
+# --------------------
+# The state in another frame: every place that is remembered is carried over, at one moment between two steps.
+
+
+def in_water(state: SkipperState, shift: Shift) -> SkipperState:
+    """Return a state in the metres of another frame.
+
+    The places of ``history`` stand between a time and a distance.
+    """
+    new = carried(state, shift)
+    history = tuple((t_s, *shift.point((east, north)), to_go_m) for t_s, east, north, to_go_m in state.progress.history)
+    return changed(new, progress=changed(new.progress, history=history))

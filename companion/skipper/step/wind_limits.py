@@ -11,8 +11,8 @@ import numpy as np
 
 from companion.messages import WindForecast
 from companion.planner.problem import ASSUMED_SHARE, Strength
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.snapshot import WindHealth
-from companion.skipper.step.turn import Turn
 
 LEAST_S = 60.0       # ahead, however near the end of the plan is
 AHEAD_S = 600.0      # while there is no plan
@@ -35,59 +35,59 @@ def strength_of(forecast: WindForecast, *, after_s: float = 0.0, is_known: bool 
         is_known=is_known)
 
 
-def too_strong(turn: Turn) -> float | None:
+def too_strong(ctx: StepContext) -> float | None:
     """Return the chance of more wind than the boat's limit, as a multiple of what is allowed; None: no limit."""
-    return _share(turn, _strong(turn))
+    return _share(ctx, _strong(ctx))
 
 
-def too_light(turn: Turn) -> float | None:
+def too_light(ctx: StepContext) -> float | None:
     """Return the same of less wind than she makes way in."""
-    return _share(turn, _light(turn))
+    return _share(ctx, _light(ctx))
 
 
-def winds_wanted(turn: Turn) -> list[str]:
+def winds_wanted(ctx: StepContext) -> list[str]:
     """Return what she waits for before setting sail, in words; empty: the wind will do."""
-    boat, allowed, out = turn.voyage.boat, _allowed(turn), []
-    for chance, name, limit in ((_strong(turn), "less wind: above", boat.max_tws_mps),
-                                (_light(turn), "more wind: below", boat.min_tws_mps)):
+    boat, allowed, out = ctx.voyage.boat, _allowed(ctx), []
+    for chance, name, limit in ((_strong(ctx), "less wind: above", boat.max_tws_mps),
+                                (_light(ctx), "more wind: below", boat.min_tws_mps)):
         if chance is not None and chance > allowed:
-            out.append(f"{name} {limit:g} m/s with {100.0 * chance:.0f} % within {_until_s(turn):.0f} s, "
+            out.append(f"{name} {limit:g} m/s with {100.0 * chance:.0f} % within {_until_s(ctx):.0f} s, "
                        f"{100.0 * allowed:.0f} % is allowed")
     return out
 
 
-def _strong(turn: Turn) -> float | None:
-    limit = turn.voyage.boat.max_tws_mps
-    strength = None if limit is None else _strength(turn)
-    return None if limit is None or strength is None else strength.over(limit, _until_s(turn))
+def _strong(ctx: StepContext) -> float | None:
+    limit = ctx.voyage.boat.max_tws_mps
+    strength = None if limit is None else _strength(ctx)
+    return None if limit is None or strength is None else strength.over(limit, _until_s(ctx))
 
 
-def _light(turn: Turn) -> float | None:
-    limit = turn.voyage.boat.min_tws_mps
-    strength = None if limit is None else _strength(turn)
-    return None if limit is None or strength is None else strength.under(limit, _until_s(turn))
+def _light(ctx: StepContext) -> float | None:
+    limit = ctx.voyage.boat.min_tws_mps
+    strength = None if limit is None else _strength(ctx)
+    return None if limit is None or strength is None else strength.under(limit, _until_s(ctx))
 
 
-def _share(turn: Turn, chance: float | None) -> float | None:
-    return None if chance is None else chance / _allowed(turn)
+def _share(ctx: StepContext, chance: float | None) -> float | None:
+    return None if chance is None else chance / _allowed(ctx)
 
 
-def _strength(turn: Turn) -> Strength | None:
-    forecast = turn.snapshot.wind.forecast
-    if forecast is None or not turn.config.sails:
+def _strength(ctx: StepContext) -> Strength | None:
+    forecast = ctx.snapshot.wind.forecast
+    if forecast is None or not ctx.config.sails:
         return None
-    return strength_of(forecast, is_known=turn.snapshot.wind.health is not WindHealth.UNTRUSTED)
+    return strength_of(forecast, is_known=ctx.snapshot.wind.health is not WindHealth.UNTRUSTED)
 
 
-def _until_s(turn: Turn) -> float:
+def _until_s(ctx: StepContext) -> float:
     """Return how far ahead is looked: the rest of the plan."""
-    route = turn.state.mission.route
+    route = ctx.state.mission.route
     whole_s = None if route is None else route.late_s or route.cost_s
     if route is None or whole_s is None:
         return AHEAD_S
-    began_s = route.plan_t_s if turn.state.voyage.sailing else turn.t_s
-    return max(LEAST_S, began_s + whole_s - turn.t_s)
+    began_s = route.plan_t_s if ctx.state.voyage.sailing else ctx.t_s
+    return max(LEAST_S, began_s + whole_s - ctx.t_s)
 
 
-def _allowed(turn: Turn) -> float:
-    return 1.0 - turn.config.delta_s
+def _allowed(ctx: StepContext) -> float:
+    return 1.0 - ctx.config.delta_s

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
+from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.geo.sun import sun_height_rad
-from companion.skipper.deeds.adrift import meets_in_s, sails
-from companion.skipper.deeds.by_field import meets_in
+from companion.skipper.behaviors.drifting import meets_in_s, sails
+from companion.skipper.behaviors.field_guidance import meets_in
 from companion.skipper.planning.autopilot_beats import beaten_within_m
-from companion.skipper.planning.errands import errand, is_composed
+from companion.skipper.planning.diversions import diversion, home_trouble, is_composed
+from companion.skipper.step.actions import Severity
 from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.context import JUMP_M, StepContext
 from companion.skipper.step.route import Kind
 from companion.skipper.step.snapshot import WindHealth
-from companion.skipper.step.turn import JUMP_M, Turn
+from companion.skipper.step.state import Charge
 from companion.skipper.step.wind_limits import too_light, too_strong
 from companion.skipper.watch.watchdogs import BY_NAME
 from companion.skipper.way.geometry import along_m, cross_track_m, distance_m
@@ -23,200 +27,205 @@ IRONS_TWA_RAD = math.radians(35.0)
 IRONS_TWS_MPS = 1.5            # less wind than this is a calm, not irons
 MOVING_MPS = 0.5
 PROGRESS_WINDOW_S = 180.0
+RISE = 0.015       # it is charged; the last percent trembles
+FALL = 0.05        # the rate is told when the charge has fallen by this much ...
+LOOK_S = 300.0     # ... and for this long
+DETOUR = 2.0       # a beat is 1.4 times its straight way, and something lies between
+LEAST_MPS = 0.5
 
 
-def measure(turn: Turn, name: str) -> float | None:
+def measure(ctx: StepContext, name: str) -> float | None:
     """Return the watched figure in the table's unit, None when it cannot be told now."""
-    return _MEASURES[name](turn)
+    return _MEASURES[name](ctx)
 
 
 def _flag(value: bool | None) -> float | None:
     return None if value is None else float(value)
 
 
-def _link(turn: Turn) -> float | None:
-    return turn.snapshot.heartbeat_age_s
+def _link(ctx: StepContext) -> float | None:
+    return ctx.snapshot.heartbeat_age_s
 
 
-def _position_lost(turn: Turn) -> float | None:
-    return turn.snapshot.vehicle_age_s
+def _position_lost(ctx: StepContext) -> float | None:
+    return ctx.snapshot.vehicle_age_s
 
 
-def _jump(turn: Turn) -> float | None:
-    if turn.snapshot.position_en_m is None:
+def _jump(ctx: StepContext) -> float | None:
+    if ctx.snapshot.position_en_m is None:
         return None
     # it lasts as long as the doubt
-    return turn.jump_m if turn.state.position.doubt is None else max(turn.jump_m, JUMP_M)
+    return ctx.jump_m if ctx.state.position.doubt is None else max(ctx.jump_m, JUMP_M)
 
 
-def _wind(turn: Turn) -> float | None:
-    health = turn.snapshot.wind.health
-    return float(health is WindHealth.UNTRUSTED or (health is WindHealth.NONE and turn.state.voyage.sailing))
+def _wind(ctx: StepContext) -> float | None:
+    health = ctx.snapshot.wind.health
+    return float(health is WindHealth.UNTRUSTED or (health is WindHealth.NONE and ctx.state.voyage.sailing))
 
 
-def _contradicted(turn: Turn) -> float | None:
-    return float(bool(turn.snapshot.unsure))
+def _contradicted(ctx: StepContext) -> float | None:
+    return float(bool(ctx.snapshot.unsure))
 
 
-def _becalmed(turn: Turn) -> float | None:
-    wind = turn.wind_mean
+def _becalmed(ctx: StepContext) -> float | None:
+    wind = ctx.wind_mean
     if wind is None:
         return None
-    return max(wind[1], BY_NAME["becalmed"].exit) if sails(turn) else wind[1]
+    return max(wind[1], BY_NAME["becalmed"].exit) if sails(ctx) else wind[1]
 
 
-def _irons(turn: Turn) -> float | None:
-    wind, vehicle = turn.wind_now, turn.snapshot.vehicle
-    if wind is None or vehicle is None or wind[1] < IRONS_TWS_MPS or turn.boat_en is None or not turn.config.sails:
+def _irons(ctx: StepContext) -> float | None:
+    wind, vehicle = ctx.wind_now, ctx.snapshot.vehicle
+    if wind is None or vehicle is None or wind[1] < IRONS_TWS_MPS or ctx.boat_en is None or not ctx.config.sails:
         return None
     if abs(difference_rad(wind[0], vehicle.heading_rad)) > IRONS_TWA_RAD:
         return BY_NAME["in irons"].exit
-    east, north = turn.through_en_mps
+    east, north = ctx.through_en_mps
     return max(0.0, east * math.sin(vehicle.heading_rad) + north * math.cos(vehicle.heading_rad))
 
 
-def _too_near(turn: Turn) -> float | None:
-    met = meets_in(turn)
+def _too_near(ctx: StepContext) -> float | None:
+    met = meets_in(ctx)
     return None if met is None else met[0]
 
 
-def _progress(turn: Turn) -> float | None:
+def _progress(ctx: StepContext) -> float | None:
     """Way made good in the window; None before the window is full or while there is a reason to stand still."""
-    if turn.is_raised("becalmed") or not turn.ahead() or not turn.state.progress.history:
+    if ctx.is_raised("becalmed") or not ctx.ahead() or not ctx.state.progress.history:
         return None
-    if turn.state.mission.route is None or turn.state.progress.history_plan != turn.state.mission.route.plan_id:
+    if ctx.state.mission.route is None or ctx.state.progress.history_plan != ctx.state.mission.route.plan_id:
         return None   # the history is of the plan before
-    old = turn.state.progress.history[0]
-    if turn.t_s - old[0] < PROGRESS_WINDOW_S:
+    old = ctx.state.progress.history[0]
+    if ctx.t_s - old[0] < PROGRESS_WINDOW_S:
         return None
-    return old[3] - turn.state.progress.history[-1][3]
+    return old[3] - ctx.state.progress.history[-1][3]
 
 
-def _heading(turn: Turn) -> float | None:
-    vehicle = turn.snapshot.vehicle
-    if vehicle is None or turn.boat_en is None:
+def _heading(ctx: StepContext) -> float | None:
+    vehicle = ctx.snapshot.vehicle
+    if vehicle is None or ctx.boat_en is None:
         return None
-    velocity = turn.through_en_mps
+    velocity = ctx.through_en_mps
     if math.hypot(*velocity) < MOVING_MPS:
         return 0.0
     return math.degrees(abs(difference_rad(math.atan2(*velocity), vehicle.heading_rad)))
 
 
-def corridor_m(turn: Turn) -> float:
+def corridor_m(ctx: StepContext) -> float:
     """Return how far off its leg the boat may be before the margin's floor is in question [m]."""
-    route = turn.state.mission.route
-    margin = route.margin_m if route is not None else turn.config.margin_m
-    return max(margin - turn.config.margin_floor_m, turn.config.manoeuvre_m)
+    route = ctx.state.mission.route
+    margin = route.margin_m if route is not None else ctx.config.margin_m
+    return max(margin - ctx.config.margin_floor_m, ctx.config.manoeuvre_m)
 
 
-def _corridor(turn: Turn) -> float | None:
+def _corridor(ctx: StepContext) -> float | None:
     """Share of the corridor used; in open water the grid size bounds it, not the margin, and a beat its own boards."""
-    boat, leg = turn.boat_en, turn.leg()
-    if boat is None or leg is None or not turn.ahead() or turn.state.steering.own_mode in STOPPING or is_composed(turn):
+    boat, leg = ctx.boat_en, ctx.leg()
+    if boat is None or leg is None or not ctx.ahead() or ctx.state.steering.own_mode in STOPPING or is_composed(ctx):
         return None      # stopped, or by a field of her own, she follows no leg
     if distance_m(*leg) < 1.0:
         return 0.0
     if along_m(boat, *leg) < 0.0:
         # Before its leg begins: by a little wherever a waypoint is announced early, by more after a jump.
-        off = max(0.0, distance_m(boat, leg[0]) - 2.0 * turn.config.announce_m)
+        off = max(0.0, distance_m(boat, leg[0]) - 2.0 * ctx.config.announce_m)
     else:
         off = abs(cross_track_m(boat, *leg))
-    clearance = turn.voyage.area.path_clearance_m([boat, leg[1]])
-    allowed = max(turn.config.grid_size_m, beaten_within_m(turn))
-    if clearance < turn.config.margin_floor_m:
-        allowed = min(allowed, corridor_m(turn))
+    clearance = ctx.voyage.area.path_clearance_m([boat, leg[1]])
+    allowed = max(ctx.config.grid_size_m, beaten_within_m(ctx))
+    if clearance < ctx.config.margin_floor_m:
+        allowed = min(allowed, corridor_m(ctx))
     return off / allowed
 
 
-def _stuck(turn: Turn) -> float | None:
-    passed = turn.state.mission.passed_since_s
-    return None if passed is None else turn.t_s - passed
+def _stuck(ctx: StepContext) -> float | None:
+    passed = ctx.state.mission.passed_since_s
+    return None if passed is None else ctx.t_s - passed
 
 
-def _ended(turn: Turn) -> float | None:
-    route = turn.state.mission.route
-    if route is None or turn.gate is None or turn.autopilot is None or errand(turn) is not None or (
-        is_composed(turn)):
+def _ended(ctx: StepContext) -> float | None:
+    route = ctx.state.mission.route
+    if route is None or ctx.gate is None or ctx.autopilot is None or diversion(ctx) is not None or (
+        is_composed(ctx)):
         return None
-    return float(turn.state.mission.index >= len(route.items) - 1 or turn.autopilot.mission_state.name == "COMPLETE")
+    return float(ctx.state.mission.index >= len(route.items) - 1 or ctx.autopilot.mission_state.name == "COMPLETE")
 
 
-def _breach(turn: Turn) -> float | None:
-    return _flag(turn.autopilot.fence_breached) if turn.autopilot is not None else None
+def _breach(ctx: StepContext) -> float | None:
+    return _flag(ctx.autopilot.fence_breached) if ctx.autopilot is not None else None
 
 
-def _foreign(turn: Turn) -> float | None:
-    return float(bool(turn.state.mission.foreign))
+def _foreign(ctx: StepContext) -> float | None:
+    return float(bool(ctx.state.mission.foreign))
 
 
-def _reboot(turn: Turn) -> float | None:
-    return float(turn.state.vehicle.rebooted)
+def _reboot(ctx: StepContext) -> float | None:
+    return float(ctx.state.vehicle.rebooted)
 
 
-def _battery(turn: Turn, name: str, *, is_below: bool) -> float | None:
+def _battery(ctx: StepContext, name: str, *, is_below: bool) -> float | None:
     """Return the charge, no more than the row's entry where the autopilot's own limit is passed."""
-    status = turn.autopilot
+    status = ctx.autopilot
     if status is None:
         return None
     charge = None if status.battery_remaining is None else 100.0 * status.battery_remaining
     return min(charge if charge is not None else 100.0, BY_NAME[name].enter) if is_below else charge
 
 
-def _battery_low(turn: Turn) -> float | None:
-    is_below = turn.autopilot is not None and bool(turn.autopilot.battery_failed)
-    return _battery(turn, "battery low", is_below=is_below)
+def _battery_low(ctx: StepContext) -> float | None:
+    is_below = ctx.autopilot is not None and bool(ctx.autopilot.battery_failed)
+    return _battery(ctx, "battery low", is_below=is_below)
 
 
-def _battery_critical(turn: Turn) -> float | None:
-    status, least_v = turn.autopilot, turn.config.ends.battery_v
+def _battery_critical(ctx: StepContext) -> float | None:
+    status, least_v = ctx.autopilot, ctx.config.ends.battery_v
     volts = status.battery_v if status is not None else None
     is_empty = least_v is not None and volts is not None and volts <= least_v
-    is_short = turn.state.alarms.charge is not None and turn.state.alarms.charge.is_short
-    is_below = turn.state.alarms.battery_critical or is_empty or is_short
-    return _battery(turn, "battery critical", is_below=is_below)
+    is_short = ctx.state.alarms.charge is not None and ctx.state.alarms.charge.is_short
+    is_below = ctx.state.alarms.battery_critical or is_empty or is_short
+    return _battery(ctx, "battery critical", is_below=is_below)
 
 
-def _leak(turn: Turn) -> float | None:
-    return _flag(turn.autopilot.leaks) if turn.autopilot is not None else None
+def _leak(ctx: StepContext) -> float | None:
+    return _flag(ctx.autopilot.leaks) if ctx.autopilot is not None else None
 
 
-def _dark(turn: Turn) -> float | None:
-    status, vehicle = turn.autopilot, turn.snapshot.vehicle
+def _dark(ctx: StepContext) -> float | None:
+    status, vehicle = ctx.autopilot, ctx.snapshot.vehicle
     if status is None or vehicle is None or status.utc_at_boot_s is None or status.boot_s is None:
         return None
     height_rad = sun_height_rad(
         math.radians(vehicle.position.lat_deg), math.radians(vehicle.position.lon_deg),
         status.utc_at_boot_s + status.boot_s)
-    return math.degrees(height_rad - turn.config.ends.dark_below_rad)
+    return math.degrees(height_rad - ctx.config.ends.dark_below_rad)
 
 
-def _shore(turn: Turn) -> float | None:
-    age_s = turn.snapshot.shore_age_s
-    return None if age_s is None else age_s / turn.config.ends.shore_lost_s
+def _shore(ctx: StepContext) -> float | None:
+    age_s = ctx.snapshot.shore_age_s
+    return None if age_s is None else age_s / ctx.config.ends.shore_lost_s
 
 
-def _time(turn: Turn) -> float | None:
-    limit_s = turn.config.voyage_timeout_s
-    return None if limit_s is None else turn.state.voyage.under_way_s / limit_s
+def _time(ctx: StepContext) -> float | None:
+    limit_s = ctx.config.voyage_timeout_s
+    return None if limit_s is None else ctx.state.voyage.under_way_s / limit_s
 
 
-def _dragged(turn: Turn) -> float | None:
-    rest, boat = turn.state.voyage.rest_en_m, turn.boat_en
+def _dragged(ctx: StepContext) -> float | None:
+    rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
     if rest is None or boat is None:
         return None
-    bound = errand(turn)
+    bound = diversion(ctx)
     return distance_m(boat, rest) if bound is None or bound.kind is Kind.REST else None
 
 
-def _planner(turn: Turn) -> float | None:
-    return float(not turn.snapshot.planner_alive)
+def _planner(ctx: StepContext) -> float | None:
+    return float(not ctx.snapshot.planner_alive)
 
 
-def _fence_off(turn: Turn) -> float | None:
-    return None if turn.autopilot is None else float(turn.autopilot.fence_on is False)
+def _fence_off(ctx: StepContext) -> float | None:
+    return None if ctx.autopilot is None else float(ctx.autopilot.fence_on is False)
 
 
-_MEASURES: dict[str, Callable[[Turn], float | None]] = {
+_MEASURES: dict[str, Callable[[StepContext], float | None]] = {
     "link silent": _link, "position lost": _position_lost, "position jump": _jump, "wind untrusted": _wind,
     "wind contradicted": _contradicted,
     "strong wind": too_strong, "light wind": too_light,
@@ -228,3 +237,52 @@ _MEASURES: dict[str, Callable[[Turn], float | None]] = {
     "battery low": _battery_low, "battery critical": _battery_critical, "out of time": _time, "dragged off": _dragged,
     "planner dead": _planner, "leaking": _leak, "dark": _dark, "shore lost": _shore,
 }
+
+
+# --------------------
+# How long the charge lasts at the rate at which it has fallen, against the way to a place where she can wait.
+# The rate is the mean since the charge was last seen to rise: a figure in whole percents tells nothing over a minute.
+# The way is a straight one, lengthened by ``DETOUR``.
+
+
+def follow_charge(ctx: StepContext) -> None:
+    """Remember where the fall of the charge began, and whether it still covers the way; say it when it does not."""
+    status, before = ctx.autopilot, ctx.state.alarms.charge
+    share = status.battery_remaining if status is not None else None
+    if share is None:
+        return
+    if before is None or share > before.last + RISE:
+        ctx.set(alarms=changed(ctx.state.alarms, charge=Charge(since_s=ctx.t_s, first=share, last=share)))
+        return
+    now = replace(before, last=min(share, before.last))
+    if now != before:
+        ctx.set(alarms=changed(ctx.state.alarms, charge=now))
+    left_s = lasts_s(ctx)
+    if now.is_short or left_s is None:
+        return
+    needed_s = way_s(ctx)
+    if needed_s is None or left_s >= ctx.config.ends.battery_reserve * needed_s:
+        return
+    ctx.set(alarms=changed(ctx.state.alarms, charge=replace(now, is_short=True)))
+    ctx.say(Severity.WARNING, "charge", f"the charge lasts {math.floor(left_s / 60.0)} min at its rate, the way to "
+             f"where she can wait takes {math.ceil(needed_s / 60.0)} min", every_s=0.0)
+
+
+def lasts_s(ctx: StepContext) -> float | None:
+    """Return how long the charge lasts [s], None while the rate is not known."""
+    charge = ctx.state.alarms.charge
+    if charge is None or ctx.t_s - charge.since_s < LOOK_S or charge.first - charge.last < FALL:
+        return None
+    return charge.last * (ctx.t_s - charge.since_s) / (charge.first - charge.last)
+
+
+def way_s(ctx: StepContext) -> float | None:
+    """Return how long she needs to the nearest refuge, or home where there is none [s]; None: there is neither."""
+    boat, wind, status = ctx.boat_en, ctx.wind_mean, ctx.autopilot
+    places = [refuge.en_m for refuge in ctx.voyage.refuges]
+    if not places and status is not None and status.home is not None and not home_trouble(ctx):
+        places.append(ctx.voyage.frame.en_from_geo(status.home))
+    if boat is None or wind is None or not places:
+        return None
+    speed_mps = max(LEAST_MPS, ctx.voyage.boat.polar.max_speed_mps(wind[1]))
+    return DETOUR * min(distance_m(boat, place) for place in places) / speed_mps

@@ -18,8 +18,8 @@ from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.planning.autopilot_beats import TACKS_FAIL_AFTER
 from companion.skipper.step.actions import Severity
-from companion.skipper.step.tacking import Tacking
-from companion.skipper.step.turn import Turn
+from companion.skipper.step.context import StepContext
+from companion.skipper.step.state import Tacking
 from companion.skipper.way.voyage import PointEn
 
 SETTLED_RAD = math.radians(30.0)
@@ -36,25 +36,25 @@ MOST_LEE_MPS = 1.0                 # more is a position that has jumped
 TACK_FAILED = "a tack failed"
 
 
-def watch_tacks(turn: Turn) -> None:
+def watch_tacks(ctx: StepContext) -> None:
     """Follow her tacks for one step."""
-    now, vehicle, wind, status = turn.state.tacking, turn.snapshot.vehicle, turn.wind_now, turn.autopilot
-    sails = turn.state.voyage.sailing and turn.config.sails and status is not None and (
+    now, vehicle, wind, status = ctx.state.tacking, ctx.snapshot.vehicle, ctx.wind_now, ctx.autopilot
+    sails = ctx.state.voyage.sailing and ctx.config.sails and status is not None and (
         status.is_armed and status.mode in {Mode.AUTO, Mode.GUIDED})
     if not sails or vehicle is None or wind is None or wind[1] < LEAST_TWS_MPS:
         if now.side or now.began_s is not None:
-            turn.set(tacking=replace(now, side=0, began_s=None, is_counted=False))
+            ctx.set(tacking=replace(now, side=0, began_s=None, is_counted=False))
         return
-    through_mps = math.dist(vehicle.velocity_en_mps, turn.snapshot.current.en_mps)   # as it is believed to move
-    then = followed(now, turn.t_s, vehicle.heading_rad, wind[0], through_mps)
+    through_mps = math.dist(vehicle.velocity_en_mps, ctx.snapshot.current.en_mps)   # as it is believed to move
+    then = followed(now, ctx.t_s, vehicle.heading_rad, wind[0], through_mps)
     if then.began_s is not None and now.began_s is None:
-        then = replace(then, began_en_m=turn.boat_en)
+        then = replace(then, began_en_m=ctx.boat_en)
     elif now.began_s is not None and then.began_s is None and (now.is_counted or then.failed > now.failed):
-        then = lain(now, then, turn.t_s, turn.boat_en, wind[0], turn.snapshot.current.en_mps)
+        then = lain(now, then, ctx.t_s, ctx.boat_en, wind[0], ctx.snapshot.current.en_mps)
     if then != now:
-        turn.set(tacking=then)
+        ctx.set(tacking=then)
     if then.failed > now.failed:
-        _failed(turn, then)
+        _failed(ctx, then)
 
 
 def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, speed_mps: float) -> Tacking:
@@ -118,16 +118,16 @@ def _through_the_eye(now: Tacking, heading_rad: float, off_rad: float) -> bool:
     return turned >= 2.0 * TURNED_RAD and abs(off_rad) < 0.5 * math.pi
 
 
-def _failed(turn: Turn, tacking: Tacking) -> None:
+def _failed(ctx: StepContext, tacking: Tacking) -> None:
     """Say so, and ask for a plan from here where she has little room, or has tried often enough."""
-    given, boat = turn.voyage.boat.tack_fails, turn.boat_en
+    given, boat = ctx.voyage.boat.tack_fails, ctx.boat_en
     told = "" if given <= 0.0 else (
         f": the next one does by {100.0 * tacking.chance(given):.0f} %, "
         f"give or take {100.0 * tacking.spread(given):.0f} %")
-    turn.say(Severity.NOTICE, "tack failed",
+    ctx.say(Severity.NOTICE, "tack failed",
              f"{TACK_FAILED}, {tacking.failed} of {tacking.tried} so far{told}", every_s=0.0)
     if given <= 0.0 or boat is None:
         return
-    is_near = float(turn.voyage.area.clearance_m([boat])[0]) < NEAR_SOLID_M
+    is_near = float(ctx.voyage.area.clearance_m([boat])[0]) < NEAR_SOLID_M
     if tacking.in_a_row >= TACKS_FAIL_AFTER or is_near:
-        turn.set(plans=changed(turn.state.plans, asked=TACK_FAILED))
+        ctx.set(plans=changed(ctx.state.plans, asked=TACK_FAILED))

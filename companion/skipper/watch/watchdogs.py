@@ -10,9 +10,9 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from companion.skipper.deeds.adrift import LIGHT_MPS
+from companion.skipper.behaviors.drifting import LIGHT_MPS
 from companion.skipper.step.actions import Severity
-from companion.skipper.step.turn import JUMP_M
+from companion.skipper.step.context import JUMP_M
 
 
 class Response(enum.Enum):

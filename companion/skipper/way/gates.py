@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from companion.geo.angles import difference_rad, wrap_pi
-from companion.skipper.way.barriers import barrier_wkt, disc_wkt
-from companion.skipper.way.geometry import bearing_rad, distance_m, moved
+from companion.skipper.way.geometry import barrier_wkt, bearing_rad, disc_wkt, distance_m, moved
 from companion.skipper.way.line import (
     BEFORE_M,
     BEFORE_RADIUS_M,

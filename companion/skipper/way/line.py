@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.skipper.way.barriers import barrier_wkt
-from companion.skipper.way.geometry import along_m, bearing_rad, cross_track_m, distance_m, moved
+from companion.skipper.way.geometry import along_m, barrier_wkt, bearing_rad, cross_track_m, distance_m, moved
 from companion.skipper.way.voyage import Area, Line, PointEn
 
 BEFORE_M = 25.0     # the place before the line: room to settle on the course across it

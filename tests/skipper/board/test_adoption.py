@@ -4,9 +4,9 @@ from dataclasses import replace
 
 from companion.messages import GeoPoint, waypoint
 from companion.skipper import Skipper
-from companion.skipper.board.adoption import adopt
+from companion.skipper.board.on_board import adopt
 from companion.skipper.step import AdoptDrawing, SkipperConfig
-from companion.skipper.step.turn import Turn
+from companion.skipper.step.context import StepContext
 from companion.skipper.way import Goal
 from tests.skipper.world import World, voyage, with_parts
 
@@ -16,8 +16,8 @@ DRAWN = (waypoint(GeoPoint(lat_deg=50.81, lon_deg=-1.31)),)
 def asked(*, adopts=True, **changes):
     skipper = Skipper(voyage=voyage(Goal(en_m=(0.0, 100.0))), config=SkipperConfig(adopts=adopts))
     world = World(skipper=skipper)
-    turn = Turn(skipper.voyage, skipper.config, with_parts(skipper.initial(), mission=changes), world.snapshot())
-    return adopt(turn), turn.actions
+    ctx = StepContext(skipper.voyage, skipper.config, with_parts(skipper.initial(), mission=changes), world.snapshot())
+    return adopt(ctx), ctx.actions
 
 
 def test_what_is_drawn_is_asked_for():

@@ -10,11 +10,11 @@ import pytest
 import shapely
 
 from companion.planner import plan
-from companion.skipper.deeds.helm import leave_passed
-from companion.skipper.planning.admission import refusal
+from companion.skipper.behaviors.helm import leave_passed
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.not_found import not_found
+from companion.skipper.planning.uploads import refusal
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, SetCurrent, UploadMission
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.way.voyage import Goal
@@ -42,15 +42,15 @@ def sailing(way=((0.0, 60.0), GOAL), *, rock=ROCK, **config):
     return world
 
 
-def offered(turn, way, *, reason=ReplanReason.ORDER, rung=0):
+def offered(ctx, way, *, reason=ReplanReason.ORDER, rung=0):
     """Let the planner answer a request from the boat with the waypoints ``way``; return the actions that follow."""
-    assert request(turn, reason, rung=rung)
-    pending = turn.state.pending.plan
-    turn.actions.clear()
+    assert request(ctx, reason, rung=rung)
+    pending = ctx.state.pending.plan
+    ctx.actions.clear()
     found = plan(pending.problem, expansions=4000)
     answer = replace(found, waypoints_en=np.asarray([pending.problem.start_en, *way]), cost_s=1.0)
-    take_plan(turn, PlanOutcome(request_id=pending.request_id, plan=answer))
-    return turn.actions
+    take_plan(ctx, PlanOutcome(request_id=pending.request_id, plan=answer))
+    return ctx.actions
 
 
 def uploads(actions):
@@ -58,14 +58,14 @@ def uploads(actions):
 
 
 def test_a_plan_that_keeps_what_is_asked_goes_on_board():
-    turn = turn_of(sailing())
-    assert uploads(offered(turn, [(8.0, 100.0), GOAL]))
+    ctx = turn_of(sailing())
+    assert uploads(offered(ctx, [(8.0, 100.0), GOAL]))
 
 
 def test_nothing_below_the_floor_goes_on_board_from_a_place_that_is_not():
     """What is on board is closed by a rock here, and that is no reason: the ladder's next answer is asked for."""
-    turn = turn_of(sailing(way=((-20.0, 100.0), GOAL)))
-    actions = offered(turn, [(-9.0, 100.0), GOAL])
+    ctx = turn_of(sailing(way=((-20.0, 100.0), GOAL)))
+    actions = offered(ctx, [(-9.0, 100.0), GOAL])
     assert uploads(actions) == []
     [ladder] = [a for a in actions if isinstance(a, Announce) and a.code.startswith("ladder")]
     assert "clear, the floor is 4 m" in ladder.text
@@ -74,24 +74,24 @@ def test_nothing_below_the_floor_goes_on_board_from_a_place_that_is_not():
 
 @pytest.mark.parametrize(("way", "is_open"), [(((12.0, 100.0), GOAL), True), (((-20.0, 100.0), GOAL), False)])
 def test_a_smaller_margin_goes_on_board_only_where_what_is_there_is_closed(way, is_open):
-    turn = turn_of(sailing(way=way))
-    assert request(turn, ReplanReason.ORDER, rung=1)
-    assert turn.state.pending.plan.facts.margin_m < MARGIN_M
-    actions = offered(turn, [(3.0, 100.0), GOAL], rung=1)
+    ctx = turn_of(sailing(way=way))
+    assert request(ctx, ReplanReason.ORDER, rung=1)
+    assert ctx.state.pending.plan.facts.margin_m < MARGIN_M
+    actions = offered(ctx, [(3.0, 100.0), GOAL], rung=1)
     assert bool(uploads(actions)) is not is_open
     if is_open:
         assert not any(isinstance(a, RequestPlan) for a in actions)   # it stays: no further step down the ladder
-        assert turn.state.mission.route.points_en_m[:2] == way
+        assert ctx.state.mission.route.points_en_m[:2] == way
 
 
 def test_a_way_that_lacks_less_than_the_predictions_error_stays_when_nothing_better_is_found():
     """A tenth of a metre at the floor is no reason to give up margin, and to change course before a waypoint."""
     for east, stays in ((-4.8, True), (-9.5, False)):
-        turn = turn_of(sailing(way=((east, 100.0), GOAL)))
-        assert request(turn, ReplanReason.ORDER)
-        turn.actions.clear()
-        not_found(turn, turn.state.pending.plan, "none")
-        asks_for_less = any(isinstance(a, RequestPlan) for a in turn.actions)
+        ctx = turn_of(sailing(way=((east, 100.0), GOAL)))
+        assert request(ctx, ReplanReason.ORDER)
+        ctx.actions.clear()
+        not_found(ctx, ctx.state.pending.plan, "none")
+        asks_for_less = any(isinstance(a, RequestPlan) for a in ctx.actions)
         assert asks_for_less is not stays
 
 
@@ -99,16 +99,16 @@ def test_from_below_the_floor_only_what_comes_no_nearer_goes_on_board():
     world = sailing()
     beside = (-7.0, 100.0)   # 3 m from the rock, on its eastern side, heading along it
     world.position, world.state = beside, with_parts(world.state, position={"last_seen": None})
-    turn = turn_of(world)
-    assert request(turn, ReplanReason.OFF_LEG)
-    pending = turn.state.pending.plan
+    ctx = turn_of(world)
+    assert request(ctx, ReplanReason.OFF_LEG)
+    pending = ctx.state.pending.plan
 
     def refused(*points):
-        ways = (*points, GOAL, turn.state.mission.route.points_en_m[-1])
-        route = replace(turn.state.mission.route, points_en_m=ways,
-            items=turn.state.mission.route.items[:1] * len(ways),
+        ways = (*points, GOAL, ctx.state.mission.route.points_en_m[-1])
+        route = replace(ctx.state.mission.route, points_en_m=ways,
+            items=ctx.state.mission.route.items[:1] * len(ways),
                         leg_from_en_m=(beside, *ways[:-1]), gate_of=(*(-1,) * len(points), 0, -1))
-        return refusal(turn, route, 1, replace(pending, start_en_m=beside))
+        return refusal(ctx, route, 1, replace(pending, start_en_m=beside))
 
     assert refused((20.0, 120.0)) == ""
     assert "the boat is" in refused((-14.0, 115.0))
@@ -120,10 +120,10 @@ def test_an_item_that_was_passed_during_its_upload_is_not_turned_back_for():
     world = sailing(way=way)
     world.position, world.state = (0.0, 34.0), with_parts(world.state, position={"last_seen": None})
     for uploaded_s, wanted in ((world.t, [3]), (world.t - 30.0, [])):
-        turn = turn_of(world)
-        turn.state = with_parts(turn.state, mission={"uploaded_s": uploaded_s})
-        leave_passed(turn)
-        assert [a.seq for a in turn.actions if isinstance(a, SetCurrent)] == wanted
+        ctx = turn_of(world)
+        ctx.state = with_parts(ctx.state, mission={"uploaded_s": uploaded_s})
+        leave_passed(ctx)
+        assert [a.seq for a in ctx.actions if isinstance(a, SetCurrent)] == wanted
 
 
 def test_a_gate_is_never_left_out_as_passed():
@@ -131,6 +131,6 @@ def test_a_gate_is_never_left_out_as_passed():
     world.position = (0.0, 34.0)
     route = replace(world.state.mission.route, gate_of=(0, -1, -1, -1))
     world.state = with_parts(world.state, mission={"uploaded_s": world.t, "route": route}, position={"last_seen": None})
-    turn = turn_of(world)
-    leave_passed(turn)
-    assert turn.actions == []
+    ctx = turn_of(world)
+    leave_passed(ctx)
+    assert ctx.actions == []

@@ -10,9 +10,9 @@ from companion.boat.failed_tack import IRONS_S
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import tacks_fail
 from companion.skipper.step.actions import ReplanReason, RequestPlan
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.tacking import Tacking
-from companion.skipper.step.turn import Turn
+from companion.skipper.step.state import Tacking
 from companion.skipper.watch.tacks import TACK_FAILED, watch_tacks
 from tests.skipper.test_voyage import make
 from tests.skipper.world import with_parts
@@ -30,7 +30,7 @@ def under_way(given=0.1, obstacles=(), **tacking):
 
 
 def turn_of(world, **changes):
-    return Turn(world.skipper.voyage, world.skipper.config, with_parts(world.state, **changes), world.snapshot())
+    return StepContext(world.skipper.voyage, world.skipper.config, with_parts(world.state, **changes), world.snapshot())
 
 
 def fallen_back(world, **seen):
@@ -39,19 +39,19 @@ def fallen_back(world, **seen):
     off = math.radians(50.0)
     vehicle = replace(snapshot.vehicle, heading_rad=off)
     tacking = Tacking(side=-1, settled_rad=off, settled_s=world.t - 7.0, began_s=world.t - 6.0, **seen)
-    turn = Turn(world.skipper.voyage, world.skipper.config, replace(world.state, tacking=tacking),
+    ctx = StepContext(world.skipper.voyage, world.skipper.config, replace(world.state, tacking=tacking),
                 replace(snapshot, vehicle=vehicle))
-    watch_tacks(turn)
-    return turn
+    watch_tacks(ctx)
+    return ctx
 
 
 def test_a_failure_is_said_with_what_it_taught_and_asks_for_a_plan_near_something():
-    turn = fallen_back(under_way(obstacles=[ROCK]))
-    assert turn.state.tacking.failed == turn.state.tacking.tried == 1
-    [text] = [a.text for a in turn.actions if getattr(a, "code", "") == "tack failed"]
+    ctx = fallen_back(under_way(obstacles=[ROCK]))
+    assert ctx.state.tacking.failed == ctx.state.tacking.tried == 1
+    [text] = [a.text for a in ctx.actions if getattr(a, "code", "") == "tack failed"]
     assert "1 of 1" in text
     assert "25 %" in text                  # (0.1 * 5 + 1) / 6
-    assert turn.state.plans.asked == TACK_FAILED
+    assert ctx.state.plans.asked == TACK_FAILED
 
 
 def test_far_from_everything_only_the_second_in_a_row_asks():
@@ -60,10 +60,10 @@ def test_far_from_everything_only_the_second_in_a_row_asks():
 
 
 def test_a_mission_that_says_0_asks_for_nothing_and_goes_on_tacking():
-    turn = fallen_back(under_way(0.0, [ROCK]), tried=1, failed=1, in_a_row=1)
-    assert turn.state.tacking.failed == 2
-    assert turn.state.plans.asked == ""
-    assert not tacks_fail(turn)
+    ctx = fallen_back(under_way(0.0, [ROCK]), tried=1, failed=1, in_a_row=1)
+    assert ctx.state.tacking.failed == 2
+    assert ctx.state.plans.asked == ""
+    assert not tacks_fail(ctx)
 
 
 def test_two_in_a_row_are_gybed_round_until_one_comes_off_or_ten_minutes_have_passed():
@@ -76,9 +76,9 @@ def test_two_in_a_row_are_gybed_round_until_one_comes_off_or_ten_minutes_have_pa
 
 def test_what_was_learned_is_in_the_next_problem():
     world = under_way(0.1, tried=5, failed=4)
-    turn = turn_of(world)
-    assert request(turn, ReplanReason.ORDER)
-    [asked] = [a for a in turn.actions if isinstance(a, RequestPlan)]
+    ctx = turn_of(world)
+    assert request(ctx, ReplanReason.ORDER)
+    [asked] = [a for a in ctx.actions if isinstance(a, RequestPlan)]
     assert asked.problem.boat.tack_fails == pytest.approx((0.5 + 4.0) / 10.0)
     assert asked.problem.wind.strength.is_known
     assert min(asked.problem.wind.strength.sigma_mps) > 0.0
@@ -87,18 +87,18 @@ def test_what_was_learned_is_in_the_next_problem():
 def test_how_she_lay_is_in_the_next_problem_and_before_a_failure_is_not():
     for failed, irons_s, lee_mps in ((0, IRONS_S, (0.0, 0.0)), (1, 14.0, (0.4, 0.0))):
         world = under_way(0.1, tried=3, failed=failed, irons_s=14.0, starboard_lee_mps=0.4)
-        turn = turn_of(world)
-        assert request(turn, ReplanReason.ORDER)
-        [asked] = [a for a in turn.actions if isinstance(a, RequestPlan)]
+        ctx = turn_of(world)
+        assert request(ctx, ReplanReason.ORDER)
+        [asked] = [a for a in ctx.actions if isinstance(a, RequestPlan)]
         assert (asked.problem.boat.irons_s, asked.problem.boat.lee_mps) == (irons_s, lee_mps)
 
 
 def test_a_plan_of_a_boat_in_irons_begins_on_the_tack_that_she_falls_off_to():
     world = under_way(0.1, tried=1, failed=1)
     lies = replace(world.state.tacking, is_counted=True, side=1, settled_rad=math.radians(-50.0), began_s=world.t - 9.0)
-    turn = turn_of(world, tacking=lies)
-    assert request(turn, ReplanReason.ORDER)
-    [asked] = [a for a in turn.actions if isinstance(a, RequestPlan)]
+    ctx = turn_of(world, tacking=lies)
+    assert request(ctx, ReplanReason.ORDER)
+    [asked] = [a for a in ctx.actions if isinstance(a, RequestPlan)]
     assert math.degrees(asked.problem.start_heading_rad) % 360.0 == pytest.approx(310.0)
 
 

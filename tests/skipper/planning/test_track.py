@@ -18,7 +18,7 @@ from companion.skipper.step.actions import Announce, ReplanReason
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.way.geometry import moved
-from tests.skipper.planning.test_beating import turn
+from tests.skipper.planning.test_beating import ctx
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.way.test_rejudged import asked, sailing
 
@@ -46,7 +46,7 @@ def test_a_margin_that_leaves_too_little_is_widened_by_name_before_it_shrinks():
 
 
 def test_unread_parameters_leave_more_beside_the_track():
-    now = turn()
+    now = ctx()
     read = replace(now.snapshot, limits=AutopilotLimits(wp_speed_mps=5.0))
     unread = replace(now.snapshot, limits=AutopilotLimits())
     lowest = []
@@ -57,7 +57,7 @@ def test_unread_parameters_leave_more_beside_the_track():
 
 
 def test_a_problem_says_how_it_is_sailed_and_what_is_solid_as_it_is():
-    now = turn(WALL)
+    now = ctx(WALL)
     now.snapshot = replace(now.snapshot, limits=AutopilotLimits(wp_radius_m=7.0, wp_speed_mps=5.0))
     part = tracking(now)
     assert (part["wp_radius_m"], part["wp_speed_mps"], part["floor_m"]) == (7.0, 5.0, 6.0)
@@ -69,7 +69,7 @@ def test_a_problem_says_how_it_is_sailed_and_what_is_solid_as_it_is():
 
 
 def test_a_way_whose_track_comes_too_near_is_seen():
-    now = turn(WALL)
+    now = ctx(WALL)
     problem = Problem.from_json(problem_dict(
         now.voyage, now.gates[0], start=Start(en_m=(0.0, 0.0), heading_rad=0.0),
         aim=_aim(), forecast=now.snapshot.wind.forecast, margin_m=12.0, delta_s=0.9, no_go_half_rad=0.8,
@@ -94,7 +94,7 @@ def test_what_is_expected_is_said(clearance, words):
 
 
 def test_what_is_left_of_a_leg_is_no_short_leg_while_it_is_sailed():
-    now = turn(WALL)
+    now = ctx(WALL)
     problem = Problem.from_json(problem_dict(
         now.voyage, now.gates[0], start=Start(en_m=(0.0, 0.0), heading_rad=0.0),
         aim=_aim(), forecast=now.snapshot.wind.forecast, margin_m=12.0, delta_s=0.9, no_go_half_rad=0.8,

@@ -13,8 +13,8 @@ from companion.planner.worker import failed
 from companion.skipper.planning.vessels import HORIZON_S, NEAREST, UNKNOWN_S, meetings, near, shares
 from companion.skipper.step import actions as act
 from companion.skipper.step.actions import ReplanReason
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Phase
-from companion.skipper.step.turn import Turn
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from companion.traffic import Targets, TrafficPicture
@@ -166,15 +166,15 @@ def turn_among(*vessels):
     world = make()
     world.run(60)
     world.extra = {"traffic": TrafficPicture(t_s=world.t, vessels=vessels)}
-    return Turn(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
+    return StepContext(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
 
 
 def test_a_plan_that_starts_within_a_disc_may_leave_it():
-    turn = turn_among()
-    here = turn.boat_en
-    turn = turn_among(vessel((here[0] + 80.0, here[1]), 0.0, 2.0, t_s=turn.t_s, heard_s=turn.t_s))
-    assert meetings(turn)
-    found = shared_discs(shares(turn, here, 0.0, 0, 0.95))
+    ctx = turn_among()
+    here = ctx.boat_en
+    ctx = turn_among(vessel((here[0] + 80.0, here[1]), 0.0, 2.0, t_s=ctx.t_s, heard_s=ctx.t_s))
+    assert meetings(ctx)
+    found = shared_discs(shares(ctx, here, 0.0, 0, 0.95))
     assert found
     assert all(distance_m(here, (t.x_m, t.y_m)) > t.radius_m for t in found if t.from_s == 0.0)
 
@@ -182,8 +182,8 @@ def test_a_plan_that_starts_within_a_disc_may_leave_it():
 @pytest.mark.parametrize("delta_s", [0.5, 0.66, 0.8, 0.95])
 @pytest.mark.parametrize("rung", range(6))
 def test_no_rung_among_vessels_asks_for_less_than_a_plan_can_promise(rung, delta_s):
-    turn = turn_among(vessel((300.0, 200.0), 0.0, 2.0, t_s=60.0, heard_s=60.0))
-    asked = shares(turn, turn.boat_en, 0.0, rung, delta_s)
+    ctx = turn_among(vessel((300.0, 200.0), 0.0, 2.0, t_s=60.0, heard_s=60.0))
+    asked = shares(ctx, ctx.boat_en, 0.0, rung, delta_s)
     assert asked.targets
     assert asked.part is not None
     assert asked.part > 0.0
@@ -191,8 +191,8 @@ def test_no_rung_among_vessels_asks_for_less_than_a_plan_can_promise(rung, delta
 
 
 def test_a_vessel_of_unknown_course_blocks_the_next_moments_only():
-    turn = turn_among(vessel((300.0, 200.0), None, None, t_s=60.0, heard_s=60.0))
-    found = shares(turn, turn.boat_en, 0.0, 0, 0.95).targets
+    ctx = turn_among(vessel((300.0, 200.0), None, None, t_s=60.0, heard_s=60.0))
+    found = shares(ctx, ctx.boat_en, 0.0, 0, 0.95).targets
     assert found
     assert max(t.until_s for t in found) == pytest.approx(UNKNOWN_S)
 
@@ -209,17 +209,17 @@ def shared_discs(found):
 
 
 def test_the_promise_is_shared_between_wind_and_vessels():
-    turn = turn_among(vessel((400.0, 300.0), 180.0, 3.0, t_s=60.0, heard_s=60.0))
-    found = shares(turn, turn.boat_en, 0.0, 0, 0.95)
+    ctx = turn_among(vessel((400.0, 300.0), 180.0, 3.0, t_s=60.0, heard_s=60.0))
+    found = shares(ctx, ctx.boat_en, 0.0, 0, 0.95)
     assert found.delta_s == pytest.approx(0.95)
     assert (1.0 - found.wind_delta_s) + found.part == pytest.approx(0.05)
-    alone = shares(turn_among(), turn.boat_en, 0.0, 0, 0.95)
+    alone = shares(turn_among(), ctx.boat_en, 0.0, 0, 0.95)
     assert (alone.targets, alone.delta_s, alone.wind_delta_s, alone.part) == ((), 0.95, 0.95, None)
 
 
 def test_later_rungs_risk_more_for_vessels_and_say_so():
-    turn = turn_among(vessel((400.0, 300.0), 180.0, 3.0, t_s=60.0, heard_s=60.0))
-    first, later = (shares(turn, turn.boat_en, 0.0, rung, 0.95) for rung in (0, 2))
+    ctx = turn_among(vessel((400.0, 300.0), 180.0, 3.0, t_s=60.0, heard_s=60.0))
+    first, later = (shares(ctx, ctx.boat_en, 0.0, rung, 0.95) for rung in (0, 2))
     assert later.part > first.part
     assert later.wind_delta_s == first.wind_delta_s
     assert later.delta_s < first.delta_s
@@ -230,8 +230,8 @@ def test_later_rungs_risk_more_for_vessels_and_say_so():
 @pytest.mark.parametrize("comes_from", ["ahead", "abeam"])
 def test_of_too_many_a_plan_is_told_of_the_ship_on_collision_course(comes_from):
     """Two dozen at their moorings near by were told of, and she was not (issue 43, point 9)."""
-    turn = turn_among()
-    here, (ve, vn) = turn.boat_en, turn.snapshot.vehicle.velocity_en_mps
+    ctx = turn_among()
+    here, (ve, vn) = ctx.boat_en, ctx.snapshot.vehicle.velocity_en_mps
     moored = [vessel((here[0] - 60.0 - 5.0 * k, here[1] + 80.0), None, 0.0, mmsi=1000 + k, nav_status=5, t_s=60.0,
                      heard_s=60.0) for k in range(24)]
     met = here[0] + 400.0 * ve, here[1] + 400.0 * vn   # where we are in 400 s

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.messages import WindForecast
-from companion.skipper.step.shifting import TAU_S, shift_time_s, shifts_of
+from companion.skipper.step.wind_shifts import TAU_S, shift_time_s, shifts_of
 
 HORIZONS_S = np.array([0.0, 1.0, 10.0, 30.0, 60.0, 300.0, 900.0])
 

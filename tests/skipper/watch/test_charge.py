@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from companion.skipper.planning.ends import BATTERY
 from companion.skipper.step.config import Ends
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Alarms, Charge, SkipperState
-from companion.skipper.step.turn import Turn
-from companion.skipper.watch.charge import DETOUR, FALL, LOOK_S, lasts_s
+from companion.skipper.watch.measures import DETOUR, FALL, LOOK_S, lasts_s
 from companion.skipper.way.voyage import Goal
 from tests.skipper.test_voyage import make, said
 from tests.skipper.world import FRAME, voyage
@@ -65,7 +65,8 @@ def test_what_is_left_at_the_mean_rate(first, fallen, after_s):
     charge = Charge(since_s=10.0, first=first, last=first - fallen)
     world = make(AWAY)
     world.t = 10.0 + after_s
-    left = lasts_s(Turn(voyage(), world.skipper.config, SkipperState(alarms=Alarms(charge=charge)), world.snapshot()))
+    state = SkipperState(alarms=Alarms(charge=charge))
+    left = lasts_s(StepContext(voyage(), world.skipper.config, state, world.snapshot()))
     if after_s < LOOK_S or first - charge.last < FALL:
         assert left is None
     else:

@@ -12,15 +12,17 @@ from companion.geo.angles import difference_rad
 from companion.skipper.way.gates import Approach, again, bearing_on, gates_of, is_on_wrong_side
 from companion.skipper.way.geometry import (
     along_m,
+    bear_away_rad,
     bearing_rad,
     cross_track_m,
     distance_m,
+    gybe_round,
     is_past,
+    is_tack,
     leg_distance_m,
     moved,
     waypoint_done,
 )
-from companion.skipper.way.manoeuvre import bear_away_rad, gybe_round, is_tack
 from companion.skipper.way.voyage import Goal, Side
 from tests.skipper.world import area, voyage
 

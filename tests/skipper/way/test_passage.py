@@ -11,10 +11,9 @@ from pyproj import Geod
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
-from companion.skipper.planning.statement import aim_at, band
+from companion.skipper.planning.statement import aim_at, along, band, leg_line
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.way.gates import Gate
-from companion.skipper.way.passage import along, leg_line
 from tests.skipper.world import voyage
 
 EARTH = Geod(ellps="WGS84")

@@ -11,9 +11,9 @@ from companion.planner.risk.tacks import of_risky, tacks_at_risk
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.not_found import not_found
+from companion.skipper.planning.uploads import is_begun_risky, is_riskier, too_risky
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, UploadMission
 from companion.skipper.step.snapshot import PlanOutcome
-from companion.skipper.way.rejudged import is_begun_risky, is_riskier, too_risky
 from companion.skipper.way.voyage import Goal
 from tests.planner.risk.test_tacks import channel
 from tests.skipper.planning.test_tacks_fail import turn_of
@@ -75,11 +75,11 @@ def sailing(obstacles=WALLS):
     return world
 
 
-def asked(turn, reason=ReplanReason.ORDER, **more):
+def asked(ctx, reason=ReplanReason.ORDER, **more):
     """Return the problem that the turn asks for, its action taken off."""
-    assert request(turn, reason, **more)
-    [action] = [a for a in turn.actions if isinstance(a, RequestPlan)]
-    turn.actions.clear()
+    assert request(ctx, reason, **more)
+    [action] = [a for a in ctx.actions if isinstance(a, RequestPlan)]
+    ctx.actions.clear()
     return action.problem
 
 
@@ -87,64 +87,64 @@ def test_the_skipper_takes_the_new_plan_when_a_tack_of_the_old_one_has_become_to
     world = sailing()
     taken = []
     for tacking in ({}, LEARNED):
-        turn = turn_of(world, tacking=replace(world.state.tacking, **tacking))
-        problem = asked(turn)
+        ctx = turn_of(world, tacking=replace(world.state.tacking, **tacking))
+        problem = asked(ctx)
         found = plan(problem, expansions=8000)
-        way = [problem.start_en, *turn.ahead()]
+        way = [problem.start_en, *ctx.ahead()]
         old = evaluate(problem, way)
         assert old.is_feasible
         before, after = (of_risky(tacks_at_risk(problem, legs)) for legs in (old.legs, found.legs))
         assert (before > after) == bool(tacking)
         # as fast as the old one, so that nothing else speaks for it
-        take_plan(turn, PlanOutcome(request_id=turn.state.pending.plan.request_id,
+        take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id,
                                     plan=replace(found, cost_s=old.time_s)))
-        taken.append(any(isinstance(a, UploadMission) for a in turn.actions))
+        taken.append(any(isinstance(a, UploadMission) for a in ctx.actions))
     assert taken == [False, True]
 
 
 def test_the_ladder_is_climbed_by_name_while_the_old_plan_is_too_risky_and_at_its_end_it_stays():
     world = sailing()
     for tacking, code in (({}, "no plan"), (LEARNED, "ladder 0")):
-        turn = turn_of(world, tacking=replace(world.state.tacking, **tacking))
-        asked(turn)
-        not_found(turn, turn.state.pending.plan, "nothing")
-        assert [a.code for a in turn.actions if isinstance(a, Announce)] == [code]
-    while turn.state.pending.plan is not None and any(isinstance(a, RequestPlan) for a in turn.actions):
-        turn.actions.clear()
-        not_found(turn, turn.state.pending.plan, "nothing")
-    [said] = [a.text for a in turn.actions if isinstance(a, Announce)]
+        ctx = turn_of(world, tacking=replace(world.state.tacking, **tacking))
+        asked(ctx)
+        not_found(ctx, ctx.state.pending.plan, "nothing")
+        assert [a.code for a in ctx.actions if isinstance(a, Announce)] == [code]
+    while ctx.state.pending.plan is not None and any(isinstance(a, RequestPlan) for a in ctx.actions):
+        ctx.actions.clear()
+        not_found(ctx, ctx.state.pending.plan, "nothing")
+    [said] = [a.text for a in ctx.actions if isinstance(a, Announce)]
     assert "the old one stays; tacks of it that fail would bring her onto something" in said
 
 
 def test_a_tack_at_the_next_waypoint_that_has_become_too_risky_is_planned_away_from_the_boat():
     world = sailing()
     for tacking, from_seq in (({}, []), (LEARNED, [None])):
-        turn = turn_of(world, tacking=replace(world.state.tacking, **tacking))
-        problem = asked(turn, ReplanReason.WAYPOINT, from_index=turn.state.mission.index)
-        take_plan(turn, PlanOutcome(request_id=turn.state.pending.plan.request_id,
+        ctx = turn_of(world, tacking=replace(world.state.tacking, **tacking))
+        problem = asked(ctx, ReplanReason.WAYPOINT, from_index=ctx.state.mission.index)
+        take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id,
                                     plan=plan(problem, expansions=8000)))
-        assert [a.from_seq for a in turn.actions if isinstance(a, RequestPlan)] == from_seq
+        assert [a.from_seq for a in ctx.actions if isinstance(a, RequestPlan)] == from_seq
 
 
 def test_so_near_that_waypoint_no_plan_is_made_from_the_boat_for_it_would_turn_beyond_it():
     world = sailing()
     for budget_s, from_seq in ((0.5, [None]), (30.0, [])):
         world.skipper = replace(world.skipper, config=replace(world.skipper.config, plan_budget_s=budget_s))
-        turn = turn_of(world, tacking=replace(world.state.tacking, **LEARNED))
-        problem = asked(turn, ReplanReason.WAYPOINT, from_index=turn.state.mission.index)
-        take_plan(turn, PlanOutcome(request_id=turn.state.pending.plan.request_id,
+        ctx = turn_of(world, tacking=replace(world.state.tacking, **LEARNED))
+        problem = asked(ctx, ReplanReason.WAYPOINT, from_index=ctx.state.mission.index)
+        take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id,
                                     plan=plan(problem, expansions=8000)))
-        assert [a.from_seq for a in turn.actions if isinstance(a, RequestPlan)] == from_seq
+        assert [a.from_seq for a in ctx.actions if isinstance(a, RequestPlan)] == from_seq
 
 
 def test_the_tack_that_begins_a_plan_is_gybed_round_too_after_two_that_failed():
     world = sailing(obstacles=())
-    turn = turn_of(world, tacking=replace(world.state.tacking, tried=2, failed=2, in_a_row=2, failed_s=world.t))
-    problem = asked(turn)
+    ctx = turn_of(world, tacking=replace(world.state.tacking, tried=2, failed=2, in_a_row=2, failed_s=world.t))
+    problem = asked(ctx)
     found = plan(problem, expansions=8000)
     came_from_the_other_side = replace(problem, start_heading_rad=-problem.start_heading_rad)
-    turn.state = with_parts(
-        turn.state, pending={"plan": replace(turn.state.pending.plan, problem=came_from_the_other_side)})
-    take_plan(turn, PlanOutcome(request_id=turn.state.pending.plan.request_id, plan=found))
-    loop = turn.state.pending.upload.route.points_en_m[:2]
+    ctx.state = with_parts(
+        ctx.state, pending={"plan": replace(ctx.state.pending.plan, problem=came_from_the_other_side)})
+    take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id, plan=found))
+    loop = ctx.state.pending.upload.route.points_en_m[:2]
     assert all(point[1] < problem.start_en[1] for point in loop)     # to leeward, before anything else

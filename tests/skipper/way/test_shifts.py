@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.skipper.way.shifts import shift_table
+from companion.skipper.step.wind_shifts import shift_table
 
 HALF_RAD = math.radians(45.0)
 

@@ -1,0 +1,6 @@
+"""Behaviors: getting under way, steering, loitering, stopping, and taking the helm again."""
+
+from companion.skipper.behaviors.drifting import CALL
+from companion.skipper.behaviors.failsafe import TOLD_S
+
+__all__ = ["CALL", "TOLD_S"]

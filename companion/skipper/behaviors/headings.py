@@ -1,0 +1,125 @@
+"""Headings to send, where the boat is steered by headings instead of a mission (Büsser 2009, chapter 3).
+
+Per leg the heading is that from the previous waypoint to the current one, not from the boat: the plan's angle to
+the wind is what makes it fast. Near the destination it is the course from the boat; near a buoy the course to the
+buoy plus 30 degrees, and no manoeuvre there leads to the buoy's side of what is wanted (section 3.2.4: "to the left of
+the desired heading", for a buoy to port). Drift is added as in equation 3 of chapter 2. What plans promise of clearance
+is of the leg's line, and his heading leads along it from wherever the last turn ended: so she is led back to it
+(``back_to_line_rad``), which is ours. Heading setpoints have no protection of ArduRover's against the no-go zone
+either: ``sailable_rad`` is ours, too.
+
+[1] G.-A. Büsser, Design and Implementation of a Navigation Algorithm for an Autonomous Sailboat, ETH Zürich, 2009.
+"""
+
+from __future__ import annotations
+
+import math
+
+from companion.geo.angles import difference_rad, wrap_pi
+from companion.skipper.step.context import StepContext
+from companion.skipper.way.gates import Gate
+from companion.skipper.way.geometry import bearing_rad, cross_track_m, distance_m
+from companion.skipper.way.voyage import PointEn, Side
+
+DRIFT_LIMIT_RAD = math.radians(20.0)  # more is not leeway but a current or a compass error
+STEERAGE_MPS = 0.5                    # slower than this the drift angle means nothing
+AT_BUOY = 3.0                         # rounding radii
+TACK_HYSTERESIS_RAD = math.radians(10.0)
+BACK_S, BACK_M = 4.0, 8.0             # the line is aimed at so far ahead, in time and at the least
+BACK_LIMIT_RAD = math.radians(45.0)
+
+
+def drift_correction_rad(velocity_en_mps: tuple[float, float], heading_rad: float) -> float:
+    """Return arctan(v_drift / v_boat), [1] eq. (3): what to add to the heading so that the course is made good.
+
+    Positive (to starboard) when the boat is pushed to port; limited, and 0 without way on.
+    """
+    ahead = velocity_en_mps[0] * math.sin(heading_rad) + velocity_en_mps[1] * math.cos(heading_rad)
+    to_port = velocity_en_mps[1] * math.sin(heading_rad) - velocity_en_mps[0] * math.cos(heading_rad)
+    if ahead < STEERAGE_MPS:
+        return 0.0
+    return max(-DRIFT_LIMIT_RAD, min(DRIFT_LIMIT_RAD, math.atan2(to_port, ahead)))
+
+
+def back_to_line_rad(off_m: float, speed_mps: float) -> float:
+    """Return what to add to a leg's course to come back to its line, ``off_m`` to the right of it [m].
+
+    >>> round(math.degrees(back_to_line_rad(8.0, 1.0)))
+    -45
+    """
+    wanted = -math.atan2(off_m, max(BACK_M, BACK_S * speed_mps))
+    return max(-BACK_LIMIT_RAD, min(BACK_LIMIT_RAD, wanted))
+
+
+def buoy_heading_rad(boat_en: PointEn, buoy_en: PointEn, side: Side, angle_rad: float) -> float:
+    """Return the course to the buoy turned away from it by ``angle_rad`` ([1] Figure 3.5), to leave it on ``side``."""
+    return wrap_pi(bearing_rad(boat_en, buoy_en) + _hand(side) * angle_rad)
+
+
+def sailable_rad(
+    wanted_rad: float, heading_rad: float, twd_from_rad: float, no_go_half_rad: float, buoy: Side = Side.NONE
+) -> float:
+    """Return the wanted heading, or the edge of the no-go zone if it lies inside.
+
+    The edge is that of the tack the boat is on; the other one only when the wanted heading is nearer to it by more
+    than 10 degrees, so that a course dead to windward does not make the boat tack to and fro. With a ``buoy`` to be
+    left on that side nothing leads to its side of the wanted heading ([1] 3.2.4): the edge is the far one, unless the
+    boat is on the near one already and that within 10 degrees of what is wanted, for staying there is no manoeuvre.
+    """
+    to_wanted = difference_rad(wanted_rad, twd_from_rad)
+    if abs(to_wanted) >= no_go_half_rad:
+        return wanted_rad
+    side = 1.0 if difference_rad(heading_rad, twd_from_rad) >= 0.0 else -1.0
+    if buoy is not Side.NONE:
+        far = _hand(buoy)
+        if side != far and far * to_wanted + no_go_half_rad > TACK_HYSTERESIS_RAD:
+            side = far
+    elif side * to_wanted < -TACK_HYSTERESIS_RAD / 2.0:
+        side = -side
+    return wrap_pi(twd_from_rad + side * no_go_half_rad)
+
+
+def _hand(side: Side) -> float:
+    """Return which way leads away from a buoy that is left on ``side``: 1 to starboard, -1 to port."""
+    return 1.0 if side is Side.PORT else -1.0
+
+
+def desired_heading_rad(ctx: StepContext) -> float | None:
+    """Return the heading to send now, None when it cannot be told: nothing is sent, and the setpoint times out."""
+    boat, leg, vehicle, wind, gate = ctx.boat_en, ctx.leg(), ctx.snapshot.vehicle, ctx.wind_now, ctx.gate
+    if boat is None or leg is None or vehicle is None or wind is None or not ctx.ahead():
+        return None
+    drift, half, twd = drift_correction_rad(vehicle.velocity_en_mps, vehicle.heading_rad), ctx.no_go_half_rad, wind[0]
+    if _is_at_buoy(gate, boat) and gate is not None and gate.buoy_en_m is not None:
+        wanted = bearing_rad(boat, leg[1])
+        if gate.is_first and distance_m(boat, gate.buoy_en_m) > distance_m(gate.en_m, gate.buoy_en_m):
+            # The scheme is for the approach: kept up all the way round it would spiral into the buoy.
+            clear = buoy_heading_rad(boat, gate.buoy_en_m, gate.side, ctx.config.buoy_angle_rad)
+            if _hand(gate.side) * difference_rad(clear, wanted) > 0.0:
+                wanted = clear
+        return sailable_rad(wrap_pi(wanted + drift), vehicle.heading_rad, twd, half, gate.side)
+    along = wrap_pi(bearing_rad(*leg) + drift)
+    off_wind = difference_rad(along, twd)
+    is_last = ctx.state.mission.index == ctx.last_waypoint() and distance_m(boat, leg[1]) < ctx.config.grid_size_m
+    if is_last or distance_m(*leg) < 1.0 or abs(off_wind) < half:
+        # On a leg that the wind has closed she goes about where the other tack is nearer to its end.
+        return sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), vehicle.heading_rad, twd, half)
+    # Back to the line on the leg's own tack: through the wind she would come to it sooner, and be on the wrong one.
+    back = back_to_line_rad(cross_track_m(boat, *leg), ctx.speed_mps)
+    side = math.copysign(1.0, off_wind)
+    return wrap_pi(twd + side * max(half, side * off_wind + side * back))
+
+
+def course_rad(ctx: StepContext) -> float | None:
+    """Return the course over ground that she is steered on now, None when it cannot be told."""
+    heading, vehicle = desired_heading_rad(ctx), ctx.snapshot.vehicle
+    if heading is None or vehicle is None:
+        return None
+    return wrap_pi(heading - drift_correction_rad(vehicle.velocity_en_mps, vehicle.heading_rad))
+
+
+def _is_at_buoy(gate: Gate | None, boat: PointEn) -> bool:
+    """Return whether the boat is at the buoy that it is to round: within three of its rounding radii."""
+    if gate is None or gate.buoy_en_m is None:
+        return False
+    return distance_m(boat, gate.buoy_en_m) < AT_BUOY * distance_m(gate.en_m, gate.buoy_en_m)

@@ -1,0 +1,292 @@
+"""What is done while it is doubted where the boat is, or what wind she sails in.
+
+A position in doubt: what is safe where it says that the boat is, and where she was and has sailed on from?
+The autopilot takes a new position and sails by it, true or not. Until there is evidence (``companion.skipper.way
+.integrity``) nothing is planned from it, and where the reckoned place is not clear ahead the boat loiters: ArduRover's
+LOITER turns in circles of 12 m about a point, and where on earth that is does not matter to it, while HOLD drifts. That
+the new place is not clear, either, is no reason against it: nobody sails inside a rock, and what jumps is false more
+often than true.
+
+Once held she stays held until the position is believed. A jump moves the point of a LOITER that is sailed already, and
+she would make for it over whatever lies between: then she is put into HOLD and into LOITER again, which begins here.
+
+A wind that her motion contradicts, or that is learned anew: she loiters, and nothing is planned. A plan for a wind that
+is not there leads anywhere, and each step of the ladder gives up some of what keeps her clear.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from companion.frozen import changed
+from companion.messages import Mode
+from companion.skipper.behaviors.drifting import stops_drift
+from companion.skipper.behaviors.helm import is_busy, set_mode
+from companion.skipper.planning.waits import utc_s
+from companion.skipper.step.actions import CancelPlan, Severity
+from companion.skipper.step.causes import CRITICAL, HOMEWARD
+from companion.skipper.step.context import FRESH_S, JUMP_M, StepContext
+from companion.skipper.step.saved import SavedPlace
+from companion.skipper.step.state import Phase
+from companion.skipper.way.position_plausibility import (
+    DISPUTED_S,
+    ERROR_M,
+    LASTS_S,
+    LOST_ERRS_MPS,
+    LOST_S,
+    Evidence,
+    PositionDoubt,
+    is_impossible,
+)
+from companion.skipper.way.voyage import PointEn
+
+AHEAD_S = 20.0        # what the boat sails until a LOITER that is asked for now has her, and some more
+SLOW_MPS = 1.0
+GLITCH_S = 3.0        # a position that is back sooner has done no harm
+SAVE_S = 30.0         # between two places that are saved
+STRAYS_M = 25.0       # what a boat in LOITER or HOLD is off her place when she is found again
+LEAST_REACH_M = 30.0  # a start finds her so near to where she was, whatever the clocks say
+UNKNOWN_S = 120.0     # how long a start has taken when no clock tells
+BEATEN_MPS = 10.0     # the wind in which she may have sailed meanwhile
+SAID_S = 60.0         # between two words on a wind that is not known
+CODE = "position doubted"
+
+
+# --------------------------------------------------------------------------------------------- seen
+def follow(ctx: StepContext) -> None:
+    """Begin a doubt of the position, reckon on from where the boat was, and end it when there is evidence."""
+    state, here, vehicle, age = (
+        ctx.state, ctx.snapshot.position_en_m, ctx.snapshot.vehicle, ctx.snapshot.vehicle_age_s)
+    if here is None or vehicle is None or age is None or age > FRESH_S:
+        return
+    _follow_filter(ctx)
+    seen = _evidence(ctx, here, ctx.t_s - age)
+    doubt = _begun(ctx, seen) if state.position.doubt is None else state.position.doubt.after(seen)
+    ctx.set(position=changed(
+        ctx.state.position,
+        restored=None if doubt is not None or utc_s(ctx) is not None else ctx.state.position.restored))
+    if doubt is None:
+        _remember(ctx, here, None)
+        return
+    if seen.is_jump and state.steering.own_mode is Mode.LOITER and ctx.autopilot is not None and (
+        ctx.autopilot.mode is Mode.LOITER
+    ):
+        ctx.set(position=changed(ctx.state.position, anew=Mode.HOLD))
+    why = "" if state.position.doubt is None else doubt.believed_for(seen)
+    if why:
+        ctx.set(
+            position=changed(ctx.state.position, doubt=None, back_s=ctx.t_s),
+            alarms=changed(
+                ctx.state.alarms, raised=tuple(r for r in state.alarms.raised if r.name != "position jump")))
+        code = "position back" if doubt.is_back(here) else "position believed"
+        ctx.say(Severity.NOTICE, code, f"the position is believed again: {why}", every_s=0.0)
+        _remember(ctx, here, None)
+        return
+    if state.position.doubt is None and not seen.is_jump:   # of a jump the watchdog speaks
+        ctx.say(Severity.WARNING, CODE, f"the position is doubted: {doubt.why}; reckoned on from where she was",
+                 every_s=0.0)
+    ctx.set(position=changed(ctx.state.position, doubt=doubt))
+    _remember(ctx, here, doubt)
+
+
+def _evidence(ctx: StepContext, here: PointEn, at_s: float) -> Evidence:
+    """Return what this step shows of the position."""
+    state, vehicle, status, solid = ctx.state, ctx.snapshot.vehicle, ctx.autopilot, ctx.voyage.area.unfenced
+    jumped = ctx.jump_m >= JUMP_M
+    velocity = (0.0, 0.0) if vehicle is None else vehicle.velocity_en_mps
+    told = status.gps2 if status is not None else None
+    second = None if told is None else ctx.voyage.frame.en_from_geo(told)
+    if state.position.doubt is None:   # nothing of the rest matters
+        return Evidence(t_s=at_s, en_m=here, velocity_en_mps=velocity, is_jump=jumped, second_en_m=second)
+    place = state.position.doubt.reckoned_en_m
+    room_m, other_m = (float(room) for room in solid.clearance_m([here, place]))
+    return Evidence(
+        t_s=at_s, en_m=here, velocity_en_mps=velocity, is_jump=jumped, is_possible=room_m > -ERROR_M,
+        is_well=status is None or (status.ekf_ok and status.system_status != CRITICAL),
+        is_other_possible=other_m > -(ERROR_M + state.position.doubt.error_m), room_m=min(room_m, other_m),
+        second_en_m=second,
+        is_given=state.operator.given_back_s >= state.position.doubt.since_s)
+
+
+def _begun(ctx: StepContext, seen: Evidence) -> PositionDoubt | None:
+    """Return the doubt that this step begins, None: the position is believed."""
+    state, last = ctx.state, ctx.state.position.last_seen
+    lost_s = 0.0 if state.position.lost_s is None else ctx.t_s - state.position.lost_s
+    lost_m = ERROR_M + LOST_ERRS_MPS * lost_s if lost_s >= LOST_S else 0.0
+    if seen.is_jump and last is not None:
+        begun = PositionDoubt(since_s=ctx.t_s, t_s=last.t_s, settled_s=seen.t_s, reckoned_en_m=last.en_m,
+                              lost_m=lost_m, why=f"it jumped {ctx.jump_m:.0f} m")
+        return begun.after(seen)
+    if seen.is_contradicted and seen.second_en_m is not None:
+        disputed_s = state.position.disputed_s if state.position.disputed_s is not None else ctx.t_s
+        ctx.set(position=changed(ctx.state.position, disputed_s=disputed_s))
+        if ctx.t_s - disputed_s >= DISPUTED_S:
+            off_m = math.dist(seen.second_en_m, seen.en_m)
+            return PositionDoubt(since_s=ctx.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=seen.second_en_m,
+                                 farthest_m=off_m, is_dispute=True,
+                                 why=f"a second receiver is {off_m:.0f} m away from it")
+    elif state.position.disputed_s is not None:
+        ctx.set(position=changed(ctx.state.position, disputed_s=None))
+    if state.position.restored is not None:
+        begun_anew = _since_the_last_start(ctx, state.position.restored, seen)
+        if begun_anew is not None:
+            return begun_anew
+    if is_impossible(ctx.voyage.area, seen.en_m, margin_m=ctx.config.margin_m):
+        deep_m = -float(ctx.voyage.area.unfenced.clearance_m([seen.en_m])[0])
+        name = ctx.voyage.area.nearest_name(seen.en_m) or "an obstacle"
+        return PositionDoubt(since_s=ctx.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=seen.en_m,
+                             error_m=deep_m + ctx.config.margin_m, why=f"it is {deep_m:.0f} m inside {name}")
+    return None
+
+
+def _since_the_last_start(ctx: StepContext, before: SavedPlace, seen: Evidence) -> PositionDoubt | None:
+    """Return the doubt of a fix that is not where the boat can have come to since it was saved, or was in doubt."""
+    now_s, saved = utc_s(ctx), ctx.state.mission.adoptable
+    passed_s = UNKNOWN_S if now_s is None else max(0.0, now_s - before.utc_s)
+    is_held = saved is not None and saved.own_mode in {Mode.LOITER, Mode.HOLD}
+    fastest_mps = ctx.voyage.boat.polar.max_speed_mps(BEATEN_MPS) + ctx.snapshot.current.drift_mps + SLOW_MPS
+    reach_m = before.error_m + (min(STRAYS_M, fastest_mps * passed_s) if is_held else fastest_mps * passed_s)
+    off_m = math.dist(before.en_m, seen.en_m)
+    was_doubted = before.farthest_m > 0.0 and passed_s < LASTS_S
+    if not was_doubted and (now_s is None or off_m <= reach_m + LEAST_REACH_M):
+        return None
+    text = "in doubt before this start" if was_doubted else (
+        f"{off_m:.0f} m from where she was {passed_s:.0f} s ago")
+    doubt = PositionDoubt(
+        since_s=ctx.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=before.en_m, error_m=reach_m,
+        farthest_m=max(before.farthest_m, off_m), why=f"it is {text}")
+    return None if doubt.is_back(seen.en_m) else doubt
+
+
+def _follow_filter(ctx: StepContext) -> None:
+    """Notice since when the filter has had no position; that is forgotten when a fix has come without a jump."""
+    status = ctx.autopilot
+    if status is None or status.ekf_ok:
+        if ctx.jump_m < JUMP_M and ctx.state.position.lost_s is not None and ctx.state.position.doubt is None:
+            ctx.set(position=changed(ctx.state.position, lost_s=None))
+    elif ctx.state.position.lost_s is None:
+        ctx.set(position=changed(ctx.state.position, lost_s=ctx.t_s))
+
+
+def _remember(ctx: StepContext, here: PointEn, doubt: PositionDoubt | None) -> None:
+    """Keep for who comes after a kill where the boat is, every ``SAVE_S`` and when a doubt begins or ends."""
+    now_s, before = utc_s(ctx), ctx.state.position.place
+    if now_s is None or not ctx.state.voyage.sailing:
+        return
+    is_same = before is not None and (before.farthest_m > 0.0) == (doubt is not None)
+    if is_same and before is not None and before.utc_s // SAVE_S == now_s // SAVE_S:
+        return
+    en_m = here if doubt is None else doubt.reckoned_en_m
+    ctx.set(position=changed(ctx.state.position, place=SavedPlace(
+        utc_s=round(now_s, 1), en_m=(round(en_m[0], 1), round(en_m[1], 1)),
+        error_m=0.0 if doubt is None else round(doubt.error_m, 1),
+        farthest_m=0.0 if doubt is None else max(JUMP_M, round(doubt.farthest_m, 1)))))
+
+
+# --------------------------------------------------------------------------------------------- held
+def is_other_shut(ctx: StepContext) -> bool:
+    """Return whether, from the reckoned place, the boat would soon come too near to something as it is steered now."""
+    doubt, here = ctx.state.position.doubt, ctx.snapshot.position_en_m
+    leg, vehicle = ctx.leg(), ctx.snapshot.vehicle
+    if doubt is None or here is None or vehicle is None:
+        return False
+    place = doubt.reckoned_en_m
+    way = (0.0, 0.0) if leg is None else (leg[1][0] - here[0], leg[1][1] - here[1])
+    left_m = math.hypot(*way)
+    share = min(1.0, AHEAD_S * max(vehicle.speed_mps, SLOW_MPS) / left_m) if left_m > 0.0 else 0.0
+    drift = (AHEAD_S * vehicle.velocity_en_mps[0], AHEAD_S * vehicle.velocity_en_mps[1])
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m) + doubt.error_m
+    return min(
+        ctx.voyage.area.path_clearance_m([place, (place[0] + d[0], place[1] + d[1])])
+        for d in ((share * way[0], share * way[1]), drift)) < floor_m
+
+
+def _is_steered_falsely(ctx: StepContext) -> bool:
+    """Return whether the autopilot has steered for a while by a place where no boat can be: inside something."""
+    here, doubt = ctx.snapshot.position_en_m, ctx.state.position.doubt
+    if here is None or doubt is None or ctx.t_s - doubt.since_s < GLITCH_S:
+        return False
+    return float(ctx.voyage.area.unfenced.clearance_m([here])[0]) < -ERROR_M
+
+
+def stands_off(ctx: StepContext) -> bool:
+    """Loiter while the position is in doubt and the reckoned place is not clear ahead; True while it does."""
+    status, state = ctx.autopilot, ctx.state
+    if status is None or not ctx.snapshot.permissions.may_set_mode:
+        return False
+    if not status.ekf_ok or status.system_status == CRITICAL:
+        return False   # nor would it loiter then
+    if state.position.anew is not None:
+        _begin_anew(ctx)
+        if ctx.state.position.anew is not None:
+            ctx.phase(Phase.HOLDING, "the position jumped, and the loiter's point with it: waiting to loiter anew")
+            return True
+    if state.position.doubt is None:
+        return False
+    is_held = status.mode is state.steering.own_mode and state.steering.own_mode is Mode.LOITER
+    if is_held:
+        stops_drift(ctx)   # which the reckoned track tells, too
+        ctx.phase(
+            Phase.HOLDING,
+            f"the position is doubted, {state.position.doubt.why}: waiting in a loiter until it can be believed")
+        return True
+    is_stopped = status.mode is state.steering.own_mode and state.steering.own_mode in {Mode.HOLD, *HOMEWARD}
+    if not (is_stopped or ctx.steers or _is_steered_falsely(ctx) or is_other_shut(ctx)):
+        return False
+    if is_busy(ctx, Mode.LOITER.name):
+        return is_stopped
+    if set_mode(ctx, Mode.LOITER, "the position is doubted and the reckoned place is not clear ahead"):
+        ctx.set(operator=changed(ctx.state.operator, is_back=True))
+        ctx.say(Severity.WARNING, "standing off",
+                 f"the position is doubted ({state.position.doubt.why}) and the reckoned place is not clear ahead: "
+                  "loitering",
+                 every_s=0.0)
+    return True
+
+
+def _begin_anew(ctx: StepContext) -> None:
+    """Begin a LOITER anew whose point has jumped with the position: HOLD, then LOITER, then it is over.
+
+    A position that is believed is planned from meanwhile: with a plan on its way HOLD is left for that.
+    """
+    status, state = ctx.autopilot, ctx.state
+    shown = None if status is None else status.mode
+    if shown not in {Mode.LOITER, Mode.HOLD} or state.steering.own_mode not in {Mode.LOITER, Mode.HOLD}:
+        ctx.set(position=changed(ctx.state.position, anew=None))
+    elif state.position.anew is Mode.HOLD and shown is Mode.LOITER:
+        set_mode(ctx, Mode.HOLD, "the position jumped, and the loiter's point with it: loitering anew")
+    elif shown is Mode.LOITER or (
+        state.position.doubt is None and (state.pending.plan is not None or state.pending.upload is not None)
+    ):
+        ctx.set(position=changed(ctx.state.position, anew=None))
+    elif set_mode(ctx, Mode.LOITER, "loitering anew where she is"):
+        ctx.set(position=changed(ctx.state.position, anew=Mode.LOITER))
+
+
+def holds(ctx: StepContext) -> bool:
+    """Loiter while wind and water are not to be planned with; True while LOITER is ours, or asked for."""
+    status, state, why = ctx.autopilot, ctx.state, ctx.snapshot.unsure
+    memory = state.adrift
+    if not why and memory.loiter_en_m is not None and not memory.loitered:
+        ctx.set(adrift=replace(memory, loiter_en_m=None))
+    if not why or status is None:
+        return False
+    if state.pending.plan is not None:
+        ctx.act(CancelPlan(request_id=state.pending.plan.request_id))
+        ctx.set(pending=changed(ctx.state.pending, plan=None))
+    ctx.set(plans=changed(ctx.state.plans, rung=0, ladder_reason=None))
+    ctx.say(Severity.ERROR, "held", f"{why}: no plan is made until it is known again", every_s=SAID_S)
+    if state.by_field.resort.engaged or not ctx.snapshot.permissions.may_set_mode or not status.ekf_ok:
+        return False
+    if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
+        if memory.loiter_en_m is None:   # by a wrong wind she may be carried off it, which is a drift
+            ctx.set(adrift=replace(memory, loiter_en_m=ctx.boat_en))
+        ctx.phase(Phase.HOLDING, f"{why}: waiting in a loiter until the wind is known")
+        return True
+    if state.steering.until_s is not None:      # out of irons, it was believed
+        ctx.set(steering=changed(ctx.state.steering, until_s=None, heading_rad=None))
+    if not is_busy(ctx, Mode.LOITER.name) and set_mode(ctx, Mode.LOITER, why):
+        ctx.set(operator=changed(ctx.state.operator, is_back=True))
+    ctx.phase(Phase.HOLDING, f"{why}: waiting for the autopilot to take LOITER")
+    return True

@@ -1,0 +1,112 @@
+"""The end of a voyage, and of a diversion: she loiters, and is watched.
+
+A voyage is over when all goals are reached (and home, where the mission ends there), or its time is up. From then on
+nothing is planned but the way back to her place, should she be dragged off it and the straight way not be clear; the
+watch goes on until somebody ends the program.
+"""
+
+from __future__ import annotations
+
+from companion.frozen import changed
+from companion.skipper.behaviors.failsafe import waits_for
+from companion.skipper.behaviors.field_guidance import keeps_station
+from companion.skipper.behaviors.helm import hand_back, repair
+from companion.skipper.planning.diversions import home_trouble, is_at_rest, pressing
+from companion.skipper.planning.ends import HOW_LONG, OUT_OF_TIME, end_of
+from companion.skipper.step.actions import CancelPlan, Severity
+from companion.skipper.step.causes import SHORE, STOPPING
+from companion.skipper.step.config import End, SafeEnd
+from companion.skipper.step.context import StepContext
+from companion.skipper.step.route import Diversion, Kind
+from companion.skipper.step.state import Phase
+
+ANSWERED = {
+    "": "for a person",
+    SHORE: "until the link to the shore is back, or a person gives AUTO",
+}
+TAKEN = "until a person takes her and gives AUTO back"
+UNTIL_TOLD = "until told to go on"
+
+
+def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
+    """Lie at the end of a diversion; True while she does."""
+    if not is_at_rest(ctx) or ctx.state.steering.own_mode in STOPPING:
+        return False
+    if ctx.is_raised(OUT_OF_TIME) and end_of(ctx.config, OUT_OF_TIME) is not End.SAY and not (
+        ctx.state.operator.answering or pressing(ctx) is not None or bound.is_ordered
+    ):
+        reached = len(ctx.state.progress.reached)
+        _end(ctx, f"out of time: {reached} of {len(ctx.voyage.legs)} goals reached", arrived=False)
+        return True
+    if bound.kind is Kind.HOME and ctx.gate is None and not ctx.state.operator.answering and not bound.is_ordered:
+        ctx.set(voyage=changed(ctx.state.voyage, home_reached=True))
+        rest(ctx)
+        return True
+    if bound.kind is Kind.REST:
+        return False
+    _let_go_of_plans(ctx)
+    if repair(ctx):
+        return True
+    hand_back(ctx)
+    where = "staying near by" if bound.kind is Kind.STAY else f"at {bound.name}"
+    how_long = UNTIL_TOLD if bound.is_ordered else bound.until or _how_long(ctx)
+    ctx.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
+    return True
+
+
+def _how_long(ctx: StepContext) -> str:
+    """Return how long a diversion that nobody ordered keeps her."""
+    raised = next((name for name in HOW_LONG if ctx.is_raised(name) and end_of(ctx.config, name) is not End.SAY), "")
+    return HOW_LONG.get(raised) or ANSWERED.get(ctx.state.operator.answering, TAKEN)
+
+
+def rest(ctx: StepContext) -> None:
+    """Keep station for as long as the mission asks, then lie in the mission's safe end."""
+    if not ctx.state.voyage.over:
+        if keeps_station(ctx):
+            return
+        ends_home = ctx.config.safe_end is SafeEnd.RETURN and not ctx.state.voyage.home_reached
+        trouble = home_trouble(ctx) if ends_home else ""
+        home = f"; not home: {trouble}" if trouble else "; home" if ctx.state.voyage.home_reached else ""
+        route = ctx.state.mission.route
+        end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
+        goals = len(ctx.voyage.legs)
+        reached = "the goal is reached" if goals == 1 else f"all {goals} goals reached"
+        if ctx.state.orders.skipped:
+            skipped = ctx.state.orders.skipped
+            reached = f"{goals - skipped} of {goals} goals reached, {skipped} given up by order"
+        before = " before this start" if ctx.state.voyage.arrived else ""
+        _end(ctx, f"{reached}{before}{home}{end}", arrived=not trouble)
+        return
+    stopped = ctx.state.steering.own_mode in STOPPING and ctx.autopilot is not None and (
+        ctx.autopilot.mode is ctx.state.steering.own_mode)
+    # the loiter's place is the same wherever she has been
+    ctx.set(operator=changed(ctx.state.operator, is_back=False))
+    why = waits_for(ctx) if stopped else ""
+    if why:
+        ctx.phase(Phase.HOLDING, why)
+    elif not repair(ctx):
+        hand_back(ctx)
+        ctx.phase(Phase.DONE, ctx.state.voyage.over + ("; waiting for AUTO" if stopped else _raised(ctx)))
+
+
+def _raised(ctx: StepContext) -> str:
+    names = ", ".join(r.name for r in ctx.state.alarms.raised if r.name != OUT_OF_TIME)
+    return f"; {names}" if names else ""
+
+
+def _end(ctx: StepContext, why: str, *, arrived: bool) -> None:
+    """The voyage is over: remember where she is to rest."""
+    _let_go_of_plans(ctx)
+    route = ctx.state.mission.route
+    place = route.points_en_m[-1] if route is not None and route.points_en_m else ctx.boat_en
+    ctx.set(voyage=changed(ctx.state.voyage, over=why, arrived=arrived, rest_en_m=place))
+    hand_back(ctx)
+    ctx.phase(Phase.DONE, why)
+    ctx.say(Severity.NOTICE if arrived else Severity.WARNING, "done", why, every_s=0.0)
+
+
+def _let_go_of_plans(ctx: StepContext) -> None:
+    if ctx.state.pending.plan is not None:
+        ctx.act(CancelPlan(request_id=ctx.state.pending.plan.request_id))
+        ctx.set(pending=changed(ctx.state.pending, plan=None))

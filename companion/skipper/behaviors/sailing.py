@@ -1,0 +1,305 @@
+"""Under way: who steers, what is asked for, and Büsser's names for what the boat is doing."""
+
+from __future__ import annotations
+
+import math
+
+from companion.frozen import changed
+from companion.geo.angles import difference_rad
+from companion.messages import Mode
+from companion.skipper.behaviors.drifting import stops_drift
+from companion.skipper.behaviors.failsafe import waits_for
+from companion.skipper.behaviors.field_guidance import heading as by_field_heading
+from companion.skipper.behaviors.headings import desired_heading_rad
+from companion.skipper.behaviors.helm import (
+    check_current,
+    hand_back,
+    is_busy,
+    leave_passed,
+    make_current,
+    repair,
+    set_mode,
+)
+from companion.skipper.behaviors.position_doubt import stands_off
+from companion.skipper.behaviors.rest import comes_to_rest, rest
+from companion.skipper.behaviors.tacks import shift_tack, short_tack
+from companion.skipper.planning.asking import request
+from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S
+from companion.skipper.planning.diversions import diversion, is_at_rest, is_composed
+from companion.skipper.planning.not_found import hold
+from companion.skipper.planning.right_of_way import stands_on
+from companion.skipper.planning.triggers import find_trigger, is_buoy
+from companion.skipper.planning.vessels import near
+from companion.skipper.planning.waits import stay_left_s
+from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
+from companion.skipper.step.causes import HOMEWARD, STOPPING
+from companion.skipper.step.config import Guidance
+from companion.skipper.step.context import StepContext
+from companion.skipper.step.route import Diversion
+from companion.skipper.step.state import Phase
+from companion.skipper.way.geometry import bear_away_rad, distance_m
+from companion.traffic.plans import MIN_INTERVAL_S
+
+HAIR_M = 0.5
+STEER_S = 25.0               # bearing away longer than this has failed
+SAILS_MPS = 0.8              # out of irons
+IN_IRONS = "she was in irons"
+SAILS_TWA_RAD = math.radians(60.0)
+# Reasons that can wait among vessels, where plans must not follow each other fast (Büsser 5.2).
+ROUTINE = frozenset({
+    ReplanReason.WAYPOINT, ReplanReason.FORECAST, ReplanReason.WIND_SHIFT, ReplanReason.PLAN_AGE, ReplanReason.OFF_LEG})
+
+
+def is_at_end(ctx: StepContext) -> bool:
+    """Return whether nothing is left to sail to: the voyage is over or its goals are passed, and no diversion is on."""
+    return diversion(ctx) is None and (ctx.gate is None or bool(ctx.state.voyage.over))
+
+
+def stand_off(ctx: StepContext) -> bool:
+    """Keep off what a doubted position may hide."""
+    if not stands_off(ctx):
+        return False
+    if not is_at_end(ctx) and ctx.state.position.doubt is None and ctx.state.pending.upload is None:
+        _consider(ctx)   # from where she is known to be, while her loiter is begun anew
+    return True
+
+
+def stop_drift(ctx: StepContext) -> bool:
+    """Stop a boat that drifts and does not sail."""
+    return (bool(ctx.state.voyage.over) or not is_at_end(ctx)) and stops_drift(ctx)
+
+
+def rest_at_end(ctx: StepContext) -> bool:
+    """Loiter at the voyage's end."""
+    if not is_at_end(ctx):
+        return False
+    rest(ctx)
+    return True
+
+
+def sail_on(ctx: StepContext) -> bool:
+    """Sail on out of a stop that the boat shows and that was asked for."""
+    stopped = ctx.state.steering.own_mode in STOPPING
+    if not stopped or ctx.autopilot is None or ctx.autopilot.mode is not ctx.state.steering.own_mode:
+        return False
+    _sail_on(ctx)
+    return True
+
+
+def lie_at_diversion(ctx: StepContext) -> bool:
+    """Lie at the end of a diversion."""
+    bound = diversion(ctx)
+    return bound is not None and comes_to_rest(ctx, bound)
+
+
+def give_back_helm(ctx: StepContext) -> bool:
+    """Give the helm back to AUTO after steering."""
+    own = ctx.state.steering.own_mode
+    if own is None or ctx.autopilot is None or ctx.autopilot.mode is not own or ctx.steers:
+        return False
+    hand_back(ctx)
+    ctx.phase(ctx.state.phase, "waiting for AUTO after steering")
+    return True
+
+
+def follow_route(ctx: StepContext) -> bool:
+    """Sail the mission on board, and plan anew when there is a reason to."""
+    if ctx.steers:
+        _send_heading(ctx)
+    elif ctx.guidance is not Guidance.PLAN:
+        ctx.say(Severity.WARNING, "guidance", f"guidance by {ctx.guidance.value} is asked for and steering is "
+                 "not permitted: by plan", every_s=600.0)
+        check_current(ctx)
+    else:
+        leave_passed(ctx)
+        check_current(ctx)
+        short_tack(ctx)
+        shift_tack(ctx)
+    if ctx.is_raised("stuck waypoint") and ctx.state.mission.own_index > ctx.state.mission.index:
+        make_current(ctx, ctx.state.mission.own_index + 1)
+    bound = diversion(ctx)
+    if bound is not None and not bound.has_place:
+        _stay(ctx, bound)
+        return True
+    if ctx.state.pending.upload is None:
+        _consider(ctx)
+    _name(ctx)
+    return True
+
+
+def _sail_on(ctx: StepContext) -> None:
+    """Out of a stop that nobody asked for, or a LOITER of ours: plan from where the boat is now, then AUTO."""
+    why = waits_for(ctx)
+    if why or repair(ctx):
+        ctx.phase(Phase.HOLDING, why or "waiting for the mission to be put right before sailing on")
+        return
+    if _goes_on_at_once(ctx):
+        hand_back(ctx)
+        ctx.phase(Phase.HOLDING, "the way on board is clear: waiting for AUTO, a new plan follows under way")
+        return
+    bound = diversion(ctx)
+    stays = bound is not None and not bound.has_place
+    if bound is not None and stays and not (is_at_rest(ctx) and (_is_outside(ctx) or _is_way_clear(ctx))):
+        _stay(ctx, bound, anew=True)
+    elif ctx.state.pending.upload is None:
+        _consider(ctx)
+    if ctx.state.pending.plan is not None or ctx.state.pending.upload is not None:
+        ctx.phase(Phase.HOLDING, "waiting for the plan from where the boat has drifted to, and for its upload")
+    elif ctx.state.operator.is_back and not stays and (ctx.is_way_shut or _is_outside(ctx)):
+        wait_s = ctx.state.plans.retry.not_before_s - ctx.t_s
+        again = f"; trying again in {wait_s:.0f} s" if wait_s > 0.0 else ""
+        ctx.phase(Phase.HOLDING, f"no plan yet from where the boat has drifted to: waiting for one{again}")
+    else:
+        hand_back(ctx)
+        ctx.phase(Phase.HOLDING, "waiting for the autopilot to take AUTO: sailing on")
+
+
+def _goes_on_at_once(ctx: StepContext) -> bool:
+    """Return whether she is sailed home by the autopilot, straight, while the way on board is clear from here.
+
+    RTL and SmartRTL turn her, at full speed, towards whatever lies between her and home, in the three seconds or more
+    that a plan and its upload take; AUTO takes one, and a plan made under way begins where she will be.
+    """
+    state = ctx.state
+    return state.steering.own_mode in HOMEWARD and state.pending.upload is None and bool(ctx.ahead()) and (
+        not _is_outside(ctx) and _is_way_clear(ctx))
+
+
+def _is_way_clear(ctx: StepContext) -> bool:
+    """Return whether what is left of the way on board, straight from where she is, comes no nearer than it may.
+
+    That is the margin's floor, or what she has about her now where that is less.
+    """
+    boat, leg, area = ctx.boat_en, ctx.leg(), ctx.voyage.area
+    if boat is None or leg is None:
+        return False
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m, float(area.clearance_m([boat])[0]) - HAIR_M)
+    return area.path_clearance_m([boat, leg[1], *ctx.ahead()[1:]]) >= max(0.0, floor_m)
+
+
+def _is_outside(ctx: StepContext) -> bool:
+    """Return whether she is where no mission may lead: outside the fence, or over something."""
+    here = ctx.snapshot.position_en_m
+    return here is not None and float(ctx.voyage.area.clearance_m([here])[0]) <= 0.0
+
+
+def _stay(ctx: StepContext, bound: Diversion, *, anew: bool = False) -> None:
+    """Loiter where there is room near by; ``anew``: the loiter on board cannot be sailed to from here."""
+    if ctx.state.pending.upload is None and ctx.t_s >= ctx.state.pending.upload_retry.not_before_s:
+        hold(ctx, bound.sentence, anew=anew)
+    ctx.phase(Phase.HOLDING, f"{bound.sentence}; waiting for the loiter's upload")
+
+
+def _send_heading(ctx: StepContext) -> None:
+    """Steer by Büsser's headings under GUIDED, and keep the autopilot's count in step for the moment we are gone."""
+    status = ctx.autopilot
+    if status is None:
+        return
+    own = ctx.state.steering.own_mode
+    is_stopping = own in STOPPING and is_busy(ctx, own.name)   # asked for, and not shown yet
+    if status.mode is not Mode.GUIDED:
+        if not is_stopping:
+            set_mode(ctx, Mode.GUIDED, f"steering by {'field' if ctx.guidance is Guidance.FIELD else 'headings'}")
+        return
+    if not is_stopping:
+        ctx.set(steering=changed(ctx.state.steering, own_mode=Mode.GUIDED))
+    if ctx.guidance is Guidance.FIELD:
+        told = by_field_heading(ctx)
+        if told is not None:
+            ctx.act(SteerHeading(heading_rad=told.heading_rad, thrust=told.thrust, text=told.reason))
+    else:
+        wanted = desired_heading_rad(ctx)
+        if wanted is not None:
+            ctx.act(SteerHeading(heading_rad=wanted, text="leg"))
+    if status.mission_seq is not None and status.mission_seq < ctx.state.mission.index + 1:
+        make_current(ctx, ctx.state.mission.index + 1)
+
+
+def _consider(ctx: StepContext) -> None:
+    trigger = find_trigger(ctx, ctx.fresh)
+    if trigger is None:
+        return
+    state = ctx.state
+    if state.pending.plan is not None and not (trigger.urgent and state.pending.plan.reason is not trigger.reason):
+        return
+    if ctx.t_s < state.plans.retry.not_before_s and not trigger.urgent:
+        return
+    interval_s = trigger.interval_s
+    if trigger.reason in ROUTINE and near(ctx):
+        interval_s = max(interval_s, MIN_INTERVAL_S)
+    if trigger.reason in ROUTINE - {ReplanReason.OFF_LEG} and stands_on(ctx):
+        return   # rule 17 a i: course and speed are kept
+    if ctx.t_s - state.plans.last_s < interval_s:
+        return
+    if request(ctx, trigger.reason, from_index=trigger.from_index, text=trigger.text):
+        at = ctx.state.plans.replanned_index if trigger.from_index is None else trigger.from_index
+        ctx.set(
+            operator=changed(ctx.state.operator, is_back=False),
+            plans=changed(ctx.state.plans, asked="", replanned_index=at))
+
+
+def bear_away(ctx: StepContext) -> bool:
+    """Bear away out of irons under GUIDED; True while the helm is ours."""
+    state, status, vehicle, boat, wind = (
+        ctx.state, ctx.autopilot, ctx.snapshot.vehicle, ctx.boat_en, ctx.wind_now)
+    if state.steering.until_s is None:
+        if "in irons" not in ctx.fresh or boat is None or vehicle is None or wind is None:
+            return False
+        recent = tuple(t for t in state.steering.irons_s if ctx.t_s - t < IRONS_MEMORY_S)
+        ctx.set(steering=changed(ctx.state.steering, irons_s=(*recent, ctx.t_s)))
+        if ctx.snapshot.permissions.may_steer and set_mode(ctx, Mode.GUIDED, "in irons: bearing away"):
+            heading = bear_away_rad(boat, vehicle.heading_rad, wind[0], ctx.voyage.area)
+            ctx.set(steering=changed(ctx.state.steering, until_s=ctx.t_s + STEER_S, heading_rad=heading))
+        else:
+            ctx.set(plans=changed(ctx.state.plans, asked=IN_IRONS))
+            return False
+    heading_rad = ctx.state.steering.heading_rad or 0.0
+    until = ctx.state.steering.until_s
+    out = vehicle is not None and wind is not None and vehicle.speed_mps > SAILS_MPS and (
+        abs(difference_rad(wind[0], vehicle.heading_rad)) > SAILS_TWA_RAD)
+    refused = status is not None and status.mode is Mode.AUTO and not is_busy(ctx, Mode.GUIDED.name)
+    over = out or refused or (until is not None and ctx.t_s > until)
+    if over and (refused or ctx.steers or set_mode(
+            ctx, Mode.AUTO, "sailing again" if out else "bearing away took too long")):
+        # The mode we asked for ourselves stays ours until AUTO shows.
+        ctx.set(
+            steering=changed(
+                ctx.state.steering, until_s=None, heading_rad=None, own_mode=None if refused else Mode.GUIDED),
+            plans=changed(ctx.state.plans, asked=IN_IRONS))
+        return False
+    ctx.act(SteerHeading(heading_rad=heading_rad, text="out of irons"))
+    ctx.phase(ctx.state.phase, f"in irons: waiting for her to bear away to {math.degrees(heading_rad) % 360.0:.0f}°")
+    return True
+
+
+def _name(ctx: StepContext) -> None:
+    """Name what the boat is doing, with the sentence why."""
+    state, route = ctx.state, ctx.state.mission.route
+    if route is None:
+        return
+    step = f" ({route.rung})" if route.rung else ""
+    if state.pending.plan is not None:
+        ctx.phase(Phase.NEW_CALCULATION, f"planning: {state.pending.plan.reason.value}")
+        return
+    raised = ", ".join(r.name for r in state.alarms.raised)
+    tail = (f"; {state.progress.task}" if state.progress.task else "") + (f"; {raised}" if raised else "")
+    gate, bound = ctx.gate, diversion(ctx)
+    if is_composed(ctx) and gate is not None and gate.field is not None:
+        left_s = stay_left_s(ctx, gate)
+        field, time = gate.field, "" if math.isinf(left_s) else f"; {left_s:.0f} s left"
+        ctx.phase(Phase.STANDARD, f"{gate.name}: by field {field.tree.text}, {field.until_words}{time}{tail}")
+    elif not ctx.ahead():
+        wait = state.plans.retry.not_before_s - ctx.t_s
+        again = f", trying again in {wait:.0f} s" if wait > 0.0 else ""
+        ctx.phase(Phase.HOLDING, f"loitering in the mission's safe end: waiting for a plan{again}{tail}")
+    elif bound is not None:
+        ctx.phase(Phase.STANDARD, f"item {state.mission.index + 1} of {len(route.items)} {bound.sentence}{step}{tail}")
+    elif gate is not None and is_buoy(gate) and gate.buoy_en_m is not None and ctx.boat_en is not None and (
+        distance_m(ctx.boat_en, gate.buoy_en_m) < 4.0 * distance_m(gate.en_m, gate.buoy_en_m)
+    ):
+        ctx.phase(Phase.BUOY_APPROACH, f"{gate.name} to {gate.side.value}{step}{tail}")
+    elif state.mission.index == ctx.last_waypoint() and route.gate_of[state.mission.index] == len(ctx.gates) - 1:
+        ctx.phase(Phase.DESTINATION_APPROACH, f"last waypoint before {gate.name if gate else 'the end'}{step}{tail}")
+    else:
+        where = f"item {state.mission.index + 1} of {len(route.items)}"
+        ctx.phase(Phase.STANDARD, f"{where} to {gate.name if gate else 'the end'}{step}{tail}")

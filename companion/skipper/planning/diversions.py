@@ -1,0 +1,307 @@
+"""Where she is bound for when it is not the next goal: a refuge, home, her place to rest, or just to stay.
+
+A diversion is found anew in every step from what is raised and what is being answered; the route says which one its end
+serves. It is planned like any leg and ends in a loiter, so that nothing is ever sailed straight and unlooked at.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from companion.orders import Verb
+from companion.skipper.planning.ends import (
+    BATTERY,
+    DARK,
+    LEAK,
+    LIGHT_WIND,
+    OUT_OF_TIME,
+    SHORE_LOST,
+    STRONG_WIND,
+    WHY,
+    end_of,
+)
+from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
+from companion.skipper.step.actions import Severity
+from companion.skipper.step.causes import SHORE, Answer
+from companion.skipper.step.config import End, SafeEnd
+from companion.skipper.step.context import StepContext
+from companion.skipper.step.route import HOME_RADIUS_M, Diversion, Kind
+from companion.skipper.way.autopilot_fence import Circle, Drawn
+from companion.skipper.way.gates import Gate, marks_of
+from companion.skipper.way.geometry import disc_wkt, distance_m
+from companion.skipper.way.voyage import PointEn, Refuge
+
+DRAGGED = "dragged off"   # a watchdog
+HOME, REST = "home", "the place to rest"
+GOAL_RADIUS_M = 10.0     # a place that is named under way: there within this
+FENCE_SAID_S = 600.0     # between two words on a fence that is drawn
+
+
+def diversion(ctx: StepContext) -> Diversion | None:
+    """Return where she is bound for instead of the next goal, None: nowhere.
+
+    It is found once, and anew only when a part of the state that it is made of has been replaced.
+    """
+    state = ctx.state
+    parts = (state.mission, state.operator, state.alarms, state.orders, state.voyage, state.plans, state.progress,
+             state.by_field, state.steering, state.position)
+    if ctx.found is None or any(new is not old for new, old in zip(parts, ctx.found[0], strict=True)):
+        ctx.found = parts, _find(ctx)
+    return ctx.found[1]
+
+
+def _find(ctx: StepContext) -> Diversion | None:
+    return pressing(ctx) or _ordered(ctx) or _at_the_end(ctx) or _kept_in(ctx) or _before_start(ctx) or (
+        _in_box(ctx) or _off_field(ctx))
+
+
+def is_composed(ctx: StepContext) -> bool:
+    """Return whether it is the field of the goal that is next that steers her now."""
+    memory, gate = ctx.state.by_field, ctx.gate
+    return memory.composed and memory.left_s is None and gate is not None and gate.field is not None
+
+
+def _off_field(ctx: StepContext) -> Diversion | None:
+    """Return where she waits while the field of the goal that is next cannot be sailed, None: it can."""
+    gate, may = ctx.gate, ctx.snapshot.permissions
+    if gate is None or gate.field is None or ctx.state.voyage.over:
+        return None
+    why = ctx.state.by_field.lost or (
+        "" if may.may_steer and may.may_set_mode else "its field is not sailed, for steering is not permitted")
+    if not why:
+        return None
+    left_s = stay_left_s(ctx, gate)
+    until = "until it can be sailed, or told to go on" if math.isinf(left_s) else f"{left_s:.0f} s more"
+    return Diversion(kind=Kind.FIELD, name=f"the place of {gate.name}", why=why, en_m=gate.en_m, radius_m=gate.radius_m,
+                  until=until)
+
+
+def _in_box(ctx: StepContext) -> Diversion | None:
+    """Return where she stays in the box that is next."""
+    gate = ctx.gate
+    if gate is None or gate.box is None or ctx.state.voyage.over:
+        return None
+    left_s = stay_left_s(ctx, gate)
+    until = "until told to go on" if gate.box.for_s is None else f"{left_s:.0f} s more"
+    return Diversion(kind=Kind.BOX, name=f"the box {gate.name}", why="to stay in it", en_m=gate.en_m,
+                  radius_m=gate.radius_m, until=until)
+
+
+def _before_start(ctx: StepContext) -> Diversion | None:
+    """Return where she waits for the gun of the start line that is next."""
+    gate = ctx.gate
+    if gate is None or gate.line is None or ctx.state.voyage.over or not waits_for_gun(ctx, gate):
+        return None
+    left_s = gun_in_s(ctx, gate.line)
+    why = "the autopilot does not know the time of day yet" if left_s is None else "waiting for the gun"
+    until = "" if left_s is None else f"{left_s:.0f} s"
+    name = f"the water before {gate.name}"
+    route = ctx.state.mission.route
+    is_bound = route is not None and route.bound_for == name and route.points_en_m
+    place = route.points_en_m[ctx.last_waypoint()] if route is not None and is_bound else waiting_en(ctx, gate)
+    return Diversion(kind=Kind.START, name=name, why=why, en_m=place, until=until)
+
+
+def pressing(ctx: StepContext) -> Diversion | None:
+    """Return the diversion that comes before every order: battery, leak, or a failsafe that is answered."""
+    state, ends = ctx.state, ctx.config.ends
+    answer = ends.answer(state.operator.answering)
+    why = "the autopilot has lost its link to the shore" if state.operator.answering == SHORE else (
+        f"the autopilot's {state.operator.answering} failsafe")
+    if answer is Answer.SHELTER:
+        is_battery = state.operator.answering == "battery"
+        # she is stopped: something must be done
+        end = End.REFUGE if not is_battery or ends.battery is End.SAY else ends.battery
+        why = WHY[BATTERY] if is_battery and ctx.is_raised(BATTERY) else why
+        return _found(ctx, end, why) or _stay(ctx, why)
+    if ctx.is_raised(BATTERY):
+        found = _found(ctx, ends.battery, WHY[BATTERY])
+        if found is not None:
+            return found   # without a place to go to what is left takes her on
+    if ctx.is_raised(LEAK) and ends.leak is not End.SAY:
+        return _found(ctx, ends.leak, WHY[LEAK]) or _stay(ctx, WHY[LEAK])
+    if answer is Answer.STAY:
+        return (_home(ctx, why) if state.operator.sent_home else None) or _stay(ctx, why)
+    return None
+
+
+def _ordered(ctx: StepContext) -> Diversion | None:
+    """Return the diversion of the order that stands, None: there is none, or she is given up."""
+    order = ctx.state.orders.standing
+    if order is None or order.verb is Verb.STOP:
+        return None
+    if order.verb is Verb.HOLD or order.en_m is None:
+        found = _stay(ctx, order.why)
+        return None if found is None else replace(found, is_ordered=True)
+    kind, name, radius_m = {
+        Verb.REFUGE: (Kind.REFUGE, f"the refuge {order.name}".rstrip(), HOME_RADIUS_M),
+        Verb.HOME: (Kind.HOME, HOME, HOME_RADIUS_M),
+    }.get(order.verb, (Kind.GOAL, order.name, GOAL_RADIUS_M))
+    radius_m = next((r.radius_m for r in ctx.voyage.refuges if r.en_m == order.en_m), radius_m)
+    return Diversion(kind=kind, name=name, why=order.why, en_m=order.en_m, radius_m=radius_m, is_ordered=True)
+
+
+def _at_the_end(ctx: StepContext) -> Diversion | None:
+    """Return where she is bound for when time, light, shore or a wind for her are gone, or the goals are reached, or
+    she is off her place."""  # noqa: D205, D209
+    state = ctx.state
+    for name in (OUT_OF_TIME, STRONG_WIND, SHORE_LOST, DARK, LIGHT_WIND):
+        end = end_of(ctx.config, name)
+        if ctx.is_raised(name) and end is not End.SAY and not state.voyage.over:
+            return _found(ctx, end, WHY[name]) or _stay(ctx, WHY[name])
+    if state.voyage.over:
+        return _back(ctx)
+    return homeward(ctx) if ctx.gate is None else None
+
+
+def _kept_in(ctx: StepContext) -> Diversion | None:
+    """Return where she waits when the autopilot's own fence lies between her and the next goal."""
+    fence, trouble = _fence_before(ctx, ctx.gate)
+    here = ctx.boat_en
+    if fence is None:
+        return None
+    # From the edge a loiter strays across it: she goes so far in, and is there when she has come there.
+    room_m = min(ctx.config.margin_m + 2.0 * ctx.config.loiter_radius_m, fence.most_room_m)
+    name = f"a place inside {fence.words}"
+    route = ctx.state.mission.route
+    is_bound = route is not None and route.bound_for == name
+    if here is None or (fence.inside_m(here) >= room_m and not is_bound):
+        staying = _stay(ctx, trouble)
+        if staying is not None or here is None:
+            return staying
+    place = route.points_en_m[ctx.last_waypoint()] if route is not None and is_bound else (
+        fence.place_inside(ctx.voyage.area, here, room_m))
+    return Diversion(kind=Kind.INSIDE, name=name, why=trouble, en_m=place)
+
+
+def fenced_off(ctx: StepContext, gate: Gate | None) -> str:
+    """Return why a goal cannot be sailed to for the autopilot's own fence (empty: it can)."""
+    return _fence_before(ctx, gate)[1]
+
+
+def _fence_before(ctx: StepContext, gate: Gate | None) -> tuple[Circle | Drawn | None, str]:
+    """Return the autopilot's own fence that a goal cannot be sailed to for, and why; None: there is none."""
+    if gate is not None and not ctx.state.voyage.over:
+        floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
+        for fence in ctx.fences:
+            trouble = fence.trouble(gate.name or "the goal", gate.en_m, floor_m)
+            if trouble:
+                return fence, trouble
+    return None, ""
+
+
+def speak_of_fence(ctx: StepContext) -> None:
+    """Say that somebody has drawn a fence on the autopilot that takes water which the mission leaves."""
+    if ctx.drawn is not None:
+        ctx.say(Severity.WARNING, "fence drawn", f"{ctx.drawn.words} takes water of the mission's: plans keep inside "
+                 "of it", every_s=FENCE_SAID_S)
+
+
+def _found(ctx: StepContext, end: End, why: str) -> Diversion | None:
+    """Return the diversion that ends a voyage so, None: there is no such place, or words are all that is asked."""
+    ends_home = end is End.HOME or ctx.state.operator.sent_home or ctx.config.safe_end is SafeEnd.RETURN
+    home = _home(ctx, why) if end in {End.HOME, End.REFUGE} and ends_home else None
+    if end is End.STAY:
+        return _stay(ctx, why)
+    if end is End.SAY:
+        return None
+    return home or _refuge(ctx, why) if end is End.HOME else _refuge(ctx, why) or home
+
+
+def homeward(ctx: StepContext) -> Diversion | None:
+    """Return the way home behind the last goal, None where the mission does not end there or has come there."""
+    if ctx.config.safe_end is not SafeEnd.RETURN or ctx.state.voyage.home_reached or ctx.state.voyage.over:
+        return None
+    return _home(ctx, "all goals are reached")
+
+
+def _stay(ctx: StepContext, why: str) -> Diversion | None:
+    """Return a diversion to stay, None outside the fence or over something: from there she sails on first."""
+    here = ctx.snapshot.position_en_m
+    if here is not None and float(ctx.voyage.area.clearance_m([here])[0]) <= 0.0:
+        return None
+    return Diversion(kind=Kind.STAY, name="", why=why)
+
+
+def _refuge(ctx: StepContext, why: str) -> Diversion | None:
+    """Return the refuge that the route is bound for, else the nearest; the next one after each that had no way."""
+    refuges = ctx.voyage.refuges
+    if not refuges:
+        return None
+    route, here = ctx.state.mission.route, ctx.boat_en or ctx.snapshot.position_en_m
+    bound = route.bound_for if route is not None else ""
+    chosen = next((r for r in refuges if refuge_name(r) == bound), None)
+    if chosen is None:
+        by_distance = sorted(refuges, key=lambda r: distance_m(here, r.en_m) if here is not None else 0.0)
+        chosen = by_distance[ctx.state.plans.retry.failures % len(by_distance)]
+    return Diversion(kind=Kind.REFUGE, name=refuge_name(chosen), why=why, en_m=chosen.en_m, radius_m=chosen.radius_m)
+
+
+def refuge_name(refuge: Refuge) -> str:
+    """Return what a refuge is called in sentences."""
+    return f"the refuge {refuge.name}".rstrip()
+
+
+def home_trouble(ctx: StepContext) -> str:
+    """Return why the way home cannot be planned (empty: it can)."""
+    status = ctx.snapshot.autopilot
+    if status is None or status.home is None:
+        return "the autopilot has not told where home is"
+    return place_trouble(ctx, HOME, ctx.voyage.frame.en_from_geo(status.home))
+
+
+def place_trouble(ctx: StepContext, what: str, en_m: PointEn) -> str:
+    """Return why no way can be planned to a place (empty: one can be looked for)."""
+    far_m = math.hypot(*en_m)
+    if not far_m <= ctx.voyage.far_m:
+        return f"{what} is {far_m / 1000.0:.0f} km from this water"
+    if far_m > ctx.voyage.area.reach_m:
+        return ""   # what lies there is seen when she comes there
+    clearance = float(ctx.voyage.area.clearance_m([en_m])[0])
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
+    if clearance < floor_m:
+        near, bare = ctx.voyage.area.nearest_name(en_m), float(ctx.voyage.area.unfenced.clearance_m([en_m])[0])
+        where = f"{clearance:.0f} m from {near}" if clearance > 0.0 else (
+            "outside the fence" if bare > 0.0 else f"not in free water but in {near}")
+        return f"{what} is {where}: the margin's floor is {floor_m:g} m"
+    return ""
+
+
+def _home(ctx: StepContext, why: str) -> Diversion | None:
+    status = ctx.snapshot.autopilot
+    if home_trouble(ctx) or status is None or status.home is None:
+        return None
+    return Diversion(kind=Kind.HOME, name=HOME, why=why, en_m=ctx.voyage.frame.en_from_geo(status.home))
+
+
+def _back(ctx: StepContext) -> Diversion | None:
+    """Return the way back to where she is to rest, when she is off it and the straight way is not clear."""
+    rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
+    off = ctx.is_raised(DRAGGED) or bool(ctx.state.operator.answering)
+    if rest is None or boat is None or not (off or _is_bound(ctx, REST)):
+        return None
+    if not _is_bound(ctx, REST) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
+        return None   # the autopilot's own loiter goes back there
+    return Diversion(kind=Kind.REST, name=REST, why="she is off the place where she was to rest", en_m=rest)
+
+
+def _is_bound(ctx: StepContext, name: str) -> bool:
+    route = ctx.state.mission.route
+    return route is not None and route.bound_for == name and bool(ctx.ahead())
+
+
+def gate_for(ctx: StepContext, bound: Diversion) -> Gate:
+    """Return a diversion as a gate that completes nothing; buoys are something to keep clear of on this leg too."""
+    discs = tuple(disc_wkt(mark, keep_m) for mark, keep_m in marks_of(ctx.voyage))
+    return Gate(
+        en_m=bound.en_m, radius_m=bound.radius_m, goal=-1, ends_goal=False, name=bound.name, from_en_m=None,
+        keep_out=discs)
+
+
+def is_at_rest(ctx: StepContext) -> bool:
+    """Return whether she is in the loiter at the end of the diversion that she is on."""
+    bound, route = diversion(ctx), ctx.state.mission.route
+    if bound is None or route is None or ctx.ahead():
+        return False
+    return bound.kind is Kind.STAY or route.bound_for == bound.name

@@ -1,0 +1,499 @@
+"""One step in the making: the state so far, the snapshot, and the actions asked for.
+
+A ``StepContext`` lives for one call of ``step``. Rules read it and change it through its methods; nothing leaves it but
+the frozen state and the tuple of actions. Permissions are checked here too, so no rule can go round them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from companion.frozen import changed
+from companion.geo.angles import difference_rad
+from companion.mavlink.wire import MEMORY_S
+from companion.messages import AutopilotStatus, Mode
+from companion.skipper.step.actions import (
+    Action,
+    Announce,
+    Arm,
+    RunMotor,
+    SetCurrent,
+    SetMode,
+    Severity,
+    SteerHeading,
+    Tack,
+    UploadFence,
+    UploadMission,
+)
+from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.config import Guidance, Permissions, SkipperConfig
+from companion.skipper.step.missions import ends_safely
+from companion.skipper.step.route import Diversion, Route
+from companion.skipper.step.snapshot import Snapshot, still_air, wind_mean, wind_now
+from companion.skipper.step.state import (
+    Adrift,
+    Alarms,
+    Announced,
+    ByField,
+    GoalProgress,
+    LoadedMission,
+    OperatorState,
+    Orders,
+    Pending,
+    Phase,
+    Planning,
+    PositionState,
+    Retry,
+    SkipperState,
+    SteeringState,
+    Tacking,
+    TrafficState,
+    VehicleIdentity,
+    VoyageState,
+    is_given_up,
+)
+from companion.skipper.way.autopilot_fence import Circle, Drawn, circle_of, drawn_of
+from companion.skipper.way.gates import Approach, Gate, gates_of
+from companion.skipper.way.geometry import bearing_rad
+from companion.skipper.way.stemming import Water
+from companion.skipper.way.voyage import PointEn, Voyage
+
+FRESH_S = 3.0          # a part older than this is not acted upon
+JUMP_M = 10.0          # a fix this much farther from where she is reckoned than she can have turned away is a jump
+GAINS_MPS = 1.0        # ... or gained speed
+SHOWS_S = 2.5          # a command that was accepted shows in the next heartbeats: it is not repeated before that
+DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
+
+
+def permitted(action: Action, permissions: Permissions) -> bool:
+    """Return whether the operator allows an action of this kind."""
+    if isinstance(action, UploadMission):
+        return permissions.may_upload and ends_safely(action.items)
+    if isinstance(action, UploadFence):
+        return permissions.may_upload_fence
+    if isinstance(action, SetMode):
+        return permissions.may_set_mode and (action.mode is not Mode.GUIDED or permissions.may_steer)
+    if isinstance(action, RunMotor | Tack):
+        return permissions.may_set_mode
+    if isinstance(action, Arm):
+        return permissions.may_arm
+    if isinstance(action, SetCurrent):
+        return permissions.may_upload
+    if isinstance(action, SteerHeading):
+        return permissions.may_steer
+    return True
+
+
+def _kept_in(voyage: Voyage, drawn: Drawn | None, circle: Circle | None) -> Voyage:
+    """Return the voyage in what the autopilot's own fence leaves of its water."""
+    if drawn is not None:
+        voyage = replace(voyage, area=drawn.left)
+    if circle is None:
+        return voyage
+    return replace(voyage, area=voyage.area.within(circle.en_m, circle.radius_m, circle.words))
+
+
+def _is_fence_off(state: SkipperState, snapshot: Snapshot) -> bool:
+    """Return whether the autopilot keeps a fence no more: under way not for a moment's silence, but by the watchdog."""
+    if state.voyage.sailing:
+        return "fence off" in [raised.name for raised in state.alarms.raised]
+    return snapshot.autopilot is not None and snapshot.autopilot.fence_on is False
+
+
+class StepContext:
+    """The work of one step. ``voyage`` is in the water that the autopilot's fences leave: ``circle`` and ``drawn``."""
+
+    def __init__(
+        self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot,
+    ) -> None:
+        self.circle = circle_of(voyage, snapshot.limits, snapshot.autopilot, snapshot.position_en_m)
+        self.drawn = drawn_of(voyage.area, snapshot.fence, snapshot.limits, config.margin_m,
+                              is_off=_is_fence_off(state, snapshot))
+        self.voyage, self.config = _kept_in(voyage, self.drawn, self.circle), config
+        self.state = state
+        self.snapshot = snapshot if config.sails else replace(snapshot, wind=still_air(snapshot.t_s))
+        self.actions: list[Action] = []
+        self.found: tuple[tuple[object, ...], Diversion | None] | None = None   # the diversion, by what it was found
+        self.fresh: tuple[str, ...] = ()   # watchdogs that were raised in this step
+        self._gates: tuple[tuple[Approach, ...], tuple[Gate, ...]] | None = None
+
+    # ------------------------------------------------------------------------------------- changing
+    def set(
+        self, *,
+        wants: tuple[str, ...] | None = None, vehicle: VehicleIdentity | None = None,
+        mission: LoadedMission | None = None, progress: GoalProgress | None = None, voyage: VoyageState | None = None,
+        plans: Planning | None = None, pending: Pending | None = None, operator: OperatorState | None = None,
+        steering: SteeringState | None = None, by_field: ByField | None = None, adrift: Adrift | None = None,
+        tacking: Tacking | None = None, position: PositionState | None = None, orders: Orders | None = None,
+        alarms: Alarms | None = None, traffic: TrafficState | None = None, announced: Announced | None = None,
+    ) -> None:
+        """Replace parts of the state whole; a part that is None stays."""
+        state = self.state
+        if wants is not None:
+            state = changed(state, wants=wants)
+        if vehicle is not None:
+            state = changed(state, vehicle=vehicle)
+        if mission is not None:
+            state = changed(state, mission=mission)
+        if progress is not None:
+            state = changed(state, progress=progress)
+        if voyage is not None:
+            state = changed(state, voyage=voyage)
+        if plans is not None:
+            state = changed(state, plans=plans)
+        if pending is not None:
+            state = changed(state, pending=pending)
+        if operator is not None:
+            state = changed(state, operator=operator)
+        if steering is not None:
+            state = changed(state, steering=steering)
+        if by_field is not None:
+            state = changed(state, by_field=by_field)
+        if adrift is not None:
+            state = changed(state, adrift=adrift)
+        if tacking is not None:
+            state = changed(state, tacking=tacking)
+        if position is not None:
+            state = changed(state, position=position)
+        if orders is not None:
+            state = changed(state, orders=orders)
+        if alarms is not None:
+            state = changed(state, alarms=alarms)
+        if traffic is not None:
+            state = changed(state, traffic=traffic)
+        if announced is not None:
+            state = changed(state, announced=announced)
+        self.state = state
+
+    def new_id(self) -> int:
+        """Return a number not used before in this voyage."""
+        number = self.state.pending.next_id
+        self.set(pending=changed(self.state.pending, next_id=number + 1))
+        return number
+
+    def act(self, action: Action) -> bool:
+        """Ask for an action; False (nothing is asked) when it is not permitted, the autopilot not ours, or given up."""
+        is_order = isinstance(
+            action, UploadMission | UploadFence | SetMode | Arm | SetCurrent | SteerHeading | Tack | RunMotor)
+        if is_order and (self.is_given_up or not self.state.vehicle.is_ours):
+            return False
+        if not permitted(action, self.snapshot.permissions):
+            return False
+        self.actions.append(action)
+        return True
+
+    def say(self, severity: Severity, code: str, text: str, *, every_s: float | None = None) -> None:
+        """Announce something; the same code not more often than every ``every_s`` (default: the configured)."""
+        if self.is_said(code, self.config.announce_interval_s if every_s is None else every_s):
+            return
+        said = dict(self.state.announced.codes)
+        said[code] = self.t_s
+        recent = sorted(said.items(), key=lambda item: item[1])[-64:]
+        self.set(announced=changed(self.state.announced, codes=tuple(recent)))
+        self.actions.append(Announce(severity=severity, code=code, text=text))
+
+    def is_said(self, code: str, within_s: float) -> bool:
+        """Return whether it was announced within that time: then it need not be worked out."""
+        return self.t_s - dict(self.state.announced.codes).get(code, -math.inf) < within_s
+
+    def phase(self, phase: Phase, why: str) -> None:
+        """Set the phase and the sentence that says why."""
+        self.state = changed(self.state, phase=phase, why=why)
+
+    def failed(self, retry: Retry) -> Retry:
+        """Return the patience after another failure: the wait doubles up to the longest."""
+        wait = min(
+            self.config.backoff_first_s * self.config.backoff_factor**retry.failures, self.config.backoff_max_s)
+        return Retry(failures=retry.failures + 1, not_before_s=self.t_s + wait)
+
+    def approach(self, approach: Approach) -> None:
+        """Begin the way to the goal that is next where ``approach`` says, from its first gate.
+
+        The gates are others from here on: what the mission on board, or on its way there, counted for is void.
+        """
+        others = tuple(a for a in self.state.progress.approaches if a.goal != approach.goal)
+        self.set(
+            progress=changed(
+                self.state.progress, approaches=(*others, approach), bearing_rad=0.0, closest_m=math.inf,
+                gate=next(n for n, gate in enumerate(self.gates) if gate.goal == approach.goal)))
+        self.void_route()
+
+    def void_route(self) -> None:
+        """Let no item of the mission on board, or on its way there, count for the gate that is next or a later one."""
+        def void(route: Route) -> Route:
+            return replace(route, gate_of=tuple(-1 if g >= self.state.progress.gate else g for g in route.gate_of))
+
+        if self.state.mission.route is not None:
+            self.set(mission=changed(self.state.mission, route=void(self.state.mission.route)))
+        if self.state.pending.upload is not None:
+            pending = self.state.pending.upload
+            self.set(pending=changed(self.state.pending, upload=replace(pending, route=void(pending.route))))
+
+    # -------------------------------------------------------------------------------------- reading
+    @property
+    def gates(self) -> tuple[Gate, ...]:
+        """The voyage's gates, in order."""
+        approaches = self.state.progress.approaches
+        if self._gates is None or self._gates[0] is not approaches:
+            self._gates = (approaches, gates_of(self.voyage, approaches))   # which hashes the whole voyage
+        return self._gates[1]
+
+    @property
+    def t_s(self) -> float:
+        """Now [s]."""
+        return self.snapshot.t_s
+
+    @property
+    def late_s(self) -> float:
+        """How much earlier than on a fast computer plans are asked for [s]: nine of ten are there as much later."""
+        return self.state.plans.latency.late_s
+
+    @property
+    def plan_lead_s(self) -> float:
+        """What she sails until a plan that is asked for now is on board, uploading aside [s]."""
+        return self.config.plan_budget_s + self.state.plans.latency.usually_late_s
+
+    @property
+    def autopilot(self) -> AutopilotStatus | None:
+        """The autopilot's status while it is heard."""
+        age = self.snapshot.heartbeat_age_s
+        return self.snapshot.autopilot if age is not None and age <= FRESH_S else None
+
+    @property
+    def boat_en(self) -> PointEn | None:
+        """The boat's position while it is fresh and plausible."""
+        age = self.snapshot.vehicle_age_s
+        if self.snapshot.vehicle is None or age is None or age > FRESH_S:
+            return None
+        is_doubted = self.state.position.doubt is not None or self.jump_m >= JUMP_M
+        return None if is_doubted and not self.plans_in_doubt else self.snapshot.position_en_m
+
+    @property
+    def reckoned_en(self) -> PointEn | None:
+        """Where the boat is, reckoned on from the last place that was believed while the position is not."""
+        doubt = self.state.position.doubt
+        return self.boat_en if doubt is None else doubt.reckoned_en_m
+
+    @property
+    def plans_in_doubt(self) -> bool:
+        """Whether a plan is made from a position that is not believed: where she cannot be kept in a LOITER instead.
+
+        Sailed by the autopilot, on a way that is shut, a plan that is clear from where it believes to be is better.
+        """
+        is_held = self.state.steering.own_mode in STOPPING and self.snapshot.permissions.may_set_mode
+        return not is_held and self.is_way_shut
+
+    @property
+    def is_way_shut(self) -> bool:
+        """Whether the autopilot, sailing by the position that it reports now, comes too near to something on its leg.
+
+        A position that has just jumped may be false; but it is what the boat is steered by, so a plan that is clear
+        from there is better than a leg that is not.
+        """
+        here, leg, vehicle = self.snapshot.position_en_m, self.leg(), self.snapshot.vehicle
+        if here is None or leg is None or vehicle is None or not self.state.voyage.sailing:
+            return False
+        goes_to = leg[1]
+        if self.state.steering.own_mode in STOPPING:   # drifting, turning, or on a way that is not ours
+            east, north = vehicle.velocity_en_mps
+            goes_to = (here[0] + DRIFT_LOOK_S * east, here[1] + DRIFT_LOOK_S * north)
+        area, floor_m = self.voyage.area, min(self.config.margin_floor_m, self.config.margin_m)
+        return float(area.clearance_m([here])[0]) > 0.0 and area.path_clearance_m([here, goes_to]) < floor_m
+
+    @property
+    def jump_m(self) -> float:
+        """How much farther the boat is from where her last fix has her sail than she can have turned away [m].
+
+        At a leap's 8 m/s a second would hide what a margin is: she is held against her own speed.
+        """
+        here, last, vehicle = self.snapshot.position_en_m, self.state.position.last_seen, self.snapshot.vehicle
+        age = self.snapshot.vehicle_age_s
+        if here is None or last is None or vehicle is None or age is None or self.state.position.back_s == self.t_s:
+            return 0.0
+        elapsed_s = max(0.0, self.t_s - age - last.t_s)
+        if elapsed_s > MEMORY_S:
+            return 0.0
+        east, north = vehicle.velocity_en_mps
+        reckoned = (last.en_m[0] + east * elapsed_s, last.en_m[1] + north * elapsed_s)
+        return max(0.0, math.dist(here, reckoned) - (vehicle.speed_mps + GAINS_MPS) * elapsed_s)
+
+    @property
+    def speed_mps(self) -> float:
+        """Speed over ground [m/s], 0 when unknown."""
+        return self.snapshot.vehicle.speed_mps if self.snapshot.vehicle is not None else 0.0
+
+    @property
+    def wind_now(self) -> tuple[float, float] | None:
+        """The 5 s wind (from [rad], speed [m/s])."""
+        return wind_now(self.snapshot)
+
+    @property
+    def wind_mean(self) -> tuple[float, float] | None:
+        """The 90 s wind (from [rad], speed [m/s])."""
+        return wind_mean(self.snapshot)
+
+    @property
+    def current_en_mps(self) -> tuple[float, float]:
+        """The current that plans reckon with [m/s, towards east and north]; 0 where none is significant."""
+        return self.snapshot.current.planned_en_mps
+
+    @property
+    def through_en_mps(self) -> tuple[float, float]:
+        """Her velocity less that current [m/s]: over the ground where none is significant; 0 when unknown."""
+        vehicle, (east, north) = self.snapshot.vehicle, self.current_en_mps
+        return (0.0, 0.0) if vehicle is None else (
+            vehicle.velocity_en_mps[0] - east, vehicle.velocity_en_mps[1] - north)
+
+    @property
+    def water(self) -> Water | None:
+        """The current as it is to be stemmed, None where none is planned with or the wind is not known."""
+        wind = self.wind_mean
+        if wind is None or not self.snapshot.current.is_significant:
+            return None
+        return Water(boat=self.voyage.boat, wind=wind, current_en_mps=self.current_en_mps,
+                     no_go_half_rad=self.no_go_half_rad)
+
+    @property
+    def no_go_half_rad(self) -> float:
+        """Where the autopilot stops following the line: SAIL_NO_GO_ANGLE; nowhere where it does not sail."""
+        if not self.config.sails:
+            return 0.0
+        limits = self.snapshot.limits
+        return self.config.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
+
+    def is_closed(self, a: PointEn, b: PointEn, wind: tuple[float, float] | None) -> bool:
+        """Return whether a to b lies where the autopilot does not follow the line in ``wind`` (from [rad], [m/s])."""
+        return wind is not None and abs(difference_rad(wind[0], bearing_rad(a, b))) < self.no_go_half_rad
+
+    @property
+    def planned_no_go_rad(self) -> float:
+        """The half angle that plans keep out of."""
+        if not self.config.sails:
+            return 0.0
+        return max(self.no_go_half_rad + self.config.no_go_pad_rad, self.voyage.boat.no_go_half_rad)
+
+    @property
+    def tack_corridor_m(self) -> float:
+        """SAIL_XTRACK_MAX; 0, none, where she is steered in GUIDED: nothing tacks her at its edge there."""
+        limits = self.snapshot.limits
+        if self.steers_plans:
+            return 0.0
+        return self.config.tack_corridor_m if limits is None else limits.sail_xtrack_max_m
+
+    @property
+    def known_config(self) -> SkipperConfig:
+        """The configuration, with what has been read of the autopilot in place of its defaults."""
+        return replace(self.config, no_go_half_rad=self.no_go_half_rad, tack_corridor_m=self.tack_corridor_m)
+
+    @property
+    def fences(self) -> tuple[Circle | Drawn, ...]:
+        """The autopilot's own fences, where it has any that matter."""
+        return tuple(fence for fence in (self.circle, self.drawn) if fence is not None)
+
+    @property
+    def gate(self) -> Gate | None:
+        """The gate being sailed to, None when all are passed."""
+        return self.gates[self.state.progress.gate] if self.state.progress.gate < len(self.gates) else None
+
+    def is_raised(self, name: str) -> bool:
+        """Return whether a watchdog is raised."""
+        return name in [raised.name for raised in self.state.alarms.raised]
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether somebody else has the boat: under way, and disarmed or in a mode that we did not ask for."""
+        status = self.autopilot
+        if status is None or not self.state.voyage.sailing:
+            return False
+        if status.is_armed and self.is_leaving:
+            return False
+        if status.mode in {None, Mode.AUTO, Mode.INITIALISING} or self.is_own(status.mode):
+            return not status.is_armed
+        return True
+
+    def is_own(self, mode: Mode | None) -> bool:
+        """Return whether a mode is one that we asked for; a LOITER that is begun anew passes through HOLD."""
+        own = self.state.steering.own_mode
+        return mode is own or (self.state.position.anew is not None and {mode, own} <= {Mode.LOITER, Mode.HOLD})
+
+    @property
+    def is_given_up(self) -> bool:
+        """Whether she was given up by order: nothing is asked of her."""
+        return is_given_up(self.state)
+
+    @property
+    def is_leaving(self) -> bool:
+        """Whether she shows a stop still, or GUIDED, that an order of ours, on its way or just accepted, ends."""
+        status, state, own = self.autopilot, self.state, self.state.steering.own_mode
+        if status is None or own is None or own is status.mode:
+            return False
+        since_s = -math.inf
+        if status.mode is not Mode.GUIDED:
+            if state.operator.stop is None or status.mode is not state.operator.stop.mode:
+                return False
+            since_s = state.operator.stop.t_s
+        if state.pending.command is not None:
+            return state.pending.command[2] == own.name and since_s < state.pending.command[1]
+        name, accepted_s = state.pending.accepted or ("", 0.0)
+        return name == own.name and since_s < accepted_s and self.t_s < accepted_s + SHOWS_S
+
+    @property
+    def guidance(self) -> Guidance:
+        """What steers her now: the mission's guidance, or the field of the goal that is next."""
+        return Guidance.FIELD if self.state.by_field.composed else self.config.guidance
+
+    @property
+    def steers(self) -> bool:
+        """Whether the boat is steered by headings, a plan's or a field's (and may be)."""
+        return self.guidance is not Guidance.PLAN and self._may_guide
+
+    @property
+    def steers_plans(self) -> bool:
+        """Whether plans are sailed in GUIDED, and not by the autopilot's line following, its corridor and its tacks.
+
+        A goal's own field ends there: what is planned from it on is sailed as the mission says.
+        """
+        return self.config.guidance is not Guidance.PLAN and self._may_guide
+
+    @property
+    def _may_guide(self) -> bool:
+        may = self.snapshot.permissions
+        return may.may_steer and may.may_set_mode
+
+    @property
+    def is_by_field(self) -> bool:
+        """Whether a field steers her now, in GUIDED."""
+        status = self.autopilot
+        return self.steers and self.guidance is Guidance.FIELD and status is not None and status.mode is Mode.GUIDED
+
+    @property
+    def sails_in(self) -> Mode:
+        """The mode that she sails in: GUIDED where she is steered, else AUTO."""
+        return Mode.GUIDED if self.steers else Mode.AUTO
+
+    def leg(self) -> tuple[PointEn, PointEn] | None:
+        """Return the planned leg being sailed (from, to), None without a route."""
+        route, i = self.state.mission.route, self.state.mission.index
+        if route is None or not 0 <= i < len(route.items):
+            return None
+        return route.leg_from_en_m[i], route.points_en_m[i]
+
+    def ahead(self) -> tuple[PointEn, ...]:
+        """Return the waypoints still to be sailed, without the safe end; empty when loitering at it."""
+        route = self.state.mission.route
+        return route.points_en_m[self.state.mission.index:-1] if route is not None else ()
+
+    def last_waypoint(self) -> int:
+        """Return the index of the last waypoint before the safe end, -1 without one."""
+        route = self.state.mission.route
+        return len(route.items) - 2 if route is not None else -1
+
+    def blank_facts(self, plan_id: int, margin_m: float, delta_s: float, rung: str) -> Route:
+        """Return the figures of a plan that is being asked for now."""
+        wind = self.wind_mean or (0.0, 0.0)
+        return Route(
+            plan_id=plan_id, plan_t_s=self.t_s, plan_twd_from_rad=wind[0], plan_tws_mps=wind[1],
+            plan_current_east_mps=self.current_en_mps[0], plan_current_north_mps=self.current_en_mps[1],
+            plan_half_width_rad=0.0, margin_m=margin_m, delta_s=delta_s, rung=rung,
+        )

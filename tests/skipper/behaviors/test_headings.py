@@ -1,0 +1,265 @@
+"""Büsser's headings: drift (equation 3), buoys, and our own: the no-go zone, the leg's line, what GUIDED has not."""
+
+import math
+from dataclasses import replace
+
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.geo.angles import difference_rad
+from companion.messages import Mode
+from companion.skipper.behaviors.drifting import CALL
+from companion.skipper.behaviors.headings import (
+    back_to_line_rad,
+    buoy_heading_rad,
+    desired_heading_rad,
+    drift_correction_rad,
+    sailable_rad,
+)
+from companion.skipper.planning.autopilot_beats import next_tack_s, room_m
+from companion.skipper.step import actions as act
+from companion.skipper.step.config import Guidance
+from companion.skipper.step.context import StepContext
+from companion.skipper.step.snapshot import CommandOutcome, CommandResult
+from companion.skipper.way.geometry import bearing_rad, cross_track_m
+from companion.skipper.way.voyage import Goal, Side
+from tests.skipper.test_voyage import is_done, is_sailing, make, said
+
+ANGLE = st.floats(-math.pi, math.pi)
+CHECK = settings(max_examples=100)
+
+
+def test_pushed_to_port_means_steering_to_starboard():
+    # Heading north at 2 m/s, pushed west (wind from starboard) at 0.2 m/s.
+    assert drift_correction_rad((-0.2, 2.0), 0.0) == pytest.approx(math.atan(0.1))
+    assert drift_correction_rad((0.2, 2.0), 0.0) == pytest.approx(-math.atan(0.1))
+    assert drift_correction_rad((0.0, 2.0), 0.0) == 0.0
+    assert drift_correction_rad((1.0, 0.1), 0.0) == 0.0
+
+
+@CHECK
+@given(ANGLE, st.floats(1.0, 4.0), st.floats(-0.3, 0.3))
+def test_the_corrected_heading_makes_the_course_good(course, speed, leeway):
+    # A boat whose track is its heading turned by its leeway: steering course + correction brings it onto the course.
+    heading = course
+    for _ in range(5):
+        track = heading + leeway
+        velocity = (speed * math.sin(track), speed * math.cos(track))
+        heading = course + drift_correction_rad(velocity, heading)
+    assert abs(difference_rad(heading + leeway, course)) < 1e-6
+
+
+@CHECK
+@given(ANGLE, ANGLE, ANGLE, st.floats(0.5, 1.2))
+def test_nothing_is_steered_into_the_no_go_zone(wanted, heading, twd, no_go):
+    out = sailable_rad(wanted, heading, twd, no_go)
+    assert abs(difference_rad(out, twd)) >= no_go - 1e-9
+    if abs(difference_rad(wanted, twd)) >= no_go:
+        assert out == wanted
+
+
+def test_dead_to_windward_it_stays_on_its_tack():
+    assert sailable_rad(0.0, 0.8, 0.0, 0.785) == pytest.approx(0.785)
+    assert sailable_rad(0.0, -0.8, 0.0, 0.785) == pytest.approx(-0.785)
+    assert sailable_rad(0.0, -0.8, 0.02, 0.785) == pytest.approx(0.02 - 0.785)
+    assert sailable_rad(0.5, -0.8, 0.0, 0.785) == pytest.approx(0.785)
+
+
+BUOYS = pytest.mark.parametrize(("side", "hand"), [(Side.PORT, 1.0), (Side.STARBOARD, -1.0)])
+
+
+@BUOYS
+@CHECK
+@given(ANGLE, ANGLE, ANGLE, st.floats(0.5, 1.2))
+def test_at_a_buoy_no_manoeuvre_leads_to_its_side_of_the_wanted_heading(side, hand, wanted, heading, twd, no_go):
+    """Büsser 3.2.4: "never to perform maneuvers that would result in a new direction to the left"."""
+    out = sailable_rad(wanted, heading, twd, no_go, side)
+    assert abs(difference_rad(out, twd)) >= no_go - 1e-9
+    if abs(difference_rad(wanted, twd)) >= no_go:
+        assert out == wanted
+    elif hand * difference_rad(out, wanted) < -1e-9:
+        # To the buoy's side only by going on as she goes, and not by more than ten degrees.
+        assert difference_rad(heading, twd) * difference_rad(out, twd) >= 0.0
+        assert abs(difference_rad(out, wanted)) <= math.radians(10.0) + 1e-9
+
+
+@BUOYS
+def test_at_a_buoy_she_goes_about_to_get_clear_and_not_to_get_nearer(side, hand):
+    wanted = hand * 0.1
+    assert sailable_rad(wanted, -hand * 0.8, 0.0, 0.785) == pytest.approx(hand * 0.785)   # nearer by 11 degrees
+    assert sailable_rad(-wanted, -hand * 0.8, 0.0, 0.785) == pytest.approx(-hand * 0.785)
+    assert sailable_rad(-wanted, -hand * 0.8, 0.0, 0.785, side) == pytest.approx(hand * 0.785)
+    assert sailable_rad(-hand * 0.5, hand * 0.8, 0.0, 0.785) == pytest.approx(-hand * 0.785)
+    assert sailable_rad(-hand * 0.5, hand * 0.8, 0.0, 0.785, side) == pytest.approx(hand * 0.785)
+    assert sailable_rad(-hand * 0.7, -hand * 0.8, 0.0, 0.785, side) == pytest.approx(-hand * 0.785)
+
+
+@pytest.mark.parametrize(("side", "sign"), [(Side.PORT, 1.0), (Side.STARBOARD, -1.0)])
+def test_the_buoy_is_left_on_its_side(side, sign):
+    boat, buoy = (0.0, 0.0), (30.0, 40.0)
+    heading = buoy_heading_rad(boat, buoy, side, math.radians(30.0))
+    assert difference_rad(heading, bearing_rad(boat, buoy)) == pytest.approx(sign * math.radians(30.0))
+
+
+# ------------------------------------------------------------------------------------- the leg's line
+BY_HEADING = {"guidance": Guidance.HEADING, "autopilot_beats": True}
+BEAM = lambda t: (-math.pi / 2.0, 5.0)  # noqa: E731 - a wind
+ISLAND = shapely.box(-60.0, 100.0, 60.0, 130.0)
+
+
+def by_heading(*goals, config=None, **how):
+    return make(*goals, config={**BY_HEADING, **(config or {})}, **how)
+
+
+def turn_of(world, **seen):
+    return StepContext(world.skipper.voyage, world.skipper.config, world.state, replace(world.snapshot(), **seen))
+
+
+def is_steered(world):
+    return world.mode is Mode.GUIDED and world.steer is not None
+
+
+def test_off_the_line_the_heading_leads_back_to_it_and_never_away():
+    assert back_to_line_rad(0.0, 3.0) == 0.0
+    assert back_to_line_rad(6.0, 3.0) == pytest.approx(-math.atan2(6.0, 12.0))
+    assert back_to_line_rad(-100.0, 3.0) == pytest.approx(math.radians(45.0))
+
+
+def test_a_boat_set_off_her_leg_comes_back_to_it():
+    """His heading leads along it from wherever the last turn ended, which may be nearer to a rock than the plan."""
+    world = by_heading(Goal(en_m=(0.0, 300.0)), obstacles=(), wind=BEAM)
+    assert world.run(60, is_steered)
+    world.run(5)
+    world.position = (world.position[0] + 6.0, world.position[1])
+    world.run(12)
+    leg = turn_of(world).leg()
+    assert abs(cross_track_m(world.position, *leg)) < 1.0
+
+
+@pytest.mark.parametrize("off_m", [6.0, -6.0])
+def test_close_hauled_she_comes_back_on_the_legs_own_tack(off_m):
+    world = by_heading(Goal(en_m=(200.0, 170.0)), Goal(en_m=(300.0, 0.0)), obstacles=(), wind=lambda t: (0.0, 5.0))
+    assert world.run(60, is_steered)
+    world.run(5)
+    ctx = turn_of(world)
+    a, b = ctx.leg()
+    across = bearing_rad(a, b) + math.pi / 2.0
+    side = difference_rad(bearing_rad(a, b), 0.0)
+    world.position = (world.position[0] + off_m * math.sin(across), world.position[1] + off_m * math.cos(across))
+    wanted = desired_heading_rad(turn_of(world))
+    assert wanted * side > 0.0
+    assert abs(wanted) >= world.no_go - 1e-9
+
+
+# ------------------------------------------------------------------------- what the autopilot does not do in GUIDED
+def test_no_beat_is_left_to_an_autopilot_that_does_not_sail_the_mission():
+    """There is no corridor in GUIDED: she sailed such a leg close-hauled, as far as it was long (issue 43)."""
+    for guidance in Guidance:
+        world = make(obstacles=(), config={"autopilot_beats": True, "guidance": guidance}, wind=lambda t: (0.0, 5.0))
+        assert world.run(60, is_sailing)
+        beats = [a.problem.beat for _, a in world.actions if isinstance(a, act.RequestPlan)]
+        assert (beats[0] is None) == (guidance is not Guidance.PLAN), guidance
+        assert (room_m(turn_of(world)) is None) == (guidance is not Guidance.PLAN), guidance
+        permitted = replace(world.permissions, may_steer=False)   # then the autopilot sails what was planned
+        assert room_m(turn_of(world, permissions=permitted)) is not None
+
+
+def test_between_islands_she_keeps_the_floor():
+    world = by_heading(wind=lambda t: (0.15 * math.sin(t / 23.0), 5.0))
+    assert world.run(1500, is_done)
+    assert world.clearance() > world.skipper.config.margin_floor_m
+
+
+def test_on_a_leg_that_the_wind_has_closed_no_tack_of_the_autopilots_is_told():
+    world = by_heading(Goal(en_m=(0.0, 300.0)), obstacles=(), wind=lambda t: (BEAM(t)[0] if t < 30.0 else 0.0, 5.0))
+    world.planner = None
+    assert world.run(60, is_steered)
+    world.run(31.0 - world.t)
+    world.winds = []
+    ctx = turn_of(world)
+    assert ctx.is_closed(*ctx.leg(), ctx.wind_now)
+    assert next_tack_s(ctx, ctx.voyage.boat.polar) is None
+
+
+@pytest.mark.parametrize("away_m", [9.0, 14.0])
+def test_too_near_to_plan_round_she_is_stopped_in_guided_too(away_m):
+    world = by_heading(Goal(en_m=(0.0, 300.0), radius_m=8.0), obstacles=(ISLAND,), wind=BEAM)
+    assert world.run(60, is_steered)
+    world.set_mode(Mode.HOLD)
+    world.run(5)
+    world.position, world.heading, world.speed = (0.0, 130.0 + away_m), math.pi, 3.0
+    world.track.clear()
+    world.set_mode(Mode.AUTO)
+    assert world.run(4, lambda w: w.mode is Mode.LOITER)
+    assert said(world, "too near")
+    assert world.run(900, is_done)
+    assert world.clearance() > 0.0
+
+
+def test_a_closed_leg_is_followed_no_farther_than_to_the_loiter():
+    """The wind comes ahead and no plan is found: close-hauled she makes for a bank, and nothing tacks her there."""
+    bank = shapely.box(-100.0, 60.0, -16.0, 400.0)
+    world = by_heading(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(bank, shapely.box(16.0, 60.0, 100.0, 400.0)),
+                       wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0),
+                       config={"margin_m": 12.0, "margin_floor_m": 5.0})
+    assert world.run(44, is_steered)
+    world.run(44 - world.t)
+    assert 40.0 < world.position[1] < 150.0
+    world.planner = lambda problem, seed: None
+    world.track.clear()
+    assert world.run(30, lambda w: w.mode is Mode.LOITER)
+    assert world.clearance() > 0.5
+    assert not any(phase == "operator" for _, phase, _ in world.log)
+
+
+def test_a_loiter_that_is_refused_leaves_her_steered():
+    bank = shapely.box(-100.0, 60.0, -16.0, 400.0)
+    world = by_heading(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(bank, shapely.box(16.0, 60.0, 100.0, 400.0)),
+                       wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0),
+                       config={"margin_m": 12.0, "margin_floor_m": 5.0})
+    answer = world._answer
+
+    def refuse(kind, action):
+        if isinstance(action, act.SetMode) and action.mode is Mode.LOITER:
+            return CommandOutcome(command_id=action.command_id, result=CommandResult.REFUSED, text="no")
+        return answer(kind, action)
+
+    world._answer = refuse
+    assert world.run(44, is_steered)
+    world.run(44 - world.t)
+    world.planner = lambda problem, seed: None
+    world.run(14)
+    assert said(world, "refused LOITER")
+    assert not any(phase == "operator" for _, phase, _ in world.log)
+    assert world.steer_until > world.t
+
+
+def test_becalmed_by_headings_she_is_held_and_the_crew_called():
+    rock = shapely.box(60.0, -100.0, 90.0, 400.0)
+    world = by_heading(Goal(en_m=(0.0, 400.0)), obstacles=(rock,),
+                       wind=lambda t: (-1.5, 0.0 if t >= 60.0 else 4.0),
+                       current=lambda t: (0.5 if t >= 60.0 else 0.0, 0.0))
+    assert world.run(180, lambda w: w.mode is Mode.LOITER)
+    assert world.run(120, lambda w: bool(said(w, CALL)))
+
+
+def test_out_of_irons_she_is_steered_on_and_not_given_to_auto():
+    world = by_heading(Goal(en_m=(0.0, 300.0)), obstacles=(), wind=BEAM)
+    assert world.run(60, is_steered)
+    world.run(5)
+    until, sail, before = world.t + 14.0, world.sail, len(world.actions)
+
+    def held(dt):
+        if world.t < until:
+            world.heading, world.speed = world.wind(world.t)[0], 0.05
+            return
+        sail(dt)
+
+    world.sail = held
+    assert world.run(30, lambda w: any(isinstance(a, act.SteerHeading) and a.text == "out of irons"
+                                       for _, a in w.actions[before:]))
+    world.run(40)
+    assert not any(isinstance(a, act.SetMode) and a.mode is Mode.AUTO for _, a in world.actions[before:])
+    assert world.speed > 1.0
