@@ -301,7 +301,7 @@ def test_who_is_told_may_fail_and_may_be_what_is_gone():
 FLYING = ("app", "commands/run.py", "compose.py", "fold.py", "geofence", "mavlink", "outputs", "page",
           "skipper", "telemetry", "traffic")
 # A key that is asked for by hand, exclusively; the log of a link, which is appended to.
-NOT_WHOLE = {"mavlink/transports/signing.py", "mavlink/tlog.py"}
+NOT_WHOLE = {"mavlink/signing.py", "mavlink/tlog.py"}
 
 
 def test_in_flying_code_the_disk_alone_makes_whole_files():

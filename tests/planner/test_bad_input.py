@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
-from companion.planner.problem import evaluate as shores
-from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.evaluate import SolidObstacles, evaluate
 from companion.planner.search.kernels import is_free
 from companion.planner.search.world import make_world
 from tests.planner.problems import POLAR, box, random_problems, simple
@@ -122,7 +121,7 @@ def test_thousands_of_slivers_are_not_united():
        st.sampled_from([0.0, 3.0]))
 def test_the_test_by_neighbours_agrees_with_the_test_against_everything(raw, points, floor):
     p = Problem.from_json(raw | {"clearance_floor_m": floor})
-    shore = shores.Shore(p)
+    shore = SolidObstacles(p)
     shore.is_large = True
     corners = [tuple(c) for g in p.obstacles for c in shapely.get_coordinates(g)[:2]]      # legs that touch
     places = [*points, *corners[:3]]
