@@ -100,7 +100,7 @@ def read_table(text: str, source: str, times: tuple[float | None, ...]) -> tuple
     Args:
         text: its content. Empty lines, lines that begin with # and one line of headings are passed over.
         source: what a complaint names.
-        times: the Unix time [s] of each line that is left, None where it is none.
+        times: the Unix time [s] of each line that is left, None where the line names no time.
 
     Raises:
         InputError: a line is no row, times do not increase, or there are fewer than two.

@@ -175,7 +175,7 @@ def _watch_irons(
 # ------------------------------------------------------------------------------------ last resort
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LastResort:
-    """Is the field steering instead of the plan? A target too near to plan for takes over, clear water hands back."""
+    """Tell if the field steers, not the plan: a target too near to plan for takes over, clear water hands back."""
 
     engaged: bool = False
     since_s: float = 0.0

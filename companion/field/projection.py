@@ -139,7 +139,7 @@ def near_and_ahead(
     own_en: tuple[float, float], heading_rad: float | None, other_en: tuple[float, float], *,
     near_m: float = 300.0, half_angle_rad: float = math.radians(110.0), always_m: float = 30.0,
 ) -> bool:
-    """Does an obstacle matter? Within ``near_m`` and in the sector ahead, or within ``always_m`` anywhere.
+    """Return whether an obstacle matters: within ``near_m`` and in the sector ahead, or within ``always_m`` anywhere.
 
     Schmitt's section 4.2: obstacles behind a robot that sails forwards do not influence its field.
     """

@@ -226,7 +226,7 @@ class Order:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Order:
-        """Read ``to_dict``'s result. Raises KeyError, ValueError or TypeError where it is none."""
+        """Read ``to_dict``'s result. Raises KeyError, ValueError or TypeError where it is no order."""
         place, source = data["place"], data["source"]
         return cls(
             wanted=Wanted(

@@ -24,7 +24,7 @@ class PlanStatus(enum.Enum):
 
     @property
     def has_path(self) -> bool:
-        """Is there something to sail?"""
+        """Whether there is something to sail."""
         return self in {PlanStatus.OPTIMAL, PlanStatus.FOUND}
 
 
@@ -146,7 +146,7 @@ class Plan:
 
     @property
     def has_path(self) -> bool:
-        """Is there something to sail?"""
+        """Whether there is something to sail."""
         return self.status.has_path
 
     @property

@@ -46,7 +46,7 @@ class Replanner:
 
     @property
     def is_over(self) -> bool:
-        """Is the time up? Never with an expansion budget: then the count of replans is fixed instead."""
+        """Return whether the time is up: never with an expansion budget, then the count of replans is fixed instead."""
         return self._expansions is None and effort_s() >= self._until_s
 
     def __call__(self, problem: Problem) -> Plan:

@@ -77,7 +77,7 @@ class Encounter:
 
 
 def is_sailing_vessel(vessel: Vessel) -> bool:
-    """Is it under sail, as far as AIS says? Type 36 without a status counts, a status of motoring (0) does not."""
+    """Return whether AIS says it sails. Type 36 without a status counts, a status of motoring (0) does not."""
     if vessel.nav_status == UNDER_SAIL:
         return True
     return vessel.ship_type == TYPE_SAILING and vessel.nav_status in {None, 15}

@@ -79,7 +79,7 @@ class AisFeed:
 
     @property
     def is_silent(self) -> bool:
-        """Has nothing come for a minute, since it was heard or opened?"""
+        """Return whether nothing has come for a minute, since it was heard or opened."""
         return now_s() - (self.opened_s if self.last_heard_s is None else self.last_heard_s) > SILENT_S
 
     def sentence(self) -> str:

@@ -144,7 +144,7 @@ def decode_nmea(line: str | bytes, t_s: float) -> AisReport | None:
 
 
 def has_right_checksum(text: str) -> bool:
-    """Is the sentence's checksum there and right? *00 is a checksum like any other."""
+    """Return whether the sentence's checksum is there and right. *00 is a checksum like any other."""
     body, star, given = text[1:].partition("*")
     if not star or len(given) < 2:
         return False

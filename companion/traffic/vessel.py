@@ -84,7 +84,7 @@ class Vessel:
 
     @property
     def is_stopped(self) -> bool:
-        """Does it say that it is at anchor, moored or aground?"""
+        """Return whether it says that it is at anchor, moored or aground."""
         return self.nav_status in STOPPED_STATUS and (self.speed_mps is None or self.speed_mps < 0.5)
 
     @property

@@ -33,7 +33,7 @@ _SWUNG_RAD = math.radians(5.0)
 
 
 class FrozenVane:
-    """Does the apparent angle stand still although the boat turns under it?"""
+    """Tell whether the apparent angle stands still although the boat turns under it."""
 
     def __init__(self) -> None:
         self._since_s: float | None = None
@@ -134,7 +134,7 @@ _OFFSET_LEAST_RAD = math.radians(4.0)
 
 
 class TackOffset:
-    """Is the vane mounted wrong? Port and starboard tack see the same wind, or they disagree.
+    """Tell whether the vane is mounted wrong: port and starboard tack see the same wind, or they disagree.
 
     A vane that reads ε too far clockwise turns the apparent from-vector A by ε; one that reads κ too wide on both
     sides (upwash, heel) by κ to the side of the wind. To first order the computed true wind moves by

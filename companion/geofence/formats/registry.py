@@ -56,7 +56,7 @@ class Content:
 
     @property
     def is_zip(self) -> bool:
-        """Is it a compressed folder, as a KMZ is?"""
+        """Return whether it is a compressed folder, as a KMZ is."""
         return self.data.startswith(b"PK")
 
     @cached_property
@@ -76,7 +76,7 @@ class Content:
 
     @cached_property
     def is_json(self) -> bool:
-        """Does it begin as JSON does?"""
+        """Return whether it begins as JSON does."""
         return self.head[:1] in {"{", "["}
 
     @cached_property
@@ -87,7 +87,7 @@ class Content:
 
     @cached_property
     def has_names(self) -> bool:
-        """Does it begin with the line that names a region?"""
+        """Return whether it begins with the line that names a region."""
         return re.match(r"Name\s*:", self.lines, re.IGNORECASE) is not None
 
     @cached_property

@@ -48,7 +48,7 @@ class _Layout:
 
 @functools.cache
 def _layout(number: int) -> _Layout | None:
-    """Return the layout of a message, None where the long way is gone: it has arrays, or is not known."""
+    """Return the layout of a message, None for pymavlink's own codec: it has arrays, or is not known."""
     kind = wire.mavlink_map.get(number)
     if kind is None or _checksum is None:
         return None

@@ -198,7 +198,7 @@ class SolidObstacles:
         return shapely.STRtree(np.asarray(shapes, dtype=object))
 
     def hits(self, shape: shapely.Geometry) -> bool:
-        """Does a leg or point collide: is it deeper than the slack in an obstacle or outside the fence?"""
+        """Return whether a leg or point collides: deeper than the slack in an obstacle or outside the fence."""
         if not self.is_large:
             solid = self._problem.eval_solid
             return not solid.is_empty and bool(solid.intersects(shape))

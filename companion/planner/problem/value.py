@@ -154,7 +154,7 @@ class Problem:
 
     @property
     def is_time_varying(self) -> bool:
-        """Does the no-go zone change with time?"""
+        """Whether the no-go zone changes with time."""
         extremes = self._widening_extremes()
         return max(extremes) > min(extremes)
 

@@ -286,7 +286,7 @@ def turning_s(world: SearchWorld) -> float:
 
 
 def grows(problem: Problem) -> bool:
-    """Does the no-go zone grow steadily, in water that stands still?"""
+    """Return whether the no-go zone grows steadily, in water that stands still."""
     sigma = problem.wind.sigma
     steadily = sigma.model == "kalman" or (sigma.model == "ar1" and sigma.sigma_inf_rad > sigma.sigma0_rad)
     return problem.is_time_varying and steadily and problem.current.drift_mps == 0.0

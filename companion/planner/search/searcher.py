@@ -96,7 +96,7 @@ class Searcher:
 
     @property
     def is_done(self) -> bool:
-        """Is there nothing left to find, or nothing left to spend?"""
+        """Return whether nothing is left to find, or nothing left to spend."""
         return self.effort.is_over or self.upper_s <= self.bound.tight_s * (1.0 + STOP_GAP)
 
     def offer(self, points: Floats | None, origin: str, within: float = math.inf) -> Candidate | None:

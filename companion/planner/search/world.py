@@ -47,7 +47,7 @@ class SearchWorld:
     free: shapely.Geometry | None
 
     def is_open(self, en: tuple[float, float]) -> bool:
-        """Is the point of the problem's frame in free water? A quick look; False may also mean: on a boundary."""
+        """Return whether the problem's point is in free water. A quick look; False may also mean: on a boundary."""
         return _is_open(self.solids, self.free, en)
 
     def to_wind(self, en: NDArray[np.float64]) -> Floats:
@@ -86,7 +86,7 @@ def polygons(geometry: shapely.Geometry | NDArray[np.object_]) -> list[shapely.G
 
 
 def _vanishes(g: shapely.Geometry) -> bool:
-    """Is the polygon a sliver that the scorer's slack removes altogether?"""
+    """Return whether the polygon is a sliver that the scorer's slack removes altogether."""
     return bool(g.buffer(-TOUCH_M, join_style="mitre", mitre_limit=5.0).is_empty)
 
 
