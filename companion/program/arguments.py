@@ -83,7 +83,7 @@ def moment(text: str) -> dt.datetime:
     except ValueError:
         raise ArgumentTypeError(f"{text[:40]!r} is no time; write 2026-11-24T08:00Z") from None
     if when.tzinfo is None:
-        raise ArgumentTypeError(f"{text} has no zone; write {text}Z for UTC")
+        raise ArgumentTypeError(f"{text} has no zone; write {when.isoformat(timespec='minutes')}Z for UTC")
     return when.astimezone(dt.UTC)
 
 

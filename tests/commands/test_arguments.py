@@ -1,11 +1,13 @@
 """What a command line is given: every option that takes a place takes the south, every number has its range."""
 
 import argparse
+import re
 
 import pytest
 
 from companion import cli
 from companion.program import with_negative_values
+from companion.program.arguments import moment
 from sitl import cli as sitl_cli
 
 PROGRAMS = {"companion": cli.PROGRAM, "sitl": sitl_cli.PROGRAM}
@@ -84,3 +86,12 @@ BOUNDLESS = {"--timeout", "--wait", "--limit", "--for", "--budget", "--explain-b
 ])
 def test_only_a_value_is_tied_to_its_option(given, taken):
     assert with_negative_values(given) == taken
+
+
+@pytest.mark.parametrize("text", ["2026-11-24", "2026-11-24T08:00"])
+def test_a_time_without_a_zone_is_told_one_that_is_taken(text):
+    """It told to write 2026-11-24Z, and refused that, too."""
+    with pytest.raises(argparse.ArgumentTypeError, match="has no zone") as refused:
+        moment(text)
+    remedy = re.search(r"write (\S+)", str(refused.value))
+    assert moment(remedy[1]).date().isoformat() == "2026-11-24"
