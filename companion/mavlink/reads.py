@@ -1,7 +1,7 @@
 """The messages that this program reads, and where.
 
 A test holds this table and the code together; ``sitl hostile`` forges each of them. Beside these, every message with
-``time_boot_ms`` counts for the autopilot's clock, and every one for its sequence numbers (``witness``), whatever it
+``time_boot_ms`` counts for the autopilot's clock, and every one for its sequence numbers (``reception``), whatever it
 says.
 """
 
@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-_LISTS = ("lists", "shore")
+_LISTS = ("mission", "mavsdk_session")
 
 # Name -> the modules that read it.
 READS: Mapping[str, tuple[str, ...]] = {
-    "HEARTBEAT": ("census", "reception", "link", "assembler", "fold", "shore"),
+    "HEARTBEAT": ("vehicle_identity", "reception", "link", "assembler", "fold", "mavsdk_session"),
     "ATTITUDE": ("assembler", "wind"),
     "GLOBAL_POSITION_INT": ("assembler",),
     "WIND": ("assembler", "wind"),
-    "NAMED_VALUE_FLOAT": ("assembler", "link", "status", "wind"),
+    "NAMED_VALUE_FLOAT": ("assembler", "link", "companion_status", "wind"),
     "MISSION_CURRENT": ("assembler",),
     "MISSION_ITEM_REACHED": ("assembler", "fold"),
     "NAV_CONTROLLER_OUTPUT": ("assembler",),
@@ -29,23 +29,23 @@ READS: Mapping[str, tuple[str, ...]] = {
     "FENCE_STATUS": ("assembler",),
     "RC_CHANNELS": ("assembler",),
     "SERVO_OUTPUT_RAW": ("assembler",),
-    "STATUSTEXT": ("assembler", "machines", "shore", "asking"),
+    "STATUSTEXT": ("assembler", "command", "mavsdk_session", "mavlink_commands"),
     "AIS_VESSEL": ("assembler",),
     "HOME_POSITION": ("assembler", "autopilot"),
     "AUTOPILOT_VERSION": ("autopilot", "fold"),
-    "PARAM_VALUE": ("fold", "params"),
-    "COMMAND_ACK": ("assembler", "commands", "asking"),
+    "PARAM_VALUE": ("fold", "parameters"),
+    "COMMAND_ACK": ("assembler", "command", "mavlink_commands"),
     "COMMAND_LONG": ("reception", "link"),
-    "COMMAND_INT": ("reception", "link", "fields"),
+    "COMMAND_INT": ("reception", "link", "mavlink_commands"),
     "MISSION_COUNT": _LISTS,
     "MISSION_ITEM_INT": ("codec", *_LISTS),
-    "MISSION_ITEM": ("lists",),
+    "MISSION_ITEM": ("mission",),
     "MISSION_REQUEST": _LISTS,
     "MISSION_REQUEST_INT": _LISTS,
     "MISSION_ACK": _LISTS,
     "FILE_TRANSFER_PROTOCOL": ("ftp",),
-    "TUNNEL": ("status",),
-    "WIND_COV": ("status",),
+    "TUNNEL": ("companion_status",),
+    "WIND_COV": ("companion_status",),
 }
 # Read only by who listens ashore, from the companion's own component.
 ASHORE = frozenset({"TUNNEL", "WIND_COV"})

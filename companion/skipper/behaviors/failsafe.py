@@ -157,10 +157,12 @@ def keeps_off(ctx: StepContext) -> bool:
 
     A mission that is not ours stays on board, and so does a mode that a person set. But legs that lead over something
     solid, and a failsafe's straight way home, are nobody's wish. Once: who sets AUTO again has been told, and means it.
+    Not where drawings are adopted: there somebody at the helm has just drawn this way, it is on offer, and a boat that
+    loiters beside what it leads over is no place to begin the voyage that comes of it.
     """
     boat, vehicle = ctx.boat_en, ctx.snapshot.vehicle
     whose, way = _others_way(ctx)
-    if boat is None or vehicle is None or not way or ctx.is_said(KEPT_OFF, KEPT_OFF_S):
+    if boat is None or vehicle is None or not way or ctx.config.adopts or ctx.is_said(KEPT_OFF, KEPT_OFF_S):
         return False
     near = _begin([boat, *way], NEAR_S * max(vehicle.speed_mps, SLOW_MPS))
     solid = ctx.voyage.area.unfenced
