@@ -10,9 +10,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from companion.ahead import PRIOR_PACE, Ahead, Pace, ahead_of, paced
 from companion.boat import AutopilotLimits
 from companion.current import FITS_S, STILL, CurrentEstimator, Prior, Sailing
+from companion.eta import PRIOR_PACE, Eta, Pace, eta_of, paced
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
@@ -231,9 +231,9 @@ class Step:
     shift: Shift | None = None
     pace: Pace = PRIOR_PACE
 
-    def ahead(self) -> Ahead:
+    def eta(self) -> Eta:
         """Return where the boat is expected from here on, and when it is there."""
-        return ahead_of(self.snapshot, self.state, self.voyage, self.pace)
+        return eta_of(self.snapshot, self.state, self.voyage, self.pace)
 
 
 class VoyageFold:

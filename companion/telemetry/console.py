@@ -284,10 +284,10 @@ def progress_text(step: Step, next_tack_s: float | None) -> str:
     if route is not None:
         if route.expected_clearance_m is not None:
             parts.append(f"clear {route.expected_clearance_m:.1f} m")
-        ahead = step.ahead()
-        if under_way and ahead.there_s is not None:
-            late = "" if ahead.there_late_s is None else f" (90 %: {ahead.there_late_s:.0f} s)"
-            parts.append(f"there in {ahead.there_s:.0f} s{late}")
+        eta = step.eta()
+        if under_way and eta.there_s is not None:
+            late = "" if eta.there_late_s is None else f" (90 %: {eta.there_late_s:.0f} s)"
+            parts.append(f"there in {eta.there_s:.0f} s{late}")
         parts.append(f"plans {state.plans.replans}")
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)

@@ -121,7 +121,7 @@ class ViewFold:
         legs: tuple[Leg, ...] = tuple(leg for known in reversed(self._plans.values()) for leg in known.plan.legs)
         goals = parts.goals_of(step, voyage)
         following = next((g for g in goals if g.is_next), None)
-        ahead = step.ahead()
+        eta = step.eta()
         ages = [a for a in (snapshot.heartbeat_age_s, snapshot.vehicle_age_s) if a is not None]
         return values.View(
             source=self._source, name=voyage.name, t_s=round(t_s, 3), unix_s=self.unix_s(t_s), area=self.area.hash,
@@ -132,8 +132,8 @@ class ViewFold:
             laylines=None if following is None or state.voyage.over else laylines_of(
                 step, voyage, config, following.name, following.at_en_m),
             polar=polar_of(step, voyage, config),
-            plan=plan_of(step, voyage, ahead, chosen, legs),
-            predicted=predicted_of(ahead),
+            plan=plan_of(step, voyage, eta, chosen, legs),
+            predicted=predicted_of(eta),
             track=tuple(values.TrackPoint(ago_s=round(t_s - at_s, 1), at_en_m=at, tack=tack)
                         for at_s, at, tack in self._track),
             vessels=vessels_of(step), goals=goals, refuges=parts.refuges_of(voyage), home=parts.home_of(step, voyage),

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from companion.ahead import Ahead
 from companion.boat import AutopilotLimits, Boat
 from companion.current import over_water
+from companion.eta import Eta
 from companion.fold import Step
 from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.messages import Command, CompanionStatus, TrafficStatus, VehicleState, WindForecast
@@ -475,7 +475,7 @@ class Chosen:
 
 
 def plan_of(
-    step: Step, voyage: Voyage, ahead: Ahead, chosen: Chosen | None, legs: tuple[Leg, ...],
+    step: Step, voyage: Voyage, eta: Eta, chosen: Chosen | None, legs: tuple[Leg, ...],
 ) -> values.PlanView | None:
     """Return the plan that is sailed; ``legs`` are those of the plans that it was spliced from, the newest first."""
     route, state = step.state.mission.route, step.state
@@ -493,7 +493,7 @@ def plan_of(
         path_risk=rounded(_risk_left(route, left), 4), vessel_risk=rounded(route.vessel_risk, 4),
         margin_m=rounded(route.margin_m, 1), cost_s=rounded(route.cost_s, 1),
         median_s=rounded(route.median_s, 0), late_s=rounded(route.late_s, 0),
-        there_s=rounded(ahead.there_s, 0), there_late_s=rounded(ahead.there_late_s, 0),
+        there_s=rounded(eta.there_s, 0), there_late_s=rounded(eta.there_late_s, 0),
         expected_clearance_m=rounded(route.expected_clearance_m, 1),
         bound_s=None if chosen is None else rounded(chosen.plan.lower_bound_s, 1), replans=state.plans.replans,
         next_tack_s=None if tack is None else rounded(tack.in_s, 0),
@@ -534,15 +534,15 @@ def safe_end_of(route: Route | None) -> values.PlaceView | None:
     return values.PlaceView(name="safe end", at_en_m=place(route.points_en_m[-1]))
 
 
-def predicted_of(ahead: Ahead) -> tuple[values.Ahead, ...]:
+def predicted_of(eta: Eta) -> tuple[values.AheadView, ...]:
     """Return where the boat is expected: a place every few seconds, and one at each tack."""
-    points: list[values.Ahead] = []
-    for n, way in enumerate(ahead.points):
+    points: list[values.AheadView] = []
+    for n, way in enumerate(eta.points):
         tack: values.Tack = "starboard" if way.is_starboard else "port"
-        is_last = n == len(ahead.points) - 1
+        is_last = n == len(eta.points) - 1
         is_new = not points or way.in_s - points[-1].in_s >= AHEAD_STEP_S or points[-1].tack != tack
         if len(points) < MOST_AHEAD and (is_new or is_last):
-            points.append(values.Ahead(
+            points.append(values.AheadView(
                 in_s=way.in_s, at_en_m=place(way.at_en_m), tack=tack, within_m=rounded(way.within_m, 1)))
     return tuple(points)
 

@@ -295,7 +295,7 @@ class PlanView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ahead:
+class AheadView:
     """Where the boat is expected ``in_s`` from now, and on which tack; nine in ten are within ``within_m`` of there."""
 
     in_s: float
@@ -434,7 +434,7 @@ class View:
     laylines: Laylines | None = None
     polar: PolarView | None = None
     plan: PlanView | None = None
-    predicted: tuple[Ahead, ...] = ()
+    predicted: tuple[AheadView, ...] = ()
     track: tuple[TrackPoint, ...] = ()
     vessels: tuple[VesselView, ...] = ()
     goals: tuple[GoalView, ...] = ()

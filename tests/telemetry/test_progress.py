@@ -66,7 +66,7 @@ def test_the_line_tells_the_clearance_and_when_she_is_there():
     route = world.state.mission.route
     assert f"clear {route.expected_clearance_m:.1f} m" in progress_text(step, None)
     left = re.search(r"there in (\d+) s \(90 %: (\d+) s\)", progress_text(step, None))
-    assert (float(left[1]), float(left[2])) == pytest.approx((step.ahead().there_s, step.ahead().there_late_s), abs=0.6)
+    assert (float(left[1]), float(left[2])) == pytest.approx((step.eta().there_s, step.eta().there_late_s), abs=0.6)
     assert "there in" not in progress_text(replace(step, state=with_parts(step.state, mission={"route": None})), None)
 
 

@@ -137,7 +137,7 @@ class Texts:
 
 # One command with its acknowledgement. Pure step machine.
 
-# Why a command failed comes as STATUSTEXT before or just after the ACK [s].
+# Why it failed comes as STATUSTEXT before or up to 7 ms after the ACK in recordings; a radio may need longer [s].
 REASON_WAIT_S = 0.4
 # A TEMPORARILY_REJECTED command is tried again after this [s], so many times.
 BUSY_WAIT_S = 1.0

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.microservices.command import Party, Retransmission, Texts, TransferOutcome
+from companion.mavlink.microservices.command import REASON_WAIT_S, Party, Retransmission, Texts, TransferOutcome
 from companion.mavlink.wire.codec import mission_item, mission_item_int
 from companion.mavlink.wire.frames import Message
 from companion.messages import MissionItem, MissionType
 
-# The reason for a refusal comes as text, up to 7 ms behind the ACK in recordings; a radio may need longer [s].
-REASON_WAIT_S = 0.4
 # ArduRover repeats its request every 1 s: silence for longer than this with all items sent means a lost last ACK [s].
 LAST_ACK_WAIT_S = 5.0
 # ... and it drops the upload 8 s after the last item it got [s].

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from companion.ahead import PRIOR_PACE, TRIED_S, Try
 from companion.clock import run_virtual
+from companion.eta import PRIOR_PACE, TRIED_S, PaceTrial
 from companion.messages import Mode
 from companion.skipper.step import Announce
 from sitl.run.embedded import run_embedded
@@ -30,22 +30,22 @@ def told(demo):
     """Yield a step, what it tells and how long it took from there [s]."""
     steps, reached_s = demo
     for step in steps:
-        ahead, left_s = step.ahead(), reached_s - step.snapshot.t_s
-        if ahead.there_s is not None and left_s > 0.0:
-            yield step, ahead, left_s
+        eta, left_s = step.eta(), reached_s - step.snapshot.t_s
+        if eta.there_s is not None and left_s > 0.0:
+            yield step, eta, left_s
 
 
 def test_the_time_that_is_told_in_the_demo_comes(demo):
     """It said "there in 131 s (90 %: 148 s)" 15 s before the mark."""
-    last = [ahead.there_s - left_s for _, ahead, left_s in told(demo) if left_s <= 60.0]
+    last = [eta.there_s - left_s for _, eta, left_s in told(demo) if left_s <= 60.0]
     assert len(last) > 50
     assert abs(statistics.median(last)) <= 10.0
     assert max(map(abs, last)) <= 20.0
-    whole = [(ahead, left_s) for _, ahead, left_s in told(demo)]
+    whole = [(eta, left_s) for _, eta, left_s in told(demo)]
     assert len(whole) > 200
-    assert abs(statistics.median(ahead.there_s - left_s for ahead, left_s in whole)) <= 15.0
-    assert 0.8 <= statistics.mean(left_s <= ahead.there_late_s for ahead, left_s in whole) <= 1.0
-    assert all(ahead.there_late_s > ahead.there_s for ahead, _ in whole)
+    assert abs(statistics.median(eta.there_s - left_s for eta, left_s in whole)) <= 15.0
+    assert 0.8 <= statistics.mean(left_s <= eta.there_late_s for eta, left_s in whole) <= 1.0
+    assert all(eta.there_late_s > eta.there_s for eta, _ in whole)
 
 
 def test_a_plan_that_is_kept_has_its_own_time_and_the_new_clock(demo):
@@ -62,15 +62,15 @@ def test_a_plan_that_is_kept_has_its_own_time_and_the_new_clock(demo):
 
 
 def test_a_boat_that_is_not_sailing_the_plan_is_told_nothing(demo):
-    step, ahead, _ = next(told(demo))
-    assert ahead.points
+    step, eta, _ = next(told(demo))
+    assert eta.points
     for changed in (
         replace(step, snapshot=replace(step.snapshot, autopilot=replace(step.snapshot.autopilot, mode=Mode.LOITER))),
         replace(step, state=with_parts(step.state, mission={"route": None})),
         replace(step, snapshot=replace(step.snapshot, position_en_m=None)),
     ):
-        assert changed.ahead().there_s is None
-        assert not changed.ahead().points
+        assert changed.eta().there_s is None
+        assert not changed.eta().points
 
 
 def paced(share, *, seconds=300.0):
@@ -78,7 +78,7 @@ def paced(share, *, seconds=300.0):
     pace, t_s, left_s = PRIOR_PACE, 0.0, 1000.0
     while t_s < seconds:
         if pace.is_due(t_s, 1):
-            pace = pace.seen(t_s, left_s, Try(t_s=t_s, plan_id=1, until=0, winds=(), walk_s=left_s))
+            pace = pace.seen(t_s, left_s, PaceTrial(t_s=t_s, plan_id=1, until=0, winds=(), walk_s=left_s))
         t_s, left_s = t_s + 1.0, left_s - share
     return pace
 
@@ -93,7 +93,7 @@ def test_a_boat_that_is_not_its_polars_is_there_when_it_is(share):
 
 
 def test_a_walk_on_another_plan_or_after_a_pause_tells_nothing():
-    first = Try(t_s=0.0, plan_id=1, until=3, winds=(), walk_s=100.0)
+    first = PaceTrial(t_s=0.0, plan_id=1, until=3, winds=(), walk_s=100.0)
     begun = PRIOR_PACE.seen(0.0, None, first)
     assert begun.is_due(1.0, 2)
     assert not begun.is_due(1.0, 1)

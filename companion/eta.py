@@ -20,8 +20,7 @@ from companion.messages import Command, Mode
 from companion.skipper.step import Route, SkipperState, Snapshot, WindView
 from companion.skipper.way import PointEn, Voyage, cross_track_m, gates_of, moved
 
-Disc = tuple[PointEn, float]               # centre and radius [m]
-Winds = tuple[tuple[float, float], ...]    # from [rad] and speed [m/s], for WIND_S each
+Winds = tuple[tuple[float, float], ...]   # from [rad] and speed [m/s], for WIND_S each
 
 FOLLOWS = frozenset({Mode.AUTO, Mode.GUIDED})   # the modes in which the boat follows the legs on board
 STEP_S = 5.0          # of a walk
@@ -41,7 +40,7 @@ LATE_SIGMAS = 1.28    # of a normal: nine in ten are below
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Waypoint:
+class ExpectedPlace:
     """A place that the boat is expected at, ``in_s`` from now, on which tack.
 
     In nine cases of ten it is within ``within_m`` of there.
@@ -54,7 +53,7 @@ class Waypoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Try:
+class PaceTrial:
     """A walk to be held against what comes: to the end of item ``until`` of a plan, in ``winds``, in ``walk_s``."""
 
     t_s: float
@@ -76,7 +75,7 @@ class Pace:
     prior: float = PRIOR
     took_s: float = 0.0
     made_s: float = 0.0
-    tried: Try | None = None
+    tried: PaceTrial | None = None
 
     @property
     def share(self) -> float:
@@ -89,7 +88,7 @@ class Pace:
         """Return whether a walk is to be begun: the last one is over, or was of another plan."""
         return self.tried is None or self.tried.plan_id != plan_id or t_s - self.tried.t_s >= TRIED_S
 
-    def seen(self, t_s: float, left_s: float | None, fresh: Try | None) -> Pace:
+    def seen(self, t_s: float, left_s: float | None, fresh: PaceTrial | None) -> Pace:
         """Return the pace where a walk ends and ``fresh`` begins.
 
         ``left_s`` is what is left of the walk that was tried; None: that is not known, or the walk was given up.
@@ -120,42 +119,33 @@ PRIOR_PACE = Pace()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ahead:
+class Eta:
     """The way ahead at the boat's pace: places in the order of time, and when the goal that is next is reached.
 
     ``there_s`` is in half of the cases [s], ``there_late_s`` in nine of ten; None: the way on board does not end there.
     """
 
-    points: tuple[Waypoint, ...] = ()
+    points: tuple[ExpectedPlace, ...] = ()
     there_s: float | None = None
     there_late_s: float | None = None
 
-    def at(self, in_s: float) -> PointEn | None:
-        """Return where the boat is expected ``in_s`` from now; None: that is not known."""
-        for a, b in zip(self.points, self.points[1:], strict=False):
-            if a.in_s <= in_s <= b.in_s:
-                part = 0.0 if b.in_s == a.in_s else (in_s - a.in_s) / (b.in_s - a.in_s)
-                return (a.at_en_m[0] + part * (b.at_en_m[0] - a.at_en_m[0]),
-                        a.at_en_m[1] + part * (b.at_en_m[1] - a.at_en_m[1]))
-        return None
+
+UNKNOWN = Eta()
 
 
-NOTHING_AHEAD = Ahead()
-
-
-def ahead_of(snapshot: Snapshot, state: SkipperState, voyage: Voyage, pace: Pace) -> Ahead:
+def eta_of(snapshot: Snapshot, state: SkipperState, voyage: Voyage, pace: Pace) -> Eta:
     """Return where the boat is expected from here on; empty where it is not being sailed, or nothing is known."""
     walk = _walk(snapshot, state, voyage)
     if walk is None or state.mission.route is None:
-        return NOTHING_AHEAD
+        return UNKNOWN
     way_m = itertools.accumulate(
         (math.dist(a.at_en_m, b.at_en_m) for a, b in itertools.pairwise(walk.points)), initial=0.0)
     points = tuple(replace(p, in_s=round(pace.left_s(p.in_s), 1), within_m=HERE_M + STRAYS * so_far_m)
                    for p, so_far_m in zip(walk.points, way_m, strict=True))
     if walk.goal_s is None:
-        return Ahead(points=points)
+        return Eta(points=points)
     spread = _wind_spread(state.mission.route)
-    return Ahead(points=points, there_s=pace.left_s(walk.goal_s), there_late_s=pace.late_s(walk.goal_s, spread))
+    return Eta(points=points, there_s=pace.left_s(walk.goal_s), there_late_s=pace.late_s(walk.goal_s, spread))
 
 
 def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -> Pace:
@@ -167,7 +157,7 @@ def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -
     if not pace.is_due(snapshot.t_s, route.plan_id):
         return pace
     walk = _walk(snapshot, state, voyage, whole_s=LOOK_S)
-    fresh = None if walk is None or walk.last < 0 else Try(
+    fresh = None if walk is None or walk.last < 0 else PaceTrial(
         t_s=snapshot.t_s, plan_id=route.plan_id, until=walk.last, winds=walk.winds, walk_s=walk.points[-1].in_s)
     left = None
     if tried is not None and tried.plan_id == route.plan_id and state.mission.index <= tried.until:
@@ -184,7 +174,7 @@ def _wind_spread(route: Route) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Walked:
-    points: tuple[Waypoint, ...]
+    points: tuple[ExpectedPlace, ...]
     winds: Winds
     last: int                  # the item to whose end it has come, -1: none
     goal_s: float | None
@@ -215,7 +205,7 @@ def _walk(
     mark = None if goal is None else (gates[goal].en_m, gates[goal].radius_m)
     at, time_s, last = here, 0.0, -1
     goal_s: float | None = None
-    points = [Waypoint(in_s=0.0, at_en_m=at, is_starboard=walker.is_starboard)]
+    points = [ExpectedPlace(in_s=0.0, at_en_m=at, is_starboard=walker.is_starboard)]
     for n in range(state.mission.index, len(route.items)):
         if route.items[n].command != Command.NAV_WAYPOINT or time_s >= whole_s or (until is not None and n > until):
             break
@@ -228,24 +218,24 @@ def _walk(
             velocity_en, lost_s = walker.steer(time_s, at, start, end)
             if lost_s > 0.0:
                 time_s += lost_s
-                points.append(Waypoint(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
+                points.append(ExpectedPlace(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
             step_s = min(STEP_S, to_go_m / math.hypot(*velocity_en))
             before, at = at, (at[0] + step_s * velocity_en[0], at[1] + step_s * velocity_en[1])
             if ends_goal and goal_s is None and mark is not None and (part := _entered(before, at, mark)) is not None:
                 goal_s = time_s + part * step_s
             time_s += step_s
-            points.append(Waypoint(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
+            points.append(ExpectedPlace(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
         if math.dist(at, end) > limits.wp_radius_m:   # what is farther is taken whole
             time_s, at = time_s + walker.whole_s(at, end), end
             if until is not None or whole_s < math.inf:
-                points.append(Waypoint(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
+                points.append(ExpectedPlace(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
         if ends_goal and goal_s is None:
             goal_s = time_s
     return _Walked(points=tuple(points), winds=winds, last=last, goal_s=goal_s)
 
 
-def _entered(before: PointEn, at: PointEn, mark: Disc) -> float | None:
-    """Return where a step enters a disc, as a share of it; None: it does not."""
+def _entered(before: PointEn, at: PointEn, mark: tuple[PointEn, float]) -> float | None:
+    """Return where a step enters a mark's circle (centre, radius [m]), as a share of the step; None: it does not."""
     (east, north), radius_m = mark
     if math.dist(at, (east, north)) > radius_m:
         return None
