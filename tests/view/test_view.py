@@ -15,8 +15,8 @@ from companion.geo.angles import difference_rad
 from companion.messages import CompanionStatus, GeoPoint, VehicleState, WindForecast
 from companion.skipper.step import SkipperConfig, SkipperState, Snapshot, WindHealth, WindView
 from companion.telemetry.folder import TLOG, VoyageFigures
-from companion.view import Past, ViewFold, recorded_views, sample_of
-from companion.view.parts import apparent, laylines_of, no_go_of
+from companion.view import Past, ViewFold, recorded_views, sample_of, values
+from companion.view.parts import _risk_left, apparent, laylines_of, no_go_of
 from companion.view.schema import files, schema
 from tests.view.conftest import write_mission
 
@@ -41,6 +41,27 @@ def test_every_view_event_and_area_of_a_voyage_is_what_the_schema_says(beat):
             valid(event, "Event")
     valid(beat.area, "Area")
     valid(Past.of([sample_of(view) for view in beat.views], 0.0), "Past")
+
+
+@pytest.mark.parametrize(("risks", "told"), [
+    ((0.2, 0.1), 0.3), ((0.7, 0.6), 1.0), ((0.2, None), 0.05), ((), 0.05)])
+def test_the_chance_of_being_forced_off_the_plan_is_what_its_legs_add_up_to(beat, risks, told):
+    """It said 0 % in all beside a leg of 20 %: it was of another part of the way than the legs beside it."""
+    route = next(step.state.mission.route for step in beat.steps if step.state.mission.route is not None)
+    legs = tuple(values.LegView(from_en_m=(0.0, 0.0), to_en_m=(9.0, 0.0), risk=risk) for risk in risks)
+    loiter = values.LegView(from_en_m=(0.0, 0.0), to_en_m=(0.0, 0.0), is_loiter=True)
+    assert _risk_left(replace(route, risk=0.05), (*legs, loiter)) == pytest.approx(told)
+    for view in beat.under_way:
+        known = [leg.risk for leg in view.plan.legs if leg.risk is not None]
+        assert view.plan.path_risk is None or view.plan.path_risk >= max(known, default=0.0) - 1e-9
+
+
+def test_a_tack_that_the_autopilot_makes_by_itself_is_told_as_such(beat):
+    told = {bool(leg.is_beat): view.plan.next_tack_is_planned for view in beat.under_way
+            for leg in view.plan.legs[:1] if view.plan.next_tack_s is not None and leg.is_beat is not None}
+    assert told.get(True) is False or told.get(False) is True
+    for view in beat.under_way:
+        assert (view.plan.next_tack_s is None) == (view.plan.next_tack_is_planned is None)
 
 
 def test_the_schema_refuses_what_is_no_view(beat):
